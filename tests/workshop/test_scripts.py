@@ -141,7 +141,7 @@ def test_tests_run_in_the_checkout_from_any_folder(miniature: Miniature, tmp_pat
     assert miniature.environment.endswith(f"cwd={miniature.root}")
 
 
-@pytest.mark.parametrize("script", ["setup", "demo", "check", "docs", "graphics"])
+@pytest.mark.parametrize("script", ["setup", "demo", "check", "docs", "graphics", "browser"])
 def test_help_is_printed_without_setting_anything_up(miniature: Miniature, script: str) -> None:
     status, said = miniature.run(script, "--help")
     assert status == 0
@@ -150,7 +150,7 @@ def test_help_is_printed_without_setting_anything_up(miniature: Miniature, scrip
     assert miniature.asked == []
 
 
-@pytest.mark.parametrize("script", ["setup", "demo", "docs", "graphics"])
+@pytest.mark.parametrize("script", ["setup", "demo", "docs", "graphics", "browser"])
 def test_an_argument_that_means_nothing_is_wrong_usage(miniature: Miniature, script: str) -> None:
     assert miniature.run(script, "all") == (2, f"kinfmu: scripts/{script} takes no arguments, got 'all'\n")
     assert miniature.asked == []

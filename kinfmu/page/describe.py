@@ -1,0 +1,326 @@
+"""The data of a page: what is drawn of a mechanism, what can be set, and what the report of `check` states.
+
+Points, shapes and loops refer to points by number, so that the page can draw the mechanism with other lengths. Lengths
+are in the file's unit, angles in radians.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from kinfmu.analysis import Report
+from kinfmu.analysis.loops import FourBar, Place
+from kinfmu.draw.instant import instant
+from kinfmu.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
+from kinfmu.joints import Coordinate, Distance, PointOnLine, Revolute, Translational
+from kinfmu.joints.joint import Joint
+from kinfmu.measures.placement import body_of
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.expression import Computed, Expression
+from kinfmu.mechanism.members import NumberPath
+from kinfmu.mechanism.parameters import Parameter
+from kinfmu.mechanism.toml_text import text
+from kinfmu.page.module import PageModule
+from kinfmu.scene import palette
+from kinfmu.scene.instant import Instant
+from kinfmu.scene.shape import Shape
+from kinfmu.scene.shapes import shapes
+from kinfmu.units import Quantity, unit_of
+from kinfmu.version import VERSION
+
+_DIGITS = 7  # of numbers that are only drawn
+
+
+def describe(mechanism: Mechanism, report: Report) -> dict[str, Any]:
+    """Return the data of a page without its modules.
+
+    Args:
+        mechanism: The mechanism.
+        report: Its report, without a problem.
+
+    """
+    shown = instant(mechanism)
+    numbers = {name: k for k, name in enumerate(mechanism.body_points)}
+    found = [_shape(shown, shape, numbers) for shape in shapes(shown) if shape.kind != "pitch"]
+    bodies = [GROUND_NAME, *(body.name for body in mechanism.moving_bodies)]
+    return {
+        "name": mechanism.name,
+        "title": mechanism.title,
+        "unit": mechanism.length_unit,
+        "version": VERSION,
+        "run": {"from": float(mechanism.run.start), "to": float(mechanism.run.stop), "step": float(mechanism.run.step)},
+        "bodies": [{"name": name, "colour": list(shown.colour(name))} for name in bodies],
+        "points": [
+            {"body": body_of(name), "name": name.partition(".")[2], "x": float(x), "y": float(y)}
+            for name, (x, y) in mechanism.body_points.items()
+        ],
+        "joints": [_joint(joint, numbers) for joint in mechanism.joints],
+        "drivers": [_driver(driver, shown, report, numbers) for driver in mechanism.drivers],
+        "interest": [
+            {"name": name, "point": numbers[point], "colour": list(palette.body(len(bodies) - 1 + k))}
+            for k, (name, point) in enumerate(mechanism.points.items())
+        ],
+        "loads": [_load(load, numbers) for load in mechanism.loads],
+        "shapes": [shape for shape in found if shape is not None],
+        "loops": list(_loops(report, numbers)),
+        "notes": list(report.notes),
+        "mobility": report.mobility,
+        "redundant": [row.row.owner for row in report.redundant],
+    }
+
+
+def module_data(module: PageModule, places: Mapping[str, NumberPath]) -> dict[str, Any]:
+    """Return the text of a module and what its numbers are; places: of parameters for plain numbers of the file."""
+    mechanism, plan = module.plan.mechanism, module.plan
+    unit = mechanism.length_unit
+    users = _users(mechanism)
+    parameters = [
+        _parameter(one.name, one.value, one.quantity, unit, description=one.description, place=places.get(one.name))
+        | {"points": users.get(one.name, [])}
+        for one in plan.parameters
+    ]
+    parameters += [
+        _parameter(one.name, one.value, one.quantity, unit, place=("drivers", one.driver, one.key))
+        | {"points": [], "isPlace": False, "isLaw": True}
+        for one in plan.law_constants
+    ]
+    return {
+        "text": module.text,
+        "outputs": [
+            {
+                "name": name,
+                "owner": name.owner,
+                "units": [unit_of(name.quantity(order), unit) for order in range(3)],
+                "names": [name.derivative(order) for order in range(3)],
+            }
+            for name in plan.outputs
+        ],
+        "fixed": list(plan.fixed),
+        "parameters": parameters,
+        "forces": [{"name": name, "unit": unit_of(name.quantity, unit)} for name in getattr(module, "forces", ())],
+    }
+
+
+def _parameter(
+    name: str, value: float, quantity: Quantity, unit: str, *, description: str = "", place: NumberPath | None = None
+) -> dict[str, Any]:
+    declared = "" if quantity.kind == "number" else unit_of(quantity, unit)
+    return {
+        "name": name,
+        "label": label_of(place) if place else name,
+        "group": str(place[1]) if place else "",
+        "kind": quantity.kind,
+        "unit": declared,
+        "inFile": "" if place else declared,
+        "value": float(value),
+        "description": description,
+        "isPlace": place is not None,
+        "isLaw": False,
+    }
+
+
+def _users(mechanism: Mechanism) -> dict[str, list[str]]:
+    """Return for each parameter the points 'body.point' whose coordinates depend on it."""
+    found: dict[str, list[str]] = {}
+    for place, expression in mechanism.expressions.items():
+        if place[0] != "bodies" or place[2] != "points":
+            continue
+        names, seen = list(expression.names), set()
+        while names:
+            name = names.pop()
+            if name not in seen:
+                seen.add(name)
+                other = mechanism.parameters[name].expression
+                names += other.names if other else ()
+        for name in seen:
+            point = f"{place[1]}.{place[3]}"
+            if point not in found.setdefault(name, []):
+                found[name].append(point)
+    return found
+
+
+def label_of(place: NumberPath) -> str:
+    """Return the place of a number in words: 'crank.P x', 'AB length'."""
+    if place[0] == "bodies":
+        _, body, _, *rest = place
+        if len(rest) == 2:
+            return f"{body}.{rest[0]} {'xy'[int(rest[1])]}"
+        return f"{body} {' '.join(map(str, place[2:]))}"
+    return " ".join(str(part) for part in place[1:] if part != "law")
+
+
+def written_file(mechanism: Mechanism, module: PageModule, places: Mapping[str, NumberPath]) -> str:
+    """Return the mechanism file with "{{name}}" in place of each number that the page can set.
+
+    Start poses are "{{start crank.phi}}", so that the file assembles on the branch that the page shows.
+    """
+    paths = {path: name for name, path in places.items()}
+    paths |= {("drivers", one.driver, "law", one.key): one.name for one in module.plan.law_constants}
+    known = {*module.plan.outputs, *module.plan.fixed}
+
+    def slot(name: str, value: float) -> Any:
+        expression = copy.copy(Expression("0", mechanism.length_unit))
+        object.__setattr__(expression, "text", f"{{{{{name}}}}}")
+        return Computed(value, expression)
+
+    def changed(path: NumberPath, value: Any, _: Quantity) -> Any:
+        if path in paths:
+            return slot(paths[path], float(value))
+        if path[0] == "bodies" and path[2] == "start" and f"{path[1]}.{path[3]}" in known:
+            return slot(f"start {path[1]}.{path[3]}", float(value))
+        return value
+
+    members = mechanism.members.changed(changed)
+    settable = {parameter.name for parameter in module.plan.parameters}
+    parameters = {
+        name: Parameter(slot(name, 0.0), parameter.quantity, parameter.description) if name in settable else parameter
+        for name, parameter in mechanism.parameters.items()
+    }
+    written = copy.copy(mechanism)
+    for key in ("bodies", "joints", "drivers", "loads", "measures", "gravity", "run"):
+        object.__setattr__(written, key, getattr(members, key))
+    object.__setattr__(written, "parameters", parameters)
+    return text(written)
+
+
+def _joint(joint: Joint, numbers: Mapping[str, int]) -> dict[str, Any]:
+    """Return a joint with the numbers of its points and the direction of its slide in the first body's frame."""
+    found: dict[str, Any] = {"name": joint.name, "type": joint.type}
+    points = getattr(joint, "between", ()) if not hasattr(joint, "of") else (joint.of,)
+    if all(point in numbers for point in points):
+        found["points"] = [numbers[point] for point in points]
+    if isinstance(joint, Translational | PointOnLine):
+        found["axis"] = float(joint.axis)
+    if isinstance(joint, Coordinate):
+        found["across"] = joint.axis
+    return found
+
+
+def _driver(driver: Driver, shown: Instant, report: Report, numbers: Mapping[str, int]) -> dict[str, Any]:
+    kind = driver.quantity.kind
+    found: dict[str, Any] = {
+        "name": driver.name,
+        "kind": kind,
+        "type": driver.type,
+        "law": driver.law.type,
+        "unit": unit_of(driver.quantity, shown.mechanism.length_unit),
+        "inputs": [str(name) for name in driver.inputs()],
+        "start": float(driver.law.at(shown.mechanism.run.start)),
+        "direction": shown.directions.get(driver.name, 1.0),
+        "turns": None,
+        "limits": [],
+        "changePoints": [],
+    }
+    if isinstance(driver, DistanceDriver | SlideDriver):
+        found["points"] = [numbers[point] for point in driver.between]
+    elif isinstance(driver, CoordinateDriver):
+        found["points"] = [numbers[driver.of]]
+        found["across"] = driver.axis
+    else:
+        *held, body = driver.bodies()
+        against = held[0] if held else GROUND_NAME
+        found |= {"body": body, "against": against, "pivot": _pivot(shown, body, against, numbers)}
+    if isinstance(driver, SlideDriver):
+        found["axis"] = float(driver.axis)
+    for reach in report.ranges:
+        if reach.driver == driver.name:
+            found["turns"] = reach.turns
+            found["reach"] = list(reach.reach)
+            found["limits"] = [{"at": limit.value, "text": limit.kind} for limit in reach.limits]
+            found["changePoints"] = [point.value for point in reach.points if point.kind == "change point"]
+    return found
+
+
+def _pivot(shown: Instant, body: str, against: str, numbers: Mapping[str, int]) -> int | None:
+    """Return the number of the driven body's point at the pin about which it turns; None without a pin."""
+    pins = [joint for joint in shown.joints if isinstance(joint, Revolute) and body in joint.bodies()]
+    for joint in sorted(pins, key=lambda joint: against not in joint.bodies()):
+        return next(numbers[point] for point in joint.between if body_of(point) == body)
+    return None
+
+
+def _load(load: Any, numbers: Mapping[str, int]) -> dict[str, Any]:
+    points = [getattr(load, "at", None) or None, *getattr(load, "between", ())]
+    return {"name": load.name, "type": load.type, "points": [numbers[p] for p in points if p in numbers]}
+
+
+def _shape(shown: Instant, shape: Shape, numbers: Mapping[str, int]) -> dict[str, Any] | None:
+    """Return a shape whose points are numbers of points of its body, or coordinates in its frame."""
+    found: dict[str, Any] = {"kind": shape.kind, "name": shape.name, "frame": shape.frame, "colour": list(shape.colour)}
+    if shape.kind == "rib":
+        return None  # the page finds corners and ribs of a link from its points
+    if shape.kind == "link":
+        found["at"] = [number for name, number in numbers.items() if body_of(name) == shape.frame]
+    elif shape.kind in ("bar", "barrel", "shaft"):
+        members: list[Joint | Driver] = [*shown.joints, *shown.drivers]
+        (member,) = (one for one in members if one.name == shape.name and isinstance(one, Distance | DistanceDriver))
+        found["between"] = [numbers[point] for point in member.between]
+    else:
+        anchor = _nearest(shown, shape, numbers)
+        if anchor is not None:
+            found["anchor"] = anchor
+    if shape.kind.startswith("die") or shape.frame.startswith("die."):
+        (joint,) = (one for one in shown.joints if f"die.{one.name}" == shape.frame)
+        point = joint.of if isinstance(joint, Coordinate) else joint.between[1]  # type: ignore[attr-defined]
+        found["follows"] = numbers[point]
+    found["points"] = _rounded(shape.points)
+    if shape.radius:
+        found["radius"] = round(float(shape.radius), _DIGITS)
+    if shape.is_closed:
+        found["closed"] = True
+    if shape.direction is not None:
+        found["direction"] = _rounded(shape.direction)
+    return found
+
+
+def _nearest(shown: Instant, shape: Shape, numbers: Mapping[str, int]) -> int | None:
+    """Return the number of the point of the shape's body that is nearest to it; the shape moves with the point."""
+    places = {name: np.array(shown.body_points[name]) for name in numbers if body_of(name) == shape.frame}
+    if not places:
+        return None
+    middle = shape.points.mean(axis=0)
+    return numbers[min(places, key=lambda name: float(np.hypot(*(places[name] - middle))))]
+
+
+def _rounded(values: Any) -> Any:
+    """Return numbers with seven digits after the point of their own size, as lists."""
+    array = np.asarray(values, dtype=float)
+    largest = float(np.abs(array).max(initial=0.0))
+    digits = _DIGITS - (math.ceil(math.log10(largest)) if largest > 0.0 else 0)
+    return (array.round(digits) + 0.0).tolist()
+
+
+def _loops(report: Report, numbers: Mapping[str, int]) -> Any:
+    """Yield the loops with a transmission angle: the numbers of the pins that enclose it."""
+    points = report.mechanism.body_points
+
+    def number(place: Place) -> int | None:
+        """Return the number of the point at a place, None if the place has no name."""
+        for name, index in numbers.items():
+            if body_of(name) == place.body and math.dist(points[name], (place.x, place.y)) < 1e-9 * max(
+                1.0, abs(place.x), abs(place.y)
+            ):
+                return index
+        return None
+
+    for named in report.loops:
+        if not named.transmission:
+            continue
+        pins = [number(pin) for pin in named.loop.pins]
+        if None in pins:
+            continue
+        angle, loop = named.transmission[0], named.loop
+        found = {"driver": angle.driver, "coupler": angle.coupler, "output": angle.output}
+        if isinstance(loop, FourBar):
+            is_first = angle.output == loop.last.name  # the output is the last link, or the loop is led by it
+            yield found | {"pins": pins[1:] if is_first else pins[2::-1]}
+        elif angle.is_slide:
+            yield found | {"pins": pins[1:], "direction": loop.direction}
+        else:
+            yield found | {"pins": [pins[2], pins[1], pins[0]]}

@@ -1,0 +1,85 @@
+"""`page`: the files of web/, the compiled mechanism and its data in one HTML text."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from kinfmu.analysis import Report, check
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.mechanism import require_mechanism
+from kinfmu.mechanism.members import NumberPath
+from kinfmu.page.describe import describe, module_data, written_file
+from kinfmu.page.module import page_module
+
+_WEB = Path(__file__).parent / "web"
+_SCRIPTS = (
+    "geometry",
+    "pen",
+    "view",
+    "engine",
+    "linkage",
+    "drawing",
+    "design",
+    "grips",
+    "plots",
+    "exports",
+    "panels",
+    "main",
+)
+_IMPORT = re.compile(r"^import .*\n", re.MULTILINE)
+_EXPORT = re.compile(r"^export ", re.MULTILINE)
+
+
+def page(mechanism: Mechanism, *, report: Report | None = None) -> str:
+    """Return a page in which a mechanism is dragged: one HTML file that works offline, without any request.
+
+    It computes with the C code of the FMU, compiled to WebAssembly: as long as no number of the file but a parameter is
+    changed, positions, velocities and accelerations equal those of the FMU to the bit.
+
+    Args:
+        mechanism: The mechanism.
+        report: Its report, if `check` was called already. Default: `check` is called.
+
+    Returns:
+        The HTML text.
+
+    Raises:
+        KinfmuError: The mechanism cannot be solved.
+        CompilerError: ziglang is not installed (`pip install 'kinfmu[native]'`), or it fails.
+
+    """
+    require_mechanism(mechanism, "page")
+    report = report or check(mechanism)
+    if report.problem is not None:
+        raise report.problem
+    as_written = page_module(mechanism)
+    places: dict[str, NumberPath] = {}
+    modules = {"written": module_data(as_written, places), "opened": None}
+    data = describe(mechanism, report) | {
+        "size": as_written.plan.size,
+        "modules": modules,
+        "file": written_file(mechanism, as_written, places),
+    }
+    return _filled(
+        (_WEB / "index.html").read_text("utf-8"),
+        {
+            "title": html.escape(mechanism.name),
+            "style": (_WEB / "style.css").read_text("utf-8"),
+            "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
+            "script": "\n".join(_script(name) for name in _SCRIPTS),
+        },
+    )
+
+
+def _script(name: str) -> str:
+    """Return a module of web/ as a part of one script: without imports, and without the word export."""
+    return _EXPORT.sub("", _IMPORT.sub("", (_WEB / f"{name}.js").read_text("utf-8")))
+
+
+def _filled(text: str, values: Mapping[str, str]) -> str:
+    """Return text with each {{name}} replaced once."""
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found[1]], text)

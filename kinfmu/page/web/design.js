@@ -1,0 +1,104 @@
+// The design: values of parameters, locks, undo and redo, the address of the page.
+
+const MOST_STEPS = 200; // that can be undone
+
+export class Design {
+    constructor(linkage) {
+        this.linkage = linkage;
+        this.locked = new Set();
+        this.past = [];
+        this.future = [];
+        this.values = new Map(linkage.values);
+        this.saved = new Map(this.values);
+        this.byName = new Map(linkage.parameters.map((one) => [one.name, one]));
+    }
+
+    get isOk() {
+        return this.ok !== false;
+    }
+
+    // Set values of some parameters; they are one step to undo after `commit`.
+    set(changes) {
+        for (const [name, value] of Object.entries(changes)) this.values.set(name, value);
+        this.ok = this.linkage.setValues(this.values);
+        return this.ok;
+    }
+
+    commit() {
+        if (same(this.values, this.saved)) return;
+        this.past.push(this.saved);
+        if (this.past.length > MOST_STEPS) this.past.shift();
+        this.future = [];
+        this.saved = new Map(this.values);
+    }
+
+    undo() {
+        return this.#step(this.past, this.future);
+    }
+
+    redo() {
+        return this.#step(this.future, this.past);
+    }
+
+    #step(from, to) {
+        const values = from.pop();
+        if (!values) return false;
+        to.push(this.saved);
+        this.saved = values;
+        this.values = new Map(values);
+        this.ok = this.linkage.setValues(this.values);
+        return true;
+    }
+
+    reset() {
+        for (const one of this.linkage.parameters) this.values.set(one.name, one.value);
+        this.ok = this.linkage.setValues(this.values);
+        this.commit();
+    }
+
+    changes() {
+        return [...this.values].filter(([name, value]) => value !== this.byName.get(name).value);
+    }
+
+    // Return the part of the address after '#': changed parameters, then driver values.
+    fragment() {
+        const parts = this.changes().map(([name, value]) => `${encodeURIComponent(name)}=${value}`);
+        this.linkage.data.drivers.forEach((driver, k) => {
+            if (this.linkage.u[k] !== this.linkage.law[0].u[k]) parts.push(`@${encodeURIComponent(driver.name)}=${this.linkage.u[k]}`);
+        });
+        return parts.length ? `#${parts.join("&")}` : "";
+    }
+
+    // Take the design of an address; unknown names and numbers are ignored. Returns the names that were ignored.
+    read(fragment) {
+        const ignored = [];
+        const values = new Map(this.linkage.parameters.map((one) => [one.name, one.value]));
+        const u = this.linkage.law[0].u.slice();
+        for (const part of fragment.replace(/^#/, "").split("&")) {
+            if (!part) continue;
+            const [key, text] = part.split("=");
+            let name = key;
+            try {
+                name = decodeURIComponent(key.replace(/^@/, ""));
+            } catch {
+                ignored.push(key);
+                continue;
+            }
+            const value = Number(text);
+            const driver = this.linkage.data.drivers.findIndex((one) => one.name === name);
+            if (text === undefined || text === "" || !Number.isFinite(value)) ignored.push(name);
+            else if (key.startsWith("@") && driver >= 0) u[driver] = value;
+            else if (!key.startsWith("@") && this.byName.has(name)) values.set(name, value);
+            else ignored.push(name);
+        }
+        this.values = values;
+        this.ok = same(values, this.linkage.values) || this.linkage.setValues(values);
+        this.saved = new Map(values);
+        if (this.ok && !u.every((value, k) => value === this.linkage.u[k])) this.linkage.goTowards(u);
+        return ignored;
+    }
+}
+
+function same(a, b) {
+    return a.size === b.size && [...a].every(([name, value]) => b.get(name) === value);
+}

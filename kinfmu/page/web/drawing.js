@@ -1,0 +1,456 @@
+// The drawing of a linkage: shapes, pins, names, curves, arrows, marks.
+
+import { distance, outline, placed, seen, TURN } from "./geometry.js";
+
+// ---- colours
+
+export const THEMES = {
+    light: { paper: "#ffffff", ink: "#1c2430", quiet: "#5b6675", grid: "#e9edf2", accent: "#0b5cad", bad: "#b3261e", pin: "#ffffff", isDark: false },
+    dark: { paper: "#12171d", ink: "#e8edf3", quiet: "#9aa7b6", grid: "#1f2730", accent: "#6cb6ff", bad: "#ff9b93", pin: "#12171d", isDark: true },
+};
+
+function mix(colour, other, part) {
+    return colour.map((value, k) => Math.round(value + part * (other[k] - value)));
+}
+
+export function css([r, g, b], alpha = 1) {
+    return alpha < 1 ? `rgba(${r},${g},${b},${alpha})` : `rgb(${r},${g},${b})`;
+}
+
+export function edgeOf(colour, theme) {
+    return css(theme.isDark ? mix(colour, [255, 255, 255], 0.25) : mix(colour, [0, 0, 0], 0.45));
+}
+
+export function fillOf(colour, theme) {
+    return css(theme.isDark ? mix(colour, [18, 23, 29], 0.55) : mix(colour, [255, 255, 255], 0.5));
+}
+
+function paleOf(colour, theme) {
+    return css(theme.isDark ? mix(colour, [18, 23, 29], 0.78) : mix(colour, [255, 255, 255], 0.82));
+}
+
+const GREY = [150, 150, 150];
+
+// ---- the linkage
+
+// Draw a pose; show: what is switched on; view: from the plane to pixels.
+export function draw(pen, linkage, view, theme, show, extra) {
+    const painter = new Painter(pen, linkage, view, theme, extra.isGhost);
+    painter.grid(show.grid);
+    painter.curves(extra.curves, show);
+    painter.wheels();
+    painter.ground();
+    painter.links(true);
+    painter.bars();
+    painter.links(false);
+    painter.slides();
+    painter.cylinders();
+    painter.pins(extra.held);
+    painter.marks(show, extra);
+    if (show.names) painter.names();
+}
+
+class Painter {
+    constructor(pen, linkage, view, theme, isGhost) {
+        Object.assign(this, { pen, linkage, view, theme, isGhost });
+        this.pose = linkage.pose;
+        this.boxes = [];
+        this.wanted = [];
+        this.fine = linkage.fineness;
+        this.width = Math.max(4, Math.min(15, 13 * this.fine));
+        this.size = Math.max(0.55, Math.min(1.15, 1.15 * this.fine));
+    }
+
+    edge(colour) {
+        return this.isGhost ? edgeOf(GREY, this.theme) : edgeOf(colour, this.theme);
+    }
+
+    fill(colour) {
+        return this.isGhost ? fillOf(GREY, this.theme) : fillOf(colour, this.theme);
+    }
+
+    dot(p) {
+        return this.view.pixel(p);
+    }
+
+    all(...kinds) {
+        return this.linkage.data.shapes.filter((shape) => kinds.includes(shape.kind));
+    }
+
+    // Return the points of a shape in the plane; they move with the point next to which the file has the shape.
+    at(shape, points = shape.points) {
+        const { linkage, pose } = this;
+        const [dx, dy] = this.moved(shape);
+        if (shape.follows !== undefined) {
+            const [x, y] = linkage.point(shape.follows);
+            return points.map((p) => [x + p[0], y + p[1]]);
+        }
+        const frame = linkage.bodyPose(linkage.bodies.indexOf(shape.frame), pose);
+        return points.map((p) => placed(frame, p[0] + dx, p[1] + dy));
+    }
+
+    moved(shape) {
+        if (shape.anchor === undefined) return [0, 0];
+        const written = this.linkage.data.points[shape.anchor];
+        const [x, y] = this.linkage.local(shape.anchor);
+        return [x - written.x, y - written.y];
+    }
+
+    // Return a direction of a shape in pixels, y down.
+    direction(shape) {
+        const body = this.linkage.bodies.indexOf(shape.frame);
+        const phi = body < 0 ? 0 : this.linkage.bodyPose(body)[2];
+        const [x, y] = placed([0, 0, phi], ...shape.direction);
+        return [x, -y];
+    }
+
+    name(text, places, colour, off, rank) {
+        this.wanted.push({ text, places, colour, off, rank });
+    }
+
+    grid(isOn) {
+        if (!isOn) return;
+        const { view, pen, theme } = this;
+        const step = niceStep(90 / view.scale);
+        const [low, high] = [view.plane([0, view.height]), view.plane([view.width, 0])];
+        for (let k = Math.ceil(low[0] / step); k * step <= high[0]; k++) {
+            const [x] = this.dot([k * step, 0]);
+            pen.line([[x, 0], [x, view.height]], { width: 1, colour: theme.grid });
+            pen.text(x + 3, view.height - 8, number(k * step), { colour: theme.quiet, size: 10, halo: theme.paper });
+        }
+        for (let k = Math.ceil(low[1] / step); k * step <= high[1]; k++) {
+            const [, y] = this.dot([0, k * step]);
+            pen.line([[0, y], [view.width, y]], { width: 1, colour: theme.grid });
+            pen.text(4, y - 7, number(k * step), { colour: theme.quiet, size: 10, halo: theme.paper });
+        }
+        pen.text(view.width - 6, view.height - 8, this.linkage.data.unit, { colour: theme.quiet, size: 11, align: "right", halo: theme.paper });
+    }
+
+    curves(curves, show) {
+        if (!show.curves) return;
+        for (const { line, colour, isTrace } of curves) {
+            const points = line.map((p) => this.dot(p));
+            this.pen.line(points, { width: isTrace ? 2.5 : 1.6, colour: this.edge(colour), alpha: isTrace ? 0.9 : 0.75 });
+        }
+    }
+
+    // ---- shapes
+
+    wheels() {
+        const wheels = this.all("wheel", "cam", "roller").sort((a, b) => (b.radius || 0) - (a.radius || 0));
+        for (const shape of wheels) {
+            const points = this.at(shape).map((p) => this.dot(p));
+            const style = { width: 1.5, colour: this.edge(shape.colour), fill: this.isGhost ? null : paleOf(shape.colour, this.theme) };
+            if (shape.kind === "cam") this.pen.line(points, { ...style, closed: true });
+            else this.pen.circle(...points[0], shape.radius * this.view.scale, shape.kind === "wheel" ? { ...style, dash: [7, 3] } : style);
+        }
+        for (const shape of this.all("spoke", "belt")) {
+            this.pen.line(this.at(shape).map((p) => this.dot(p)), { width: 1.4, colour: this.edge(shape.colour) });
+        }
+        for (const rack of this.all("rack")) this.rack(rack);
+    }
+
+    rack(shape) {
+        const [a, b] = this.at(shape).map((p) => this.dot(p));
+        const [nx, ny] = this.direction(shape);
+        const length = distance(a, b);
+        const count = Math.max(Math.round(length / 11), 2);
+        const along = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
+        const corners = [];
+        for (let k = 0; k < count; k++) {
+            for (const [part, depth] of [[0, 1], [0.25, 1], [0.4, -1], [0.6, -1], [0.75, 1]]) {
+                const s = ((k + part) / count) * length;
+                corners.push([a[0] + s * along[0] + 4 * depth * nx, a[1] + s * along[1] + 4 * depth * ny]);
+            }
+        }
+        corners.push([b[0] + 4 * nx, b[1] + 4 * ny], [b[0] + 11 * nx, b[1] + 11 * ny], [a[0] + 11 * nx, a[1] + 11 * ny]);
+        this.pen.line(corners, { width: 1.2, colour: this.edge(shape.colour), fill: this.fill(shape.colour), closed: true });
+    }
+
+    ground() {
+        const s = this.size;
+        const colour = this.edge(GREY);
+        for (const shape of this.all("support")) {
+            const [p] = this.at(shape).map((one) => this.dot(one));
+            const [dx, dy] = [shape.direction[0], -shape.direction[1]];
+            const foot = [p[0] + 17 * s * dx, p[1] + 17 * s * dy];
+            const along = [-dy * s, dx * s];
+            const corner = (k) => [foot[0] + k * along[0], foot[1] + k * along[1]];
+            this.pen.line([p, corner(-10), corner(10)], { width: 1.3, colour, fill: fillOf(GREY, this.theme), closed: true });
+            this.hatched(corner(-15), corner(15), [dx, dy], colour);
+        }
+        for (const shape of this.all("rail", "bed")) {
+            const [a, b] = this.at(shape).map((one) => this.dot(one));
+            const [dx, dy] = [shape.direction[0], -shape.direction[1]];
+            let along = [-dy, dx];
+            if (along[0] * (b[0] - a[0]) + along[1] * (b[1] - a[1]) < 0) along = [dy, -dx];
+            const lift = (shape.kind === "rail" ? 9 : 13) * s;
+            const end = (p, sign) => [p[0] + lift * dx + sign * 25 * s * along[0], p[1] + lift * dy + sign * 25 * s * along[1]];
+            this.hatched(end(a, -1), end(b, 1), [dx, dy], colour);
+        }
+    }
+
+    hatched(a, b, [dx, dy], colour) {
+        const length = distance(a, b);
+        const along = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
+        const count = Math.min(Math.max(Math.floor(length / 6), 3), 400);
+        for (let k = 0; k < count; k++) {
+            const s = (length * (k + 0.8)) / count;
+            const top = [a[0] + s * along[0], a[1] + s * along[1]];
+            const depth = 6 * this.size;
+            this.pen.line([top, [top[0] + depth * (dx - 0.8 * along[0]), top[1] + depth * (dy - 0.8 * along[1])]], { width: 0.9, colour });
+        }
+        this.pen.line([a, b], { width: 1.6, colour });
+    }
+
+    // Draw links: plates first, then those whose points are on a line, with their rods.
+    links(areClosed) {
+        for (const link of this.all("link")) {
+            const body = this.linkage.bodies.indexOf(link.frame);
+            const found = this.outlines[body];
+            if (found.closed !== areClosed) continue;
+            const pose = this.linkage.bodyPose(body);
+            const place = (p) => this.dot(placed(pose, p[0], p[1]));
+            const routes = found.corners.length > 1 ? [{ points: found.corners.map(place), closed: found.closed }] : [];
+            for (const rod of this.all("rod")) {
+                if (rod.frame === link.frame) routes.push({ points: this.at(rod).map((p) => this.dot(p)), closed: false });
+            }
+            const [edge, fill] = [this.edge(link.colour), this.fill(link.colour)];
+            const width = this.width * (found.closed ? 0.8 : 1);
+            if (found.closed) this.pen.line(routes[0].points, { width: 0, fill: paleOf(this.isGhost ? GREY : link.colour, this.theme), closed: true, alpha: 0.85 });
+            for (const { points, closed } of routes) this.pen.line(points, { width: width + 1.4, colour: edge, closed });
+            for (const { points, closed } of routes) this.pen.line(points, { width: width - 1.4, colour: fill, closed });
+            for (const rib of found.ribs) this.pen.line(rib.map(place), { width: width * 0.5, colour: fill });
+            const middles = routes.flatMap(({ points, closed }) => middlesOf(points, closed));
+            if (found.closed) middles.unshift(centreOf(routes[0].points));
+            if (middles.length) this.name(link.name, middles, edge, found.closed ? 0 : width / 2 + 8, 2);
+            else this.name(link.name, [place(found.corners[0] || [0, 0])], edge, 24, 3);
+        }
+    }
+
+    get outlines() {
+        const { linkage } = this;
+        if (linkage.outlinesFor !== linkage.pose.locals) {
+            linkage.outlinesFor = linkage.pose.locals;
+            linkage.outlineList = linkage.bodies.map((_, body) => {
+                const points = linkage.data.points.map((__, k) => k).filter((k) => linkage.bodyOf[k] === body);
+                return outline(points.length ? points.map((k) => linkage.local(k)) : [[0, 0]]);
+            });
+        }
+        return linkage.outlineList;
+    }
+
+    bars() {
+        for (const bar of this.all("bar")) {
+            const points = bar.between.map((point) => this.dot(this.linkage.point(point)));
+            const width = 0.5 * this.width;
+            this.pen.line(points, { width: width + 1.2, colour: this.edge(GREY) });
+            this.pen.line(points, { width: Math.max(width - 1, 1), colour: fillOf(GREY, this.theme) });
+            this.name(bar.name, middlesOf(points, false), this.edge(GREY), width / 2 + 8, 3);
+        }
+    }
+
+    slides() {
+        const s = 1.2 * this.size;
+        for (const shape of this.all("slot", "block", "die")) {
+            const points = this.at(shape).map((p) => this.dot(p));
+            const [edge, fill] = [this.edge(shape.colour), this.fill(shape.colour)];
+            if (shape.kind === "slot") {
+                const [a, b] = points;
+                this.pen.line([a, b], { width: 1.55 * this.width + 1.4, colour: edge });
+                this.pen.line([a, b], { width: 1.55 * this.width - 1.4, colour: fill });
+                this.pen.line([a, b], { width: 0.75 * this.width + 1.2, colour: edge });
+                this.pen.line([a, b], { width: 0.75 * this.width - 1.2, colour: this.theme.paper });
+            } else {
+                const [x, y] = shape.kind === "die" ? [shape.direction[0], -shape.direction[1]] : this.direction(shape);
+                const corner = (i, j) => [points[0][0] + s * (13 * i * x - 8 * j * y), points[0][1] + s * (13 * i * y + 8 * j * x)];
+                this.pen.line([corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)], { width: 1.5, colour: edge, fill, closed: true });
+            }
+        }
+    }
+
+    cylinders() {
+        const shafts = new Map(this.all("shaft").map((shape) => [shape.name, shape]));
+        for (const barrel of this.all("barrel")) {
+            const [a, b] = barrel.between.map((point) => this.dot(this.linkage.point(point)));
+            const length = distance(a, b);
+            const along = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
+            const tube = Math.min(barrel.points[1][0] * this.view.scale, 0.97 * length);
+            const piston = Math.max(length + shafts.get(barrel.name).points[0][0] * this.view.scale, 5);
+            const at = (d) => [a[0] + d * along[0], a[1] + d * along[1]];
+            const w = this.width;
+            this.pen.line([a, b], { width: 0.42 * w + 1.4, colour: this.edge(GREY), cap: "butt" });
+            this.pen.line([a, b], { width: 0.42 * w - 0.8, colour: this.theme.paper, cap: "butt" });
+            this.pen.line([at(4), at(tube)], { width: 1.15 * w + 1.4, colour: this.edge(GREY), cap: "butt" });
+            this.pen.line([at(5), at(tube - 1)], { width: 1.15 * w - 1, colour: fillOf(GREY, this.theme), cap: "butt" });
+            const disc = Math.min(Math.max(piston, 7), tube - 3);
+            this.pen.line([at(disc - 1.6), at(disc + 1.6)], { width: 1.15 * w - 1, colour: this.edge(GREY), cap: "butt" });
+            this.name(barrel.name, [at(0.35 * length), at(0.6 * length)], this.edge(GREY), 0.6 * w + 8, 3);
+        }
+    }
+
+    pins(held) {
+        const { linkage, pen, theme } = this;
+        const radius = Math.max(2.4, 0.33 * this.width);
+        const done = [];
+        const pin = (point, text) => {
+            const p = this.dot(linkage.point(point));
+            if (done.some((other) => distance(other, p) < 1)) return;
+            done.push(p);
+            pen.circle(...p, radius, { width: 1.6, colour: theme.ink, fill: theme.pin });
+            this.boxes.push([p[0] - radius, p[1] - radius, p[0] + radius, p[1] + radius]);
+            if (text) this.name(text, [p], theme.ink, radius + 8, 1);
+        };
+        for (const joint of linkage.data.joints) {
+            if (joint.points && joint.type !== "translational") {
+                joint.points.forEach((point, k) => pin(point, k === joint.points.length - 1 ? joint.name : ""));
+            }
+        }
+        for (const driver of linkage.data.drivers) if (driver.type === "distance") driver.points.forEach((point) => pin(point, ""));
+        for (const { name, point, colour } of linkage.data.interest) {
+            const p = this.dot(linkage.point(point));
+            pen.circle(...p, radius + 0.6, { width: 1.6, colour: theme.ink, fill: this.edge(colour) });
+            this.name(name, [p], theme.ink, radius + 8, 0);
+        }
+        if (held) pen.circle(...this.dot(held), radius + 6, { width: 2.5, colour: theme.accent });
+    }
+
+    // ---- what is measured
+
+    marks(show, extra) {
+        const { linkage, pen, theme, view } = this;
+        if (show.limits) this.driverMarks();
+        if (show.transmission) {
+            for (const { angle, at, arms } of linkage.transmissions()) {
+                const p = this.dot(at);
+                const r = 30;
+                const [a, b] = arms.map(([x, y]) => Math.atan2(y, x));
+                const sweep = Math.atan2(Math.sin(b - a), Math.cos(b - a));
+                const arc = Array.from({ length: 25 }, (_, k) => {
+                    const w = a + (sweep * k) / 24;
+                    return [p[0] + r * Math.cos(w), p[1] - r * Math.sin(w)];
+                });
+                const acute = Math.min(angle, Math.PI - angle);
+                const colour = acute < (40 * Math.PI) / 180 ? theme.bad : theme.accent;
+                pen.line(arc, { width: 2, colour });
+                const w = a + sweep / 2;
+                const label = `${degrees(angle, 1)}${acute < (40 * Math.PI) / 180 ? " poor" : ""}`;
+                this.name(label, [[p[0] + (r + 6) * Math.cos(w), p[1] - (r + 6) * Math.sin(w)]], colour, 14, -1);
+            }
+        }
+        if (show.centres) {
+            const shown = linkage.centres().map(({ at, label }) => ({ p: this.dot(at), label }));
+            const merged = [];
+            for (const one of shown) {
+                const same = merged.find((other) => distance(other.p, one.p) < 2);
+                if (same) same.label += `, ${one.label}`;
+                else merged.push(one);
+            }
+            for (const { p, label } of merged) {
+                if (p[0] < -20 || p[1] < -20 || p[0] > view.width + 20 || p[1] > view.height + 20) continue;
+                pen.line([[p[0] - 5, p[1] - 5], [p[0] + 5, p[1] + 5]], { width: 2, colour: theme.accent });
+                pen.line([[p[0] - 5, p[1] + 5], [p[0] + 5, p[1] - 5]], { width: 2, colour: theme.accent });
+                this.name(`P${label}`, [p], theme.accent, 12, -1);
+            }
+        }
+        for (const arrow of extra.arrows) this.arrow(arrow);
+    }
+
+    arrow({ from, along, colour, text }) {
+        const a = this.dot(from);
+        const b = [a[0] + along[0], a[1] - along[1]];
+        const length = distance(a, b);
+        if (length < 2) return;
+        const [x, y] = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
+        const head = Math.min(10, 0.6 * length);
+        const base = [b[0] - head * x, b[1] - head * y];
+        const ink = css(colour(this.theme));
+        this.pen.line([a, base], { width: 2.4, colour: ink });
+        this.pen.line([b, [base[0] - 0.4 * head * y, base[1] + 0.4 * head * x], [base[0] + 0.4 * head * y, base[1] - 0.4 * head * x]], { width: 1, colour: ink, fill: ink, closed: true });
+        if (text) this.name(text, [b], ink, 10, -1);
+    }
+
+    // Mark the range of a turning driver, its limits and change points on a circle about its pivot.
+    driverMarks() {
+        const { linkage, pen, theme } = this;
+        linkage.data.drivers.forEach((driver, k) => {
+            if (driver.kind !== "angle" || driver.pivot === null || driver.pivot === undefined) return;
+            const centre = this.dot(linkage.point(driver.pivot));
+            const body = linkage.bodies.indexOf(driver.body);
+            const reach = Math.max(...linkage.data.points.map((_, i) => (linkage.bodyOf[i] === body ? distance(this.dot(linkage.point(i)), centre) : 0)));
+            const radius = Math.max(reach, 24) + 16;
+            const base = linkage.bodyPose(body)[2] - linkage.u[k];
+            const tip = linkage.data.points.reduce((best, _, i) => (linkage.bodyOf[i] === body && distance(linkage.local(i), linkage.local(driver.pivot)) > distance(linkage.local(best), linkage.local(driver.pivot)) ? i : best), driver.pivot);
+            const [tx, ty] = linkage.local(tip).map((value, i) => value - linkage.local(driver.pivot)[i]);
+            const turn = base + (tx || ty ? Math.atan2(ty, tx) : 0);
+            const on = (u, r) => [centre[0] + r * Math.cos(u + turn), centre[1] - r * Math.sin(u + turn)];
+            const [low, high] = linkage.ranges[k];
+            const span = Math.min(high - low, TURN);
+            pen.line(Array.from({ length: 73 }, (_, i) => on(low + (span * i) / 72, radius)), { width: 1.4, colour: theme.quiet, dash: [2, 4] });
+            const mark = (u, colour, label) => {
+                pen.line([on(u, radius - 7), on(u, radius + 7)], { width: 3, colour });
+                this.name(label, [on(u, radius + 8)], colour, 14, -1);
+            };
+            for (const limit of linkage.limits) if (limit.driver === k) mark(limit.at, theme.bad, `limit ${degrees(limit.at, 1)}`);
+            if (linkage.which === "written") for (const at of driver.changePoints) mark(at, theme.accent, `change point ${degrees(at, 1)}`);
+            const p = on(linkage.u[k], radius);
+            pen.circle(...p, 4, { colour: theme.accent, fill: theme.accent });
+        });
+    }
+
+    // ---- names: the most important first, where they cover nothing
+
+    names() {
+        const { pen, theme } = this;
+        this.wanted.sort((a, b) => a.rank - b.rank);
+        for (const { text, places, colour, off } of this.wanted) {
+            const width = 6.6 * text.length + 4;
+            let done = false;
+            for (const [x, y] of places) {
+                const spots = off === 0 ? [[0, 0]] : [[0.9, -0.9], [-0.9, -0.9], [0.9, 0.9], [-0.9, 0.9], [0, -1.2], [0, 1.2], [1.2, 0], [-1.2, 0]];
+                for (const [dx, dy] of spots) {
+                    const cx = x + dx * off + (Math.sign(dx) * width) / 2;
+                    const cy = y + dy * off;
+                    const box = [cx - width / 2, cy - 8, cx + width / 2, cy + 8];
+                    if (box[0] < 2 || box[2] > this.view.width - 2 || box[1] < 2 || box[3] > this.view.height - 2) continue;
+                    if (this.boxes.some((b) => b[0] < box[2] && b[2] > box[0] && b[1] < box[3] && b[3] > box[1])) continue;
+                    this.boxes.push(box);
+                    pen.text(cx, cy, text, { colour, size: 12, align: "center", halo: theme.paper });
+                    done = true;
+                    break;
+                }
+                if (done) break;
+            }
+        }
+    }
+}
+
+function middlesOf(points, closed) {
+    const ends = closed ? [...points, points[0]] : points;
+    const edges = ends.slice(1).map((b, k) => [ends[k], b]);
+    edges.sort((p, q) => distance(...q) - distance(...p));
+    return edges.flatMap(([a, b]) => [0.5, 0.35, 0.65].map((part) => [a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])]));
+}
+
+function centreOf(points) {
+    const sum = points.reduce(([x, y], p) => [x + p[0], y + p[1]], [0, 0]);
+    return sum.map((value) => value / points.length);
+}
+
+export function niceStep(wanted) {
+    const tens = 10 ** Math.floor(Math.log10(wanted));
+    return [1, 2, 5, 10].find((step) => step * tens >= wanted) * tens;
+}
+
+export function number(value, digits = 5) {
+    if (value === 0 || Math.abs(value) < 1e-13) return "0";
+    return String(Number(value.toPrecision(digits)));
+}
+
+export function degrees(angle, decimals = 2) {
+    return `${Number(((angle * 180) / Math.PI).toFixed(decimals)) + 0}\u00b0`;
+}
+
+export function bodySeen(linkage, body, p) {
+    return seen(linkage.bodyPose(body), ...p);
+}

@@ -1,0 +1,381 @@
+// The mechanism that moves: engines, the pose that is shown, curves and ranges, quantities of the pose.
+
+import { TURN, placed, remainder } from "./geometry.js";
+
+const CURVE = 720; // points of a coupler curve
+const BOX = 73; // poses that decide what fits into the view
+const LAW = 400; // times at which the laws are tabled
+
+export class Linkage {
+    // engines: { written: [shown, probe], opened: [shown, probe] or null }, data: of the page
+    constructor(data, engines) {
+        this.data = data;
+        this.engines = engines;
+        this.bodies = data.bodies.map((body) => body.name);
+        this.bodyOf = data.points.map((point) => this.bodies.indexOf(point.body));
+        this.parameters = (data.modules.opened || data.modules.written).parameters;
+        this.values = new Map(this.parameters.map((one) => [one.name, one.value]));
+        this.bound = new Map(this.values);
+        this.failure = "";
+        this.#use("written");
+        this.u = Float64Array.from(this.shown.driven(data.run.from).u);
+        this.t = data.run.from;
+        this.pose = null;
+        this.changed = 0; // counts new lengths
+        this.#tableLaws();
+        this.goTo(this.u);
+        if (!this.pose) throw new Error(this.failure);
+        this.findRanges();
+    }
+
+    #use(which) {
+        this.which = which;
+        [this.shown, this.probe] = this.engines[which];
+        this.part = this.data.modules[which];
+        this.index = new Map([...this.part.outputs.map((output) => output.name), ...this.part.fixed].map((name, k) => [name, k]));
+        this.count = this.part.outputs.length; // the coordinates after these never move
+        this.triples = this.bodies.map((body) => ["x", "y", "phi"].map((axis) => this.index.get(`${body}.${axis}`) ?? -1));
+        this.locals = Float64Array.from(this.shown.points());
+    }
+
+    // ---- pose
+
+    #keep(u) {
+        this.pose = this.poseOf(this.shown);
+        this.u = Float64Array.from(u);
+        this.failure = "";
+    }
+
+    // Return a copy of the pose of an engine.
+    poseOf(engine) {
+        const fixed = engine.fixed();
+        const joined = (values, rest) => {
+            const all = new Float64Array(values.length + fixed.length);
+            all.set(values);
+            if (rest) all.set(rest, values.length);
+            return all;
+        };
+        const { locals, triples } = this;
+        const forces = engine.forces?.();
+        return {
+            q: joined(engine.q, fixed),
+            qd: joined(engine.qd),
+            qdd: joined(engine.qdd),
+            forces: forces ? Float64Array.from(forces) : null,
+            locals,
+            triples,
+        };
+    }
+
+    // Move to driver values; return true if the pose is reached. The last good pose stays otherwise.
+    goTo(u, rates = null) {
+        const { ud, udd } = rates || this.ratesNear(u);
+        const status = this.shown.at(Float64Array.from(u), ud, udd);
+        if (!isGood(status)) {
+            this.failure = this.shown.message || "This pose is unreachable.";
+            return false;
+        }
+        this.#keep(u);
+        return true;
+    }
+
+    // Move as far towards driver values as the mechanism goes.
+    goTowards(u) {
+        if (this.goTo(u)) return true;
+        const failure = this.failure;
+        let [reached, target] = [Float64Array.from(this.u), Float64Array.from(u)];
+        for (let k = 0; k < 12; k++) {
+            const middle = reached.map((value, i) => 0.5 * (value + target[i]));
+            if (this.goTo(middle)) reached = middle;
+            else target = middle;
+        }
+        this.failure = failure;
+        return false;
+    }
+
+    goToTime(t, offset = null) {
+        const law = this.shown.driven(t);
+        const u = offset ? law.u.map((value, k) => value + offset[k]) : law.u;
+        this.t = t;
+        return this.goTo(Float64Array.from(u), { ud: Float64Array.from(law.ud), udd: Float64Array.from(law.udd) });
+    }
+
+    bodyPose(body, pose = this.pose) {
+        const [x, y, phi] = pose.triples[body];
+        return x < 0 ? [0, 0, 0] : [pose.q[x], pose.q[y], pose.q[phi]];
+    }
+
+    local(point, pose = this.pose) {
+        return [pose.locals[2 * point], pose.locals[2 * point + 1]];
+    }
+
+    point(point, pose = this.pose) {
+        return placed(this.bodyPose(this.bodyOf[point], pose), ...this.local(point, pose));
+    }
+
+    // Return velocity and acceleration of a place of a body that is now at p.
+    motionOf(body, p, pose = this.pose) {
+        const [ix, iy, iphi] = pose.triples[body];
+        if (ix < 0) return { v: [0, 0], a: [0, 0] };
+        const { q, qd, qdd } = pose;
+        const dx = p[0] - q[ix];
+        const dy = p[1] - q[iy];
+        const w = qd[iphi];
+        return {
+            v: [qd[ix] - w * dy, qd[iy] + w * dx],
+            a: [qdd[ix] - qdd[iphi] * dy - w * w * dx, qdd[iy] + qdd[iphi] * dx - w * w * dy],
+        };
+    }
+
+    // ---- laws
+
+    #tableLaws() {
+        const { from, to } = this.data.run;
+        this.law = Array.from({ length: LAW + 1 }, (_, k) => {
+            const t = from + ((to - from) * k) / LAW;
+            return { t, u: Float64Array.from(this.shown.driven(t).u) };
+        });
+    }
+
+    // Return the time at which the laws come nearest to driver values.
+    timeNear(u) {
+        const gap = (law) =>
+            law.u.reduce((sum, value, k) => {
+                const apart = this.data.drivers[k].turns ? remainder(u[k] - value) : u[k] - value;
+                return sum + apart * apart;
+            }, 0);
+        let best = this.law[0];
+        let least = Infinity;
+        for (const law of this.law) {
+            const g = gap(law) + 1e-9 * Math.abs(law.t - this.t);
+            if (g < least) [best, least] = [law, g];
+        }
+        const step = (this.data.run.to - this.data.run.from) / LAW;
+        let [low, high] = [best.t - step, best.t + step];
+        for (let k = 0; k < 40; k++) {
+            const [a, b] = [low + (high - low) / 3, high - (high - low) / 3];
+            if (gap({ u: this.shown.driven(a).u.slice() }) < gap({ u: this.shown.driven(b).u.slice() })) high = b;
+            else low = a;
+        }
+        return Math.min(Math.max(0.5 * (low + high), this.data.run.from), this.data.run.to);
+    }
+
+    // Return speeds and accelerations of the drivers: those of their laws at the time that is shown.
+    ratesNear() {
+        const { ud, udd } = this.shown.driven(this.t);
+        return { ud: Float64Array.from(ud), udd: Float64Array.from(udd) };
+    }
+
+    // ---- lengths
+
+    // Bind other values of parameters (a Map); return true if the mechanism closes with them at its driver values.
+    setValues(values) {
+        this.values = new Map(values);
+        const isOpened = this.parameters.some((one) => one.isPlace && values.get(one.name) !== one.value);
+        const which = isOpened ? "opened" : "written";
+        const [shown, probe] = this.engines[which];
+        const part = this.data.modules[which];
+        const vector = Float64Array.from(part.parameters, (one) => values.get(one.name) ?? one.value);
+        const found = shown.bind(vector);
+        if (!found.ok) {
+            this.failure = found.message || "The mechanism does not close with these lengths.";
+            return false;
+        }
+        probe.bind(vector);
+        this.#use(which);
+        this.changed += 1;
+        if (this.parameters.some((one) => one.isLaw && values.get(one.name) !== this.bound.get(one.name))) this.#tableLaws();
+        if (!this.goTo(this.u)) return false;
+        this.bound = new Map(values);
+        return true;
+    }
+
+    // ---- curves and ranges, by the engine that is not shown
+
+    // Return the driver values of a curve: over the driver's range, or over the run with several drivers.
+    #samples(count) {
+        const { drivers, run } = this.data;
+        if (drivers.length !== 1) {
+            return Array.from({ length: count + 1 }, (_, k) =>
+                Float64Array.from(this.probe.driven(run.from + ((run.to - run.from) * k) / count).u),
+            );
+        }
+        const [low, high] = this.ranges[0];
+        return Array.from({ length: count + 1 }, (_, k) => Float64Array.of(low + ((high - low) * k) / count));
+    }
+
+    #swept(samples, columns) {
+        const n = this.data.drivers.length;
+        const us = new Float64Array(samples.length * n);
+        samples.forEach((u, k) => us.set(u, k * n));
+        return this.probe.sweep(us, columns);
+    }
+
+    // Find the range of each driver, the others at the start of their laws.
+    findRanges() {
+        const start = Array.from(this.law[0].u);
+        this.limits = [];
+        this.ranges = this.data.drivers.map((driver, k) => {
+            const reach = this.#reach(driver, k, start[k]);
+            const ends = reach.map((end) => this.#end(start, k, end));
+            ends.forEach((end) => {
+                if (end.isLimit) this.limits.push({ driver: k, at: end.at });
+            });
+            if (driver.kind === "angle" && !ends[0].isLimit && !ends[1].isLimit) {
+                return [start[k], start[k] + TURN * (driver.turns || 1)];
+            }
+            return [ends[0].at, ends[1].at];
+        });
+    }
+
+    #reach(driver, k, start) {
+        if (driver.kind === "angle") return [start - TURN, start + TURN];
+        const law = this.law.map((one) => one.u[k]);
+        const [low, high] = [Math.min(...law), Math.max(...law)];
+        const [least, most] = driver.reach || [low, high];
+        const spare = Math.max(0.5 * (high - low), 0.02 * this.data.size);
+        const limits = driver.limits.map((limit) => limit.at);
+        return [
+            limits.some((at) => at < low) ? least - 0.1 * (high - least) : Math.max(low - spare, least),
+            limits.some((at) => at > high) ? most + 0.1 * (most - low) : Math.min(high + spare, most),
+        ];
+    }
+
+    // Return how far one driver goes from its start towards an end, to 1e-9 of the way.
+    #end(start, k, end) {
+        const steps = 120;
+        const at = (part) => start[k] + (end - start[k]) * part;
+        if (end === start[k]) return { at: end, isLimit: false };
+        const goes = (from, to, count) => {
+            const us = Array.from({ length: count }, (_, i) => {
+                const u = Float64Array.from(start);
+                u[k] = at(from + ((to - from) * (i + 1)) / count);
+                return u;
+            });
+            const { status } = this.#swept([Float64Array.from(start), ...us], [0]);
+            for (let i = 1; i <= count; i++) if (!isGood(status[i])) return i - 1;
+            return count;
+        };
+        const reached = goes(0, 1, steps);
+        if (reached === steps) return { at: end, isLimit: false };
+        let [low, high] = [reached / steps, (reached + 1) / steps];
+        for (let i = 0; i < 6; i++) {
+            const inner = goes(low, high, 16);
+            [low, high] = [low + ((high - low) * inner) / 16, low + ((high - low) * (inner + 1)) / 16];
+        }
+        return { at: at(low), isLimit: true };
+    }
+
+    // Return polylines of the points with these numbers, over the driver's range or the run.
+    curves(points, count = CURVE) {
+        const bodies = [...new Set(points.map((point) => this.bodyOf[point]))].filter((body) => this.triples[body][0] >= 0);
+        const columns = bodies.flatMap((body) => this.triples[body]);
+        if (!columns.length) return points.map(() => []);
+        const samples = this.#samples(count);
+        const moving = columns.map((column) => (column < this.count ? column : 0));
+        const { values, status } = this.#swept(samples, moving);
+        const width = columns.length;
+        columns.forEach((column, place) => {
+            if (column < this.count) return;
+            for (let k = 0; k < samples.length; k++) values[k * width + place] = this.pose.q[column];
+        });
+        return points.map((point) => {
+            const place = 3 * bodies.indexOf(this.bodyOf[point]);
+            if (place < 0) return [];
+            const [x, y] = [this.locals[2 * point], this.locals[2 * point + 1]];
+            const line = [];
+            for (let k = 0; k < samples.length; k++) {
+                if (!isGood(status[k])) continue;
+                const at = k * width + place;
+                const c = Math.cos(values[at + 2]);
+                const s = Math.sin(values[at + 2]);
+                line.push([values[at] + c * x - s * y, values[at + 1] + s * x + c * y]);
+            }
+            return line;
+        });
+    }
+
+    // Return the corners of the box around all points over the range.
+    box() {
+        const all = this.data.points.map((_, k) => k);
+        let [x0, y0, x1, y1] = [Infinity, Infinity, -Infinity, -Infinity];
+        const add = ([x, y]) => {
+            [x0, y0, x1, y1] = [Math.min(x0, x), Math.min(y0, y), Math.max(x1, x), Math.max(y1, y)];
+        };
+        for (const line of this.curves(all, BOX)) line.forEach(add);
+        all.forEach((k) => add(this.point(k)));
+        for (const shape of this.data.shapes) {
+            if (!shape.radius && shape.kind !== "cam") continue;
+            const body = this.bodies.indexOf(shape.frame);
+            if (body < 0) continue;
+            for (const [x, y] of shape.points) {
+                const p = placed(this.bodyPose(body), x, y);
+                const r = shape.radius || 0;
+                add([p[0] - r, p[1] - r]);
+                add([p[0] + r, p[1] + r]);
+            }
+        }
+        return [x0, y0, x1, y1];
+    }
+
+    // ---- quantities
+
+    // Visit poses over the driver ("driver") or the run ("time"): visit(x, pose or null).
+    visit(over, count, visit) {
+        const { run } = this.data;
+        const { probe } = this;
+        const rates = this.ratesNear();
+        const [low, high] = over === "time" ? [run.from, run.to] : this.ranges[0];
+        probe.restart();
+        for (let k = 0; k <= count; k++) {
+            const x = low + ((high - low) * k) / count;
+            const law = over === "time" ? probe.driven(x) : { u: Float64Array.of(x), ...rates };
+            visit(x, isGood(probe.at(law.u, law.ud, law.udd)) ? this.poseOf(probe) : null);
+        }
+    }
+
+    // Return transmission angles [rad] of the loops, with the place of the pin.
+    transmissions(pose = this.pose) {
+        return this.data.loops.map((loop) => {
+            const pins = loop.pins.map((pin) => this.point(pin, pose));
+            if (loop.direction !== undefined) {
+                const [p, s] = pins;
+                const length = Math.hypot(s[0] - p[0], s[1] - p[1]);
+                const normal = [-Math.sin(loop.direction), Math.cos(loop.direction)];
+                const cosine = (normal[0] * (s[0] - p[0]) + normal[1] * (s[1] - p[1])) / length;
+                const arms = [[p[0] - s[0], p[1] - s[1]], [-normal[0], -normal[1]]];
+                return { loop, angle: Math.acos(Math.max(-1, Math.min(1, cosine))), at: s, arms };
+            }
+            const [p, q, c] = pins;
+            const arms = [[p[0] - q[0], p[1] - q[1]], [c[0] - q[0], c[1] - q[1]]];
+            const [[ax, ay], [bx, by]] = arms;
+            return { loop, angle: Math.abs(Math.atan2(ax * by - ay * bx, ax * bx + ay * by)), at: q, arms };
+        });
+    }
+
+    // Return instant centres of moving bodies relative to the ground, and of all pairs of up to four bodies.
+    centres(pose = this.pose) {
+        const twists = this.bodies.map((name, body) => {
+            const { v } = this.motionOf(body, [0, 0], pose);
+            const iphi = pose.triples[body][2];
+            return { name, omega: iphi < 0 ? 0 : pose.qd[iphi], v };
+        });
+        const found = [];
+        const fastest = Math.max(...twists.map((twist) => Math.abs(twist.omega)));
+        for (let i = 0; i < twists.length; i++) {
+            for (let j = i + 1; j < twists.length; j++) {
+                if (i > 0 && twists.length > 4) continue;
+                const omega = twists[j].omega - twists[i].omega;
+                if (Math.abs(omega) <= 1e-6 * fastest) continue;
+                const v = [twists[j].v[0] - twists[i].v[0], twists[j].v[1] - twists[i].v[1]];
+                found.push({ at: [-v[1] / omega, v[0] / omega], label: `${i + 1}${twists.length > 9 ? "," : ""}${j + 1}` });
+            }
+        }
+        return found;
+    }
+}
+
+// Return whether a status is that of a pose with numbers.
+export function isGood(status) {
+    return status <= 2;
+}

@@ -1,0 +1,257 @@
+// The panels beside the drawing: values, plots, what is shown, files.
+
+import { number } from "./drawing.js";
+import { buildCommand, download, drawing, mechanismFile, table } from "./exports.js";
+import { defaults, Plot, quantities, sampled } from "./plots.js";
+
+const DEGREE = 180 / Math.PI;
+
+export function element(tag, properties = {}, ...children) {
+    const made = document.createElement(tag);
+    for (const [key, value] of Object.entries(properties)) {
+        if (key.includes("-") || key === "for" || key === "role") made.setAttribute(key, value);
+        else made[key] = value;
+    }
+    made.append(...children);
+    return made;
+}
+
+// Return how a unit is shown and edited: angles in degrees.
+export function shownUnit(unit) {
+    return unit.startsWith("rad") ? { unit: unit.replace("rad", "deg"), factor: DEGREE } : { unit, factor: 1 };
+}
+
+// ---- values
+
+export class Values {
+    constructor(page, root) {
+        this.page = page;
+        this.rows = new Map();
+        const { linkage } = page;
+        const own = linkage.parameters.filter((one) => !one.isPlace && !one.isLaw);
+        const places = linkage.parameters.filter((one) => one.isPlace);
+        const laws = linkage.parameters.filter((one) => one.isLaw);
+        if (!linkage.parameters.length) root.append(element("p", { className: "quiet", textContent: "This mechanism has no numbers to change." }));
+        own.forEach((one) => root.append(this.#row(one)));
+        const groups = Map.groupBy ? Map.groupBy(places, (one) => one.group) : grouped(places);
+        const isOpen = !own.length && places.length <= 40;
+        for (const [name, members] of groups) root.append(this.#group(name, members, isOpen));
+        if (laws.length) root.append(this.#group("Laws of the drivers", laws, false));
+    }
+
+    // A group is filled when it opens, since long chains have thousands of numbers.
+    #group(title, members, isOpen) {
+        const details = element("details", { open: isOpen }, element("summary", { textContent: title }));
+        const fill = () => {
+            if (!details.open || details.filled) return;
+            details.filled = true;
+            members.forEach((one) => details.append(this.#row(one)));
+            this.update();
+        };
+        details.addEventListener("toggle", fill);
+        if (isOpen) fill();
+        return details;
+    }
+
+    #row(one) {
+        const { page } = this;
+        const { unit, factor } = shownUnit(one.unit);
+        const usual = Math.abs(one.value) || (one.kind === "angle" ? 1 : one.kind === "length" ? 0.3 * page.linkage.data.size : 1);
+        const [low, high] = one.value === 0 ? [-usual, usual] : [one.value - 0.6 * usual, one.value + 0.6 * usual];
+        const text = element("div", { className: "text", textContent: one.label });
+        if (one.description) text.append(element("small", { textContent: one.description }));
+        const field = element("input", { type: "number", step: "any", "aria-label": `${one.label} ${unit}` });
+        const slider = element("input", { type: "range", min: low * factor, max: high * factor, step: "any", "aria-label": `${one.label}, slider` });
+        const lock = element("button", { className: "lock", "aria-pressed": "false", title: `Keep ${one.label} while pins are dragged`, "aria-label": `Lock ${one.label}` });
+        lock.innerHTML = '<svg viewBox="0 0 20 20"><rect x="4" y="9" width="12" height="8" rx="1.5"/><path d="M7 9V6a3 3 0 0 1 6 0v3"/></svg>';
+        lock.addEventListener("click", () => {
+            const isLocked = !page.design.locked.has(one.name);
+            if (isLocked) page.design.locked.add(one.name);
+            else page.design.locked.delete(one.name);
+            lock.setAttribute("aria-pressed", String(isLocked));
+        });
+        const set = (value) => page.setValue(one.name, value / factor);
+        slider.addEventListener("input", () => set(Number(slider.value)));
+        slider.addEventListener("change", () => page.commit());
+        field.addEventListener("change", () => {
+            const value = Number(field.value);
+            const isNumber = field.value.trim() !== "" && Number.isFinite(value);
+            field.classList.toggle("wrong", !isNumber);
+            if (!isNumber) return;
+            set(value);
+            page.commit();
+        });
+        const parts = [text, field, element("span", { className: "unit", textContent: unit })];
+        const row = element("div", { className: "value" }, ...parts, one.isLaw ? element("span") : lock, slider);
+        this.rows.set(one.name, { row, field, slider, factor, one });
+        return row;
+    }
+
+    update() {
+        for (const [name, { row, field, slider, factor, one }] of this.rows) {
+            const value = this.page.design.values.get(name);
+            if (document.activeElement !== field || !this.page.isTyping) field.value = number(value * factor, 9);
+            if (document.activeElement !== slider) slider.value = value * factor;
+            row.classList.toggle("changed", value !== one.value);
+            field.classList.toggle("wrong", !this.page.design.isOk && value !== this.page.linkage.bound.get(name));
+        }
+    }
+}
+
+function grouped(places) {
+    const found = new Map();
+    for (const one of places) found.set(one.group, [...(found.get(one.group) || []), one]);
+    return found;
+}
+
+// ---- plots
+
+export class Plots {
+    constructor(page, root) {
+        this.page = page;
+        this.root = root;
+        this.all = quantities(page.linkage);
+        this.byId = new Map(this.all.map((one) => [one.id, one]));
+        this.over = page.linkage.data.drivers.length === 1 ? "driver" : "time";
+        this.list = element("div");
+        this.plots = [];
+        const choice = element("select", { "aria-label": "Horizontal axis" }, element("option", { value: "time", textContent: "time" }));
+        if (this.over === "driver") choice.prepend(element("option", { value: "driver", textContent: page.linkage.data.drivers[0].name }));
+        choice.value = this.over;
+        choice.addEventListener("change", () => {
+            this.over = choice.value;
+            this.refresh();
+        });
+        const add = element("button", { textContent: "Add a plot" });
+        add.addEventListener("click", () => this.add(this.all[this.plots.length % this.all.length].id));
+        const over = element("label", { className: "row" }, element("span", { className: "label", textContent: "Over" }), choice);
+        root.append(over, this.list, add, element("p", { className: "quiet", textContent: "Click or drag in a plot to move the mechanism there." }));
+        defaults(page.linkage, this.all).forEach((id) => this.add(id));
+    }
+
+    add(id) {
+        const select = element("select", { "aria-label": "Quantity" });
+        for (const [name, members] of grouped(this.all)) {
+            const group = element("optgroup", { label: name });
+            members.forEach((one) => group.append(element("option", { value: one.id, textContent: `${one.label} [${one.unit}]` })));
+            select.append(group);
+        }
+        select.value = id;
+        const value = element("output");
+        const remove = element("button", { textContent: "\u00d7", title: "Remove the plot", "aria-label": "Remove the plot" });
+        const canvas = element("canvas", { tabIndex: 0, role: "img" });
+        const card = element("div", { className: "plot" }, element("div", { className: "head" }, select, value, remove), canvas);
+        const plot = { select, value, canvas, painter: new Plot(canvas, (x) => this.page.pick(this.over, x)) };
+        select.addEventListener("change", () => this.refresh());
+        remove.addEventListener("click", () => {
+            this.plots.splice(this.plots.indexOf(plot), 1);
+            card.remove();
+        });
+        this.plots.push(plot);
+        this.list.append(card);
+        this.refresh();
+    }
+
+    get isShown() {
+        return !this.root.hidden && this.plots.length > 0;
+    }
+
+    // Compute the curves again, after lengths have changed.
+    refresh() {
+        this.table = null;
+        this.draw();
+    }
+
+    draw() {
+        if (!this.isShown) return;
+        const { linkage, theme } = this.page;
+        const wanted = this.plots.map((plot) => this.byId.get(plot.select.value));
+        this.table ||= sampled(linkage, this.over, wanted);
+        const driver = linkage.data.drivers[0];
+        const isAngle = this.over === "driver" && driver.kind === "angle";
+        const cursor = this.over === "time" ? linkage.t : this.page.wrapped(0);
+        this.plots.forEach((plot, k) => {
+            const one = wanted[k];
+            const now = one.read(linkage, linkage.pose);
+            plot.value.textContent = `${number(now)} ${one.unit}`;
+            const xLabel = this.over === "time" ? "s" : isAngle ? "" : linkage.data.unit;
+            plot.painter.draw({ x: this.table.x, values: this.table.columns[k], label: one.label, unit: one.unit, cursor, now, theme, isAngle, xLabel });
+        });
+    }
+}
+
+// ---- what is shown, files
+
+export function showPanel(page, root) {
+    const has = page.linkage.data;
+    const rows = [
+        ["names", "Names", ""],
+        ["curves", "Curves of the points of interest", ""],
+        ["traces", "Trace while it moves", "the last turn of every drawn point"],
+        ["velocity", "Velocities", ""],
+        ["acceleration", "Accelerations", ""],
+        ...(has.loops.length ? [["transmission", "Transmission angle", "red below 40\u00b0 or above 140\u00b0"]] : []),
+        ["centres", "Instant centres", "1 is the ground, then the bodies in the order of the file"],
+        ["limits", "Limits and change points", "on the circle of the driver"],
+        ...(page.linkage.part.forces.length ? [["forces", "Forces in the joints", "of the first body on the second"]] : []),
+        ["grid", "Grid", ""],
+    ];
+    for (const [key, label, note] of rows) {
+        const box = element("input", { type: "checkbox", checked: page.show[key], id: `show-${key}` });
+        box.addEventListener("change", () => {
+            page.show[key] = box.checked;
+            page.refresh();
+        });
+        const text = element("span", { textContent: label });
+        if (note) text.append(element("small", { textContent: note }));
+        root.append(element("label", { className: "check" }, box, text));
+    }
+    if (page.linkage.bodies.length <= 13) {
+        const numbers = page.linkage.bodies.map((name, k) => `${k + 1} ${name}`).join(", ");
+        root.append(element("p", { className: "quiet", textContent: `Bodies: ${numbers}.` }));
+    }
+    root.append(element("p", { className: "quiet", textContent: "Double-click a point of the drawing to draw its curve." }));
+}
+
+export function filesPanel(page, root) {
+    const { linkage, design } = page;
+    const name = linkage.data.name;
+    const buttons = element("div", { className: "buttons" });
+    const add = (label, id, act) => {
+        const button = element("button", { textContent: label, id });
+        button.addEventListener("click", act);
+        buttons.append(button);
+    };
+    add("Mechanism file with the values as set (TOML)", "save-file", () => download(`${name}.toml`, mechanismFile(linkage, design), "application/toml"));
+    if (linkage.data.drivers.length === 1) add(`Table over ${linkage.data.drivers[0].name} (CSV)`, "save-driver", () => download(`${name}.csv`, table(linkage, "driver"), "text/csv"));
+    add("Table over time (CSV)", "save-time", () => download(`${name}.csv`, table(linkage, "time"), "text/csv"));
+    add("Drawing as shown (SVG)", "save-svg", () => download(`${name}.svg`, drawing(linkage, page.view, page.show, page.extra()), "image/svg+xml"));
+    root.append(element("h2", { textContent: "Save" }), buttons);
+    const { command } = buildCommand(linkage, design);
+    const code = element("code", { textContent: command });
+    root.append(
+        element("h2", { textContent: "Build the FMU" }),
+        element("p", { className: "quiet", textContent: "Save the mechanism file, then type in its folder:" }),
+        element("div", { className: "command" }, code, copyButton(() => command)),
+        element("h2", { textContent: "Link to this design", style: "margin-top: 18px" }),
+        element("p", { className: "quiet", textContent: "The address of this page holds the values and the pose." }),
+        element("div", { className: "command" }, copyButton(() => location.href, "Copy the address")),
+    );
+    const notes = linkage.data.notes;
+    if (notes.length) root.append(element("h2", { textContent: "Notes of kinfmu check", style: "margin-top: 18px" }), ...notes.map((note) => element("p", { className: "quiet", textContent: note })));
+    root.append(element("p", { className: "quiet", style: "margin-top: 18px", textContent: `Computed by kinfmu ${linkage.data.version}, with the code of its FMU. This page works offline.` }));
+}
+
+function copyButton(text, label = "Copy") {
+    const button = element("button", { textContent: label });
+    button.addEventListener("click", async () => {
+        try {
+            await navigator.clipboard.writeText(text());
+            button.textContent = "Copied";
+        } catch {
+            button.textContent = "Select and copy";
+        }
+        setTimeout(() => (button.textContent = label), 1500);
+    });
+    return button;
+}

@@ -1,0 +1,103 @@
+// Pens: the same drawing on a canvas or as SVG text. All places are in pixels, y down.
+
+export class CanvasPen {
+    constructor(context) {
+        this.context = context;
+    }
+
+    line(points, { width = 1, colour = null, fill = null, closed = false, dash = null, cap = "round", alpha = 1 } = {}) {
+        const c = this.context;
+        if (points.length < 2) return;
+        c.globalAlpha = alpha;
+        c.beginPath();
+        c.moveTo(points[0][0], points[0][1]);
+        for (let k = 1; k < points.length; k++) c.lineTo(points[k][0], points[k][1]);
+        if (closed) c.closePath();
+        this.#paint(width, colour, fill, dash, cap);
+    }
+
+    circle(x, y, radius, { width = 1, colour = null, fill = null, dash = null, alpha = 1 } = {}) {
+        const c = this.context;
+        c.globalAlpha = alpha;
+        c.beginPath();
+        c.arc(x, y, Math.max(radius, 0), 0, 2 * Math.PI);
+        this.#paint(width, colour, fill, dash, "butt");
+    }
+
+    text(x, y, text, { colour, size = 12, align = "left", halo = null, italic = false, bold = false } = {}) {
+        const c = this.context;
+        c.globalAlpha = 1;
+        c.font = `${italic ? "italic " : ""}${bold ? "600 " : ""}${size}px ${FONT}`;
+        c.textAlign = align;
+        c.textBaseline = "middle";
+        if (halo) {
+            c.lineWidth = 3;
+            c.lineJoin = "round";
+            c.strokeStyle = halo;
+            c.strokeText(text, x, y);
+        }
+        c.fillStyle = colour;
+        c.fillText(text, x, y);
+    }
+
+    #paint(width, colour, fill, dash, cap) {
+        const c = this.context;
+        if (fill) {
+            c.fillStyle = fill;
+            c.fill();
+        }
+        if (colour) {
+            c.lineWidth = width;
+            c.lineCap = cap;
+            c.lineJoin = "round";
+            c.setLineDash(dash || []);
+            c.strokeStyle = colour;
+            c.stroke();
+            if (dash) c.setLineDash([]);
+        }
+        c.globalAlpha = 1;
+    }
+}
+
+export class SvgPen {
+    constructor(width, height, background) {
+        this.head = `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${height}" viewBox="0 0 ${width} ${height}">`;
+        this.parts = [`<rect width="${width}" height="${height}" fill="${background}"/>`];
+    }
+
+    line(points, { width = 1, colour = null, fill = null, closed = false, dash = null, cap = "round", alpha = 1 } = {}) {
+        if (points.length < 2) return;
+        const path = points.map(([x, y], k) => `${k ? "L" : "M"}${x.toFixed(2)} ${y.toFixed(2)}`).join("");
+        this.parts.push(`<path d="${path}${closed ? "Z" : ""}"${this.#style(width, colour, fill, dash, cap, alpha)}/>`);
+    }
+
+    circle(x, y, radius, { width = 1, colour = null, fill = null, dash = null, alpha = 1 } = {}) {
+        const place = `cx="${x.toFixed(2)}" cy="${y.toFixed(2)}" r="${Math.max(radius, 0).toFixed(2)}"`;
+        this.parts.push(`<circle ${place}${this.#style(width, colour, fill, dash, "butt", alpha)}/>`);
+    }
+
+    text(x, y, text, { colour, size = 12, align = "left", halo = null, italic = false, bold = false } = {}) {
+        const anchor = { left: "start", center: "middle", right: "end" }[align];
+        const escaped = text.replace(/&/g, "&amp;").replace(/</g, "&lt;");
+        const around = halo ? ` stroke="${halo}" stroke-width="3" paint-order="stroke" stroke-linejoin="round"` : "";
+        const style = `${italic ? ' font-style="italic"' : ""}${bold ? ' font-weight="600"' : ""}`;
+        this.parts.push(
+            `<text x="${x.toFixed(2)}" y="${y.toFixed(2)}" dy="0.35em" fill="${colour}" font-size="${size}" ` +
+                `text-anchor="${anchor}"${around}${style}>${escaped}</text>`,
+        );
+    }
+
+    svg() {
+        return `${this.head}<g font-family="sans-serif">${this.parts.join("\n")}</g></svg>\n`;
+    }
+
+    #style(width, colour, fill, dash, cap, alpha) {
+        const stroke = colour
+            ? ` stroke="${colour}" stroke-width="${width.toFixed(2)}" stroke-linecap="${cap}" stroke-linejoin="round"`
+            : "";
+        const dashes = dash ? ` stroke-dasharray="${dash.join(" ")}"` : "";
+        return ` fill="${fill || "none"}"${stroke}${dashes}${alpha < 1 ? ` opacity="${alpha}"` : ""}`;
+    }
+}
+
+export const FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif';

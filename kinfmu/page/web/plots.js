@@ -1,0 +1,168 @@
+// Plots of quantities over time or the driver, with one cursor for all.
+
+import { degrees, niceStep, number } from "./drawing.js";
+import { FONT } from "./pen.js";
+
+const SAMPLES = 360;
+const MARGIN = { left: 58, right: 10, top: 10, bottom: 24 };
+
+// Return all quantities that can be plotted: { id, label, unit, read(linkage, pose) }.
+export function quantities(linkage) {
+    const found = [];
+    const outputs = [...linkage.part.outputs].sort((a, b) => rank(linkage, a) - rank(linkage, b));
+    for (const output of outputs) {
+        output.names.forEach((label, order) => {
+            const unit = output.units[order];
+            const scale = unit.startsWith("rad") ? 180 / Math.PI : 1;
+            const read = (one, pose) => [pose.q, pose.qd, pose.qdd][order][one.index.get(output.name)] * scale;
+            found.push({ id: label, label, group: output.owner, unit: unit.replace(/^rad/, "deg"), read });
+        });
+    }
+    linkage.data.loops.forEach((loop, k) => {
+        const label = `transmission angle ${loop.coupler}, ${loop.output}`;
+        const read = (one, pose) => (one.transmissions(pose)[k].angle * 180) / Math.PI;
+        found.push({ id: label, label, group: "transmission", unit: "deg", read });
+    });
+    linkage.part.forces.forEach(({ name, unit }, k) => {
+        found.push({ id: name, label: name, group: "forces", unit, read: (one, pose) => (pose.forces ? pose.forces[k] : NaN) });
+    });
+    return found;
+}
+
+function rank(linkage, output) {
+    return linkage.data.interest.some((one) => one.name === output.owner) ? 0 : 1;
+}
+
+// Return the first quantities to plot.
+export function defaults(linkage, all) {
+    const { interest, loops, drivers } = linkage.data;
+    if (linkage.part.forces.length) {
+        const effort = all.find((one) => one.id === `${drivers[0].name}.torque` || one.id === `${drivers[0].name}.force`);
+        if (effort) return [effort.id, ...(interest.length ? [`${interest[0].name}.y`] : [])];
+    }
+    if (interest.length) return [`${interest[0].name}.x`, `${interest[0].name}.y`];
+    const output = loops.length ? loops[0].output : linkage.bodies[linkage.bodies.length - 1];
+    const wanted = [`${output}.phi`, `${output}.x`].filter((id) => all.some((one) => one.id === id));
+    return wanted.length ? wanted.slice(0, 1) : all.slice(0, 1).map((one) => one.id);
+}
+
+// Return x and values of quantities over "time" or "driver"; values are NaN at poses without numbers.
+export function sampled(linkage, over, wanted, count = SAMPLES) {
+    const x = new Float64Array(count + 1);
+    const columns = wanted.map(() => new Float64Array(count + 1));
+    let row = 0;
+    linkage.visit(over, count, (at, pose) => {
+        x[row] = at;
+        wanted.forEach((one, k) => {
+            columns[k][row] = pose ? one.read(linkage, pose) : NaN;
+        });
+        row += 1;
+    });
+    return { x, columns };
+}
+
+export class Plot {
+    constructor(canvas, onPick) {
+        this.canvas = canvas;
+        const pick = (event) => {
+            if (!this.range) return;
+            const box = canvas.getBoundingClientRect();
+            const part = (event.clientX - box.left - MARGIN.left) / (box.width - MARGIN.left - MARGIN.right);
+            onPick(this.range[0] + Math.min(1, Math.max(0, part)) * (this.range[1] - this.range[0]));
+        };
+        canvas.addEventListener("pointerdown", (event) => {
+            canvas.setPointerCapture(event.pointerId);
+            pick(event);
+        });
+        canvas.addEventListener("pointermove", (event) => {
+            if (event.buttons) pick(event);
+        });
+        canvas.addEventListener("keydown", (event) => {
+            const way = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+            if (!way || !this.range) return;
+            event.preventDefault();
+            const step = (this.range[1] - this.range[0]) / (event.shiftKey ? 36 : 360);
+            onPick(Math.min(this.range[1], Math.max(this.range[0], this.cursor + way * step)));
+        });
+    }
+
+    draw({ x, values, label, unit, cursor, now, theme, isAngle, xLabel }) {
+        const { canvas } = this;
+        const ratio = window.devicePixelRatio || 1;
+        const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+        if (!width || !height) return;
+        if (canvas.width !== Math.round(width * ratio)) canvas.width = Math.round(width * ratio);
+        if (canvas.height !== Math.round(height * ratio)) canvas.height = Math.round(height * ratio);
+        const c = canvas.getContext("2d");
+        c.setTransform(ratio, 0, 0, ratio, 0, 0);
+        c.clearRect(0, 0, width, height);
+        this.range = [x[0], x[x.length - 1]];
+        this.cursor = cursor;
+        let [low, high] = [Infinity, -Infinity];
+        for (const value of values) if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
+        if (low > high) [low, high] = [0, 1];
+        const least = 1e-9 * Math.max(Math.abs(low), Math.abs(high), 1e-12);
+        if (high - low < least) [low, high] = [low - Math.max(Math.abs(low) * 0.1, 1e-6), high + Math.max(Math.abs(high) * 0.1, 1e-6)];
+        const pad = 0.06 * (high - low);
+        [low, high] = [low - pad, high + pad];
+        const px = (value) => MARGIN.left + ((value - this.range[0]) / (this.range[1] - this.range[0] || 1)) * (width - MARGIN.left - MARGIN.right);
+        const py = (value) => height - MARGIN.bottom - ((value - low) / (high - low)) * (height - MARGIN.top - MARGIN.bottom);
+        c.font = `11px ${FONT}`;
+        c.strokeStyle = theme.grid;
+        c.fillStyle = theme.quiet;
+        c.lineWidth = 1;
+        c.textBaseline = "middle";
+        c.textAlign = "right";
+        const stepY = niceStep((high - low) / 4);
+        for (let k = Math.ceil(low / stepY); k * stepY <= high; k++) {
+            const y = py(k * stepY);
+            line(c, [[MARGIN.left, y], [width - MARGIN.right, y]]);
+            c.fillText(number(k * stepY, 4), MARGIN.left - 6, y);
+        }
+        const span = this.range[1] - this.range[0];
+        const stepX = isAngle ? (Math.PI / 180) * [1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720, 1440].find((d) => (d * Math.PI) / 180 >= span / 6 || d === 1440) : niceStep(span / 6 || 1);
+        c.textAlign = "center";
+        for (let k = Math.ceil(this.range[0] / stepX - 1e-9); k * stepX <= this.range[1] * (1 + 1e-12) + 1e-12; k++) {
+            const at = px(k * stepX);
+            line(c, [[at, MARGIN.top], [at, height - MARGIN.bottom]]);
+            if (at < width - 34) c.fillText(isAngle ? degrees(k * stepX, 0) : number(k * stepX, 4), at, height - MARGIN.bottom + 12);
+        }
+        c.textAlign = "right";
+        c.fillText(xLabel, width - 4, height - MARGIN.bottom + 12);
+        c.strokeStyle = theme.accent;
+        c.lineWidth = 2;
+        c.lineJoin = "round";
+        c.beginPath();
+        let isDown = false;
+        values.forEach((value, k) => {
+            if (!Number.isFinite(value)) {
+                isDown = false;
+                return;
+            }
+            if (isDown) c.lineTo(px(x[k]), py(value));
+            else c.moveTo(px(x[k]), py(value));
+            isDown = true;
+        });
+        c.stroke();
+        if (Number.isFinite(cursor)) {
+            const at = px(Math.min(this.range[1], Math.max(this.range[0], cursor)));
+            c.strokeStyle = theme.ink;
+            c.lineWidth = 1;
+            line(c, [[at, MARGIN.top], [at, height - MARGIN.bottom]]);
+            if (Number.isFinite(now)) {
+                c.fillStyle = theme.ink;
+                c.beginPath();
+                c.arc(at, py(now), 4, 0, 2 * Math.PI);
+                c.fill();
+            }
+        }
+        canvas.setAttribute("aria-label", `${label}: ${number(now)} ${unit}`);
+    }
+}
+
+function line(c, [a, b]) {
+    c.beginPath();
+    c.moveTo(...a);
+    c.lineTo(...b);
+    c.stroke();
+}

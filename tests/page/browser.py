@@ -1,0 +1,109 @@
+"""One Chromium for the tests of pages: a page of a mechanism, opened from a file, with what it logs and requests."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import kinfmu
+from kinfmu.page import page
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed; scripts/browser installs it")
+DESKTOP, PHONE = {"width": 1280, "height": 800}, {"width": 360, "height": 740}
+
+
+@dataclass
+class Opened:
+    """A page in the browser; errors: of its console and scripts; requests: addresses beyond its own file."""
+
+    tab: Any
+    errors: list[str] = field(default_factory=list)
+    requests: list[str] = field(default_factory=list)
+
+    def get(self, expression: str) -> Any:
+        """Return the value of an expression in which `k` is the page's object."""
+        return self.tab.evaluate(f"() => {{ const k = window.kinfmu; return {expression}; }}")
+
+    def settle(self) -> None:
+        """Wait until the page has drawn what was asked for."""
+        self.tab.wait_for_function("!window.kinfmu.isAsked")
+
+    def at(self, point: str) -> tuple[float, float]:
+        """Return the place on the screen of a point 'body.point'."""
+        x, y = self.tab.evaluate(
+            """name => {
+                const { linkage, view, canvas } = window.kinfmu;
+                const number = linkage.data.points.findIndex((one) => `${one.body}.${one.name}` === name);
+                const box = canvas.getBoundingClientRect();
+                const [x, y] = view.pixel(linkage.point(number));
+                return [x + box.left, y + box.top];
+            }""",
+            point,
+        )
+        return x, y
+
+    def drag(self, point: str, way: list[tuple[float, float]]) -> None:
+        """Drag a point through places on the screen."""
+        mouse = self.tab.mouse
+        mouse.move(*self.at(point))
+        mouse.down()
+        for place in way:
+            mouse.move(*place)
+            self.settle()
+        mouse.up()
+        self.settle()
+
+
+@cache
+def text_of(name: str) -> str:
+    """Return the page of a mechanism of the gallery."""
+    return page(kinfmu.load(name))
+
+
+class Browser:
+    """The browser; pages open in contexts of their own."""
+
+    def __init__(self, chromium: Any, folder: Path) -> None:
+        self._chromium, self._folder = chromium, folder
+
+    @contextmanager
+    def open(self, text: str, fragment: str = "", **options: Any) -> Iterator[Opened]:
+        """Yield the page of an HTML text, opened from a file with an address that ends with `fragment`."""
+        path = self._folder / f"{abs(hash(text))}.html"
+        if not path.exists():
+            path.write_text(text, "utf-8")
+        context = self._chromium.new_context(viewport=DESKTOP, accept_downloads=True, **options)
+        try:
+            opened = Opened(context.new_page())
+            tab = opened.tab
+            tab.on("console", lambda message: opened.errors.append(message.text))
+            tab.on("pageerror", lambda error: opened.errors.append(str(error)))
+            tab.on("request", lambda request: opened.requests.append(request.url))
+            tab.goto(f"{path.as_uri()}{fragment}")
+            tab.wait_for_function("window.kinfmu")
+            opened.settle()
+            opened.requests = [url for url in opened.requests if not url.startswith((path.as_uri(), "data:", "blob:"))]
+            yield opened
+        finally:
+            context.close()
+
+
+@contextmanager
+def browser(folder: Path) -> Iterator[Browser]:
+    """Yield a browser that runs without a display."""
+    from playwright.sync_api import sync_playwright
+
+    options = ["--no-sandbox"] if os.name == "posix" and os.geteuid() == 0 else []
+    with sync_playwright() as driver:
+        chromium = driver.chromium.launch(executable_path=CHROMIUM, args=options)
+        yield Browser(chromium, folder)
+        chromium.close()

@@ -1,0 +1,118 @@
+"""The page in a browser: it opens without errors and requests, moves under the hand, shows native poses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import kinfmu
+from tests.page.browser import PHONE, Browser, browser, needs_browser, text_of
+
+pytestmark = needs_browser
+LARGEST = 300_000  # [bytes] of a page
+
+
+@pytest.fixture(scope="module")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with browser(tmp_path_factory.mktemp("pages")) as opened:
+        yield opened
+
+
+def test_page_is_one_small_file_without_addresses() -> None:
+    text = text_of("jansen_leg")
+    assert len(text.encode()) <= LARGEST
+    outside = text.replace("http://www.w3.org/2000/svg", "")
+    assert "http://" not in outside
+    assert "https://" not in outside
+
+
+@pytest.mark.parametrize("name", ["crank_rocker", "jansen_leg", "excavator"])
+def test_page_opens_without_errors_and_without_requests(chromium: Browser, name: str) -> None:
+    with chromium.open(text_of(name)) as page:
+        page.tab.click("#tab-plots")
+        page.tab.click("#play")
+        page.tab.wait_for_timeout(150)
+        assert page.get("k.isPlaying && k.linkage.t > 0")
+        assert page.errors == []
+        assert page.requests == []
+
+
+def test_dragged_crank_turns_through_its_whole_range_with_the_native_poses(chromium: Browser) -> None:
+    mech = kinfmu.load("crank_rocker")
+    with chromium.open(text_of("crank_rocker")) as page:
+        (x, y), (tip, _) = page.at("crank.O"), page.at("crank.P")
+        radius = tip - x
+        turn = [math.radians(10 * k) for k in range(1, 37)]
+        page.drag("crank.P", [(x + radius * math.cos(a), y - radius * math.sin(a)) for a in turn])
+        angle = page.get("k.linkage.u[0]")
+        shown = page.get("Array.from(k.linkage.pose.q)")
+        names = page.get("[...k.linkage.index.keys()]")
+        assert page.errors == []
+    assert angle == pytest.approx(2 * math.pi, abs=0.02)
+    run = kinfmu.solve(mech, crank_angle=[angle])
+    known = dict(zip(names, shown, strict=True))
+    for name in run.outputs:
+        assert known[name] == pytest.approx(run[name][0], abs=1e-10)
+
+
+def test_dragged_bucket_moves_three_cylinders(chromium: Browser) -> None:
+    with chromium.open(text_of("excavator")) as page:
+        x, y = page.at("bucket.tip")
+        page.drag("bucket.tip", [(x - 8 * k, y - 3 * k) for k in range(1, 11)])
+        assert page.at("bucket.tip") == pytest.approx((x - 80, y - 30), abs=3)
+        assert page.errors == []
+
+
+def test_page_fits_a_phone(chromium: Browser) -> None:
+    with chromium.open(text_of("jansen_leg"), has_touch=True) as page:
+        page.tab.set_viewport_size(PHONE)
+        page.settle()
+        assert page.tab.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+        x, y = page.at("crank.X")
+        page.tab.touchscreen.tap(x, y)
+        assert page.errors == []
+
+
+def test_value_changes_curve_and_can_be_undone_and_read_from_the_address(chromium: Browser) -> None:
+    with chromium.open(text_of("jansen_leg")) as page:
+        before = page.get("k.curves[0]")
+        field = page.tab.get_by_label("m mm", exact=True)
+        field.fill("14")
+        field.press("Enter")
+        page.settle()
+        changed = page.get("k.curves[0]")
+        page.tab.wait_for_function("location.hash === '#m=14'")
+        page.tab.click("#undo")
+        page.settle()
+        assert page.get("k.curves[0]") == before
+        assert page.get("location.hash") == ""
+    with chromium.open(text_of("jansen_leg"), "#m=14&@crank=1") as page:
+        assert page.get("k.curves[0]") == changed
+        assert page.get("k.linkage.u[0]") == 1.0
+        assert page.errors == []
+    leg = kinfmu.load("jansen_leg").with_parameters({"m": 14.0})
+    run = kinfmu.solve(leg, crank_angle=np.linspace(0.0, 2.0 * np.pi, 721))
+    apart = np.hypot(*(np.array(changed).T - np.array([run["foot.x"], run["foot.y"]])))
+    assert apart.max() < 1e-9
+
+
+def test_lengths_that_do_not_close_keep_the_last_pose_in_grey(chromium: Browser) -> None:
+    with chromium.open(text_of("jansen_leg")) as page:
+        pose = page.get("Array.from(k.linkage.pose.q)")
+        field = page.tab.get_by_label("m mm", exact=True)
+        field.fill("45")
+        field.press("Enter")
+        page.settle()
+        banner = page.tab.text_content("#banner")
+        assert banner.startswith("Does not close.")
+        assert page.get("k.extra().isGhost")
+        assert page.get("Array.from(k.linkage.pose.q)") == pose
+        field.fill("15")
+        field.press("Enter")
+        page.settle()
+        assert page.tab.is_hidden("#banner")
+        assert page.get("Array.from(k.linkage.pose.q)") == pose
+        assert page.errors == []
