@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import base64
 import gzip
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -46,47 +46,49 @@ class PageModule(NamedTuple):
         data: The WebAssembly module.
         plan: What it solves: all bodies' coordinates that move, then the points of interest.
         points: The points 'body.point' whose places in their bodies it returns.
+        parameters: Names of what it can bind, in its order: parameters, or their labels, then constants of the laws.
 
     """
 
     data: bytes
     plan: SolvePlan
     points: tuple[str, ...]
+    parameters: tuple[str, ...]
 
     @property
     def text(self) -> str:
         """The module for a page: compressed by gzip, in base64."""
         return base64.b64encode(gzip.compress(self.data, 9, mtime=0)).decode()
 
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """Names of what the module can bind, in its order: parameters, then constants of the laws."""
-        constants = (constant.name for constant in self.plan.law_constants)
-        return (*(parameter.name for parameter in self.plan.parameters), *constants)
 
-
-def page_module(mechanism: Mechanism) -> PageModule:
+def page_module(mechanism: Mechanism, labels: Mapping[str, str] | None = None) -> PageModule:
     """Return the module of a mechanism, compiled now or taken from the cache of compiled libraries.
+
+    Args:
+        mechanism: The mechanism.
+        labels: Names of parameters for messages and `PageModule.parameters`, such as `Opened.labels`. Default: none.
 
     Raises:
         KinfmuError: The mechanism cannot be solved, as `compile_plan` reports it.
         CompilerError: ziglang is not installed, or it fails.
 
     """
+    labels = labels or {}
     plan = compile_plan(replace(mechanism, coordinates="moving"))
-    files, points = page_sources(plan)
-    return PageModule(compiler.wasm_module(files, EXPORTS, FLAGS), plan, points)
+    points = tuple(mechanism.body_points)
+    data = compiler.wasm_module(page_sources(plan, points, labels), EXPORTS, FLAGS)
+    parameters = (labels.get(parameter.name, parameter.name) for parameter in plan.parameters)
+    return PageModule(data, plan, points, (*parameters, *(constant.name for constant in plan.law_constants)))
 
 
-def page_sources(plan: SolvePlan) -> tuple[dict[str, str], tuple[str, ...]]:
-    """Return the C files of a module by name, and the points that it returns. All is one unit, page.c."""
-    points = tuple(plan.mechanism.body_points)
-    files = emit(plan) | compiler.sources([*compiler.SOLVER, *FOLLOWER])
+def page_sources(plan: SolvePlan, points: Sequence[str], labels: Mapping[str, str]) -> dict[str, str]:
+    """Return the C files of a module by name; all is one unit, page.c."""
+    files = emit(plan, labels) | compiler.sources([*compiler.SOLVER, *FOLLOWER])
     files |= {"interface.h": _header(plan, points), "points.h": _points(plan, points)}
     files["interface.c"] = _INTERFACE.read_text("utf-8")
     lines = ["/* The whole module as one unit. Files included here are not compiled separately. */"]
     lines += [f'#include "{name}"' for name in sorted(files) if name.endswith(".c")]
-    return files | {"page.c": "\n".join(lines) + "\n"}, points
+    return files | {"page.c": "\n".join(lines) + "\n"}
 
 
 def _header(plan: SolvePlan, points: Sequence[str]) -> str:

@@ -16,14 +16,14 @@ from kinfmu.plan import Block, SolvePlan
 from kinfmu.solver.python.curve import CurveData
 
 
-def emit(plan: SolvePlan) -> dict[str, str]:
-    """Return the texts of sizes.h and model.c, by file name."""
+def emit(plan: SolvePlan, labels: Mapping[str, str] | None = None) -> dict[str, str]:
+    """Return the texts of sizes.h and model.c, by file name; labels: of parameters that messages name otherwise."""
     parts = Parts(plan)
-    model = _model(parts)
+    model = _model(parts, labels or {})
     return {"sizes.h": _sizes(parts), "model.c": model}
 
 
-def _model(parts: Parts) -> str:
+def _model(parts: Parts, labels: Mapping[str, str]) -> str:
     """Return model.c."""
     reading = readers(parts)  # before the units: they fill the stage cache
     lines = [
@@ -34,7 +34,7 @@ def _model(parts: Parts) -> str:
         "#include <math.h>",
         "#include <stdio.h>",
         "",
-        *tables(parts.plan, parts.solved),
+        *tables(parts.plan, parts.solved, labels),
         *curve_tables(parts.curves),
         *(line for units in parts.units.values() for line in units.source()),
         *(line for number, run in parts.numbered() for line in rows_of(number, run, parts.place)),
@@ -83,7 +83,7 @@ def _sizes(parts: Parts) -> str:
     return "\n".join(lines) + "\n"
 
 
-def tables(plan: SolvePlan, solved: Sequence[Block]) -> list[str]:
+def tables(plan: SolvePlan, solved: Sequence[Block], labels: Mapping[str, str]) -> list[str]:
     """Return the tables that the solver reads from a model; solved: the blocks that need Newton."""
     anchor_u, anchor_z = plan.anchor_values
     kinds = [driver.quantity.kind for driver in plan.drivers]
@@ -115,7 +115,7 @@ def tables(plan: SolvePlan, solved: Sequence[Block]) -> list[str]:
         *array("bool kf_unknown_is_angle", booleans(name.is_angle for name in plan.unknowns)),
         *array("bool kf_output_is_angle", booleans(name.is_angle for name in plan.outputs)),
         *_strings("kf_watch_names", plan.watch_names),
-        *_strings("kf_parameter_names", [parameter.name for parameter in plan.parameters]),
+        *_strings("kf_parameter_names", [labels.get(one.name, one.name) for one in plan.parameters]),
         *_strings("kf_block_row_names", [", ".join(block.row_names) for block in solved]),
         "",
     ]

@@ -1,0 +1,69 @@
+"""A mechanism with its plain numbers as parameters, so that a page can change each of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from kinfmu.mechanism import Mechanism, Parameter
+from kinfmu.mechanism.members import NumberPath
+from kinfmu.units import Quantity
+
+AXES = ("x", "y")  # of a point
+
+
+class Opened(NamedTuple):
+    """A mechanism whose plain numbers are parameters.
+
+    Attributes:
+        mechanism: The mechanism; it solves to the same numbers, within round-off.
+        places: The paths of the numbers that became parameters, by the names of these.
+
+    """
+
+    mechanism: Mechanism
+    places: dict[str, NumberPath]
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Places as text, such as 'bodies.crank.points.P.x', by the names of the parameters."""
+        return {name: place_text(place) for name, place in self.places.items()}
+
+
+def opened(mechanism: Mechanism) -> Opened:
+    """Return a mechanism with parameters in place of the plain numbers of its points and joints.
+
+    These are coordinates of points, and lengths, angles, offsets and ratios of joints. Numbers given by expressions
+    stay expressions, constants of laws can be set anyway, and laws of cams and couplings stay numbers.
+    """
+    places: dict[str, NumberPath] = {}
+    parameters: dict[str, Parameter] = {}
+
+    def open_number(place: NumberPath, value: Any, quantity: Quantity) -> Any:
+        is_point = place[0] == "bodies" and place[2] == "points"
+        is_of_joint = place[0] == "joints" and "law" not in place
+        if not (is_point or is_of_joint) or type(value) is not float:
+            return value
+        name = _unused(f"opened_{len(places)}", mechanism)
+        places[name] = place
+        parameters[name] = Parameter(value, quantity)
+        return name
+
+    members = mechanism.members.changed(open_number)
+    changed = replace(
+        mechanism, bodies=members.bodies, joints=members.joints, parameters={**mechanism.parameters, **parameters}
+    )
+    return Opened(changed, places)
+
+
+def place_text(place: NumberPath) -> str:
+    """Return the place of a number in a mechanism file as text, such as 'bodies.crank.points.P.x'."""
+    *tables, last = place
+    return ".".join([*map(str, tables), AXES[last] if isinstance(last, int) else last])
+
+
+def _unused(name: str, mechanism: Mechanism) -> str:
+    """Return the name, longer if the mechanism has a parameter of this name."""
+    while name in mechanism.parameters:
+        name += "_"
+    return name

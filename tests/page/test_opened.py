@@ -1,0 +1,119 @@
+"""A mechanism with its plain numbers as parameters moves as before, and as a file with other numbers does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu import Mechanism, Parameter, Run, Status
+from kinfmu.mechanism.members import NumberPath
+from kinfmu.page.module import page_module
+from kinfmu.page.opened import Opened, opened, place_text
+from tests.page.engines import answers, driven_of, needs_node, rows_of, sweep_call, table
+
+CLOSE = 1e-12  # of the size, or of a radian
+MEMBERS = ("fourbar", "rack_steering", "cam_roller", "parallel_jaw")
+PIN, ROD = "bodies.ground.points.C.y", "bodies.coupler.points.Q.x"  # of the crank-rocker
+
+
+@cache
+def of(name: str) -> tuple[Mechanism, Opened]:
+    mechanism = kinfmu.load(name)
+    return mechanism, opened(mechanism)
+
+
+def with_number(mechanism: Mechanism, label: str, value: float) -> Mechanism:
+    """Return the mechanism with another number at a place."""
+    members = mechanism.members.changed(lambda place, old, _: value if place_text(place) == label else old)
+    return replace(mechanism, bodies=members.bodies, joints=members.joints)
+
+
+def worst_difference(run: Run, other: Run, size: float) -> float:
+    """Return the largest difference, of each table relative to its largest number, in radians and sizes."""
+    scales = np.array([1.0 if name.is_angle else size for name in run.outputs])
+    tables = zip(
+        (run.values, run.rates, run.accelerations), (other.values, other.rates, other.accelerations), strict=True
+    )
+    pairs = [(a / scales, b / scales) for a, b in tables]
+    return max(float(np.nanmax(np.abs(a - b)) / max(1.0, np.nanmax(np.abs(a)))) for a, b in pairs)
+
+
+@pytest.mark.parametrize("name", MEMBERS)
+def test_an_opened_mechanism_solves_to_the_same_numbers(name: str) -> None:
+    mechanism, found = of(name)
+    moving = replace(mechanism, coordinates="moving")
+    run = kinfmu.solve(moving, engine="python")
+    again = kinfmu.solve(replace(found.mechanism, coordinates="moving"), outputs=run.outputs, engine="python")
+    assert run.status.tolist() == again.status.tolist()
+    assert worst_difference(run, again, kinfmu.compile(moving).plan.size) < CLOSE
+
+
+def test_every_plain_number_of_points_and_joints_is_open() -> None:
+    mechanism, found = of("rack_steering")
+    assert {"bodies.rack.points.left.y", "joints.way.axis", "joints.mesh.radius"} <= set(found.labels.values())
+    assert not [name for name in found.mechanism.own_parameters if name not in found.places]
+    left: list[NumberPath] = []
+    found.mechanism.members.changed(
+        lambda place, value, _: left.append(place) if type(value) is float and place[0] == "joints" else value
+    )
+    assert not left
+    assert len(found.places) == 2 * len(mechanism.body_points) + sum(
+        place[0] == "joints" for place in found.places.values()
+    )
+
+
+def test_expressions_stay_and_names_do_not_clash() -> None:
+    leg = kinfmu.load("jansen_leg")
+    leg = replace(leg, parameters={**leg.parameters, "opened_0": Parameter(1.0)})
+    found = opened(leg)
+    assert found.places["opened_0_"] == ("bodies", "ground", "points", "axle", 0)
+    assert found.mechanism.parameters["left_x"] == leg.parameters["left_x"]
+    assert "bodies.crank.points.X.x" not in found.labels.values()  # follows from m
+    assert "bodies.crank.points.X.y" in found.labels.values()
+
+
+@pytest.fixture(scope="module")
+def crank_rocker(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    mechanism, found = of("crank_rocker")
+    module = page_module(found.mechanism, found.labels)
+    written = [one.value for one in (*module.plan.parameters, *module.plan.law_constants)]
+
+    def bind(**changed: float) -> list[Any]:
+        by_place = {PIN: changed.get("pin"), ROD: changed.get("rod")}
+        return [by_place.get(name) or value for name, value in zip(module.parameters, written, strict=True)]
+
+    run = kinfmu.solve(mechanism, np.linspace(0.0, 2.0, 361))
+    sweep = sweep_call(module, driven_of(run))
+    calls = [["bind", bind(pin=3.0, rod=48.0)], sweep, ["points"], ["bind", bind(rod=120.0)], ["points"]]
+    (found_answers,) = answers(tmp_path_factory.mktemp("opened"), [(module, calls)])
+    return {"answers": found_answers, "run": run, "mechanism": mechanism, "module": module}
+
+
+@needs_node
+def test_binding_a_length_equals_the_file_with_that_length(crank_rocker: dict[str, Any]) -> None:
+    bind, sweep, points, *_ = crank_rocker["answers"]
+    changed = with_number(with_number(crank_rocker["mechanism"], PIN, 3.0), ROD, 48.0)
+    expected = kinfmu.solve(replace(changed, coordinates="moving"), np.linspace(0.0, 2.0, 361))
+    rows, outputs = rows_of(expected), crank_rocker["module"].plan.outputs  # crank.x and crank.y among them
+    found = table(sweep["values"], 3 * len(outputs))
+    columns = [outputs.index(name) for name in expected.outputs]
+    found = found[:, [order * len(outputs) + column for order in range(3) for column in columns]]
+    assert bind == {"ok": True, "message": ""}
+    assert set(sweep["status"]) == {Status.OK}
+    assert np.abs(found - rows).max() < CLOSE * np.abs(rows).max()
+    assert np.array_equal(table(points, 2), list(changed.body_points.values()))
+
+
+@needs_node
+def test_lengths_that_do_not_close_are_named_by_their_places(crank_rocker: dict[str, Any]) -> None:
+    *_, before, bind, after = crank_rocker["answers"]
+    assert bind["ok"] is False
+    assert bind["message"].startswith(
+        f"parameters {ROD} = 120: the mechanism does not close: rows Q.x, Q.y leave a gap"
+    )
+    assert after == before
