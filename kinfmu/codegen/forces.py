@@ -1,4 +1,4 @@
-"""Where the numbers of a force stage are in an FMU, for both languages: lists of the pose, the drivers and the host."""
+"""The force stages of an FMU, and where their numbers are: lists of the pose, the drivers and the host."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from kinfmu.plan import SolvePlan
 from kinfmu.plan.steps import derivative_name
 from kinfmu.plan.trace import parameter_symbol
 
+STAGES = ("forces", "reactions", "shaking")  # each is a part of the FMU's variables and a function of its own
 ARGUMENTS = ("time", "u", "ud", "udd", "z", "zd", "zdd", "slopes", "efforts", "parameters")
 
 

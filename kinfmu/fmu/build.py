@@ -43,8 +43,9 @@ def build(
             Default: native where a C compiler is found, else python.
         drive: Default of the parameter `driven_by_time`: 'time' (the laws in the file drive) or 'inputs'. Default:
             time, but inputs if a driver's law is external.
-        outputs: Coordinates such as 'coupler.x' and forces such as 'crank.torque' that the FMU has. Default: all, with
-            efforts, inertias and energies of mechanisms with masses or loads. What no output needs is not solved.
+        outputs: Coordinates such as 'coupler.x', forces such as 'crank.torque' and reactions such as 'pin.force_x' that
+            the FMU has. Default: all, with the forces of mechanisms with masses or loads, without reactions that
+            redundant joints leave undetermined. What no output needs is not solved.
         fmi: Version of FMI, 2 or 3. The python flavour is FMI 2.0 only.
         platforms: Platforms of the native flavour: 'host' (compiled by the system's compiler) or 'all' (by zig).
         progress: Called with (platforms done, number of platforms) during compilation.
@@ -64,14 +65,14 @@ def build(
     drive = default_drive(mechanism) if drive is None else drive
     flavour = default_flavour(fmi, platforms) if flavour is None else flavour
     _check(flavour, drive, fmi, platforms)
-    from kinfmu.fmu.force_variables import chosen_outputs
+    from kinfmu.fmu.force_variables import chosen_outputs, force_stages
     from kinfmu.plan import compile_plan
-    from kinfmu.plan.forces import force_steps, loaded_coordinates
+    from kinfmu.plan.forces import loaded_coordinates
 
     path = _file(path, mechanism.name)
     coordinates, names = chosen_outputs(mechanism, outputs)
     plan = compile_plan(mechanism, coordinates, solved=loaded_coordinates(mechanism) if names else ())
-    forces = force_steps(plan, names, given_coefficients=True) if names else None
+    forces = force_stages(plan, names, are_default=outputs is None) if names else {}
     if flavour == "python":
         from kinfmu.fmu import python_flavour
 

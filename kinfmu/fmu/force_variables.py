@@ -1,16 +1,18 @@
-"""The variables of forces: efforts, inertias and energies, and inputs for external loads, with their dependencies."""
+"""The variables of forces: efforts, energies and reactions, and inputs for external loads, with their dependencies."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+from kinfmu.codegen.forces import STAGES
 from kinfmu.equations.graph import Node, symbols
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.fmu.interface import Variable
 from kinfmu.mechanism import Mechanism
 from kinfmu.plan import SolvePlan
-from kinfmu.plan.forces import ForceSteps, force_names
-from kinfmu.plan.reactions import reaction_names_of
+from kinfmu.plan.forces import ForceSteps, force_names, force_steps
+from kinfmu.plan.reactions import reaction_names_of, reaction_steps, undetermined_reactions
+from kinfmu.plan.shaking import shaking_steps
 from kinfmu.plan.steps import Assignment, derivative_name
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.units import ForceName, InputName, Quantity, unit_of
@@ -24,6 +26,15 @@ _WORDS = {
     "reduced_inertia": "Change of its effort with its acceleration",
     "kinetic_energy": "Kinetic energy of all bodies",
     "potential_energy": "Potential energy of gravity and of loads that store energy",
+    "shaking_force_x": "Force on the ground, along x",
+    "shaking_force_y": "Force on the ground, along y",
+    "shaking_moment": "Moment on the ground about its origin",
+}
+_ROWS = {
+    "force": "force along the direction that it holds",
+    "force_x": "force along x",
+    "force_y": "force along y",
+    "moment": "moment",
 }
 
 
@@ -33,30 +44,44 @@ def chosen_outputs(
     """Return the coordinates (None: all) and the forces among the outputs requested; default: all of both.
 
     Raises:
-        RequestError: The outputs are reactions, or forces alone.
+        RequestError: A name is like that of a force, and no output.
 
     """
-    known = force_names(mechanism)
+    known = (*force_names(mechanism), *reaction_names_of(mechanism))
     if outputs is None or isinstance(outputs, str) or not known:
         return outputs, known if outputs is None else ()  # type: ignore[return-value]  # a text is refused later
-    reactions = reaction_names_of(mechanism)
-    for name in outputs:
-        if name in reactions:
-            raise RequestError(
-                f"outputs: '{name}' is a reaction, and FMUs have no reactions yet: read them of a run; "
-                f"forces of an FMU: {listed(known)}"
-            )
     coordinates = [name for name in outputs if name not in known]
-    if not coordinates:
-        raise RequestError(
-            f"outputs: {listed(outputs)}: name a coordinate, too, such as '{mechanism.coordinate_names[0]}'"
-        )
     all_names = [*mechanism.coordinate_names, *known]
     for name in coordinates:
         near = suggestion(name, all_names)
         if name not in all_names and any(f"'{force}'" in near for force in known):
             raise RequestError(f"outputs: '{name}' is not one{near}; forces: {listed(known)}")
     return coordinates, tuple(name for name in known if name in outputs)
+
+
+def force_stages(plan: SolvePlan, names: Sequence[str], *, are_default: bool) -> dict[str, ForceSteps]:
+    """Return the steps to the forces of an FMU, by the parts of its variables; none for parts without any.
+
+    Args:
+        plan: The plan.
+        names: Of forces and reactions.
+        are_default: They were not requested: those that redundant rows leave undetermined are left out.
+
+    Raises:
+        RequestError: A reaction that was requested is undetermined.
+
+    """
+    undetermined = undetermined_reactions(plan)
+    for name in () if are_default else names:
+        if name in undetermined:
+            shared = listed(undetermined[name])  # type: ignore[index]
+            raise RequestError(f"outputs: '{name}' is undetermined: rows {shared} share its load in an unknown way")
+    found = {
+        "forces": force_steps(plan, names, given_coefficients=True),
+        "reactions": reaction_steps(plan, [name for name in names if name not in undetermined]),
+        "shaking": shaking_steps(plan, names),
+    }
+    return {stage: found[stage] for stage in STAGES if found[stage].names}
 
 
 def load_variables(mechanism: Mechanism) -> Iterator[Variable]:
@@ -73,6 +98,14 @@ def load_variables(mechanism: Mechanism) -> Iterator[Variable]:
                 unit=unit_of(Quantity(effort), mechanism.length_unit),
                 start=0.0,
             )
+
+
+def force_parts(plan: SolvePlan, stages: Mapping[str, ForceSteps]) -> dict[str, Iterable[Variable]]:
+    """Return the parts of the variables of forces, by name: loads, then one for each stage; none without stages."""
+    if not stages:
+        return {}
+    loads = {"loads": load_variables(plan.mechanism)}
+    return loads | {name: force_variables(plan, stages[name]) if name in stages else () for name in STAGES}
 
 
 def force_variables(plan: SolvePlan, steps: ForceSteps) -> Iterator[Variable]:
@@ -96,7 +129,7 @@ def force_variables(plan: SolvePlan, steps: ForceSteps) -> Iterator[Variable]:
             "Real",
             "output",
             "continuous",
-            _description(name),
+            _description(plan, name),
             initial="calculated",
             unit=unit_of(name.quantity, plan.mechanism.length_unit),
             dependencies=inputs,
@@ -110,9 +143,11 @@ def force_variables(plan: SolvePlan, steps: ForceSteps) -> Iterator[Variable]:
         )
 
 
-def _description(name: ForceName) -> str:
+def _description(plan: SolvePlan, name: ForceName) -> str:
     if not name.owner:
         return _WORDS[name.noun]
+    if name in reaction_names_of(plan.mechanism):
+        return f"Joint {name.owner}: {_ROWS.get(name.noun, name.noun)} of its first body on its second"
     noun, _, other = name.noun.partition(".")
     if other:
         return f"Driver {name.owner}: change of its effort with the acceleration of driver {other}"
@@ -145,6 +180,11 @@ def _behind_symbols(plan: SolvePlan, steps: ForceSteps) -> dict[str, frozenset[s
     for step in steps.steps:
         if isinstance(step, Assignment):
             behind[step.name] = _of_node(step.node, behind)
+            continue
+        matrix = frozenset().union(*(_of_node(node, behind) for row in step.jacobian for node in row))
+        for column, solved in zip(step.columns, step.names, strict=True):
+            found = matrix.union(*(_of_node(node, behind) for node in column))
+            behind |= dict.fromkeys(solved, found)
     return behind
 
 

@@ -17,13 +17,14 @@ from kinfmu.fmu.layout import NOT_A_NUMBER, Numbers
 from kinfmu.fmu.slave import MechanismSlave
 from kinfmu.fmu.slave_outputs import Shown
 from kinfmu.solver.python.pose import tangent_of
+from kinfmu.solver.python.status import Status
 from kinfmu.solver.python.tracks import rates_in_time
 
 
 class LoadedSlave(MechanismSlave):
-    """A mechanism with forces as an FMI 2.0 co-simulation slave; a subclass defines `forces`, the emitted stage."""
+    """A mechanism with forces as an FMI 2.0 co-simulation slave; a subclass defines `stages`, emitted, by part."""
 
-    forces: ClassVar[Callable[..., Numbers]]
+    stages: ClassVar[dict[str, Callable[..., Numbers]]]
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
@@ -31,7 +32,8 @@ class LoadedSlave(MechanismSlave):
         self._loads: Numbers = parts["loads"].starts  # efforts of external loads
         self._committed_loads = self._loads
         self._forces_of: Shown | None = None  # the sample of `_forces`
-        self._forces: Numbers = (NOT_A_NUMBER,) * len(parts["forces"].variables)
+        self._forces: dict[str, Numbers] = {}  # by part, as far as they were read
+        self._unknown = {stage: (NOT_A_NUMBER,) * len(parts[stage].variables) for stage in self.stages}
 
     def _set_other_real(self, vr: int, value: float) -> None:
         part, place = self._references.real(vr)
@@ -58,17 +60,29 @@ class LoadedSlave(MechanismSlave):
         return self._loads
 
     def _read_forces(self) -> Numbers:
+        return self._read_stage("forces")
+
+    def _read_reactions(self) -> Numbers:
+        return self._read_stage("reactions")
+
+    def _read_shaking(self) -> Numbers:
+        return self._read_stage("shaking")
+
+    def _read_stage(self, stage: str) -> Numbers:
         shown = self._look()
         if self._forces_of is not shown:
+            self._forces_of, self._forces = shown, {}
+        if stage not in self._forces:
             try:
-                self._forces = self._forces_at(shown)
+                self._forces[stage] = self._forces_at(shown, stage)
             except (ArithmeticError, ValueError) as error:  # a load without a value, such as a spring of length 0
                 self.log(f"forces have no value: {error}", Fmi2Status.warning)
-                self._forces = (NOT_A_NUMBER,) * len(self._forces)
-            self._forces_of = shown
-        return self._forces
+                self._forces[stage] = self._unknown[stage]
+        return self._forces[stage]
 
-    def _forces_at(self, shown: Shown) -> Numbers:
+    def _forces_at(self, shown: Shown, stage: str) -> Numbers:
+        if stage == "reactions" and shown.pose.status >= Status.BRIDGED:  # the blocks do not give them there
+            return self._unknown[stage]
         model, pose = self._solver.model, shown.pose
         u, ud, udd = self._drive(shown)
         if len(u) == 1:
@@ -85,7 +99,7 @@ class LoadedSlave(MechanismSlave):
         if not self._driven_by_time and self._history and (shown.stale or not self._touched):
             time = self._history[-1][0]  # of the sample that is shown
         loads = self._committed_loads if shown.stale else self._loads
-        return self.forces(time, u, ud, udd, pose.z, zd, zdd, slopes, loads, self._parameters)
+        return self.stages[stage](time, u, ud, udd, pose.z, zd, zdd, slopes, loads, self._parameters)
 
     def _get_fmu_state(self) -> dict[str, Any]:
         return super()._get_fmu_state() | {

@@ -22,9 +22,11 @@ import sys
 from collections.abc import Mapping
 from importlib.metadata import distribution
 from importlib.resources import files
+from types import MappingProxyType
 
+from kinfmu.codegen.forces import STAGES
 from kinfmu.codegen.python import emit
-from kinfmu.codegen.python.forces import emit_forces
+from kinfmu.codegen.python.forces import emit_forces, solves
 from kinfmu.errors import FmuError
 from kinfmu.fmu import description, documentation
 from kinfmu.fmu.archive import digest, token, zipped
@@ -62,7 +64,7 @@ _LOADED_IMPORTS = """\
 from {package}.fmu.layout import Layout, PartLayout
 from {package}.fmu.loaded_slave import LoadedSlave
 from {package}.fmu.slave import hold
-from {package}.solver import forces, model
+from {package}.solver import {modules}
 """
 _IMPORTS = """\
 from {package}.fmu.layout import Layout, PartLayout
@@ -89,14 +91,16 @@ class Slave({base}):
 '''
 
 
-def archive(plan: SolvePlan, drive: Drive, version: str, forces: ForceSteps | None = None) -> bytes:
+def archive(
+    plan: SolvePlan, drive: Drive, version: str, forces: Mapping[str, ForceSteps] = MappingProxyType({})
+) -> bytes:
     """Return the FMU of a plan; the same plan gives the same bytes.
 
     Args:
         plan: Plan of the mechanism.
         drive: Default of the parameter `driven_by_time`: 'time' (true) or 'inputs' (false).
         version: Version of kinfmu.
-        forces: Steps to the forces that are outputs. Default: none.
+        forces: Stages of the forces that are outputs, by part. Default: none.
 
     Returns:
         Bytes of the zip archive.
@@ -107,8 +111,12 @@ def archive(plan: SolvePlan, drive: Drive, version: str, forces: ForceSteps | No
     """
     variables = interface(plan, drive, forces=forces)
     contents = _contents(plan, variables, version)
-    if forces is not None:
-        contents["kinfmu/solver/forces.py"] = emit_forces(plan, forces).encode()
+    if forces:
+        contents |= {f"kinfmu/solver/{stage}.py": emit_forces(plan, steps).encode() for stage, steps in forces.items()}
+        if any(map(solves, forces.values())):
+            contents["kinfmu/solver/solutions.py"] = (
+                files("kinfmu.codegen.python").joinpath("solutions.py").read_bytes()
+            )
         contents["kinfmu/fmu/loaded_slave.py"] = files("kinfmu.fmu").joinpath("loaded_slave.py").read_bytes()
         contents = dict(sorted(contents.items()))
     return zipped(_named(contents, variables, version, digest(contents)))
@@ -175,12 +183,14 @@ def _entry(variables: Interface, token: str, package: str = "kinfmu") -> str:
     for part in variables.parts:
         starts = tuple(variable.start for variable in part.variables) if part.name in PARTS_WITH_START else ()
         parts.append(f"            PartLayout({part.name!r}, {part.names!r}, {starts!r}),")
-    has_forces = bool(variables.part("forces"))
+    stages = [stage for stage in STAGES if variables.part(stage)]
     return _ENTRY.format(
         name=variables.name,
-        imports=(_LOADED_IMPORTS if has_forces else _IMPORTS).format(package=package),
-        base="LoadedSlave" if has_forces else "MechanismSlave",
-        forces="    forces = staticmethod(forces.forces)\n" if has_forces else "",
+        imports=(_LOADED_IMPORTS if stages else _IMPORTS).format(
+            package=package, modules=", ".join(sorted([*stages, "model"]))
+        ),
+        base="LoadedSlave" if stages else "MechanismSlave",
+        forces=f"    stages = {{{', '.join(f'{one!r}: {one}.forces' for one in stages)}}}\n" if stages else "",
         title=repr(variables.title or variables.name)[1:-1].replace('"', "'"),
         token=token,
         start=float(variables.experiment.start),

@@ -15,6 +15,7 @@ from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.fmu.slaves import LoadedSlave
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.force_names import force_names, reaction_names_of
 from kinfmu.run import Event, Run
 from kinfmu.run.channels import absent_columns
 from kinfmu.run.run import Sink
@@ -27,18 +28,15 @@ PERIOD = 0.5  # [s] of wall-clock time
 LAST_GOOD = int(Status.BRIDGED)  # compared in every sample, where an int is faster
 DISCARD, ERROR = 2, 3  # of FMI's statuses
 _LEVELS = ("info", "warning", "error", "error", "error", "info")  # of FMI's OK, Warning, Discard, Error, Fatal, Pending
-_REALS = ("values", "rates", "accelerations", "driven", "residual", "watch", "forces", "margin", "errors")
+_FORCES = ("forces", "reactions", "shaking")
+_REALS = ("values", "rates", "accelerations", "driven", "residual", "watch", *_FORCES, "margin", "errors")
 _ESTIMATES = 2  # number of parts at the end that follow from the others
 
 
-def _force_names(interface: Interface, mechanism: Mechanism) -> tuple[ForceName, ...]:
-    """Return the names of the forces that an FMU has."""
-    if not interface.part("forces"):
-        return ()
-    from kinfmu.plan.forces import force_names  # not at the top: planning imports scipy
-
-    names = {str(name): name for name in force_names(mechanism)}
-    return tuple(names[variable.name] for variable in interface.part("forces"))
+def _force_names(interface: Interface, mechanism: Mechanism, parts: Sequence[str]) -> tuple[ForceName, ...]:
+    """Return the names of the forces in some parts of an FMU."""
+    names = {str(name): name for name in (*force_names(mechanism), *reaction_names_of(mechanism))}
+    return tuple(names[variable.name] for part in parts for variable in interface.part(part))
 
 
 class Samples:
@@ -63,7 +61,8 @@ class Samples:
         self._columns: tuple[Any, Any, Any] = self._t.data, self._status.data, self._iterations.data
         self._size = 0
         self._names = [variable.name for part in _REALS for variable in interface.part(part)]
-        self._force_names = _force_names(interface, mechanism)
+        self._force_names = _force_names(interface, mechanism, _FORCES[:1])
+        self._reaction_names = _force_names(interface, mechanism, _FORCES[1:])
         self._absent: frozenset[str] = frozenset()
         self._asked: list[int] | None = None  # columns that are read; None: all
         self._mechanism, self._model_description = mechanism, model_description
@@ -245,6 +244,8 @@ class Samples:
             watch=part["watch"],
             force_names=self._force_names,
             forces=part["forces"] if self._force_names else None,
+            reaction_names=self._reaction_names,
+            reactions=np.hstack([part["reactions"], part["shaking"]]) if self._reaction_names else None,
             length_unit=interface.length_unit,
             mechanism_source=self._mechanism,
             model_description=self._model_description,

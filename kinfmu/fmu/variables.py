@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Literal, NamedTuple
 
 from kinfmu.equations.graph import Node, reachable
 from kinfmu.fmu.estimated_rates import Rates
-from kinfmu.fmu.force_variables import force_variables, load_variables
+from kinfmu.fmu.force_variables import force_parts
 from kinfmu.fmu.interface import RATES_TYPE, STATUS_TYPE, Drive, Interface, InterfacePart, Variable
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.plan import SolvePlan
@@ -74,7 +75,11 @@ _TIME = Variable("time", "Real", "independent", "continuous", "Time", unit="s")
 
 
 def interface(
-    plan: SolvePlan, drive: Drive = "time", *, has_time: bool = False, forces: ForceSteps | None = None
+    plan: SolvePlan,
+    drive: Drive = "time",
+    *,
+    has_time: bool = False,
+    forces: Mapping[str, ForceSteps] = MappingProxyType({}),
 ) -> Interface:
     """Return the variables of the FMU of a plan.
 
@@ -83,7 +88,7 @@ def interface(
         drive: Default of the parameter `driven_by_time`: 'time' (true) or 'inputs' (false).
         has_time: True for FMI 3.0: time is the last variable, and what the drivers move depends on it and on tunable
             parameters, which FMI 3.0 counts as known after initialization.
-        forces: Efforts, inertias and energies that are outputs. Default: none.
+        forces: Stages of the forces that are outputs, by part. Default: none.
 
     Returns:
         The variables, part by part.
@@ -113,7 +118,7 @@ def interface(
         "parameters": _parameters(plan),
         "tolerance": [_TOLERANCE],
         "fixed": _fixed(plan),
-        **({} if forces is None else {"loads": load_variables(mechanism), "forces": force_variables(plan, forces)}),
+        **force_parts(plan, forces),
         "counts": [
             _solver_output(
                 plan, "solver.status", _STATUS_TEXT, kind="Enumeration", minimum=min(Status), maximum=max(Status)

@@ -14,7 +14,7 @@ of length is. Haug (1989), chapters 6 and 7.
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import NamedTuple
@@ -50,6 +50,15 @@ class ForceSteps:
     results: list[Node]
 
 
+def chosen_steps(
+    names: Sequence[ForceName], nodes: Sequence[Node], steps: Sequence[Step], wanted: Container[str] | None
+) -> ForceSteps:
+    """Return the steps to those of some forces that are wanted; None: to all."""
+    pairs = [(name, node) for name, node in zip(names, nodes, strict=True) if wanted is None or name in wanted]
+    results = [node for _, node in pairs]
+    return ForceSteps(needed_steps(results, steps), tuple(name for name, _ in pairs), results)
+
+
 def loaded_coordinates(mechanism: Mechanism) -> list[str]:
     """Return the coordinates of the bodies that have masses or on which loads act."""
     loaded = {body.name for body in mechanism.moving_bodies if body.has_mass}
@@ -68,10 +77,8 @@ def force_steps(plan: SolvePlan, wanted: Sequence[str], *, given_coefficients: b
 
     """
     mechanics = Mechanics(plan, given_coefficients=given_coefficients)
-    names = tuple(name for name in force_names(plan.mechanism) if name in wanted)
-    found = _forces(plan, mechanics)
-    results = [found[name] for name in names]
-    return ForceSteps(needed_steps(results, mechanics.steps), names, results)
+    names, found = force_names(plan.mechanism), _forces(plan, mechanics)
+    return chosen_steps(names, [found[name] for name in names], mechanics.steps, wanted)
 
 
 class _Inertia(NamedTuple):

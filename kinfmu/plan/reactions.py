@@ -9,16 +9,18 @@ or moment that its first body exerts on its second. Haug (1989), Lagrange multip
 
 from __future__ import annotations
 
+from collections.abc import Container
+
 from kinfmu.equations.graph import Node
 from kinfmu.equations.system import System
 from kinfmu.mechanism.force_names import names_of_rows, reaction_names_of
 from kinfmu.plan.block import Block
-from kinfmu.plan.forces import ForceSteps
+from kinfmu.plan.forces import ForceSteps, chosen_steps
 from kinfmu.plan.mechanics import Mechanics
 from kinfmu.plan.origin import localized
 from kinfmu.plan.plan import SolvePlan
 from kinfmu.plan.shaking import shaking_nodes
-from kinfmu.plan.steps import Assignment, needed_steps
+from kinfmu.plan.steps import Assignment
 from kinfmu.plan.structure import RowTracer
 from kinfmu.units import CoordinateName, ForceName
 
@@ -53,13 +55,14 @@ def row_names(plan: SolvePlan) -> list[str]:
     return [f"{joint.name}.{label}" for joint in plan.mechanism.joints for label in joint.labels]
 
 
-def reaction_steps(plan: SolvePlan) -> ForceSteps:
+def reaction_steps(plan: SolvePlan, wanted: Container[str] | None = None) -> ForceSteps:
     """Return the steps to the reactions of all joints and on the ground, in the order of `reaction_names`.
 
     Where redundant rows share a load, the steps give one of the possible distributions.
 
     Args:
         plan: The plan, as `Mechanics` takes it.
+        wanted: Names of those of joints that are wanted, without those on the ground. Default: all.
 
     """
     mechanics = Mechanics(plan)
@@ -70,8 +73,10 @@ def reaction_steps(plan: SolvePlan) -> ForceSteps:
         for kind, scale in zip(joint.kinds(), joint.scales(), strict=True):
             effort = -(multipliers.get(len(results), zero) * scale)
             results.append(effort / mechanics.metre if kind == "length" else effort)
-    results += shaking_nodes(plan, mechanics)
-    return ForceSteps(needed_steps(results, mechanics.steps), reaction_names(plan), results)
+    names = reaction_names(plan)
+    if wanted is None:
+        results += shaking_nodes(plan, mechanics)
+    return chosen_steps(names[: len(results)], results, mechanics.steps, wanted)
 
 
 class _Multipliers:

@@ -9,25 +9,26 @@ Berkof and Lowen (1969) define both by the inertia forces alone; here with weigh
 
 from __future__ import annotations
 
+from collections.abc import Container
+
 from kinfmu.equations.graph import Node
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.force_names import shaking_names
-from kinfmu.plan.forces import ForceSteps
+from kinfmu.plan.forces import ForceSteps, chosen_steps
 from kinfmu.plan.mechanics import Mechanics
 from kinfmu.plan.plan import SolvePlan
-from kinfmu.plan.steps import needed_steps
 
 
-def shaking_steps(plan: SolvePlan) -> ForceSteps:
+def shaking_steps(plan: SolvePlan, wanted: Container[str] | None = None) -> ForceSteps:
     """Return the steps to shaking force and moment alone; they solve nothing.
 
     Args:
         plan: The plan, as `Mechanics` takes it.
+        wanted: Names of those that are wanted. Default: all.
 
     """
     mechanics = Mechanics(plan, given_coefficients=True)
-    results = shaking_nodes(plan, mechanics)
-    return ForceSteps(needed_steps(results, mechanics.steps), shaking_names(plan.mechanism), results)
+    return chosen_steps(shaking_names(plan.mechanism), shaking_nodes(plan, mechanics), mechanics.steps, wanted)
 
 
 def shaking_nodes(plan: SolvePlan, mechanics: Mechanics) -> list[Node]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -13,12 +14,15 @@ import pytest
 
 import kinfmu
 from kinfmu import Mechanism
+from kinfmu.codegen.forces import STAGES
 from kinfmu.errors import RequestError
 from kinfmu.fmu.description import read
+from kinfmu.fmu.interface import Variable
 from kinfmu.fmu.unpacked import text_in, unpacked
 from kinfmu.mechanism import toml_file
 from tests.fmu.host import DISCARD, OK, Host, answer
 from tests.sweep.test_forces import loaded
+from tests.sweep.test_redundant_reactions import LOCOMOTIVE, coupled
 
 FLAVOURS = [("python", 2), ("native", 2), ("native", 3)]
 of_each_flavour = pytest.mark.parametrize(("flavour", "fmi"), FLAVOURS)
@@ -123,7 +127,17 @@ def start(fmu_of: Callable[..., Path], tmp_path: Path) -> Iterator[Callable[...,
         host.free()
 
 
+def force_outputs(host: Host) -> tuple[Variable, ...]:
+    """All outputs that are forces: efforts and energies, reactions, shaking force and moment."""
+    return tuple(variable for stage in STAGES for variable in host.about.interface.part(stage))
+
+
 def assert_forces_equal(run: kinfmu.Run, reference: kinfmu.Run) -> None:
+    determined = [name for name in reference.reaction_names if not np.isnan(reference[name]).all()]
+    assert list(run.reaction_names) == determined
+    for name in determined:
+        largest = np.nanmax(np.abs(reference[name]))
+        np.testing.assert_allclose(run[name], reference[name], rtol=0, atol=1e-12 * (1.0 + largest))
     assert run.force_names == reference.force_names
     assert run.force_names
     assert np.isfinite(reference.forces).all(axis=1).tolist() == run.good.tolist()
@@ -160,8 +174,9 @@ def test_external_loads_laws_over_time_and_masses_equal_those_of_a_run(
 def test_declared_dependencies_are_those_that_count(start: Callable[..., Host], flavour: str, fmi: int) -> None:
     host = start(flavour, fmi)
     at = {"crank_angle": 0.7, "crank_speed": 3.0, "crank_acceleration": 20.0, "work_force": -150.0}
-    forces = host.about.interface.part("forces")
+    forces = force_outputs(host)
     names = [variable.name for variable in forces]
+    assert {"crank.torque", "guide.moment", "shaking_moment"} <= set(names)
     host.set(at)
     before = np.array(host.get(*names))
     for changed, value in at.items():
@@ -174,6 +189,7 @@ def test_declared_dependencies_are_those_that_count(start: Callable[..., Host], 
     assert units["crank.torque"] == units["crank.bias_torque"] == "N m"
     assert units["crank.reduced_inertia"] == "kg m2"
     assert (units["crank.power"], units["kinetic_energy"]) == ("W", "J")
+    assert (units["O.force_x"], units["guide.moment"], units["shaking_moment"]) == ("N", "N m", "N m")
 
 
 @of_each_flavour
@@ -250,33 +266,66 @@ def test_a_native_fmu_discards_forces_of_an_unreachable_sample(fmu_of: Callable[
 
 
 @pytest.mark.parametrize(
-    ("outputs", "forces"),
-    [(["ram.x"], []), (["ram.x", "crank.torque"], ["crank.torque"])],
-)
-def test_outputs_choose_forces(outputs: Sequence[str], forces: Sequence[str], tmp_path: Path) -> None:
-    path = kinfmu.build(press(), tmp_path, flavour="python", outputs=outputs)
-    with unpacked(path) as folder:
-        interface = read(text_in(path, folder, "modelDescription.xml").encode(), str(path)).interface
-        assert any(folder.glob("resources/*/solver/forces.py")) == bool(forces)
-    assert [variable.name for variable in interface.part("values")] == ["ram.x"]
-    assert [variable.name for variable in interface.part("forces")] == list(forces)
-    run = kinfmu.simulate(path)
-    reference = kinfmu.solve(press(), run.t)
-    for name in forces:
-        np.testing.assert_allclose(run[name], reference[name], atol=1e-11)
-
-
-@pytest.mark.parametrize(
-    ("outputs", "message"),
+    ("flavour", "outputs", "stages"),
     [
-        (["crank.torque"], "outputs: crank.torque: name a coordinate, too, such as 'crank.x'"),
-        (["ram.x", "guide.moment"], "outputs: 'guide.moment' is a reaction, and FMUs have no reactions yet"),
-        (["ram.x", "crank.torqe"], "outputs: 'crank.torqe' is not one; did you mean 'crank.torque'?"),
+        ("python", ["ram.x"], []),
+        ("python", ["ram.x", "crank.torque"], ["forces"]),
+        ("python", ["crank.torque"], ["forces"]),
+        ("native", ["guide.moment", "shaking_moment"], ["reactions", "shaking"]),
     ],
 )
-def test_outputs_that_an_fmu_cannot_have(outputs: Sequence[str], message: str, tmp_path: Path) -> None:
+def test_outputs_choose_forces(flavour: str, outputs: Sequence[str], stages: Sequence[str], tmp_path: Path) -> None:
+    """What no output asks for is not generated."""
+    path = kinfmu.build(press(), tmp_path, flavour=flavour, outputs=outputs)
+    with unpacked(path) as folder:
+        interface = read(text_in(path, folder, "modelDescription.xml").encode(), str(path)).interface
+        places = ("resources/*/solver/*.py", "sources/*.c")
+        generated = {file.stem for place in places for file in folder.glob(place)}
+    assert generated & set(STAGES) == set(stages)
+    coordinates = [name for name in outputs if name == "ram.x"]
+    assert [variable.name for variable in interface.part("values")] == coordinates
+    found = [variable.name for stage in STAGES for variable in interface.part(stage)]
+    assert found == [name for name in outputs if name not in coordinates]
+    run = kinfmu.simulate(path)
+    reference = kinfmu.solve(press(), run.t)
+    for name in outputs:
+        np.testing.assert_allclose(run[name], reference[name], rtol=0, atol=1e-11)
+
+
+def test_outputs_that_an_fmu_cannot_have(tmp_path: Path) -> None:
+    message = "outputs: 'crank.torqe' is not one; did you mean 'crank.torque'?"
     with pytest.raises(RequestError, match=re.escape(message)):
-        kinfmu.build(press(), tmp_path, flavour="python", outputs=outputs)
+        kinfmu.build(press(), tmp_path, flavour="python", outputs=["ram.x", "crank.torqe"])
+    message = "outputs: 'AB.force' is undetermined: rows AB.length, "
+    with pytest.raises(RequestError, match=re.escape(message)):
+        kinfmu.build(loaded("fourbar"), tmp_path, flavour="python", outputs=["AB.force"])
+
+
+@pytest.mark.parametrize(("flavour", "fmi"), FLAVOURS[:2])
+def test_determined_reactions_of_redundant_rows_and_nan_on_a_bridge(flavour: str, fmi: int, tmp_path: Path) -> None:
+    """Wheels whose rods are solved by least squares, and a parallelogram at its change point."""
+    wheels = coupled(LOCOMOTIVE)
+    path = kinfmu.build(wheels, tmp_path / "wheels.fmu", flavour=flavour, fmi=fmi, drive="inputs")
+    t = np.linspace(0.0, 1.0, 9)
+    given = {"crank_angle": 5.0 * t, "crank_speed": 5.0 + 0.0 * t, "crank_acceleration": 0.0 * t}
+    run = kinfmu.simulate(path, inputs={"time": t, **given}, step=t[1], parameters={"rates": 2})
+    assert_forces_equal(run, kinfmu.solve(wheels, **given))
+    assert set(run.reaction_names) < set(kinfmu.solve(wheels, **given).reaction_names)
+
+    parallelogram = loaded("fourbar")
+    bare = replace(parallelogram, joints=tuple(joint for joint in parallelogram.joints if joint.name != "AB"))
+    host = Host(kinfmu.build(bare, tmp_path / "bare.fmu", flavour=flavour, fmi=fmi, drive="inputs"), tmp_path / "bare")
+    host.set({"rates": 2, "crank_angle": 3.0, "crank_speed": 1.0})
+    host.initialize(0.0)
+    host.set({"crank_angle": math.pi})
+    names = ("crank.torque", "shaking_force_y", "O.force_x")
+    torque, shaking, reaction = host.get(*names)
+    assert host.status() == 2
+    reference = kinfmu.solve(bare, crank_angle=[3.0, math.pi], crank_acceleration=0.0)
+    assert [torque, shaking] == pytest.approx([reference[name][1] for name in names[:2]], rel=1e-9)
+    assert math.isnan(reaction)
+    assert np.isnan(reference["O.force_x"][1])
+    host.free()
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
@@ -288,7 +337,7 @@ def test_directional_derivatives_of_forces_are_exact(start: Callable[..., Host],
     (inertia,) = host.get("crank.reduced_inertia")
     assert host.slopes(["crank.torque"], ["crank_acceleration"], [1.0])[0] == pytest.approx(inertia, rel=1e-13)
     assert host.slopes(["crank.bias_torque"], ["crank_acceleration"], [1.0])[0] == pytest.approx(0.0, abs=1e-12)
-    names = [variable.name for variable in host.about.interface.part("forces")]
+    names = [variable.name for variable in force_outputs(host)]
     for known, value in at.items():
         slopes = np.array(host.slopes(names, [known], [1.0]))
         h = 1e-3 * max(1.0, abs(value))
@@ -317,12 +366,12 @@ def test_model_exchange_has_the_forces_of_a_run(fmu_of: Callable[..., Path], fmi
     host.set({"work_force": -150.0})
     host.initialize(0.0)
     host.fmu.enterContinuousTimeMode()
-    names = [variable.name for variable in host.about.interface.part("forces")]
+    names = [variable.name for variable in force_outputs(host)]
     t = np.linspace(0.0, 1.0, 21)
     reference = kinfmu.solve(press(), t, work_force=-150.0)
     for k, time in enumerate(t):
         host.fmu.setTime(time)
-        np.testing.assert_allclose(host.get(*names), reference.forces[k], rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(host.get(*names), [reference[name][k] for name in names], rtol=1e-12, atol=1e-11)
     host.free()
 
 

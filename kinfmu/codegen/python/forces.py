@@ -1,6 +1,6 @@
-"""The force stage of an FMU as Python source: a module of the standard library, beside the model of a Solver.
+"""A force stage of an FMU as Python source: a module of the standard library, beside the model of a Solver.
 
-It holds one function, which gives efforts, inertias and energies of one sample:
+It holds one function, which gives efforts, inertias and energies of one sample, or reactions:
 
     forces(time, u, ud, udd, z, zd, zdd, slopes, efforts, parameters)
 
@@ -9,18 +9,22 @@ z are the unknowns of all blocks, zd and zdd their derivatives in time; slopes a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 from kinfmu.codegen.forces import ARGUMENTS, places_of_symbols
-from kinfmu.codegen.python.block_code import indented, tupled
+from kinfmu.codegen.python.block_code import indented, matrix, tupled
 from kinfmu.codegen.python.stage import given_symbols, stage_curves, stage_lines
 from kinfmu.codegen.writer import identifier
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import ForceSteps
+from kinfmu.plan.steps import LinearSolve
 
 
 def emit_forces(plan: SolvePlan, steps: ForceSteps) -> str:
-    """Return the source text; steps: of coefficients that are given, so that there is nothing to solve."""
+    """Return the source text; linear systems of three and more unknowns are left to the module `solutions`."""
     places, given, curves = places_of_symbols(plan), given_symbols(steps), stage_curves(steps)
-    lines, found = stage_lines(steps, given, curves, _no_solve)
+    lines, found = stage_lines(steps, given, curves, _solve)
     values = iter(found)
     results = ["0.0" if node.constant == 0.0 else next(values) for node in steps.results]
     return "\n".join(
@@ -29,6 +33,7 @@ def emit_forces(plan: SolvePlan, steps: ForceSteps) -> str:
             "",
             "from math import atan2, cos, floor, sin, sqrt",
             *(["", "from .curve import curve"] if curves else []),
+            *(["", "from .solutions import solutions"] if solves(steps) else []),
             "",
             f"FORCES = {tuple(map(str, steps.names))!r}",
             *(f"{name} = {data!r}" for data, name in curves.items()),
@@ -44,5 +49,10 @@ def emit_forces(plan: SolvePlan, steps: ForceSteps) -> str:
     )
 
 
-def _no_solve(*_: object) -> list[str]:
-    raise AssertionError("a force stage with given coefficients solves nothing")
+def solves(steps: ForceSteps) -> bool:
+    """Return True for a stage with linear systems of three and more unknowns."""
+    return any(isinstance(step, LinearSolve) for step in steps.steps)
+
+
+def _solve(rows: Sequence[Sequence[Any]], columns: Sequence[Sequence[Any]], names: Sequence[str]) -> list[str]:
+    return [f"{tupled(names)} = solutions({matrix(rows)}, {matrix(columns)})"]

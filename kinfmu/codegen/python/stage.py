@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 
 from kinfmu.codegen.python.block_code import indented, matrix, tupled, unpacking
+from kinfmu.codegen.python.solutions import solutions
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node, reachable, symbols
 from kinfmu.measures.arithmetic import floor
 from kinfmu.plan.steps import Assignment, Stage, Step
 from kinfmu.solver.python.curve import CurveData
 from kinfmu.solver.python.curve import curve as curve_value
-from kinfmu.solver.python.linear import factor, least_norm, lu_solve, qr_factor, qr_solve
 
 FEW = 16  # samples up to which numbers are faster than arrays: numpy takes a microsecond for each operation
 FEW_WITH_SOLVES = 2  # likewise where blocks of three unknowns are solved by loops in Python
@@ -158,24 +158,8 @@ def _used_again(nodes: list[Node], roots: list[Node]) -> set[Node]:
     return {node for node, count in uses.items() if count > 1 and node.args}
 
 
-def _solutions_of_numbers(rows: Entries, columns: Entries) -> list[float]:
-    """Return the entries of the solutions x of J x = -b, column after column.
-
-    Least squares for more rows than unknowns, the shortest x for less. rows: of J; columns: the columns b.
-    """
-    matrix_rows, right = [list(row) for row in rows], [[-b for b in column] for column in columns]
-    if len(rows) < len(rows[0]):
-        orthogonal = qr_factor([list(column) for column in zip(*rows, strict=True)])
-        return [entry for column in right for entry in least_norm(orthogonal, column)]
-    if len(rows) > len(rows[0]):
-        orthogonal = qr_factor(matrix_rows)
-        return [entry for column in right for entry in qr_solve(orthogonal, column)]
-    factors = factor(matrix_rows)
-    return [entry for column in right for entry in lu_solve(factors, column)]
-
-
 def _solutions_of_arrays(rows: Entries, columns: Entries) -> list[Any]:
-    """Return the same for entries that are numbers or arrays (n,); NaN where J is singular."""
+    """Return what `solutions` returns, for entries that are numbers or arrays (n,); NaN where J is singular."""
     n = max(np.size(entry) for row in (*rows, *columns) for entry in row)
     jacobian = np.empty((n, len(rows), len(rows[0])))
     right = np.empty((n, len(rows), len(columns)))
@@ -214,7 +198,7 @@ _OF_NUMBERS: dict[str, Any] = {
     "floor": floor,
     "atan2": math.atan2,
     "curve": curve_value,
-    "solutions": _solutions_of_numbers,
+    "solutions": solutions,
 }
 _OF_ARRAYS: dict[str, Any] = {
     "sin": np.sin,

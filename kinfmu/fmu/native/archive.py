@@ -13,6 +13,7 @@ It needs the C library only, has no global state and reads no file.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from xml.etree import ElementTree as ET
 from xml.etree.ElementTree import Element, SubElement
 
@@ -60,7 +61,7 @@ def archive(
     fmi: FmiVersion,
     platforms: str,
     progress: Callable[[int, int], None] | None = None,
-    forces: ForceSteps | None = None,
+    forces: Mapping[str, ForceSteps] = MappingProxyType({}),
 ) -> bytes:
     """Return the FMU of a plan; the same plan and the same compiler give the same bytes.
 
@@ -71,7 +72,7 @@ def archive(
         fmi: Version of FMI.
         platforms: 'host', compiled by the system's compiler, or 'all', compiled by zig.
         progress: Called with (platforms done, number of platforms).
-        forces: Steps to the forces that are outputs. Default: none.
+        forces: Stages of the forces that are outputs, by part. Default: none.
 
     Returns:
         Bytes of the zip archive.
@@ -95,7 +96,12 @@ def archive(
 
 
 def _contents(
-    plan: SolvePlan, variables: Interface, version: str, fmi: FmiVersion, guid: str, forces: ForceSteps | None
+    plan: SolvePlan,
+    variables: Interface,
+    version: str,
+    fmi: FmiVersion,
+    guid: str,
+    forces: Mapping[str, ForceSteps],
 ) -> dict[str, bytes]:
     """Return every file except the binaries, by path in the FMU."""
     code = sources(plan, variables, fmi, guid, forces)

@@ -7,10 +7,13 @@ from collections.abc import Iterable, Mapping
 from importlib.util import find_spec
 from itertools import accumulate
 from pathlib import Path
+from types import MappingProxyType
 
 from kinfmu.codegen.c import compiler, emit
 from kinfmu.codegen.c.forces import emit_forces
 from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
+from kinfmu.codegen.forces import STAGES
+from kinfmu.codegen.python.forces import solves
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.errors import MissingPackageError
 from kinfmu.fmu.estimated_rates import Rates
@@ -47,7 +50,11 @@ _OTHER_VERSION = {"2.0": "fmi3.c", "3.0": "fmi2.c"}
 
 
 def sources(
-    plan: SolvePlan, variables: Interface, version: str, token: str, forces: ForceSteps | None = None
+    plan: SolvePlan,
+    variables: Interface,
+    version: str,
+    token: str,
+    forces: Mapping[str, ForceSteps] = MappingProxyType({}),
 ) -> dict[str, str]:
     """Return all C files and headers of the FMU by name, except the headers of FMI.
 
@@ -56,16 +63,18 @@ def sources(
         variables: Variables of the FMU.
         version: Version of FMI, "2.0" or "3.0".
         token: Hash of the FMU's content.
-        forces: Steps to the forces that are outputs. Default: none.
+        forces: Stages of the forces that are outputs, by part. Default: none.
 
     """
     instance = {file.name: file.read_text("utf-8") for file in sorted(RUNTIME.iterdir()) if file.suffix in (".c", ".h")}
     del instance[_OTHER_VERSION[version]]
-    if forces is None:
-        del instance["forces_at.c"]
+    if not forces:
+        del instance["forces_at.c"], instance["solutions.c"]
         instance = {name: _OF_FORCES.sub("", text) for name, text in instance.items()}
     else:
-        instance["forces.c"] = emit_forces(plan, forces)
+        if not any(map(solves, forces.values())):
+            del instance["solutions.c"]
+        instance |= {f"{stage}.c": emit_forces(plan, steps, stage) for stage, steps in forces.items()}
     tables = {"interface.h": _header(plan, variables, version, token), "interface.c": _tables(variables)}
     tables |= {"step.c": _step(version), "events.c": _events(plan)}
     files = emit(plan) | compiler.sources(compiler.SOLVER) | instance | tables
@@ -109,8 +118,11 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
     names = [part.name for part in variables.parts if part.name not in NOT_REAL]
     real = sum(len(variables.part(name)) for name in names)
     words = _WORDS[version]
-    forces = [f"#define KF_{name.upper()} {len(variables.part(name))}" for name in ("forces", "loads")]
-    forces = [*forces, ""] if variables.part("forces") else []
+    counts = {stage: len(variables.part(stage)) for stage in STAGES}
+    forces = [f"#define KF_FORCES {sum(counts.values())} /* of all stages */"]
+    forces += [f"#define KF_STAGE_{stage.upper()} {count}" for stage, count in counts.items()]
+    forces = [*forces, f"#define KF_LOADS {len(variables.part('loads'))}", ""] if sum(counts.values()) else []
+    bits, not_real = ("unsigned", 1 << 31) if forces else ("unsigned short", 1 << 15)
     lines = [
         f"/* Variables of the FMU of {variables.name}: generated from its mechanism, not to be edited. */",
         "#ifndef KF_INTERFACE_H",
@@ -146,8 +158,8 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
         "extern const char *const kf_variable_names[KF_VARIABLES];",
         *array("static int kf_part_first", [0, *accumulate(len(variables.part(name)) for name in names)]),
         "extern const unsigned char kf_part_of[KF_REALS];",
-        "#define KF_NOT_REAL 0x8000u",
-        "extern const unsigned short kf_bit_of[KF_VARIABLES + 1]; /* 1 << kf_part_of, or KF_NOT_REAL */",
+        f"#define KF_NOT_REAL {not_real:#x}u",
+        f"extern const {bits} kf_bit_of[KF_VARIABLES + 1]; /* 1 << kf_part_of, or KF_NOT_REAL */",
         "extern const double kf_real_starts[KF_REALS];",
         "extern const bool kf_real_is_positive[KF_REALS];",
         "extern const bool kf_driven_by_time_start;",
@@ -165,6 +177,8 @@ def _tables(variables: Interface) -> str:
     real = [variable for part in parts for variable in part.variables]
     (drive,), (rates,) = variables.part("drive"), variables.part("rate_source")
     place = _numbers(len(part.variables) for part in parts)
+    has_forces = any(variables.part(stage) for stage in STAGES)
+    bits, not_real = ("unsigned", "0x80000000u") if has_forces else ("unsigned short", 1 << 15)
     positive = [v.causality == "parameter" and v.minimum is not None and v.minimum >= 0.0 for v in real]
     lines = [
         f"/* Variables of the FMU of {variables.name}: generated from its mechanism, not to be edited. */",
@@ -172,7 +186,7 @@ def _tables(variables: Interface) -> str:
         "",
         *array("char *const kf_variable_names", [string(variable.name) for variable in variables]),
         *array("unsigned char kf_part_of", place),
-        *array("unsigned short kf_bit_of", [1 << k for k in place] + [0x8000] * (len(list(variables)) - len(real) + 1)),
+        *array(f"{bits} kf_bit_of", [1 << k for k in place] + [not_real] * (len(list(variables)) - len(real) + 1)),
         *array("double kf_real_starts", [float(variable.start or 0.0) for variable in real]),
         *array("bool kf_real_is_positive", booleans(positive)),
         f"const bool kf_driven_by_time_start = {'true' if drive.start else 'false'};",

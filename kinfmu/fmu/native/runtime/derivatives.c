@@ -193,8 +193,8 @@ static bool add_differences(kf_instance *instance, const double *du, kf_solver *
                 return false;
             }
 #if KF_FORCES
-            if (parts & KF_BIT(KF_PART_FORCES)) {
-                kf_forces_of_trial(s, solver, pose, drive, instance->trial + kf_part_first[KF_PART_FORCES]);
+            if (parts & KF_FORCE_PARTS) {
+                kf_forces_of_trial(s, solver, pose, drive, parts, instance->trial);
             }
 #endif
             for (k = 0; k < KF_REALS; ++k) {
@@ -286,9 +286,8 @@ static kf_answer along(kf_instance *instance, double time_seed, unsigned parts)
         driven[2] = direction.da[k];
     }
 #if KF_FORCES
-    if (parts & KF_BIT(KF_PART_FORCES)) { /* before the trials, which overwrite the pose */
-        kf_add_force_slopes(s, direction.dv, direction.da, seed + kf_part_first[KF_PART_LOADS], time_seed,
-                            slope + kf_part_first[KF_PART_FORCES]);
+    if (parts & KF_FORCE_PARTS) { /* before the trials, which overwrite the pose */
+        kf_add_force_slopes(s, direction.dv, direction.da, seed + kf_part_first[KF_PART_LOADS], time_seed, parts, slope);
     }
 #endif
     if (largest_rate(direction.du) > 0.0 && (parts & ~linear)) {

@@ -1,14 +1,47 @@
-/* Forces of a pose: outputs of mechanisms with masses or loads. The stage itself is generated: forces.c. */
+/* Forces of a pose: outputs of mechanisms with masses or loads. The stages are generated, a part and a file each. */
 #include "instance.h"
 #include "internal.h"
 
 #include <math.h>
 #include <string.h>
 
-/* Forces of a good pose at time t, driver values, speeds and accelerations; efforts: of external loads. */
-void kf_forces_at(const kf_solver *solver, kf_pose *pose, double t, const double *const drive[3], const double *efforts,
-                  double *forces)
+/* The stages in `parts`. Blocks do not give reactions of poses that are interpolated across a singular point. */
+static void evaluate(unsigned parts, double t, const double *const drive[3], const double *z, const double *zd,
+                     const double *zdd, const double *slopes, const double *efforts, const double *parameters,
+                     bool is_bridged, double *row)
 {
+#if KF_STAGE_FORCES
+    if (parts & KF_BIT(KF_PART_FORCES)) {
+        kf_forces(t, drive[0], drive[1], drive[2], z, zd, zdd, slopes, efforts, parameters,
+                  row + kf_part_first[KF_PART_FORCES]);
+    }
+#endif
+#if KF_STAGE_REACTIONS
+    if (parts & KF_BIT(KF_PART_REACTIONS)) {
+        double *const reactions = row + kf_part_first[KF_PART_REACTIONS];
+        int k;
+        kf_reactions(t, drive[0], drive[1], drive[2], z, zd, zdd, slopes, efforts, parameters, reactions);
+        for (k = 0; is_bridged && k < KF_STAGE_REACTIONS; ++k) {
+            reactions[k] = NAN;
+        }
+    }
+#endif
+#if KF_STAGE_SHAKING
+    if (parts & KF_BIT(KF_PART_SHAKING)) {
+        kf_shaking(t, drive[0], drive[1], drive[2], z, zd, zdd, slopes, efforts, parameters,
+                   row + kf_part_first[KF_PART_SHAKING]);
+    }
+#endif
+}
+
+/* Forces of a good pose at time t, driver values, speeds and accelerations, in a row of all Real variables.
+ *
+ * parts: those that are wanted; efforts: of external loads.
+ */
+void kf_forces_at(const kf_solver *solver, kf_pose *pose, double t, const double *const drive[3], const double *efforts,
+                  unsigned parts, double *row)
+{
+    const bool is_bridged = pose->status == KF_BRIDGED;
     const kf_model *const model = &solver->model;
     const double *const ud = drive[1], *const udd = drive[2];
 #if KF_DRIVERS == 1
@@ -19,18 +52,18 @@ void kf_forces_at(const kf_solver *solver, kf_pose *pose, double t, const double
         zd[k] = pose->x1[k] * ud[0];
         zdd[k] = pose->x2[k] * (ud[0] * ud[0]) + pose->x1[k] * udd[0];
     }
-    kf_forces(t, drive[0], ud, udd, pose->found.x, zd, zdd, pose->x1, efforts, model->parameters, forces);
+    evaluate(parts, t, drive, pose->found.x, zd, zdd, pose->x1, efforts, model->parameters, is_bridged, row);
 #else
     double slopes[KF_ROOM(KF_DRIVERS * KF_UNKNOWNS)], unit[KF_DRIVERS];
     int k;
-    for (k = 0; k < KF_DRIVERS; ++k) {
+    for (k = 0; k < KF_DRIVERS && (parts & KF_BIT(KF_PART_FORCES)); ++k) { /* no other stage reads slopes */
         memset(unit, 0, sizeof unit);
         unit[k] = 1.0;
         kf_rates_in_time(model, pose, unit, NULL);
         memcpy(slopes + k * KF_UNKNOWNS, pose->x1, KF_UNKNOWNS * sizeof *slopes);
     }
     kf_rates_in_time(model, pose, ud, udd);
-    kf_forces(t, drive[0], ud, udd, pose->found.x, pose->x1, pose->x2, slopes, efforts, model->parameters, forces);
+    evaluate(parts, t, drive, pose->found.x, pose->x1, pose->x2, slopes, efforts, model->parameters, is_bridged, row);
 #endif
 }
 
@@ -49,7 +82,7 @@ static double shown_at(const kf_state *s, const double **efforts)
     return t;
 }
 
-void kf_read_forces(kf_state *s)
+void kf_read_forces(kf_state *s, unsigned parts)
 {
     const double *drive[3], *efforts;
     double t;
@@ -58,30 +91,30 @@ void kf_read_forces(kf_state *s)
     drive[1] = s->ud;
     drive[2] = s->udd;
     t = shown_at(s, &efforts);
-    kf_forces_at(&s->solver, kf_shown(s), t, drive, efforts, KF_REAL(s, KF_PART_FORCES));
+    kf_forces_at(&s->solver, kf_shown(s), t, drive, efforts, parts, s->real);
 }
 
 /* Forces of another pose, at the time and the loads of the one shown. */
 void kf_forces_of_trial(kf_state *s, const kf_solver *solver, kf_pose *pose, const double *const drive[3],
-                        double *forces)
+                        unsigned parts, double *row)
 {
     const double *efforts;
     const double t = shown_at(s, &efforts);
-    kf_forces_at(solver, pose, t, drive, efforts, forces);
+    kf_forces_at(solver, pose, t, drive, efforts, parts, row);
 }
 
 /* Add the derivatives of the forces of the pose shown along speeds dv, accelerations da, loads and time, at a pose that stays.
  *
  * Forces are polynomials of at most the third degree in all but time: the differences are exact but for rounding.
  */
-void kf_add_force_slopes(kf_state *s, const double *dv, const double *da, const double *loads, double dt, double *slope)
+void kf_add_force_slopes(kf_state *s, const double *dv, const double *da, const double *loads, double dt,
+                         unsigned parts, double *slope)
 {
     static const double weights[3] = {45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0};
-    const int count = kf_part_first[KF_PART_FORCES + 1] - kf_part_first[KF_PART_FORCES];
     double ud[KF_DRIVERS], udd[KF_DRIVERS], moved[KF_ROOM(KF_LOADS)], trial[KF_REALS];
     const double *drive[3], *efforts;
     const double t = shown_at(s, &efforts), h = dt != 0.0 ? 2e-3 / fabs(dt) : 1.0;
-    int j, k, sign;
+    int j, k, part, sign;
     drive[0] = s->u;
     drive[1] = ud;
     drive[2] = udd;
@@ -95,9 +128,11 @@ void kf_add_force_slopes(kf_state *s, const double *dv, const double *da, const 
             for (k = 0; k < KF_LOADS; ++k) {
                 moved[k] = efforts[k] + by * loads[k];
             }
-            kf_forces_at(&s->solver, kf_shown(s), t + by * dt, drive, moved, trial);
-            for (k = 0; k < count; ++k) {
-                slope[k] += sign * weights[j - 1] / h * trial[k];
+            kf_forces_at(&s->solver, kf_shown(s), t + by * dt, drive, moved, parts, trial);
+            for (part = KF_PART_FORCES; part <= KF_PART_SHAKING; ++part) {
+                for (k = kf_part_first[part]; (parts >> part & 1u) && k < kf_part_first[part + 1]; ++k) {
+                    slope[k] += sign * weights[j - 1] / h * trial[k];
+                }
             }
         }
     }

@@ -163,11 +163,12 @@ kf_answer kf_deserialize(kf_instance *instance, const unsigned char *bytes, size
 #define KF_GIVEN_PARTS                                                                                                 \
     (KF_BIT(KF_PART_INPUTS) | KF_BIT(KF_PART_CONSTANTS) | KF_BIT(KF_PART_PARAMETERS) | KF_BIT(KF_PART_TOLERANCE))
 #if KF_FORCES
+#define KF_FORCE_PARTS (KF_BIT(KF_PART_FORCES) | KF_BIT(KF_PART_REACTIONS) | KF_BIT(KF_PART_SHAKING))
 #undef KF_POSE_PARTS
 #undef KF_GIVEN_PARTS
 #define KF_POSE_PARTS                                                                                                  \
     (KF_BIT(KF_PART_VALUES) | KF_BIT(KF_PART_RATES) | KF_BIT(KF_PART_ACCELERATIONS) | KF_BIT(KF_PART_ERRORS) |          \
-     KF_BIT(KF_PART_WATCH) | KF_BIT(KF_PART_FORCES))
+     KF_BIT(KF_PART_WATCH) | KF_FORCE_PARTS)
 #define KF_GIVEN_PARTS                                                                                                 \
     (KF_BIT(KF_PART_INPUTS) | KF_BIT(KF_PART_CONSTANTS) | KF_BIT(KF_PART_PARAMETERS) | KF_BIT(KF_PART_TOLERANCE) |      \
      KF_BIT(KF_PART_LOADS))
@@ -175,16 +176,19 @@ kf_answer kf_deserialize(kf_instance *instance, const unsigned char *bytes, size
 #define KF_REAL(state, part) ((state)->real + kf_part_first[part])
 
 #if KF_FORCES
-void kf_forces(double time, const double *u, const double *ud, const double *udd, const double *z, const double *zd,
-               const double *zdd, const double *slopes, const double *efforts, const double *parameters,
-               double *forces); /* generated: all forces of one sample */
+/* Generated, where their part has variables: the forces of one sample. */
+typedef void kf_stage(double time, const double *u, const double *ud, const double *udd, const double *z,
+                      const double *zd, const double *zdd, const double *slopes, const double *efforts,
+                      const double *parameters, double *forces);
+kf_stage kf_forces, kf_reactions, kf_shaking;
+void kf_solutions(int m, int k, int columns, const double *a, const double *b, double *factors, double *x);
 void kf_forces_at(const kf_solver *solver, kf_pose *pose, double t, const double *const drive[3], const double *efforts,
-                  double *forces);
-void kf_read_forces(kf_state *state);
+                  unsigned parts, double *row);
+void kf_read_forces(kf_state *state, unsigned parts);
 void kf_forces_of_trial(kf_state *state, const kf_solver *solver, kf_pose *pose, const double *const drive[3],
-                        double *forces);
+                        unsigned parts, double *row);
 void kf_add_force_slopes(kf_state *state, const double *dv, const double *da, const double *loads, double dt,
-                         double *slope);
+                         unsigned parts, double *slope);
 #endif
 void kf_forget(kf_state *state);        /* the driver values may have changed */
 void kf_forget_motion(kf_state *state); /* the rates may have changed */

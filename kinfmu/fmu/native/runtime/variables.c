@@ -83,8 +83,8 @@ kf_answer kf_read(kf_instance *instance, unsigned parts)
                 kf_find_errors(s, KF_REAL(s, KF_PART_ERRORS));
             }
 #if KF_FORCES
-            if (missing & KF_BIT(KF_PART_FORCES)) {
-                kf_read_forces(s);
+            if (missing & KF_FORCE_PARTS) {
+                kf_read_forces(s, missing);
             }
 #endif
             if (missing & KF_BIT(KF_PART_WATCH)) {
@@ -225,7 +225,7 @@ static KF_RARE kf_answer set_other(kf_instance *instance, unsigned reference, do
         if (s->ahead) {
             kf_forget(s);
         }
-        s->known &= ~KF_BIT(KF_PART_FORCES);
+        s->known &= ~KF_FORCE_PARTS;
         return KF_DONE;
     }
     if (part != KF_PART_LOADS)
