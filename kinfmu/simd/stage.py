@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import itertools
 import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -24,6 +23,7 @@ FloatArray = NDArray[np.float64]
 HEADERS = ("stage.h", "stream.h", "vectors.h")
 FUNCTIONS = {"sin": "kf_sin_lane", "cos": "kf_cos_lane"}
 LINE = 8  # numbers in a line of the caches
+ITEM = 8  # [bytes] of a number
 LARGE = 1 << 20  # numbers; larger tables are written past the caches
 _UNEVEN = 512  # numbers; rows whose pitch is a multiple of it would share few places of the caches
 
@@ -171,23 +171,30 @@ def load_native_stage(stage: CompiledStage) -> Callable[[Sequence[FloatArray | f
     """
     texts = {name: (Path(__file__).parent / name).read_text("utf-8") for name in HEADERS}
     files = {"evaluate.c": stage_source(stage)} | texts | compiler.sources(("sincos.h",))
-    library = compiler.load(files, compiler.VECTORIZED)
+    evaluate = compiler.load(files, compiler.VECTORIZED).kf_evaluate
+    numbers, places, counts = (kind * len(stage.given) for kind in (ctypes.c_double, ctypes.c_size_t, ctypes.c_int64))
 
     def fill(given: Sequence[FloatArray | float], results: FloatArray) -> bool:
-        single = np.array([number for number in given if not isinstance(number, np.ndarray)])
-        arrays = [number if isinstance(number, np.ndarray) else None for number in given]
-        place = itertools.count(single.ctypes.data, single.itemsize)
-        starts = np.array(
-            [next(place) if array is None else array.__array_interface__["data"][0] for array in arrays], dtype=np.uintp
+        single = numbers()
+        starts, steps = places(), counts()
+        first = ctypes.addressof(single)
+        for k, number in enumerate(given):
+            if isinstance(number, np.ndarray):
+                starts[k], steps[k] = number.__array_interface__["data"][0], number.strides[0] // ITEM
+            else:
+                single[k] = number
+                starts[k] = first + k * ITEM
+        job = _Stage(
+            results.shape[1],
+            ctypes.addressof(starts),
+            ctypes.addressof(steps),
+            results.__array_interface__["data"][0],
+            results.strides[0] // ITEM,
+            results.size > LARGE,
         )
-        steps = np.array(
-            [0 if array is None else array.strides[0] // array.itemsize for array in arrays], dtype=np.int64
-        )
-        n, pitch, start = results.shape[1], results.strides[0] // results.itemsize, results.ctypes.data
-        job = _Stage(n, starts.ctypes.data, steps.ctypes.data, start, pitch, results.size > LARGE)
-        answer: int = library.kf_evaluate(ctypes.byref(job))
+        answer: int = evaluate(ctypes.byref(job))
         if answer < 0:
-            raise KinfmuError(f"no memory is left for the results of {n} samples")
+            raise KinfmuError(f"no memory is left for the results of {results.shape[1]} samples")
         return answer == 1
 
     return fill

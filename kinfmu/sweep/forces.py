@@ -26,6 +26,7 @@ from kinfmu.sweep.designs import Solvable
 from kinfmu.sweep.driving import column_of
 from kinfmu.sweep.stages import native_stage, stage_results
 
+LEAST_SPEED = 1e-100  # [rad/s, ...] of a driver; products with smaller ones lose digits
 _STAGES = 4  # forces, the same with coefficients given, reactions, those on the ground alone
 Given = dict[str, FloatArray | float]
 
@@ -77,14 +78,14 @@ class ForceModel:
     def forces(self, run: LoadedRun) -> FloatArray:
         """Return the forces at all samples, (n, names); NaN where the run has no numbers.
 
-        Samples that are interpolated across a singular point take the velocity coefficients from runs with unit speeds,
-        which are interpolated likewise: there the blocks do not give them.
+        Samples that are interpolated across a singular point take the velocity coefficients from rates, which are
+        interpolated likewise: there the blocks do not give them.
         """
         forces, irregular = self._at_regular_samples(self._stage, run)
         bridged = irregular[run.poses.status[irregular] == Status.BRIDGED]
         if len(bridged):
-            given = self._given(run, bridged) | self._coefficients(run, bridged)
-            forces[bridged] = self._evaluated(self._stage_of_coefficients, given, len(bridged))
+            coefficients = self._coefficients(run, bridged)
+            forces[bridged] = self._evaluated(self._stage_of_coefficients, run, bridged, len(bridged), coefficients)
         return forces
 
     def reactions(self, run: LoadedRun) -> FloatArray:
@@ -99,7 +100,7 @@ class ForceModel:
         reactions[:, [names.index(name) for name in undetermined_reactions(self.poses.plan)]] = np.nan
         bridged = irregular[run.poses.status[irregular] == Status.BRIDGED]
         if len(bridged):
-            shaking = self._evaluated(self._shaking_stage, self._given(run, bridged), len(bridged))
+            shaking = self._evaluated(self._shaking_stage, run, bridged, len(bridged))
             reactions[bridged, len(names) - shaking.shape[1] :] = shaking
         return reactions
 
@@ -109,7 +110,7 @@ class ForceModel:
         The stage runs over these too: they are few, and tables of the others would be copied without them.
         """
         status = run.poses.status
-        results = self._evaluated(stage, self._given(run, slice(None)), len(status))
+        results = self._evaluated(stage, run, slice(None), len(status))
         irregular = np.flatnonzero(status >= Status.BRIDGED)
         results[irregular] = np.nan
         return results, irregular
@@ -130,15 +131,18 @@ class ForceModel:
     def _shaking_stage(self) -> CompiledStage:
         return load_stage(shaking_steps(self.poses.plan))
 
+    @cached_property
+    def _columns(self) -> dict[str, tuple[int, int]]:
+        """Table and column of each symbol that a run has: values, rates, accelerations, inputs."""
+        names = [[name.derivative(order) for name in self.poses.plan.outputs] for order in range(3)]
+        names.append([name for driver in self.poses.plan.drivers for name in driver.inputs])
+        return {name: (table, k) for table, own in enumerate(names) for k, name in enumerate(own)}
+
     def _given(self, run: LoadedRun, samples: Any) -> Given:
-        """Return the numbers of the symbols in a stage, at some samples."""
-        plan, poses, setting = self.poses.plan, run.poses, run.setting
+        """Return the numbers of the symbols that are not columns of the run, at some samples."""
+        plan, setting = self.poses.plan, run.setting
         given: Given = {"time": np.nan if run.times is None else run.times[samples]}
         given |= {name: effort[samples] for name, effort in run.efforts.items()}
-        given |= dict(zip(poses.input_names, poses.inputs[samples].T, strict=True))
-        for order, table in enumerate((poses.values, poses.rates, poses.accelerations)):
-            columns = table[samples].T
-            given |= {name.derivative(order): column for name, column in zip(plan.outputs, columns, strict=True)}
         written = [parameter.value for parameter in plan.parameters]
         for parameter, value in zip(plan.parameters, setting.values or written, strict=True):
             given[parameter_symbol(parameter.name)] = value
@@ -147,8 +151,16 @@ class ForceModel:
         return given
 
     def _coefficients(self, run: LoadedRun, samples: Any) -> Given:
-        """Return the derivatives of the coordinates with respect to each driver: rates at a speed of 1."""
+        """Return the derivatives of the coordinates with respect to each driver.
+
+        With one driver that moves they are the rates over its speed; else the rates of runs in which one driver has a
+        speed of 1 and the others rest.
+        """
         plan = self.poses.plan
+        speed = run.poses.inputs[samples, 1:2]
+        if len(plan.drivers) == 1 and (np.abs(speed) > LEAST_SPEED).all():
+            rates = run.poses.rates[samples] / speed
+            return {derivative_name(name, 0): rate for name, rate in zip(plan.outputs, rates.T, strict=True)}
         values = {driver.inputs[0]: run.poses.inputs[samples, 3 * k] for k, driver in enumerate(plan.drivers)}
         found: Given = {}
         for number in range(len(plan.drivers)):
@@ -157,12 +169,23 @@ class ForceModel:
             found |= {derivative_name(name, number): rate for name, rate in zip(plan.outputs, rates, strict=True)}
         return found
 
-    def _evaluated(self, stage: CompiledStage, given: Mapping[str, Any], n: int) -> FloatArray:
-        """Return the results of a stage, (n, results)."""
+    def _evaluated(
+        self, stage: CompiledStage, run: LoadedRun, samples: Any, n: int, coefficients: Given | None = None
+    ) -> FloatArray:
+        """Return the results of a stage at n samples, (n, results)."""
+        poses, columns = run.poses, self._columns
+        tables = (poses.values, poses.rates, poses.accelerations, poses.inputs)
+        given = self._given(run, samples) | (coefficients or {})
         native = self._native(stage) if self.poses.is_native(n) else None
-        numbers = [given[name] for name in stage.given]
+        numbers = [given[name] if name in given else _column(tables, columns[name], samples) for name in stage.given]
         results, _ = stage_results(stage, native, numbers, (len(stage.steps.results), n))
         return results.T
+
+
+def _column(tables: Sequence[FloatArray], place: tuple[int, int], samples: Any) -> FloatArray:
+    table, column = place
+    found: FloatArray = tables[table][samples, column]
+    return found
 
 
 def force_plan(plan: SolvePlan) -> SolvePlan:
