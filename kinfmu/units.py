@@ -306,6 +306,35 @@ class ForceName(str):
         return self.owner, self.noun, self.quantity
 
 
+class SignalName(str):
+    """The name of an output of an FMU that is not kinfmu's, such as 'motor.current', with its unit.
+
+    Args:
+        name: The name; in a system of several FMUs it begins with that of the component.
+        unit: The unit that the FMU declares, '1' without one.
+
+    Attributes:
+        unit: As given.
+
+    """
+
+    __slots__ = ("unit",)
+    unit: str
+
+    def __new__(cls, name: str, unit: str = "1") -> SignalName:
+        made = super().__new__(cls, name)
+        made.unit = unit
+        return made
+
+    def __getnewargs__(self) -> tuple[str, str]:  # type: ignore[override]  # for copies: what `__new__` takes
+        return str(self), self.unit
+
+    @property
+    def owner(self) -> str:
+        """The component, '' of a single FMU; a bracket begins a name such as 'der(x.y)'."""
+        return self.partition("(")[0].partition(".")[0] if "." in self.partition("(")[0] else ""
+
+
 def read_force(text: str, kind: str) -> ForceName | None:
     """Return the force, inertia or energy that a name in a file states; None if the text is no such name."""
     owner, _, noun = text.partition(".") if "." in text else ("", "", text)

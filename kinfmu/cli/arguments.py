@@ -84,10 +84,10 @@ class MechanismName(ArgumentType):
 
 
 class ModelName(MechanismName):
-    """An .fmu file, or a mechanism."""
+    """An .fmu or .ssp file, or a mechanism."""
 
-    name = "FMU|MECH"
-    suffixes = (".toml", ".fmu")
+    name = "FMU|SSP|MECH"
+    suffixes = (".toml", ".fmu", ".ssp")
 
 
 mechanism_argument = click.argument("mechanism", type=MechanismName(), metavar="MECH")

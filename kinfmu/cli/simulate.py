@@ -22,7 +22,7 @@ LOGS = Path("logs")
 
 
 @main.command(epilog="Example: kinfmu simulate fourbar --stop 90 --step 0.5")
-@click.argument("model", metavar="FMU|MECH", type=ModelName())
+@click.argument("model", metavar="FMU|SSP|MECH", type=ModelName())
 @click.option("--start", type=Time(), help="Start time [s]. Default: first row of --input, else that of the model.")
 @click.option("--stop", type=Time(), help="Stop time [s]. Default: last row of --input, else that of the model.")
 @click.option("--step", type=Time(), help="Communication step [s]. Default: that of the model.")
@@ -42,9 +42,16 @@ LOGS = Path("logs")
 @click.option(
     "--channels",
     metavar="NAMES",
-    help="What to log, separated by commas: q, qd, qdd, points, inputs, forces, reactions, residual, iterations, "
-    "margin, error, watch, drawn (for viewers), columns such as coupler.*; -error,-margin: all but these; none: no "
-    "logs. Default: all.",
+    help="What to log, separated by commas: q, qd, qdd, points, inputs, forces, reactions, signals, residual, "
+    "iterations, margin, error, watch, drawn (for viewers), columns such as coupler.*; -error,-margin: all but these; "
+    "none: no logs. Default: all.",
+)
+@click.option(
+    "--exchange",
+    type=click.Choice(["ordered", "jacobi"]),
+    default="ordered",
+    help="How an SSP passes values: ordered, an output after the inputs that it depends on; jacobi, all at once, a "
+    "step late, as many hosts do. Default: ordered.",
 )
 @click.option("--rate", type=click.FloatRange(min=0.0, min_open=True), help="Samples to log per second of the run.")
 @on_interrupt("stopped before the first sample: nothing was kept")
@@ -59,12 +66,13 @@ def simulate(
     mcap: Path | None,
     rrd: Path | None,
     channels: str | None,
+    exchange: str,
     rate: float | None,
 ) -> None:
-    """Step an FMU and write logs; build it first from a MECH.
+    """Step an FMU or an SSP and write logs; build an FMU first from a MECH.
 
-    Steps an FMU of kinfmu with fmpy and writes an MCAP record and a Rerun recording. The record grows during the run;
-    kinfmu recover restores that of a killed run.
+    Steps an FMU with fmpy, of kinfmu or of another tool, or the connected FMUs of an SSP, and writes an MCAP record and
+    a Rerun recording. The record grows during the run; kinfmu recover restores that of a killed run.
     """
     from tempfile import TemporaryDirectory
 
@@ -97,6 +105,7 @@ def simulate(
                 rate=rate,
                 sink=McapLog(record, drawn=is_drawn(names)) if record else None,
                 progress=progress,
+                exchange=exchange,
             )
     if recording:
         with on_interrupt(f"stopped before the recording was written; the run is in {record}"):
@@ -113,7 +122,7 @@ def _fmu(
     from kinfmu.fmu import build
     from kinfmu.fmu.build import default_drive
 
-    if suffix_of(model) == ".fmu":
+    if suffix_of(model) in (".fmu", ".ssp"):
         return Path(model), as_values(settings)
     mech = gallery.load(model)
     given = checked_settings(mech, settings, (TOLERANCE, DRIVEN_BY_TIME, RATES))
@@ -131,7 +140,7 @@ def _logs(model: str, mcap: Path | None, rrd: Path | None) -> tuple[Path, Path]:
     The recording has the path of the record with the ending .rrd, so that two runs of one mechanism keep all files.
     """
     file = Path(model.replace(":", "_"))
-    name = file.stem if suffix_of(file) in (".toml", ".fmu") else file.name
+    name = file.stem if suffix_of(file) in (".toml", ".fmu", ".ssp") else file.name
     record = mcap or LOGS / f"{name}.mcap"
     return record, rrd or record.with_suffix(".rrd")
 

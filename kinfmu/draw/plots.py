@@ -17,7 +17,7 @@ from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import ROUND_OFF, Axis, axis_of, shown_range
 from kinfmu.run.channels import coordinates, forces
 from kinfmu.scene import palette
-from kinfmu.units import CoordinateName, ForceName, unit_of
+from kinfmu.units import CoordinateName, ForceName, SignalName, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -82,13 +82,13 @@ def plot(
 
 
 class Panel(NamedTuple):
-    """A panel: a column, its name on the axis, its unit, order of derivative, and the coordinate or force."""
+    """A panel: a column, its name on the axis, its unit, order of derivative, and the coordinate, force or signal."""
 
     column: str
     label: str
     unit: str
     order: int
-    name: CoordinateName | ForceName
+    name: CoordinateName | ForceName | SignalName
 
 
 class Stack(NamedTuple):
@@ -119,9 +119,17 @@ def stacks_of(run: Run, columns: Sequence[str]) -> list[Stack]:
         found.append(Stack(name, tuple(panels)))
     for owner in dict.fromkeys(force.owner for force in chosen):
         own = [force for force in chosen if force.owner == owner]
-        panels = [Panel(name, name.noun, unit_of(name.quantity, run.length_unit), 0, name) for name in own]
-        found += [Stack(owner or "energy", tuple(panels[k : k + _PANELS])) for k in range(0, len(panels), _PANELS)]
+        panels = [_of_force(name, run.length_unit) for name in own]
+        title = owner or ("signals" if isinstance(own[0], SignalName) else "energy")
+        found += [Stack(title, tuple(panels[k : k + _PANELS])) for k in range(0, len(panels), _PANELS)]
     return found
+
+
+def _of_force(name: ForceName | SignalName, length_unit: str) -> Panel:
+    """Return the panel of a force or a signal."""
+    if isinstance(name, SignalName):
+        return Panel(name, name.removeprefix(f"{name.owner}."), name.unit, 0, name)
+    return Panel(name, name.noun, unit_of(name.quantity, length_unit), 0, name)
 
 
 def _chooses_coordinates(run: Run, name: str) -> bool:
@@ -189,7 +197,7 @@ def _panel(axes: Axes, run: Run, axis: Axis, panel: Panel) -> None:
         values = np.where(run.good, np.asarray(run[panel.column], dtype=float), np.nan)
     known = values[np.isfinite(values)]
     rows = rows_of(values)
-    is_force = isinstance(panel.name, ForceName)
+    is_force = not isinstance(panel.name, CoordinateName)
     colour = ink(_FORCES if is_force else (palette.BODIES[5], palette.BODIES[2], palette.BODIES[4])[panel.order])
     look: dict[str, Any] = {"color": colour, "linewidth": 1.2, "solid_joinstyle": "round"}
     if len(known) < 2:
@@ -203,7 +211,9 @@ def _panel(axes: Axes, run: Run, axis: Axis, panel: Panel) -> None:
     axes.locator_params(axis="y", nbins=4)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:.4g}".replace("-", "\N{MINUS SIGN}"))
     unit = panel.unit.replace("2", "\N{SUPERSCRIPT TWO}")
-    axes.set_ylabel(f"{panel.label} [{unit}]", fontsize=SMALL, color=ink(GREY), labelpad=3.0)
+    axes.set_ylabel(
+        panel.label if unit == "1" else f"{panel.label} [{unit}]", fontsize=SMALL, color=ink(GREY), labelpad=3.0
+    )
     if not is_kept or (is_force and not len(known)):
         words = "not determined" if is_kept else "not kept"
         axes.text(0.5, 0.5, words, fontsize=SMALL, ha="center", transform=axes.transAxes, color=ink(GREY))
@@ -226,6 +236,8 @@ def _shown(run: Run, axis: Axis, panel: Panel, known: FloatArray) -> tuple[float
 def _usual(run: Run, axis: Axis, panel: Panel) -> float:
     """Return the size of what is like a curve: positions with their derivatives, or efforts of the same quantity."""
     name = panel.name
+    if isinstance(name, SignalName):
+        return float(np.max(np.abs(run[name]), initial=0.0, where=np.isfinite(run[name])))
     if isinstance(name, ForceName):
         tables = ((run.force_names, run.forces), (run.reaction_names, run.reactions))
         names, table = next((names, table) for names, table in tables if name in names)

@@ -98,11 +98,24 @@ def input_table(
         for part in ("inputs", "loads")
         for variable in interface.part(part)
     }
-    if isinstance(inputs, Mapping):
-        table = _from_arrays(inputs, tuple(quantities))
-    else:
-        table = _from_csv(Path(inputs), quantities, interface.length_unit)
+    units = {name: factors(quantity, interface.length_unit) for name, quantity in quantities.items()}
+    table = table_of(inputs, units)
     return _unwrapped(table, quantities) if wrap else table
+
+
+def table_of(inputs: str | Path | Mapping[str, ArrayLike], units: Mapping[str, Mapping[str, float]]) -> InputTable:
+    """Return the table of inputs of any model.
+
+    Args:
+        inputs: As in `input_table`.
+        units: For each input the units that its column may have, with their factors into that of the model.
+
+    Raises:
+        FmuError: If the table is faulty.
+        RequestError: If the file cannot be read.
+
+    """
+    return _from_arrays(inputs, tuple(units)) if isinstance(inputs, Mapping) else _from_csv(Path(inputs), units)
 
 
 def _unwrapped(table: InputTable, quantities: Mapping[str, Quantity]) -> InputTable:
@@ -124,8 +137,8 @@ def _from_arrays(inputs: Mapping[str, ArrayLike], known: Sequence[str]) -> Input
     return _checked("inputs", columns, lambda k: f"sample {k}")
 
 
-def _from_csv(path: Path, quantities: Mapping[str, Quantity], length_unit: str) -> InputTable:
-    known = tuple(quantities)
+def _from_csv(path: Path, accepted: Mapping[str, Mapping[str, float]]) -> InputTable:
+    known = tuple(accepted)
     rows = _rows(path)
     _, first = next(rows, (0, []))
     if not first:
@@ -133,8 +146,8 @@ def _from_csv(path: Path, quantities: Mapping[str, Quantity], length_unit: str) 
     titles = [_title(name) for name in first]
     header = [name for name, _ in titles]
     _check_names(str(path), header, known)
-    units = {TIME: Quantity("time")} | dict(quantities)
-    into = [_factor(str(path), name, unit, factors(units[name], length_unit)) for name, unit in titles]
+    units = {TIME: factors(Quantity("time"), "m"), **accepted}
+    into = [_factor(str(path), name, unit, units[name]) for name, unit in titles]
     columns = [array("d") for _ in header]  # 8 bytes per number, since tables may be long
     lines = array("q")
     for line, row in rows:

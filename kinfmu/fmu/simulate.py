@@ -9,11 +9,13 @@ from __future__ import annotations
 import math
 import signal
 import threading
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
+from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
@@ -37,6 +39,7 @@ from kinfmu.solver.python.status import Status
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+BEGINNING = 4096  # bytes of a model description that hold the attributes of its first tag
 LAST_STEP = 1e-6  # of a step: a shorter remainder before `stop` is rounding, not a step
 
 
@@ -57,8 +60,9 @@ def simulate(
     rate: float | None = None,
     sink: Sink | None = None,
     progress: Callable[[int, int], None] | None = None,
+    exchange: str = "ordered",
 ) -> Run:
-    """Step an FMU that kinfmu built, or integrate the motion of a mechanism under torques, both from start to stop.
+    """Step an FMU or a system of FMUs, or integrate the motion of a mechanism under torques, from start to stop.
 
     Samples are at t_k = start + k step; a shorter last step ends at stop. If a pose cannot be reached, the run ends:
     its last sample has the status and no numbers, and an event of level "error" states driver, value and limit.
@@ -68,6 +72,11 @@ def simulate(
 
     Probable mistakes (inputs that no column drives, angles that jump by more than half a turn, radians that look like
     degrees) are reported by events of level "warning" and "info".
+
+    FMUs of other tools are stepped too, and the FMUs of an .ssp, with the connections between them. Their outputs are
+    the signals of the run; those of the first FMU of kinfmu among them are its coordinates and forces, and its linkage
+    is drawn. Parameters and inputs of the components of a system have names such as motor.voltage. At each sample all
+    connections pass their values, and then all FMUs step.
 
     With a mechanism and drive="torque" the drivers apply efforts, and their values and speeds are integrated:
 
@@ -79,7 +88,7 @@ def simulate(
     the drivers with an event as above, and goes through change points.
 
     Args:
-        fmu_path: File of the FMU; a mechanism with masses for drive="torque".
+        fmu_path: File of the FMU or of the SSP; a mechanism with masses for drive="torque".
         drive: 'torque' for a mechanism; None for an FMU.
         start: Start time [s]. Default: of the FMU's default experiment; with inputs, of their first row.
         stop: Stop time [s]. Default: of the FMU's default experiment; with inputs, of their last row.
@@ -101,14 +110,16 @@ def simulate(
         sink: Sink that gets the run while it is simulated, such as kinfmu.log.McapLog("run.mcap"), or any other
             kinfmu.Sink.
         progress: Called with (samples done, number of samples).
+        exchange: How connections of a system pass values: 'ordered', an output is read after the inputs that it depends
+            on are set, or 'jacobi', all outputs are read before any input is set, as many hosts do. Default: 'ordered'.
 
     Returns:
         The run.
 
     Raises:
         RequestError: If times, inputs, parameters or channels are not valid.
-        FmuError: If the file is not an FMU of kinfmu, a table of inputs is faulty, or the mechanism has no solution
-            with the parameters.
+        FmuError: If the file is not an FMU, connections do not fit, a table of inputs is faulty, or the mechanism has
+            no solution with the parameters.
 
     """
     if isinstance(fmu_path, Mechanism):
@@ -123,7 +134,7 @@ def simulate(
 
         run = torque_driven(
             fmu_path,
-            _times(fmu_path.run, start, stop, fmu_path.run.step if step is None else step),
+            times(fmu_path.run, start, stop, fmu_path.run.step if step is None else step),
             inputs=inputs,
             state=state,
             parameters=parameters,
@@ -141,6 +152,24 @@ def simulate(
     if given:
         raise RequestError(f"{listed(given)}: for a mechanism driven by torques, not for FMU {fmu_path}")
     path = Path(fmu_path)
+    if not is_own(path):
+        from kinfmu.fmu.system.simulate import simulate_system  # imports this module
+
+        if wrap:
+            raise RequestError("wrap is for FMUs of kinfmu")
+        return simulate_system(
+            path,
+            start=start,
+            stop=stop,
+            step=step,
+            inputs=inputs,
+            parameters=parameters or {},
+            channels=channels,
+            rate=rate,
+            sink=sink,
+            progress=progress,
+            exchange=exchange,
+        )
     interrupted = Interruption()
     try:
         with unpacked(path) as folder:
@@ -151,7 +180,7 @@ def simulate(
                 raise RequestError("wrap unwraps angles among the inputs, and no inputs are given")
             table = None if inputs is None else input_table(inputs, interface, wrap=wrap)
             experiment = interface.experiment
-            t = _times(table or experiment, start, stop, experiment.step if step is None else step)
+            t = times(table or experiment, start, stop, experiment.step if step is None else step)
             rows = np.empty((len(t), 0)) if table is None else table.at(t)
             kept = kept_samples(t, rate)
             mechanism = toml_file.parse(text_in(path, folder, MECHANISM), f"{path}: {MECHANISM}")
@@ -160,7 +189,7 @@ def simulate(
                 settings = _settings(interface, mechanism.settable, parameters or {}, has_inputs=drives)
             except RequestError as error:
                 raise RequestError(f"{path}: {error}") from None
-            mechanism = _as_set(mechanism, settings)
+            mechanism = as_set(mechanism, settings)
             samples = Samples(about, len(kept), settings=settings, mechanism=mechanism, model_description=xml)
             if not _time_drives(interface, settings):
                 samples.extend(undriven(interface, table, float(t[0])))
@@ -185,7 +214,21 @@ def simulate(
         interrupted.deliver()
 
 
-def _as_set(mechanism: Mechanism, settings: Mapping[str, float | bool | str]) -> Mechanism:
+def is_own(path: Path) -> bool:
+    """Return False for an SSP and for an FMU of another tool; True also for a damaged FMU."""
+    if path.suffix.lower() == ".ssp":
+        return False
+    try:
+        with ZipFile(path) as zipped:
+            if MECHANISM in zipped.namelist():
+                return True
+            with zipped.open(DESCRIPTION) as file:
+                return b'generationTool="kinfmu' in file.read(BEGINNING)
+    except (OSError, BadZipFile, LookupError, ValueError, RuntimeError, zlib.error):
+        return True
+
+
+def as_set(mechanism: Mechanism, settings: Mapping[str, float | bool | str]) -> Mechanism:
     """Return the mechanism with the parameters that are set in the FMU, if it can have them."""
     own = mechanism.settable.names
     values: dict[str, float | str] = {name: value for name, value in settings.items() if name in own}
@@ -195,7 +238,7 @@ def _as_set(mechanism: Mechanism, settings: Mapping[str, float | bool | str]) ->
         return mechanism  # the FMU reports why
 
 
-def _times(span: RunSettings | InputTable, start: float | None, stop: float | None, step: float) -> NDArray[np.float64]:
+def times(span: RunSettings | InputTable, start: float | None, stop: float | None, step: float) -> NDArray[np.float64]:
     """Return t_k = start + k step (n,), of which stop is the last; start and stop default to those of `span`."""
     first = span.start if start is None else float(start)
     last = span.stop if stop is None else float(stop)

@@ -33,11 +33,12 @@ _DAMAGED = (
 
 
 @contextmanager
-def unpacked(path: Path) -> Iterator[Path]:
-    """Unpack an FMU into a temporary folder, which is removed at the end.
+def unpacked(path: Path, needed: str = DESCRIPTION) -> Iterator[Path]:
+    """Unpack an FMU, or another archive of this kind, into a temporary folder, which is removed at the end.
 
     Args:
         path: File of the FMU.
+        needed: Name of a file that it must hold.
 
     Yields:
         The folder.
@@ -49,7 +50,7 @@ def unpacked(path: Path) -> Iterator[Path]:
     with tempfile.TemporaryDirectory(prefix="kinfmu_", ignore_cleanup_errors=True) as folder:
         try:
             with zipfile.ZipFile(path) as zipped:
-                _check(path, zipped)
+                _check(path, zipped, needed)
                 for entry in zipped.infolist():
                     _extract(path, zipped, entry, folder)
         except _DAMAGED as error:
@@ -86,7 +87,7 @@ def text_in(path: Path, folder: Path, name: str, largest: int = LARGEST_FILE) ->
         raise FmuError(f"{path}: {name} is not a text file (byte {error.start} is not UTF-8)") from None
 
 
-def _check(path: Path, zipped: zipfile.ZipFile) -> None:
+def _check(path: Path, zipped: zipfile.ZipFile, needed: str) -> None:
     """Raise an FmuError for an FMU that is not unpacked; sizes are those in the directory, the most that is read."""
     entries = zipped.infolist()
     if len(entries) > MOST_FILES:
@@ -96,8 +97,8 @@ def _check(path: Path, zipped: zipfile.ZipFile) -> None:
     size = sum(entry.file_size for entry in entries)
     if size > LARGEST:
         raise FmuError(f"{path}: takes {size} bytes unpacked; an FMU has at most {LARGEST}")
-    if DESCRIPTION not in zipped.namelist():
-        raise FmuError(f"{path}: is no FMU ({DESCRIPTION} is missing)")
+    if needed not in zipped.namelist():
+        raise FmuError(f"{path}: is no {'FMU' if needed == DESCRIPTION else 'SSP'} ({needed} is missing)")
 
 
 def _extract(path: Path, zipped: zipfile.ZipFile, entry: zipfile.ZipInfo, folder: str) -> None:

@@ -23,7 +23,19 @@ from kinfmu.solver.python.status import Status
 
 FORMAT = "2"  # increased when older files can no longer be read the same way
 _INTEGERS = ("status", "iterations")
-_TABLES = ("inputs", "values", "rates", "accelerations", "forces", "reactions", "error", "watch")  # of several columns
+_TABLES = (
+    "inputs",
+    "values",
+    "rates",
+    "accelerations",
+    "forces",
+    "reactions",
+    "signals",
+    "error",
+    "watch",
+)  # of several columns
+
+_OPTIONAL = ("forces", "reactions", "signals")  # None in a run that has none
 
 
 def description(run: Run) -> dict[str, str]:
@@ -43,6 +55,8 @@ def description(run: Run) -> dict[str, str]:
     for table, names in (("forces", run.force_names), ("reactions", run.reaction_names)):
         if names:
             lists[table] = {name: name.quantity.kind for name in names}
+    if run.signal_names:
+        lists["signals"] = {name: name.unit for name in run.signal_names}
     return {"format": FORMAT} | {key: json.dumps(value, ensure_ascii=False) for key, value in lists.items()}
 
 
@@ -129,9 +143,9 @@ def _empty(about: Mapping[str, Any], n: int) -> Run:
     outputs, inputs, watches = (about[key] for key in ("outputs", "input_names", "watch_names"))
     widths = dict.fromkeys(("values", "rates", "accelerations"), len(outputs))
     widths |= {"inputs": len(inputs), "error": 3, "watch": len(watches)}
-    widths |= {table: len(about[table]) for table in ("forces", "reactions")}
+    widths |= {table: len(about[table]) for table in _OPTIONAL}
     blank: dict[str, Any] = {name: np.empty((n, widths[name])) for name in _TABLES}
-    blank |= {table: None for table in ("forces", "reactions") if not about[table]}
+    blank |= {table: None for table in _OPTIONAL if not about[table]}
     blank["inputs"] = np.zeros((n, len(inputs)))  # they are read before they are filled
     blank |= {name: np.empty(n) for name in ("residual", "margin")}
     blank |= {name: np.zeros(n, np.int64) for name in _INTEGERS}
@@ -144,6 +158,7 @@ def _empty(about: Mapping[str, Any], n: int) -> Run:
         watch_names=tuple(watches),
         force_names=about["forces"],
         reaction_names=about["reactions"],
+        signal_names=about["signals"],
         length_unit=about["length_unit"],
         absent=frozenset(about["absent"]),
         axis=about["axis"],

@@ -11,7 +11,7 @@ from kinfmu.errors import LogError, listed
 from kinfmu.mechanism.valid import is_line, quoted
 from kinfmu.run import MOST_SAMPLES, Event
 from kinfmu.run.axis import SAMPLE, TIME
-from kinfmu.units import METRES, ForceName, read_coordinate, read_force, read_inputs
+from kinfmu.units import METRES, ForceName, SignalName, read_coordinate, read_force, read_inputs
 
 MOST_COLUMNS = 500_000  # three times those of the largest mechanism
 LEVELS = ("info", "warning", "error")
@@ -45,6 +45,7 @@ def lists_of(texts: Mapping[str, str]) -> dict[str, Any]:
     if not isinstance(axis, str):
         raise LogError(f"axis of the record = {quoted(axis)} must be the name of an input, or {TIME} or {SAMPLE}")
     found |= {table: _forces(texts, table) for table in ("forces", "reactions")}
+    found["signals"] = _signals(texts)
     if found["coordinate_count"] > len(found["outputs"]):
         raise LogError(f"coordinate_count of the record = {found['coordinate_count']} is more than its outputs")
     if len(set(found["columns"])) < len(found["columns"]):
@@ -59,6 +60,14 @@ def _forces(texts: Mapping[str, str], key: str) -> tuple[ForceName, ...]:
     if None in names or len(names) > MOST_COLUMNS:
         raise LogError(f"{key} of the record = {quoted(kinds)} must be kinds of quantities, such as 'torque', by name")
     return tuple(name for name in names if name is not None)
+
+
+def _signals(texts: Mapping[str, str]) -> tuple[SignalName, ...]:
+    """Return the names of the outputs of other FMUs; older records have none."""
+    units = _value(texts, "signals") if "signals" in texts else {}
+    if not (_are_texts(units) and _are_lines(list(units)) and len(units) <= MOST_COLUMNS):
+        raise LogError(f"signals of the record = {quoted(units)} must be units by name")
+    return tuple(SignalName(*entry) for entry in units.items())
 
 
 def samples_of(texts: Mapping[str, str]) -> int:

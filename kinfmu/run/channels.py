@@ -10,7 +10,7 @@ import numpy as np
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.run.axis import TIME
 from kinfmu.run.run import FloatArray, IntArray, Run
-from kinfmu.units import CoordinateName, ForceName
+from kinfmu.units import CoordinateName, ForceName, SignalName
 
 ALWAYS = ("time", "solver.status")  # without them a sample has no meaning
 DRAWN = "drawn"
@@ -24,9 +24,9 @@ def absent_columns(run: Run, names: Sequence[str] | None) -> frozenset[str]:
     Args:
         run: The run, with or without samples.
         names: 'all', 'none'; groups 'inputs', 'q', 'qd', 'qdd', 'points' (of interest, with rates), 'forces' (efforts,
-            inertias, energies), 'reactions', 'residual', 'iterations', 'margin', 'error', 'watch'; columns such as
-            'coupler.vx', with * for any letters; 'drawn', the topics of an MCAP file that viewers draw by themselves. A
-            minus in front leaves out: ['-error', '-margin'] is all but those. None: all.
+            inertias, energies), 'reactions', 'signals' (of other FMUs), 'residual', 'iterations', 'margin', 'error',
+            'watch'; columns such as 'coupler.vx', with * for any letters; 'drawn', the topics of an MCAP file that
+            viewers draw by themselves. A minus in front leaves out: ['-error', '-margin'] is all but those. None: all.
 
     Returns:
         Names of the absent columns. Time and status are always kept, and the inputs of a run over these.
@@ -131,17 +131,19 @@ def coordinates(run: Run, names: Sequence[str]) -> tuple[CoordinateName, ...]:
     return tuple(dict.fromkeys(owners[column] for column in kept if column in owners))
 
 
-def forces(run: Run, names: Sequence[str]) -> tuple[ForceName, ...]:
-    """Return the forces and reactions that `names` choose, in the order of the run.
+def forces(run: Run, names: Sequence[str]) -> tuple[ForceName | SignalName, ...]:
+    """Return the forces, reactions and signals that `names` choose, in the order of the run.
 
     Args:
         run: The run.
         names: As in `absent_columns`. None given, or a minus in front of the first: all but reactions.
 
     """
-    known = {str(name): name for name in (*run.force_names, *run.reaction_names)}
+    every: tuple[ForceName | SignalName, ...] = (*run.force_names, *run.reaction_names, *run.signal_names)
+    known = {str(name): name for name in every}
     groups = {group: found & known.keys() for group, found in _groups(run).items()}
-    kept = set(map(str, run.force_names)) if not names or names[0].startswith("-") else set()
+    usual = {*map(str, run.force_names), *map(str, run.signal_names)}
+    kept = usual if not names or names[0].startswith("-") else set()
     for name in names:
         bare = name.removeprefix("-")
         found = groups[bare] if bare in groups else {column for column in known if fnmatchcase(column, bare)}
@@ -177,6 +179,7 @@ def _groups(run: Run) -> dict[str, set[str]]:
         "error": {f"solver.error_{name}" for name in ("q", "qd", "qdd")},
         "forces": set(run.force_names),
         "reactions": set(run.reaction_names),
+        "signals": set(run.signal_names),
         "watch": {f"watch.{name}" for name in run.watch_names},
         DRAWN: {DRAWN},
     }

@@ -16,7 +16,7 @@ from kinfmu.display import Displayed
 from kinfmu.errors import KinfmuError, MissingPackageError, listed, suggestion
 from kinfmu.run.axis import TIME, axis_of, rates_per
 from kinfmu.solver.python.status import Status
-from kinfmu.units import CoordinateName, ForceName, InputName, read_coordinate, read_inputs, unit_of
+from kinfmu.units import CoordinateName, ForceName, InputName, SignalName, read_coordinate, read_inputs, unit_of
 
 if TYPE_CHECKING:
     from kinfmu.mechanism import Mechanism
@@ -100,6 +100,8 @@ class Run(Displayed):
         forces: (n, f) in SI units; None without any.
         reaction_names: Names of the r reactions of joints, such as 'pin.force_x'.
         reactions: (n, r) in N and N m; None without any. NaN where redundant rows share a load in an unknown way.
+        signal_names: Names of the s outputs of FMUs that are not kinfmu's, with their units, such as 'motor.current'.
+        signals: (n, s) their values; None without any.
         fixed: Coordinates that a joint holds at a constant, by name.
         input_names: Names of the 3 d inputs: value, speed and acceleration of each driver.
         inputs: (n, 3 d).
@@ -141,6 +143,8 @@ class Run(Displayed):
     forces: Lazy[FloatArray | None] = Lazy(None)
     reaction_names: tuple[ForceName, ...] = ()
     reactions: Lazy[FloatArray | None] = Lazy(None)
+    signal_names: tuple[SignalName, ...] = ()
+    signals: Lazy[FloatArray | None] = Lazy(None)
     length_unit: str = "m"
     mechanism_source: Lazy[Mechanism | str] = Lazy("")
     model_description: str = ""
@@ -230,7 +234,8 @@ class Run(Displayed):
         name = self.info.get("name", "run")
         span = f", {axis_of(self).range()}" if len(self.t) else ""
         bad = int((~self.good).sum())
-        return f"<Run of {name}: {len(self.t)} samples{span}, {bad} without numbers; {', '.join(self.outputs)}>"
+        columns = ", ".join((*self.outputs, *self.signal_names))
+        return f"<Run of {name}: {len(self.t)} samples{span}, {bad} without numbers; {columns}>"
 
     def __len__(self) -> int:
         return len(self.values)
@@ -296,6 +301,8 @@ class Run(Displayed):
         for table, names in (("forces", self.force_names), ("reactions", self.reaction_names)):
             for k, force in enumerate(names):
                 yield ColumnPlace(force, unit_of(force.quantity, self.length_unit), table, k)
+        for k, signal in enumerate(self.signal_names):
+            yield ColumnPlace(signal, signal.unit, "signals", k)
         for table in ("status", "residual", "iterations", "margin"):
             yield ColumnPlace(f"solver.{table}", "1", table, None)
         for k, error in enumerate(("solver.error_q", "solver.error_qd", "solver.error_qdd")):
@@ -342,7 +349,7 @@ class Run(Displayed):
 
         """
         if not isinstance(name, str):
-            raise KinfmuError(f"columns of a run have names such as '{self.outputs[0]}', not {name!r}")
+            raise KinfmuError(f"columns of a run have names such as '{next(iter(self._index))}', not {name!r}")
         place = self._index.get(name)
         if isinstance(place, float):
             return np.full(len(self.t), place)
@@ -363,7 +370,7 @@ class Run(Displayed):
 
 _LAZY = tuple(name for name, value in vars(Run).items() if isinstance(value, Lazy))
 _TABLES = ("t", "values", "rates", "accelerations", "inputs", "status", "iterations", "residual", "margin", "error",
-           "watch", "forces", "reactions")  # fmt: skip
+           "watch", "forces", "reactions", "signals")  # fmt: skip
 
 
 def arrow_table(columns: Iterable[Column]) -> Any:

@@ -192,7 +192,7 @@ def test_a_file_that_is_no_fmu_is_reported(fails: Callable[..., str], tmp_path: 
 
 
 def test_what_simulate_takes_is_in_the_message_for_another_file(refuses: Callable[..., str]) -> None:
-    assert refuses("simulate", "motion.csv").endswith("files end in .toml or .fmu")
+    assert refuses("simulate", "motion.csv").endswith("files end in .toml or .fmu or .ssp")
 
 
 def test_review_of_a_run_that_is_missing_is_reported(refuses: Callable[..., str], tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ SHORTEST_SHOW, LONGEST_SHOW = 5.0, 30.0  # [s], limits of the time to play the w
 SWEEP_SHOW = 10.0  # [s] to play a run that has no time
 EDGE = 0.01  # of the run's time, left free before and after the curves
 LEGEND_EDGE, LETTER = 34.0, 7.0  # [points]; width of a legend around its names, and of a letter
+ABREAST = 4  # most plots of efforts and signals in a row
 PLOT, NARROW = 400.0, 200.0  # [points], widths of plots on a usual screen
 LEAST_LEGEND, MOST_LEGEND = 0.15, 0.6  # of the run's time, left free after the curves for the legend
 
@@ -33,7 +34,7 @@ def single(
 ) -> rrb.Blueprint:
     """Return the layout of one run: linkage on the left; on the right one row per order, one column per unit.
 
-    Efforts and energies, then the solver's diagnostics are below the curves.
+    Efforts, energies and signals, then the solver's diagnostics are below the curves.
     """
     import rerun.blueprint as rrb
 
@@ -44,14 +45,19 @@ def single(
             rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], timeline, [run]) for group in found]))
     if forces:
         width = NARROW if len(forces) > len(KINDS) else PLOT
-        rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], timeline, [run], width) for group in forces]))
+        views = [plot(group.title, [("", group)], timeline, [run], width) for group in forces]
+        abreast = -(-len(views) // -(-len(views) // ABREAST))  # so that rows are of about the same length
+        rows += [rrb.Horizontal(*views[k : k + abreast]) for k in range(0, len(views), abreast)]
     shares = [2.0] * len(rows)
     if solver:
         rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], timeline, [run], NARROW) for group in solver]))
         shares.append(1.5)
-    rows.append(status_view([""], timeline, [run]))
-    left = _left(linkage_view(["/linkage"], timeline, [run], [scene]), [""], [run])
-    right = rrb.Vertical(*rows, row_shares=[*shares, 1.0])
+    has_motion = scene is not None or bool(run.outputs)
+    if has_motion:
+        rows.append(status_view([""], timeline, [run]))
+        shares.append(1.0)
+    left = _left(linkage_view(["/linkage"], timeline, [run], [scene]) if has_motion else None, [""], [run])
+    right = rrb.Vertical(*rows, row_shares=shares)
     return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), timeline, [run])
 
 
@@ -83,13 +89,16 @@ def compared(
     return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), timeline, runs)
 
 
-def _left(linkage: rrb.View, roots: Sequence[str], runs: Sequence[Run]) -> rrb.Container:
-    """Return the left side: linkage, card, and the log if there are events.
+def _left(linkage: rrb.View | None, roots: Sequence[str], runs: Sequence[Run]) -> rrb.Container:
+    """Return the left side: linkage, if there is one, card, and the log if there are events.
 
     The log does not wrap its texts, so it gets the full width; the card wraps them.
     """
     import rerun.blueprint as rrb
 
+    if linkage is None:
+        views = [card_view(), *([log_view(roots)] if any(notable_events(run) for run in runs) else [])]
+        return rrb.Vertical(*views)
     if any(notable_events(run) for run in runs):
         return rrb.Vertical(linkage, card_view(), log_view(roots), row_shares=[1.5, 0.9, 0.6])
     return rrb.Vertical(linkage, card_view(), row_shares=[1.7, 1.0])

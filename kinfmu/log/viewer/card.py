@@ -47,10 +47,10 @@ def _period(run: Run) -> str:
     if not len(run):
         return "No samples."
     axis = axis_of(run)
-    units = f"Lengths in {run.length_unit}, angles in rad. {axis.rates}".strip()
+    units = f"Lengths in {run.length_unit}, angles in rad. {axis.rates}".strip() if run.outputs else ""
     if len(run) == 1:
-        return f"One sample, at {axis.place(float(run.t[0]))}. {units}"
-    return f"{len(run)} samples, {axis.range()}. {units}"
+        return f"One sample, at {axis.place(float(run.t[0]))}. {units}".rstrip()
+    return f"{len(run)} samples, {axis.range()}. {units}".rstrip()
 
 
 def _table(heading: str, entries: Mapping[str, str]) -> list[str]:

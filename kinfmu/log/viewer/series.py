@@ -86,6 +86,27 @@ def efforts(run: Run) -> list[Group]:
     return found
 
 
+def signals(run: Run) -> list[Group]:
+    """Return the outputs of other FMUs, one group for each unit."""
+    found = []
+    kept = [name for name in run.signal_names if name not in run.absent]
+    for place, unit in enumerate(dict.fromkeys(name.unit for name in kept)):
+        own = [name for name in kept if name.unit == unit]
+        values = np.where(run.good[:, None], np.column_stack([run[name] for name in own]), np.nan)
+        size = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
+        found.append(
+            Group(
+                path=f"signals/{place}",
+                title=f"{own[0] if len(own) == 1 else 'signals'}{'' if unit == '1' else f' [{unit}]'}",
+                names=tuple(map(str, own)),
+                colours=tuple(palette.body(number) for number in range(len(own))),
+                values=values,
+                shown=shown_range(values, size),
+            )
+        )
+    return found
+
+
 def _title(quantity: Quantity, length_unit: str) -> str:
     """Return a title such as 'angular velocity [rad/s]'."""
     words = {"angle": ("angle", "angular velocity", "angular acceleration"), "length": ORDERS}[quantity.kind]

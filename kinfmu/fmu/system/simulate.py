@@ -1,0 +1,266 @@
+"""Step any FMU, or the FMUs of an SSP, and return their samples as one run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kinfmu.errors import FmuError, MissingPackageError, RequestError, listed, suggestion
+from kinfmu.fmu.input_table import InputTable, table_of
+from kinfmu.fmu.samples import DISCARD, ERROR, Samples
+from kinfmu.fmu.simulate import Interruption, as_set, times
+from kinfmu.fmu.slaves import LoadedSlave, slave
+from kinfmu.fmu.system.exchange import check_exchange, exchange_of, ordered
+from kinfmu.fmu.system.ports import Port
+from kinfmu.fmu.system.samples import SystemSamples
+from kinfmu.fmu.system.slave import AnySlave, foreign_slave
+from kinfmu.fmu.system.structure import STRUCTURE, Component, Structure, of_fmu, of_ssp
+from kinfmu.fmu.unpacked import unpacked
+from kinfmu.mechanism import toml_file
+from kinfmu.run import Event, Run
+from kinfmu.run.channels import kept_samples
+from kinfmu.run.run import Sink
+from kinfmu.solver.python.status import Status
+from kinfmu.units import SignalName
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+RESERVED = ("time",)  # names of columns that every run has
+
+
+def simulate_system(
+    path: Path,
+    *,
+    start: float | None,
+    stop: float | None,
+    step: float | None,
+    inputs: str | Path | Mapping[str, ArrayLike] | None,
+    parameters: Mapping[str, float | str | bool],
+    channels: Sequence[str] | None,
+    rate: float | None,
+    sink: Sink | None,
+    progress: Callable[[int, int], None] | None,
+    exchange: str,
+) -> Run:
+    """Step an .ssp, or an FMU that is not kinfmu's; arguments and errors as in kinfmu.simulate."""
+    check_exchange(exchange)
+    try:
+        import fmpy  # noqa: F401  # only to see if it is installed
+    except ImportError:
+        raise MissingPackageError("stepping an FMU needs fmpy; pip install fmpy") from None
+    interrupted = Interruption()
+    try:
+        with ExitStack() as opened:
+            is_ssp = path.suffix.lower() == ".ssp"
+            folder = opened.enter_context(unpacked(path, STRUCTURE) if is_ssp else unpacked(path))
+            system = of_ssp(path, folder, opened) if is_ssp else of_fmu(path, folder)
+            table = None if inputs is None else table_of(inputs, _units(system))
+            span = table or system.experiment
+            if stop is None and math.isnan(span.stop):
+                raise RequestError(f"{path}: the model states no stop time; give one (--stop)")
+            default = system.experiment.step if math.isfinite(system.experiment.step) else None
+            if step is None and default is None:
+                first = span.start if start is None else start
+                default = ((span.stop if stop is None else stop) - first) / 1000 or 1.0
+            t = times(span, start, stop, step if step is not None else default or 1.0)
+            kept = kept_samples(t, rate)
+            values = _values(path, system, parameters, table)
+            with interrupted:
+                return _run(system, t, kept, table, values, channels, sink, progress, exchange, interrupted, opened)
+    finally:
+        interrupted.deliver()
+
+
+def _units(system: Structure) -> dict[str, dict[str, float]]:
+    """Return the units that columns of a table of inputs may have."""
+    return {name: ends[0][1].units() for name, ends in system.inputs.items()}
+
+
+def _values(
+    path: Path, system: Structure, parameters: Mapping[str, float | str | bool], table: InputTable | None
+) -> dict[str, dict[str, float]]:
+    """Return what is set before initialization, by component and variable."""
+    found = {one.name: dict(one.values) for one in system.components}
+    settable = {
+        one.column(port.name): (one, port)
+        for one in system.components
+        for port in one.ports.values()
+        if port.causality in ("parameter", "input")
+    }
+    settable |= {name: ends[0] for name, ends in system.inputs.items()}
+    for name, value in parameters.items():
+        if name not in settable:
+            raise RequestError(
+                f"{path}: '{name}' is no parameter or input{suggestion(name, settable)}; "
+                f"parameters and inputs: {listed(settable)}"
+            )
+        for one, port in system.inputs.get(name, (settable[name],)):
+            found[one.name][port.name] = port.number(name, value)
+    for one in system.components:  # drivers whose inputs are given follow these, not their laws
+        if one.own is not None:
+            given = {wire.input.name for wire in system.connections if wire.target is one}
+            given |= {
+                port.name for name in (table.names if table else ()) for end, port in system.inputs[name] if end is one
+            }
+            drivers = [variable.name for variable in one.own.interface.part("inputs")]
+            if given & set(drivers):
+                (switch,) = one.own.interface.part("drive")
+                found[one.name].setdefault(switch.name, 0.0)
+                if given >= set(drivers) and "rates" in one.ports:
+                    found[one.name].setdefault("rates", one.ports["rates"].number("rates", "wired"))
+    return found
+
+
+def _run(
+    system: Structure,
+    t: NDArray[np.float64],
+    kept: NDArray[np.int64],
+    table: InputTable | None,
+    values: Mapping[str, Mapping[str, float]],
+    channels: Sequence[str] | None,
+    sink: Sink | None,
+    progress: Callable[[int, int], None] | None,
+    exchange: str,
+    interrupted: Interruption,
+    opened: ExitStack,
+) -> Run:
+    """Start the slaves, initialize them, and step them."""
+    rows = np.empty((len(t), 0)) if table is None else table.at(t)
+    main = next((one for one in system.components if one.own is not None), None)
+    others = [one for one in system.components if one is not main]
+    names = [SignalName(_column(one, port), port.unit) for one in others for port in one.of("output")]
+    driven = [name for name in (table.names if table else ()) if all(end is not main for end, _ in system.inputs[name])]
+    names += [SignalName(name, system.inputs[name][0][1].unit) for name in driven]
+    own = _samples_of(main, len(kept), values) if main else None
+    samples = SystemSamples(names, len(kept), _info(system, values, main), own)
+    samples.extend([Event(float(t[0]), "info", note) for note in system.notes])
+    samples.now = float(t[0])
+    slaves: dict[str, AnySlave] = {}
+    loaded: LoadedSlave | None = None
+    for one in system.components:
+        if one.own is not None:
+            made = opened.enter_context(slave(one.own, one.folder, samples.log))
+            slaves[one.name] = AnySlave(one.name or one.path.stem, made.fmpy, one.own.version == "3.0")
+            loaded = made if one is main else loaded
+        else:
+            slaves[one.name] = opened.enter_context(
+                foreign_slave(one.name or one.path.stem, one.about, one.folder, samples.log)
+            )
+    exchanged = exchange_of(exchange, system.connections, slaves)
+    set_inputs = [
+        (column, slaves[end.name].setter([port]))
+        for column, name in enumerate(table.names if table else ())
+        for end, port in system.inputs[name]
+    ]
+
+    def exchange_at(k: int) -> None:
+        for column, set_input in set_inputs:
+            set_input([float(rows[k, column])])
+        exchanged()
+
+    try:
+        for one in system.components:
+            given = values[one.name]
+            slaves[one.name].setter([one.ports[name] for name in given])(list(given.values()))
+            slaves[one.name].enter(float(t[0]))
+        exchange_at(0)
+        for one in system.components:
+            slaves[one.name].exit()
+    except FmuError as error:
+        raise FmuError(f"{error} {samples.first_error()}".strip()) from None
+    if own is not None and loaded is not None:
+        if own.first_error():  # FMUs in Python cannot return Error here: their messages count
+            raise FmuError(own.first_error())
+        own.read_fixed(loaded)
+    for loop in ordered(system.connections)[1]:
+        text = f"algebraic loop: {', '.join(map(str, loop))}; its first value is a step late, which may be unstable"
+        samples.extend([Event(float(t[0]), "warning", text)])
+    if interrupted:
+        raise KeyboardInterrupt
+    readers = [slaves[one.name].getter(one.of("output")) for one in others]
+    columns = [] if table is None else [table.names.index(name) for name in driven]
+    place = [0]
+    readers.append(lambda: [float(rows[place[0], column]) for column in columns])
+    samples.begin(readers, loaded, channels, sink)
+    try:
+        _step_through(slaves, samples, t, kept, exchange_at, loaded, place, progress, interrupted.came)
+    except FmuError as failure:
+        samples.log(ERROR, f"at t = {samples.now:g} s: {failure}")
+    except BaseException as failure:
+        samples.end(str(failure) or type(failure).__name__)
+        raise
+    return samples.end()
+
+
+def _step_through(
+    slaves: Mapping[str, AnySlave],
+    samples: SystemSamples,
+    t: NDArray[np.float64],
+    kept: NDArray[np.int64],
+    exchange_at: Callable[[int], None],
+    loaded: LoadedSlave | None,
+    place: list[int],
+    progress: Callable[[int, int], None] | None,
+    signals: list[int],
+) -> None:
+    """Run the loop: exchange at t_k, record, step all FMUs."""
+    kept_at = np.zeros(len(t), bool)
+    kept_at[kept] = True
+    for k, time in enumerate(t.tolist()):
+        samples.now, place[0] = time, k
+        if signals and k:
+            samples.log(ERROR, f"at t = {time:g} s: interrupted; the run ends here")
+            return
+        exchange_at(k)
+        good = samples.read(time, is_kept=bool(kept_at[k]))
+        if progress is not None:
+            progress(k + 1, len(t))
+        if not good:
+            samples.log(DISCARD, f"at t = {time:g} s: {loaded.message() if loaded else ''}")
+            return
+        if k == len(t) - 1:
+            return
+        end = float(t[k + 1])
+        for one in slaves.values():
+            if not one.step(time, end - time):
+                if loaded is not None and loaded.counts()[0] > Status.BRIDGED:  # it goes to an unreachable pose
+                    samples.now = end
+                    samples.read(end, is_kept=True)
+                else:
+                    samples.log(DISCARD, f"at t = {time:g} s: {one.name} ends the run: it does not step further")
+                return
+
+
+def _column(one: Component, port: Port) -> str:
+    """Return the name of an output as a column."""
+    name = one.column(port.name)
+    return f"fmu.{name}" if name in RESERVED or name.startswith("solver.") else name
+
+
+def _samples_of(one: Component, count: int, values: Mapping[str, Mapping[str, float]]) -> Samples:
+    """Return the samples of kinfmu's FMU in the system."""
+    assert one.own is not None  # noqa: S101  # for the type
+    mechanism = toml_file.parse(one.mechanism, f"{one.path}: mechanism.toml")
+    mechanism = as_set(mechanism, values[one.name])
+    text = (one.folder / "modelDescription.xml").read_text("utf-8")
+    return Samples(one.own, count, settings=values[one.name], mechanism=mechanism, model_description=text)
+
+
+def _info(system: Structure, values: Mapping[str, Mapping[str, float]], main: Component | None) -> dict[str, str]:
+    """Return what the record states of the system."""
+    given = [f"{one.column(name)} = {value:g}" for one in system.components for name, value in values[one.name].items()]
+    if len(system.components) == 1:
+        parts = {"generation_tool": str(system.components[0].about.generationTool or "")}
+    else:
+        parts = {
+            "components": ", ".join(f"{one.name} ({one.about.modelName})" for one in system.components),
+            "connections": ", ".join(map(str, system.connections)),
+        }
+    parts |= {} if main else {"token": ""}
+    return {"name": system.name, "title": system.title, **parts, "parameters": ", ".join(given)}
