@@ -27,6 +27,7 @@ from kinfmu.mechanism.members import NumberPath
 from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.toml_text import text
 from kinfmu.page.module import PageModule
+from kinfmu.page.opened import AXES, place_text
 from kinfmu.scene import palette
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.shape import Shape
@@ -86,8 +87,8 @@ def module_data(module: PageModule, places: Mapping[str, NumberPath]) -> dict[st
         for one in plan.parameters
     ]
     parameters += [
-        _parameter(one.name, one.value, one.quantity, unit, place=("drivers", one.driver, one.key))
-        | {"points": [], "isPlace": False, "isLaw": True}
+        _parameter(one.name, one.value, one.quantity, unit)
+        | {"label": f"{one.driver} {one.key}", "short": f"{one.driver} {one.key}", "inFile": "", "points": [], "isLaw": True}
         for one in plan.law_constants
     ]
     return {
@@ -112,8 +113,9 @@ def _parameter(
 ) -> dict[str, Any]:
     declared = "" if quantity.kind == "number" else unit_of(quantity, unit)
     return {
-        "name": name,
+        "name": place_text(place) if place else name,
         "label": label_of(place) if place else name,
+        "short": label_of(place).removeprefix(str(place[1])).lstrip(". ") if place else name,
         "group": str(place[1]) if place else "",
         "kind": quantity.kind,
         "unit": declared,
@@ -150,7 +152,7 @@ def label_of(place: NumberPath) -> str:
     if place[0] == "bodies":
         _, body, _, *rest = place
         if len(rest) == 2:
-            return f"{body}.{rest[0]} {'xy'[int(rest[1])]}"
+            return f"{body}.{rest[0]} {AXES[int(rest[1])]}"
         return f"{body} {' '.join(map(str, place[2:]))}"
     return " ".join(str(part) for part in place[1:] if part != "law")
 
@@ -160,7 +162,7 @@ def written_file(mechanism: Mechanism, module: PageModule, places: Mapping[str, 
 
     Start poses are "{{start crank.phi}}", so that the file assembles on the branch that the page shows.
     """
-    paths = {path: name for name, path in places.items()}
+    paths = {path: place_text(path) for path in places.values()}
     paths |= {("drivers", one.driver, "law", one.key): one.name for one in module.plan.law_constants}
     known = {*module.plan.outputs, *module.plan.fixed}
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from kinfmu.analysis import Report, check
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
-from kinfmu.mechanism.members import NumberPath
 from kinfmu.page.describe import describe, module_data, written_file
 from kinfmu.page.module import page_module
+from kinfmu.page.opened import opened
 
 _WEB = Path(__file__).parent / "web"
 _SCRIPTS = (
@@ -57,8 +57,11 @@ def page(mechanism: Mechanism, *, report: Report | None = None) -> str:
     if report.problem is not None:
         raise report.problem
     as_written = page_module(mechanism)
-    places: dict[str, NumberPath] = {}
-    modules = {"written": module_data(as_written, places), "opened": None}
+    with_places, places = opened(mechanism)
+    modules = {
+        "written": module_data(as_written, {}),
+        "opened": module_data(page_module(with_places), places) if places else None,
+    }
     data = describe(mechanism, report) | {
         "size": as_written.plan.size,
         "modules": modules,

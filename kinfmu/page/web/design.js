@@ -64,7 +64,8 @@ export class Design {
     fragment() {
         const parts = this.changes().map(([name, value]) => `${encodeURIComponent(name)}=${value}`);
         this.linkage.data.drivers.forEach((driver, k) => {
-            if (this.linkage.u[k] !== this.linkage.law[0].u[k]) parts.push(`@${encodeURIComponent(driver.name)}=${this.linkage.u[k]}`);
+            const value = this.linkage.wrapped(k);
+            if (Math.abs(value - this.linkage.law[0].u[k]) > 1e-12) parts.push(`@${encodeURIComponent(driver.name)}=${value}`);
         });
         return parts.length ? `#${parts.join("&")}` : "";
     }

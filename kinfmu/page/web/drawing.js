@@ -116,7 +116,7 @@ class Painter {
         for (let k = Math.ceil(low[0] / step); k * step <= high[0]; k++) {
             const [x] = this.dot([k * step, 0]);
             pen.line([[x, 0], [x, view.height]], { width: 1, colour: theme.grid });
-            pen.text(x + 3, view.height - 8, number(k * step), { colour: theme.quiet, size: 10, halo: theme.paper });
+            if (x < view.width - 60) pen.text(x + 3, view.height - 8, number(k * step), { colour: theme.quiet, size: 10, halo: theme.paper });
         }
         for (let k = Math.ceil(low[1] / step); k * step <= high[1]; k++) {
             const [, y] = this.dot([0, k * step]);

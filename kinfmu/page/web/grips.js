@@ -2,6 +2,8 @@
 
 import { distance, distanceToSegment, leastSquares, remainder, seen } from "./geometry.js";
 
+const NO_EFFECT = 1e-5; // of the largest effect of a parameter on a pin; a smaller one is rounding
+
 // Return what is at a place in the plane, within a reach: { body, local, point } or null.
 export function gripAt(linkage, p, reach) {
     let best = null;
@@ -122,26 +124,32 @@ export function stretch(linkage, design, point, names, target) {
     if (!names.length) return true;
     const start = new Map(design.values);
     const step = 1e-6 * linkage.data.size;
+    const grid = 10 ** Math.floor(Math.log10(linkage.data.size) - 3.5); // round values are easier to read and to make
+    const decimals = Math.max(0, Math.ceil(-Math.log10(grid)));
     const unit = (name) => (design.byName.get(name).kind === "angle" ? step / linkage.data.size : step);
     for (let round = 0; round < 3; round++) {
         const now = linkage.point(point);
         const gap = [target[0] - now[0], target[1] - now[1]];
-        if (Math.hypot(...gap) < 1e-7 * linkage.data.size) return true;
+        if (Math.hypot(...gap) < grid) return true;
         const base = new Map(design.values);
         const columns = names.map((name) => {
             const moved = new Map(base).set(name, base.get(name) + unit(name));
             const p = linkage.setValues(moved) ? linkage.point(point) : now;
             return [(p[0] - now[0]) / step, (p[1] - now[1]) / step];
         });
+        const sizes = columns.map((column) => Math.hypot(...column));
+        const scale = Math.max(...sizes);
+        for (let k = 0; k < names.length; k++) if (sizes[k] < NO_EFFECT * scale) columns[k].fill(0);
         const rows = [0, 1].map((axis) => columns.map((column) => column[axis]));
-        const scale = Math.max(...rows.flat().map(Math.abs));
         linkage.setValues(base);
         if (!(scale > 1e-9)) return true;
         const change = leastSquares(rows, gap, 1e-5 * scale * scale);
         const most = Math.max(Math.hypot(...gap) / (0.1 * linkage.data.size), 1);
         const next = {};
         names.forEach((name, k) => {
-            next[name] = base.get(name) + (change[k] / most) * (unit(name) / step);
+            if (sizes[k] < NO_EFFECT * scale) return;
+            const wanted = base.get(name) + (change[k] / most) * (unit(name) / step);
+            next[name] = Number((Math.round(wanted / grid) * grid).toFixed(decimals));
         });
         if (!design.set(next)) {
             for (const [name, value] of round ? base : start) design.values.set(name, value);

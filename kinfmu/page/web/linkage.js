@@ -266,6 +266,15 @@ export class Linkage {
         return { at: at(low), isLimit: true };
     }
 
+    // Return the value of a driver within its range, if it turns without end.
+    wrapped(k) {
+        const [low, high] = this.ranges[k];
+        const value = this.u[k];
+        if (this.data.drivers[k].kind !== "angle" || this.limits.some((limit) => limit.driver === k)) return value;
+        const period = high - low;
+        return low + (((value - low) % period) + period) % period;
+    }
+
     // Return polylines of the points with these numbers, over the driver's range or the run.
     curves(points, count = CURVE) {
         const bodies = [...new Set(points.map((point) => this.bodyOf[point]))].filter((body) => this.triples[body][0] >= 0);

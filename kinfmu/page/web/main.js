@@ -6,11 +6,11 @@ import { Engine } from "./engine.js";
 import { TURN } from "./geometry.js";
 import { gripAt, parametersOf, pinAt, place, pull, stretch } from "./grips.js";
 import { Linkage } from "./linkage.js";
-import { element, filesPanel, Plots, showPanel, shownUnit, Values } from "./panels.js";
+import { breakable, element, filesPanel, Plots, showPanel, shownUnit, Values } from "./panels.js";
 import { CanvasPen } from "./pen.js";
 import { View } from "./view.js";
 
-const SPEEDS = [0.05, 0.1, 0.25, 0.5, 1, 2, 4];
+const SPEEDS = [0.005, 0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1, 2, 4];
 const LONGEST_PLAY = 8; // [s] of a run at the first speed; longer or shorter runs start at another one
 const TRACE = 600; // points of a trace
 const ARROW = 0.22; // of the smaller side of the view, longest arrow
@@ -161,16 +161,6 @@ class Page {
 
     // ---- motion
 
-    // Return the value of a driver within its range, if it turns without end.
-    wrapped(k) {
-        const { linkage } = this;
-        const [low, high] = linkage.ranges[k];
-        const value = linkage.u[k];
-        if (linkage.data.drivers[k].kind !== "angle" || linkage.limits.some((limit) => limit.driver === k)) return value;
-        const period = high - low;
-        return low + (((value - low) % period) + period) % period;
-    }
-
     play(isPlaying = !this.isPlaying) {
         this.isPlaying = isPlaying;
         const button = $("play");
@@ -289,7 +279,7 @@ class Page {
 
     #header() {
         const { data } = this.linkage;
-        $("name").textContent = data.name;
+        $("name").textContent = breakable(data.name);
         $("title").textContent = data.title;
         $("undo").addEventListener("click", () => this.undo());
         $("redo").addEventListener("click", () => this.undo(true));
@@ -373,7 +363,7 @@ class Page {
                 this.refresh(() => this.move(k, Number(field.value) / factor));
                 this.writeSoon();
             });
-            const label = element("label", { className: "wide" }, element("span", { className: "label", textContent: driver.name }), slider);
+            const label = element("label", { className: "wide" }, element("span", { className: "label", textContent: breakable(driver.name) }), slider);
             $("drivers").append(element("div", { className: "row driver" }, label, field, element("span", { className: "unit", textContent: unit })));
             return { slider, field, factor };
         });
@@ -391,7 +381,7 @@ class Page {
         $("clock").textContent = `${linkage.t.toFixed(run.to - run.from < 10 ? 2 : 1)} s`;
         if (document.activeElement !== $("time") || this.isPlaying) $("time").value = linkage.t;
         this.sliders.forEach(({ slider, field, factor }, k) => {
-            const value = this.wrapped(k);
+            const value = this.linkage.wrapped(k);
             if (document.activeElement !== slider || this.isPlaying) slider.value = value;
             if (document.activeElement !== field) field.value = number(value * factor, 6);
         });

@@ -27,6 +27,7 @@ export class Values {
     constructor(page, root) {
         this.page = page;
         this.rows = new Map();
+        this.isReady = false;
         const { linkage } = page;
         const own = linkage.parameters.filter((one) => !one.isPlace && !one.isLaw);
         const places = linkage.parameters.filter((one) => one.isPlace);
@@ -34,9 +35,17 @@ export class Values {
         if (!linkage.parameters.length) root.append(element("p", { className: "quiet", textContent: "This mechanism has no numbers to change." }));
         own.forEach((one) => root.append(this.#row(one)));
         const groups = Map.groupBy ? Map.groupBy(places, (one) => one.group) : grouped(places);
-        const isOpen = !own.length && places.length <= 40;
-        for (const [name, members] of groups) root.append(this.#group(name, members, isOpen));
+        const isOpen = !own.length && places.length <= 60;
+        for (const [name, members] of groups) {
+            const sizes = members.filter((one) => one.value !== 0);
+            const zeros = members.filter((one) => one.value === 0);
+            const group = this.#group(name, sizes.length ? sizes : zeros, isOpen);
+            if (sizes.length && zeros.length) group.append(this.#group(`coordinates of ${name} that are 0`, zeros, false));
+            root.append(group);
+        }
         if (laws.length) root.append(this.#group("Laws of the drivers", laws, false));
+        this.isReady = true;
+        this.update();
     }
 
     // A group is filled when it opens, since long chains have thousands of numbers.
@@ -45,7 +54,7 @@ export class Values {
         const fill = () => {
             if (!details.open || details.filled) return;
             details.filled = true;
-            members.forEach((one) => details.append(this.#row(one)));
+            details.querySelector("summary").after(...members.map((one) => this.#row(one)));
             this.update();
         };
         details.addEventListener("toggle", fill);
@@ -58,7 +67,7 @@ export class Values {
         const { unit, factor } = shownUnit(one.unit);
         const usual = Math.abs(one.value) || (one.kind === "angle" ? 1 : one.kind === "length" ? 0.3 * page.linkage.data.size : 1);
         const [low, high] = one.value === 0 ? [-usual, usual] : [one.value - 0.6 * usual, one.value + 0.6 * usual];
-        const text = element("div", { className: "text", textContent: one.label });
+        const text = element("div", { className: "text", textContent: breakable(one.short) });
         if (one.description) text.append(element("small", { textContent: one.description }));
         const field = element("input", { type: "number", step: "any", "aria-label": `${one.label} ${unit}` });
         const slider = element("input", { type: "range", min: low * factor, max: high * factor, step: "any", "aria-label": `${one.label}, slider` });
@@ -81,13 +90,14 @@ export class Values {
             set(value);
             page.commit();
         });
-        const parts = [text, field, element("span", { className: "unit", textContent: unit })];
-        const row = element("div", { className: "value" }, ...parts, one.isLaw ? element("span") : lock, slider);
+        const parts = [text, slider, field, element("span", { className: "unit", textContent: unit })];
+        const row = element("div", { className: "value" }, ...parts, one.isLaw ? element("span") : lock);
         this.rows.set(one.name, { row, field, slider, factor, one });
         return row;
     }
 
     update() {
+        if (!this.isReady) return;
         for (const [name, { row, field, slider, factor, one }] of this.rows) {
             const value = this.page.design.values.get(name);
             if (document.activeElement !== field || !this.page.isTyping) field.value = number(value * factor, 9);
@@ -96,6 +106,11 @@ export class Values {
             field.classList.toggle("wrong", !this.page.design.isOk && value !== this.page.linkage.bound.get(name));
         }
     }
+}
+
+// Return a name that may be broken after each "_".
+export function breakable(name) {
+    return name.replaceAll("_", "_\u200b");
 }
 
 function grouped(places) {
@@ -169,7 +184,7 @@ export class Plots {
         this.table ||= sampled(linkage, this.over, wanted);
         const driver = linkage.data.drivers[0];
         const isAngle = this.over === "driver" && driver.kind === "angle";
-        const cursor = this.over === "time" ? linkage.t : this.page.wrapped(0);
+        const cursor = this.over === "time" ? linkage.t : linkage.wrapped(0);
         this.plots.forEach((plot, k) => {
             const one = wanted[k];
             const now = one.read(linkage, linkage.pose);
