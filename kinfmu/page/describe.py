@@ -88,7 +88,13 @@ def module_data(module: PageModule, places: Mapping[str, NumberPath]) -> dict[st
     ]
     parameters += [
         _parameter(one.name, one.value, one.quantity, unit)
-        | {"label": f"{one.driver} {one.key}", "short": f"{one.driver} {one.key}", "inFile": "", "points": [], "isLaw": True}
+        | {
+            "label": f"{one.driver} {one.key}",
+            "short": f"{one.driver} {one.key}",
+            "inFile": "",
+            "points": [],
+            "isLaw": True,
+        }
         for one in plan.law_constants
     ]
     return {

@@ -57,10 +57,11 @@ def page(mechanism: Mechanism, *, report: Report | None = None) -> str:
     if report.problem is not None:
         raise report.problem
     as_written = page_module(mechanism)
-    with_places, places = opened(mechanism)
+    change = opened(mechanism)
+    places = change.places
     modules = {
         "written": module_data(as_written, {}),
-        "opened": module_data(page_module(with_places), places) if places else None,
+        "opened": module_data(page_module(change.mechanism, change.labels), places) if places else None,
     }
     data = describe(mechanism, report) | {
         "size": as_written.plan.size,

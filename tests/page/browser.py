@@ -37,6 +37,11 @@ class Opened:
         """Wait until the page has drawn what was asked for."""
         self.tab.wait_for_function("!window.kinfmu.isAsked")
 
+    def move(self, value: float) -> None:
+        """Move the only driver."""
+        self.get(f"k.refresh(() => k.move(0, {value!r}))")
+        self.settle()
+
     def at(self, point: str) -> tuple[float, float]:
         """Return the place on the screen of a point 'body.point'."""
         x, y = self.tab.evaluate(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu.mechanism.toml_file import parse
 from tests.page.browser import PHONE, Browser, browser, needs_browser, text_of
 
 pytestmark = needs_browser
@@ -115,4 +116,89 @@ def test_lengths_that_do_not_close_keep_the_last_pose_in_grey(chromium: Browser)
         page.settle()
         assert page.tab.is_hidden("#banner")
         assert page.get("Array.from(k.linkage.pose.q)") == pose
+        assert page.errors == []
+
+
+def test_dragged_pin_changes_lengths_and_the_saved_file_has_them(chromium: Browser) -> None:
+    with chromium.open(text_of("crank_rocker")) as page:
+        x, y = page.at("rocker.Q")
+        page.tab.get_by_text("coordinates of coupler that are 0").click()
+        page.tab.get_by_label("Lock coupler.Q y").click()
+        page.tab.click("#edit")
+        page.drag("rocker.Q", [(x + 4 * k, y - 3 * k) for k in range(1, 9)])
+        values = page.get("Object.fromEntries(k.design.changes())")
+        assert values
+        assert all(name.startswith(("bodies.coupler.points.Q.x", "bodies.rocker.points.Q")) for name in values)
+        assert page.at("rocker.Q") == pytest.approx((x + 32, y - 24), abs=2)
+        page.move(2.0)
+        names, shown = page.get("[...k.linkage.index.keys()]"), page.get("Array.from(k.linkage.pose.q)")
+        page.tab.click("#tab-files")
+        with page.tab.expect_download() as waiting:
+            page.tab.click("#save-file")
+        text = waiting.value.path().read_text("utf-8")
+        assert waiting.value.suggested_filename == "crank_rocker.toml"
+        with page.tab.expect_download() as waiting:
+            page.tab.click("#save-driver")
+        table = np.genfromtxt(waiting.value.path(), delimiter=",", names=True, deletechars="")
+        assert page.errors == []
+    mech = parse(text)
+    run = kinfmu.solve(mech, crank_angle=[2.0])
+    known = dict(zip(names, shown, strict=True))
+    for name in run.outputs:
+        assert known[name] == pytest.approx(run[name][0], abs=1e-10)
+    speed = math.pi  # [rad/s], of the file
+    turn = kinfmu.solve(mech, crank_angle=np.radians(table["crank_angle_[deg]"]), crank_speed=np.full(361, speed))
+    assert np.abs(turn["tracer.y"] - table["tracer.y_[mm]"]).max() < 1e-10
+    assert np.abs(turn["tracer.vx"] - table["tracer.vx_[mm/s]"]).max() < 1e-9
+
+
+def test_pin_dragged_too_far_stays_where_the_lengths_close(chromium: Browser) -> None:
+    with chromium.open(text_of("crank_rocker")) as page:
+        page.tab.click("#edit")
+        x, y = page.at("ground.C")
+        page.drag("ground.C", [(x + 60 * k, y) for k in range(1, 15)])
+        assert page.get("k.design.isOk")
+        reached, _ = page.at("ground.C")
+        assert x < reached < x + 60 * 14
+        pins = [page.at("coupler.Q"), page.at("rocker.Q")]
+        assert pins[0] == pytest.approx(pins[1], abs=1e-6)
+        assert page.errors == []
+
+
+def test_click_in_a_plot_moves_the_crank(chromium: Browser) -> None:
+    with chromium.open(text_of("crank_rocker")) as page:
+        page.tab.click("#tab-plots")
+        page.settle()
+        box = page.tab.locator(".plot canvas").first.bounding_box()
+        left, right = 58, 10  # margins of a plot
+        page.tab.mouse.click(box["x"] + left + 0.25 * (box["width"] - left - right), box["y"] + 60)
+        page.settle()
+        assert page.get("k.linkage.u[0]") == pytest.approx(math.pi / 2, abs=0.05)
+        assert page.errors == []
+
+
+def test_keyboard_alone_moves_plays_and_changes_values(chromium: Browser) -> None:
+    with chromium.open(text_of("crank_rocker")) as page:
+        keyboard = page.tab.keyboard
+        page.tab.focus("#drawing")
+        keyboard.press("ArrowRight")
+        page.settle()
+        keyboard.press("Shift+ArrowRight")
+        page.settle()
+        assert page.get("k.linkage.u[0]") == pytest.approx(math.radians(11))
+        keyboard.press("Space")
+        page.tab.wait_for_function("window.kinfmu.isPlaying")
+        keyboard.press("Space")
+        assert not page.get("k.isPlaying")
+        field = page.tab.get_by_label("crank.P x mm", exact=True)
+        field.focus()
+        keyboard.press("Control+A")
+        keyboard.type("18")
+        keyboard.press("Enter")
+        page.settle()
+        assert page.get("k.design.values.get('bodies.crank.points.P.x')") == 18
+        page.tab.focus("#drawing")
+        keyboard.press("Control+Z")
+        page.settle()
+        assert page.get("k.design.values.get('bodies.crank.points.P.x')") == 20
         assert page.errors == []

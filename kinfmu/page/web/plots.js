@@ -19,7 +19,7 @@ export function quantities(linkage) {
         });
     }
     linkage.data.loops.forEach((loop, k) => {
-        const label = `transmission angle ${loop.coupler}, ${loop.output}`;
+        const label = `transmission angle ${loop.coupler}-${loop.output}`;
         const read = (one, pose) => (one.transmissions(pose)[k].angle * 180) / Math.PI;
         found.push({ id: label, label, group: "transmission", unit: "deg", read });
     });
