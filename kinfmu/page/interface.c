@@ -3,13 +3,14 @@
  * Numbers are exchanged in arrays, whose places kf_page_place returns; they stay where they are. Every function works on
  * these arrays, so that a call from JavaScript passes no memory.
  */
-#include "interface.h"
+#include "instance.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "follower.h"
+#include "internal.h"
 #include "points.h"
 
 #define LARGEST_RATE 1e100   /* of drivers; squares of much larger numbers are infinite */
@@ -26,18 +27,21 @@ static double bound[KF_ROOM(KF_PARAMETERS + KF_CONSTANTS)];
 static double drive[3][KF_DRIVERS];
 static double motion[3][KF_ROOM(KF_OUTPUTS)], swept[3][KF_ROOM(KF_OUTPUTS)];
 static double errors[3], fixed[KF_ROOM(KF_FIXED)], points[KF_ROOM(2 * KF_POINTS)];
+static double forces[KF_ROOM(KF_FORCES)], efforts[KF_ROOM(KF_LOADS)];
 
 /* The arrays, in the order that web/engine.js gives their numbers. */
 double *kf_page_place(int which)
 {
-    double *const places[] = {settings, bound, drive[0], motion[0], swept[0], errors, fixed, points};
+    double *const places[] = {settings, bound, drive[0], motion[0], swept[0],
+                              errors,   fixed, points,   forces,    efforts};
     return places[which];
 }
 
 int kf_page_length(int which)
 {
     static const int lengths[] = {KF_PARAMETERS + KF_CONSTANTS, KF_PARAMETERS + KF_CONSTANTS, 3 * KF_DRIVERS,
-                                  3 * KF_OUTPUTS, 3 * KF_OUTPUTS, 3, KF_FIXED, 2 * KF_POINTS};
+                                  3 * KF_OUTPUTS, 3 * KF_OUTPUTS, 3, KF_FIXED, 2 * KF_POINTS,
+                                  KF_FORCES, KF_LOADS};
     return lengths[which];
 }
 
@@ -190,20 +194,64 @@ void kf_page_errors(void)
     kf_errors(&followers[shown].solver, pose_of(&followers[shown]), drive[1], drive[2], errors);
 }
 
+/* Compute the forces of a pose with the drive and the efforts, at a time of the laws of loads. */
+static void find_forces(kf_follower *follower, double time)
+{
+#if KF_FORCES
+    const kf_model *const model = &follower->solver.model;
+    kf_pose *const pose = pose_of(follower);
+    double zd[KF_ROOM(KF_UNKNOWNS)], zdd[KF_ROOM(KF_UNKNOWNS)], slopes[KF_ROOM(KF_DRIVERS * KF_UNKNOWNS)];
+    int k;
+#if KF_DRIVERS == 1
+    kf_tangent(model, pose);
+    memcpy(slopes, pose->x1, sizeof slopes);
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        zd[k] = slopes[k] * drive[1][0];
+        zdd[k] = pose->x2[k] * (drive[1][0] * drive[1][0]) + slopes[k] * drive[2][0];
+    }
+#else
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        double unit[KF_DRIVERS] = {0.0};
+        unit[k] = 1.0;
+        kf_rates_in_time(model, pose, unit, NULL);
+        memcpy(slopes + k * KF_UNKNOWNS, pose->x1, KF_UNKNOWNS * sizeof *slopes);
+    }
+    kf_rates_in_time(model, pose, drive[1], drive[2]);
+    memcpy(zd, pose->x1, sizeof zd);
+    memcpy(zdd, pose->x2, sizeof zdd);
+#endif
+    kf_forces(time, drive[0], drive[1], drive[2], pose->found.x, zd, zdd, slopes, efforts, model->parameters, forces);
+#else
+    (void)follower;
+    (void)time;
+#endif
+}
+
+void kf_page_forces(double time)
+{
+    find_forces(&followers[shown], time);
+}
+
 /* Begin a sweep: it starts where the branch is known, and leaves the pose shown. */
 void kf_page_sweep(void)
 {
     kf_restart(&followers[1 - shown]);
 }
 
-/* Compute one sample of a sweep at the driver values; orders: 1 positions alone, 2 with rates, 3 with accelerations. */
-int kf_page_sample(int orders)
+/* Compute one sample of a sweep at the driver values, at a time of the laws of loads.
+ *
+ * orders: 1 positions alone, 2 with rates, 3 with accelerations, 4 with forces.
+ */
+int kf_page_sample(int orders, double time)
 {
     kf_follower *const follower = &followers[1 - shown];
     kf_pose *const pose = kf_followed(follower, drive[0]);
     if (KF_GOOD(pose->status)) {
         kf_motion(&follower->solver, pose, drive[1], drive[2], swept[0], orders > 1 ? swept[1] : NULL,
                   orders > 2 ? swept[2] : NULL);
+        if (orders > 3) {
+            find_forces(follower, time);
+        }
     }
     return (int)pose->status;
 }

@@ -14,10 +14,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from kinfmu.codegen.c import compiler, emit
+from kinfmu.codegen.c.forces import SIGNATURE, emit_forces
 from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
+from kinfmu.codegen.forces import load_inputs
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.mechanism import Mechanism
 from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.plan.forces import force_names, force_steps, loaded_coordinates
 from kinfmu.plan.trace import Tracer, parameter_symbol
 
 FOLLOWER = ("follower.h", "follower.c")
@@ -32,6 +35,7 @@ EXPORTS = (
     "kf_page_at",
     "kf_page_margin",
     "kf_page_errors",
+    "kf_page_forces",
     "kf_page_sweep",
     "kf_page_sample",
 )
@@ -47,6 +51,7 @@ class PageModule(NamedTuple):
         plan: What it solves: all bodies' coordinates that move, then the points of interest.
         points: The points 'body.point' whose places in their bodies it returns.
         parameters: Names of what it can bind, in its order: parameters, or their labels, then constants of the laws.
+        forces: Names of its forces; none without masses and loads.
 
     """
 
@@ -54,6 +59,12 @@ class PageModule(NamedTuple):
     plan: SolvePlan
     points: tuple[str, ...]
     parameters: tuple[str, ...]
+    forces: tuple[str, ...]
+
+    @property
+    def loads(self) -> tuple[str, ...]:
+        """Inputs with the efforts of external loads, in the order of the module."""
+        return load_inputs(self.plan)
 
     @property
     def text(self) -> str:
@@ -74,34 +85,42 @@ def page_module(mechanism: Mechanism, labels: Mapping[str, str] | None = None) -
 
     """
     labels = labels or {}
-    plan = compile_plan(replace(mechanism, coordinates="moving"))
+    names = force_names(mechanism)
+    plan = compile_plan(replace(mechanism, coordinates="moving"), solved=loaded_coordinates(mechanism) if names else ())
     points = tuple(mechanism.body_points)
     data = compiler.wasm_module(page_sources(plan, points, labels), EXPORTS, FLAGS)
     parameters = (labels.get(parameter.name, parameter.name) for parameter in plan.parameters)
-    return PageModule(data, plan, points, (*parameters, *(constant.name for constant in plan.law_constants)))
+    constants = (constant.name for constant in plan.law_constants)
+    return PageModule(data, plan, points, (*parameters, *constants), names)
 
 
 def page_sources(plan: SolvePlan, points: Sequence[str], labels: Mapping[str, str]) -> dict[str, str]:
-    """Return the C files of a module by name; all is one unit, page.c."""
+    """Return the C files of a module by name; all but forces.c is one unit, page.c."""
     files = emit(plan, labels) | compiler.sources([*compiler.SOLVER, *FOLLOWER])
-    files |= {"interface.h": _header(plan, points), "points.h": _points(plan, points)}
+    files |= {"instance.h": _header(plan, points), "points.h": _points(plan, points)}
     files["interface.c"] = _INTERFACE.read_text("utf-8")
     lines = ["/* The whole module as one unit. Files included here are not compiled separately. */"]
     lines += [f'#include "{name}"' for name in sorted(files) if name.endswith(".c")]
-    return files | {"page.c": "\n".join(lines) + "\n"}
+    names = force_names(plan.mechanism)
+    forces = {"forces.c": emit_forces(plan, force_steps(plan, names, given_coefficients=True))} if names else {}
+    return files | {"page.c": "\n".join(lines) + "\n"} | forces
 
 
 def _header(plan: SolvePlan, points: Sequence[str]) -> str:
     constants = plan.law_constants
     lines = [
         f"/* What the page of {plan.mechanism.name} needs to know: generated from its mechanism, not to be edited. */",
-        "#ifndef KF_INTERFACE_H",
-        "#define KF_INTERFACE_H",
+        "#ifndef KF_INSTANCE_H",
+        "#define KF_INSTANCE_H",
         "",
-        "#include <stdbool.h>",
+        '#include "kinfmu.h"',
         "",
         f"#define KF_POINTS {len(points)}",
+        f"#define KF_FORCES {len(force_names(plan.mechanism))}",
+        f"#define KF_LOADS {len(load_inputs(plan))} /* efforts of external loads */",
         f"#define KF_START {plan.mechanism.run.start!r} /* [s] of the laws */",
+        "",
+        *(f"{SIGNATURE.format(stage=stage)};" for stage in ("forces",)),
         "",
         *array("static char *const kf_constant_names", [string(one.name) for one in constants]),
         *array("static bool kf_constant_is_positive", booleans(one.is_positive for one in constants)),

@@ -31,8 +31,10 @@ MEMBERS = {  # with what their poses are
     "excavator": {Status.OK},  # three cylinders
     "triple_rocker": {Status.OK, Status.OUTSIDE},
 }
+LOADED = "excavator_loaded"  # masses, several drivers
 LEG = kinfmu.load("jansen_leg")
 OTHER_LEG = {"m": 14.0, "k": 62.5, "crank.speed": 3.0}
+TIMES = np.linspace(0.0, 5.0, 41)
 NO_LEGS: tuple[dict[str, float], ...] = ({"m": 45.0}, {"e": 3.0}, {"crank.speed": float("nan")})
 
 pytestmark = needs_node
@@ -77,9 +79,24 @@ def swept(native: Callable[[str], StepByStep], tmp_path_factory: pytest.TempPath
         sweep_call(leg, driven_of(runs["jansen_leg"])),
         ["driven", 0.25],
     ]
-    jobs += [(leg, [*here, *binds, ["q"], ["parameters"]]), (leg, [*binds, *bound, *here[:4]])]
+    jobs += [(leg, [*here, ["forces"], *binds, ["q"], ["parameters"]]), (leg, [*binds, *bound, *here[:4]])]
+    loaded, run = page_module(kinfmu.load(LOADED)), kinfmu.solve(kinfmu.load(LOADED), TIMES)
+    first, count = 3 * len(loaded.plan.outputs), len(loaded.forces)
+    u, ud, udd = (values.ravel().tolist() for values in driven_of(run))
+    columns = list(range(first, first + count))
+    calls = [["sweep", u, columns, ud, udd, TIMES.tolist()], ["at", u[-3:], ud[-3:], udd[-3:]], ["forces", TIMES[-1]]]
+    jobs.append((loaded, calls))
     found = answers(tmp_path_factory.mktemp("page"), jobs)
-    return {"runs": runs, **dict(zip([*MEMBERS, "refused", "bound"], found, strict=True))}
+    return {"runs": {**runs, LOADED: run}, **dict(zip([*MEMBERS, "refused", "bound", LOADED], found, strict=True))}
+
+
+def test_forces_are_those_of_a_run(swept: dict[str, Any]) -> None:
+    run, (sweep, status, forces) = swept["runs"][LOADED], swept[LOADED]
+    found = table(sweep["values"], len(run.force_names))
+    assert status == Status.OK
+    assert np.abs(found - run.forces).max() < 1e-12 * np.abs(run.forces).max()
+    assert np.abs(forces - run.forces[-1]).max() < 1e-12 * np.abs(run.forces).max()
+    assert swept["refused"][7] is None  # a leg without masses
 
 
 @pytest.mark.parametrize("name", MEMBERS)

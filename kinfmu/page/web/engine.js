@@ -2,7 +2,7 @@
 //
 // All arrays are views of the module's memory: they hold until the next call that writes them, and are not to be kept.
 
-const ARRAYS = ["settings", "bound", "drive", "motion", "swept", "errors", "fixed", "points"]; // as in interface.c
+const ARRAYS = ["settings", "bound", "drive", "motion", "swept", "errors", "fixed", "points", "forces", "efforts"]; // as in interface.c
 const BRIDGED = 2; // the last status of a pose with numbers: see kinfmu.Status
 
 export class Engine {
@@ -17,13 +17,11 @@ export class Engine {
   #code;
   #arrays;
   #drive;
-  #swept;
 
   constructor(code) {
     this.#code = code;
     this.#arrays = Object.fromEntries(ARRAYS.map((name, which) => [name, this.#view(which)]));
     this.#drive = thirds(this.#arrays.drive);
-    this.#swept = this.#arrays.swept;
     [this.q, this.qd, this.qdd] = thirds(this.#arrays.motion); // (outputs) of the last good pose
     this.status = 0; // of the last call of at
     code._initialize?.();
@@ -98,21 +96,35 @@ export class Engine {
     return this.#arrays.points;
   }
 
+  // Forces of the pose, at a time t [s] of laws of loads (NaN where one needs it and none is given) and with efforts of
+  // external loads; null without masses and loads.
+  forces(t = NaN, efforts = null) {
+    if (this.#arrays.forces.length === 0) return null;
+    this.#load(efforts);
+    this.#code.kf_page_forces(t);
+    return this.#arrays.forces;
+  }
+
   // Positions at many driver values us (samples x drivers), followed from the start; the pose stays.
   //
   // columns: numbers of outputs k; with n outputs, n + k is the rate of one and 2 n + k its acceleration, for which uds
-  // and udds give speeds and accelerations of the drivers (default: 1 and 0). Returns values (samples x columns), NaN
-  // where a pose is not good, and the status of each sample.
-  sweep(us, columns, uds = null, udds = null) {
+  // and udds give speeds and accelerations of the drivers (default: 1 and 0); 3 n + k is force k, for which ts gives times
+  // [s] of laws of loads. Returns values (samples x columns), NaN where a pose is not good, and the status of each sample.
+  sweep(us, columns, uds = null, udds = null, ts = null, efforts = null) {
     const drivers = this.#drive[0].length;
     const samples = us.length / drivers;
     const outputs = this.q.length;
-    const orders = 1 + Math.floor(Math.max(0, ...columns) / outputs);
+    const largest = columns.reduce((most, column) => Math.max(most, column), 0);
+    const orders = Math.min(4, 1 + Math.floor(largest / outputs));
+    const sources = Array.from(columns, (column) =>
+      column < 3 * outputs ? [this.#arrays.swept, column] : [this.#arrays.forces, column - 3 * outputs],
+    );
     const values = new Float64Array(samples * columns.length);
     const status = new Uint8Array(samples);
     const [u, ud, udd] = this.#drive;
     ud.fill(1);
     udd.fill(0);
+    this.#load(efforts);
     this.#code.kf_page_sweep();
     for (let sample = 0, place = 0; sample < samples; sample += 1) {
       for (let driver = 0; driver < drivers; driver += 1) {
@@ -121,14 +133,23 @@ export class Engine {
         if (uds) ud[driver] = uds[number];
         if (udds) udd[driver] = udds[number];
       }
-      status[sample] = this.#code.kf_page_sample(orders);
+      status[sample] = this.#code.kf_page_sample(orders, ts ? ts[sample] : NaN);
       const good = status[sample] <= BRIDGED;
-      for (const column of columns) {
-        values[place] = good ? this.#swept[column] : NaN;
+      for (const [numbers, column] of sources) {
+        values[place] = good ? numbers[column] : NaN;
         place += 1;
       }
     }
     return { values, status };
+  }
+
+  #load(efforts) {
+    if (efforts === null) {
+      this.#arrays.efforts.fill(0);
+      return;
+    }
+    this.#expect("forces", "efforts", efforts, this.#arrays.efforts.length);
+    this.#arrays.efforts.set(efforts);
   }
 
   #set(...given) {
