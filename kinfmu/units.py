@@ -44,6 +44,7 @@ POUND_FORCE = POUND * 9.80665  # [N]
 INCH = METRES["in"]
 KILOGRAMS = {"kg": 1.0, "g": 1e-3, "t": 1e3, "lb": POUND}
 INERTIAS = {"kg m2": 1.0, "kg cm2": 1e-4, "kg mm2": 1e-6, "g cm2": 1e-7, "g mm2": 1e-9, "lb in2": POUND * INCH**2}
+DENSITIES = {"kg/m3": 1.0, "g/cm3": 1e3, "kg/dm3": 1e3, "t/m3": 1e3, "lb/in3": POUND / INCH**3}
 NEWTONS = {"N": 1.0, "mN": 1e-3, "kN": 1e3, "MN": 1e6, "lbf": POUND_FORCE}
 TORQUES = {
     "N m": 1.0, "Nm": 1.0, "mN m": 1e-3, "mNm": 1e-3, "kN m": 1e3, "kNm": 1e3, "N mm": 1e-3, "Nmm": 1e-3, "N cm": 1e-2,
@@ -81,6 +82,8 @@ def _per_angle(units: dict[str, float], word: str = "") -> dict[str, float]:
 KINDS = {
     "mass": Kind("kg", KILOGRAMS, (1, 0, 0), "a mass"),
     "inertia": Kind("kg m2", INERTIAS, (1, 2, 0), "a moment of inertia"),
+    "density": Kind("kg/m3", DENSITIES, (1, -3, 0), "a density"),
+    "areal_density": Kind("kg/m2", {"kg/m2": 1.0, "g/cm2": 10.0, "g/m2": 1e-3}, (1, -2, 0), "a mass by area"),
     "force": Kind("N", NEWTONS, (1, 1, -2), "a force"),
     "torque": Kind("N m", TORQUES, (1, 2, -2), "a torque"),
     "mass_moment": Kind("kg m", {"kg m": 1.0, "kg mm": 1e-3, "g mm": 1e-6}, (1, 1, 0), "a mass times a length"),

@@ -66,7 +66,7 @@ def _texts(member: object) -> set[object]:
 
 def _unused_points(mechanism: Mechanism) -> Iterator[str]:
     used: set[object] = set(mechanism.points.values())
-    used |= {f"{body.name}.{end}" for body in mechanism.bodies for end in body.rod or ()}
+    used |= {f"{body.name}.{end}" for body in mechanism.bodies for end in body.rod or body.plate or ()}
     for member in (*mechanism.joints, *mechanism.drivers, *mechanism.loads, *mechanism.measures):
         used |= _texts(member)
     unused = [name for name in mechanism.body_points if name not in used]

@@ -8,13 +8,16 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.expression import Computed, Expression
+from kinfmu.mechanism.uniform import MassProperties, bar, crossing, has_area, plate
 from kinfmu.mechanism.valid import check_number, is_number, quoted
 from kinfmu.units import METRES
 
 GROUND_NAME = "ground"
-MASS_KEYS = ("mass", "center_of_mass", "inertia", "rod")  # of a body's table
+MASS_KEYS = (  # of a body's table
+    "mass", "center_of_mass", "inertia", "rod", "plate", "density", "areal_density", "thickness", "width",
+)  # fmt: skip
+_POSITIVE = ("density", "areal_density", "thickness", "width")  # where they are given
 
 
 class Point(NamedTuple):
@@ -30,15 +33,6 @@ class Start(NamedTuple):
     x: float | None = None
     y: float | None = None
     phi: float | None = None  # [rad]
-
-
-class MassProperties(NamedTuple):
-    """Mass [kg], centre of mass (x, y) in the body's frame [length], moment of inertia about it [kg m2]."""
-
-    mass: Value
-    x: Value
-    y: Value
-    inertia: Value
 
 
 class Gravity(NamedTuple):
@@ -70,8 +64,13 @@ class Body:
         mass: Mass [kg]. Default: 0.
         center_of_mass: Its centre of mass in its frame (s_x, s_y) [length]. Default: the origin of the frame.
         inertia: Moment of inertia about the centre of mass [kg m2]. Default: 0.
-        rod: Names of two of its points between which its mass is a uniform slender rod; centre of mass and moment of
-            inertia follow from it. Default: none.
+        rod: Names of two of its points between which its mass is a uniform rod; centre of mass and moment of inertia
+            follow from it. Default: none.
+        plate: Names of three or more of its points, the corners of a uniform plate in order, in place of a rod.
+        density: Of the rod or plate [kg/m3], with a thickness, in place of a mass.
+        areal_density: Mass by area of the rod or plate [kg/m2], in place of a density with a thickness.
+        thickness: Of the rod or plate, across the plane [length].
+        width: Of the rod [length]. Default: 0, a slender rod.
 
     Raises:
         MechanismError: A point is not a pair.
@@ -85,6 +84,11 @@ class Body:
     center_of_mass: Point = Point(0.0, 0.0)
     inertia: float = 0.0
     rod: tuple[str, str] | None = None
+    plate: tuple[str, ...] | None = None
+    density: float = 0.0
+    areal_density: float = 0.0
+    thickness: float = 0.0
+    width: float = 0.0
 
     def __post_init__(self) -> None:
         points = {name: self._point(f"points.{name}", point) for name, point in self.points.items()}
@@ -93,6 +97,8 @@ class Body:
         object.__setattr__(self, "center_of_mass", self._point("center_of_mass", self.center_of_mass))
         if self.rod is not None:
             object.__setattr__(self, "rod", self._rod(self.rod))
+        if self.plate is not None:
+            object.__setattr__(self, "plate", self._plate(self.plate))
 
     def _point(self, key: str, point: Iterable[float]) -> Point:
         try:
@@ -109,39 +115,50 @@ class Body:
             )
         return ends
 
+    def _plate(self, corners: Iterable[str]) -> tuple[str, ...]:
+        names = () if isinstance(corners, str | Mapping) or not isinstance(corners, Iterable) else tuple(corners)
+        if len(names) < 3 or not all(isinstance(name, str) for name in names):
+            raise MechanismError(
+                f"[bodies.{self.name}] plate = {quoted(corners)} must be three or more points of the body, "
+                f"such as ['A', 'B', 'C']"
+            )
+        return names
+
     @property
     def given_masses(self) -> dict[str, Any]:
-        """The values of mass, centre of mass, inertia and rod that are not the default, by key."""
+        """The values of mass, centre of mass, inertia, shape and density that are not the default, by key."""
         values = {key: getattr(self, key) for key in MASS_KEYS}
         return {key: value for key, value in values.items() if value != getattr(Body, key) or _is_computed(value)}
 
     @property
     def has_mass(self) -> bool:
-        """True if a mass is given, as a number other than 0 or as an expression."""
-        return not is_number(self.mass) or _is_computed(self.mass) or self.mass != 0.0
+        """True if a mass or a density is given: a number other than 0, or an expression."""
+        given = (self.mass, self.density, self.areal_density)
+        return any(not is_number(value) or _is_computed(value) or value != 0.0 for value in given)
 
     def mass_properties(self, length_unit: str) -> MassProperties:
         """Return mass, centre of mass and moment of inertia, in the arithmetic of the body's numbers.
-
-            rod from a to b: centre (s_a + s_b) / 2, moment of inertia m |s_b - s_a|^2 / 12
 
         Args:
             length_unit: Unit of length of the mechanism.
 
         """
-        if self.rod is None:
+        metre = METRES[length_unit]
+        shape = [self.points[name] for name in self.rod or self.plate or ()]
+        if not shape:
             return MassProperties(self.mass, *self.center_of_mass, self.inertia)
-        (a_x, a_y), (b_x, b_y) = (self.points[name] for name in self.rod)
-        d_x, d_y, metre = b_x - a_x, b_y - a_y, METRES[length_unit]
-        inertia = self.mass * (d_x * d_x + d_y * d_y) * (metre * metre / 12.0)
-        return MassProperties(self.mass, 0.5 * (a_x + b_x), 0.5 * (a_y + b_y), inertia)
+        per_area = self.density * (self.thickness * metre) + self.areal_density
+        if self.rod:
+            return bar(shape, self.width, self.mass, per_area, metre)
+        return plate(shape, self.mass, per_area, metre)
 
     def with_mass_properties(self, length_unit: str) -> Body:
-        """Return the body with centre of mass and moment of inertia in place of a rod, in any arithmetic."""
-        if self.rod is None:
+        """Return the body with mass, centre of mass and moment of inertia in place of a shape, in any arithmetic."""
+        if self.rod is None and self.plate is None:
             return self
         mass, x, y, inertia = self.mass_properties(length_unit)
-        return replace(self, mass=mass, center_of_mass=Point(x, y), inertia=inertia, rod=None)
+        plain = {key: getattr(Body, key) for key in ("rod", "plate", *_POSITIVE)}
+        return replace(self, mass=mass, center_of_mass=Point(x, y), inertia=inertia, **plain)
 
     def check_mass(self) -> None:
         """Raise a MechanismError for an invalid mass; all are numbers by then."""
@@ -152,31 +169,74 @@ class Body:
         for key in ("mass", "inertia"):
             if getattr(self, key) < 0.0:
                 raise MechanismError(f"{where} {key} = {float(getattr(self, key))!r} must be 0 or more")
+        self._check_uniform(where)
         if self.given_masses and not self.has_mass:
             raise MechanismError(f"{where} {next(iter(self.given_masses))} needs a mass, such as mass = '1.2 kg'")
-        if self.rod is not None:
-            self._check_rod(f"{where} rod", self.rod)
+        for key, names in (("rod", self.rod), ("plate", self.plate)):
+            if names is not None:
+                self._check_shape(where, key, names)
 
-    def _check_rod(self, where: str, rod: tuple[str, str]) -> None:
-        for key in ("center_of_mass", "inertia"):
-            if key in self.given_masses:
-                raise MechanismError(f"{where}: '{key}' follows from the rod; remove one of the two keys")
-        for end in rod:
-            if end not in self.points:
+    def _check_uniform(self, where: str) -> None:
+        """Raise a MechanismError for keys of uniform bodies that are invalid, or contradict or need each other."""
+        given = self.given_masses
+        for key in _POSITIVE:
+            if key in given and not getattr(self, key) > 0.0:
+                raise MechanismError(f"{where} {key} = {float(getattr(self, key))!r} must be positive")
+        for key, other in (
+            ("plate", "rod"),
+            ("density", "mass"),
+            ("areal_density", "mass"),
+            ("areal_density", "density"),
+            ("areal_density", "thickness"),
+        ):
+            if key in given and other in given:
+                raise MechanismError(f"{where}: '{key}' and '{other}' exclude each other; remove one of the two keys")
+        by_area = next((key for key in ("density", "areal_density") if key in given), "")
+        if by_area and not given.keys() & {"rod", "plate"}:
+            raise MechanismError(
+                f"{where} {by_area} needs a shape: plate = ['A', 'B', 'C'], or rod = ['A', 'B'] with a width"
+            )
+        for key, needed, example in (
+            ("density", "thickness", "'10 mm'"),
+            ("thickness", "density", "'7850 kg/m3'"),
+            ("width", "rod", "['A', 'B']"),
+        ):
+            if key in given and needed not in given:
+                raise MechanismError(f"{where} {key} needs a {needed}, such as {needed} = {example}")
+        if by_area and "rod" in given and "width" not in given:
+            raise MechanismError(f"{where} {by_area}: a rod needs a width, such as width = '30 mm'")
+
+    def _check_shape(self, where: str, key: str, names: tuple[str, ...]) -> None:
+        for other in ("center_of_mass", "inertia"):
+            if other in self.given_masses:
+                raise MechanismError(f"{where} {key}: '{other}' follows from the {key}; remove one of the two keys")
+        for name in names:
+            if name not in self.points:
                 raise MechanismError(
-                    f"{where}: body '{self.name}' has no point {quoted(end)}{suggestion(end, self.points)}; "
+                    f"{where} {key}: body '{self.name}' has no point {quoted(name)}{suggestion(name, self.points)}; "
                     f"its points: {listed(self.points)}"
                 )
-        if self.points[rod[0]] == self.points[rod[1]]:
-            raise MechanismError(f"{where} = {quoted(list(rod))} has length 0; its ends must be two places of the body")
+        places = [self.points[name] for name in names]
+        what = f"{where} {key} = {quoted(list(names))}"
+        if key == "rod" and places[0] == places[1]:
+            raise MechanismError(f"{what} has length 0; its ends must be two places of the body")
+        if key == "plate":
+            touching = crossing(places)
+            if touching is not None:
+                first, second = (f"{names[k]}-{names[(k + 1) % len(names)]}" for k in touching)
+                raise MechanismError(
+                    f"{what}: its edges {first} and {second} meet; list its corners in order around it"
+                )
+            if not has_area(places):
+                raise MechanismError(f"{what} has no area; its corners must not lie on one line")
 
     @property
     def is_ground(self) -> bool:
         return self.name == GROUND_NAME
 
     def __hash__(self) -> int:
-        masses = (self.mass, self.center_of_mass, self.inertia, self.rod)
-        return hash((self.name, tuple(self.points.items()), self.start, masses))
+        masses = (getattr(self, key) for key in MASS_KEYS)
+        return hash((self.name, tuple(self.points.items()), self.start, *masses))
 
 
 def _is_computed(value: Any) -> bool:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 NumberPath = tuple[str | int, ...]
 """Path of a number: ("bodies", body, "points", point, 0 or 1), ("bodies", body, "start", "x" | "y" | "phi"),
-("bodies", body, "mass" | "inertia"), ("bodies", body, "center_of_mass", 0 or 1), ("gravity", "x" | "y"),
+("bodies", body, key of a mass), ("bodies", body, "center_of_mass", 0 or 1), ("gravity", "x" | "y"),
 ("joints" | "drivers" | "loads", name, key), ("joints" | "loads", name, measure, key), ("run", key), and of a law
 (table, name, "law", constant) or (table, name, "law", "points", number, 0 or 1), and
 ("measures", measure, key), ("measures", measure, "targets", number, 0 or 1)."""
@@ -32,7 +32,12 @@ Bodies = Mapping[str, Body]  # by name
 Change = Callable[[NumberPath, Any, Quantity], Any]  # place, value and quantity -> new value
 LENGTH, ANGLE, TIME = Quantity("length"), Quantity("angle"), Quantity("time")
 COORDINATES = ("x", "y", "phi")
-MASS, INERTIA, ACCELERATION = Quantity("mass"), Quantity("inertia"), Quantity("length", 2)
+ACCELERATION = Quantity("length", 2)
+_MASSES = {
+    **{key: Quantity(key) for key in ("mass", "inertia", "density", "areal_density")},
+    "thickness": LENGTH,
+    "width": LENGTH,
+}
 _START = {"x": LENGTH, "y": LENGTH, "phi": ANGLE}
 
 
@@ -108,8 +113,7 @@ def _body(body: Body, change: Change) -> Body:
         "points": body.points if all(points[name] is point for name, point in body.points.items()) else points,
         "start": body.start if all(map(is_, start, body.start)) else start,
         "center_of_mass": _point(body.center_of_mass, ("bodies", body.name, "center_of_mass"), change),
-        "mass": change(("bodies", body.name, "mass"), body.mass, MASS),
-        "inertia": change(("bodies", body.name, "inertia"), body.inertia, INERTIA),
+        **{key: change(("bodies", body.name, key), getattr(body, key), quantity) for key, quantity in _MASSES.items()},
     }
     return _replaced(body, values)  # type: ignore[no-any-return]  # of the same class
 

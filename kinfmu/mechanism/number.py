@@ -18,6 +18,8 @@ EXAMPLES = {
     "length": "25 mm",
     "time": "10 ms",
     "mass": "1.2 kg",
+    "density": "7850 kg/m3",
+    "areal_density": "39 kg/m2",
     "inertia": "0.003 kg m2",
     "force": "10 N",
     "torque": "2 N m",

@@ -146,9 +146,19 @@ def _body() -> Schema:
             },
             "inertia": _number(Quantity("inertia"), "Moment of inertia about the centre of mass [kg m2]; default: 0"),
             "rod": {
-                "description": "Two points of the body between which its mass is a uniform slender rod",
+                "description": "Two points of the body between which its mass is a uniform rod",
                 **_list(_ref("name"), 2, 2),
             },
+            "plate": {
+                "description": "Points of the body: the corners of a uniform plate, in order",
+                **_list(_ref("name"), 3),
+            },
+            "density": _number(
+                Quantity("density"), "Of the rod or plate [kg/m3], with its thickness, in place of a mass"
+            ),
+            "areal_density": _number(Quantity("areal_density"), "Mass by area of the rod or plate [kg/m2]"),
+            "thickness": _number(Quantity("length"), "Of the rod or plate, across the plane"),
+            "width": _number(Quantity("length"), "Of the rod; default: 0, a slender rod"),
         }
     )
 

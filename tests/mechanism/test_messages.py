@@ -66,7 +66,7 @@ CHANGES = {
         "start = { x = 0,",
         "stat = { x = 0,",
         "[bodies.crank] stat: unknown key; did you mean 'start'?; "
-        "keys: points, start, mass, center_of_mass, inertia, rod",
+        "keys: points, start, mass, center_of_mass, inertia, rod, plate, density, areal_density, thickness, width",
     ),
     "a coordinate of a start pose that is not known": (
         "start = { x = 0,",
