@@ -17,6 +17,7 @@ from kinfmu.mechanism.force_names import shaking_names
 from kinfmu.plan.forces import ForceSteps, chosen_steps
 from kinfmu.plan.mechanics import Mechanics
 from kinfmu.plan.plan import SolvePlan
+from kinfmu.plan.steps import Assignment
 
 
 def shaking_steps(plan: SolvePlan, wanted: Container[str] | None = None) -> ForceSteps:
@@ -28,7 +29,9 @@ def shaking_steps(plan: SolvePlan, wanted: Container[str] | None = None) -> Forc
 
     """
     mechanics = Mechanics(plan, given_coefficients=True)
-    return chosen_steps(shaking_names(plan.mechanism), shaking_nodes(plan, mechanics), mechanics.steps, wanted)
+    nodes = shaking_nodes(plan, mechanics)  # of loads too, whose slopes are along symbols of known coordinates
+    mechanics.steps += [Assignment(name, node) for name, node in mechanics.known.items()]
+    return chosen_steps(shaking_names(plan.mechanism), nodes, mechanics.steps, wanted)
 
 
 def shaking_nodes(plan: SolvePlan, mechanics: Mechanics) -> list[Node]:
