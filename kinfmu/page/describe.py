@@ -23,6 +23,7 @@ from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.expression import Computed, Expression
+from kinfmu.mechanism.force_names import force_names, reaction_names_of
 from kinfmu.mechanism.members import NumberPath
 from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.toml_text import text
@@ -81,6 +82,7 @@ def module_data(module: PageModule, places: Mapping[str, NumberPath]) -> dict[st
     mechanism, plan = module.plan.mechanism, module.plan
     unit = mechanism.length_unit
     users = _users(mechanism)
+    quantities = {str(name): name.quantity for name in (*force_names(mechanism), *reaction_names_of(mechanism))}
     parameters = [
         _parameter(one.name, one.value, one.quantity, unit, description=one.description, place=places.get(one.name))
         | {"points": users.get(one.name, [])}
@@ -110,7 +112,7 @@ def module_data(module: PageModule, places: Mapping[str, NumberPath]) -> dict[st
         ],
         "fixed": list(plan.fixed),
         "parameters": parameters,
-        "forces": [{"name": name, "unit": unit_of(name.quantity, unit)} for name in getattr(module, "forces", ())],
+        "forces": [{"name": name, "unit": unit_of(quantities[name], unit)} for name in getattr(module, "forces", ())],
     }
 
 

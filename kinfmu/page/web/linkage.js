@@ -47,7 +47,7 @@ export class Linkage {
     }
 
     // Return a copy of the pose of an engine.
-    poseOf(engine) {
+    poseOf(engine, t = this.t) {
         const fixed = engine.fixed();
         const joined = (values, rest) => {
             const all = new Float64Array(values.length + fixed.length);
@@ -56,7 +56,7 @@ export class Linkage {
             return all;
         };
         const { locals, triples } = this;
-        const forces = engine.forces?.();
+        const forces = engine.forces?.(t);
         return {
             q: joined(engine.q, fixed),
             qd: joined(engine.qd),
@@ -339,7 +339,7 @@ export class Linkage {
         for (let k = 0; k <= count; k++) {
             const x = low + ((high - low) * k) / count;
             const law = over === "time" ? probe.driven(x) : { u: Float64Array.of(x), ...rates };
-            visit(x, isGood(probe.at(law.u, law.ud, law.udd)) ? this.poseOf(probe) : null);
+            visit(x, isGood(probe.at(law.u, law.ud, law.udd)) ? this.poseOf(probe, over === "time" ? x : this.t) : null);
         }
     }
 

@@ -208,7 +208,7 @@ export function showPanel(page, root) {
         ...(has.loops.length ? [["transmission", "Transmission angle", "red below 40\u00b0 or above 140\u00b0"]] : []),
         ["centres", "Instant centres", "1 is the ground, then the bodies in the order of the file"],
         ["limits", "Limits and change points", "on the circle of the driver"],
-        ...(page.linkage.part.forces.length ? [["forces", "Forces in the joints", "of the first body on the second"]] : []),
+        ...(page.linkage.part.forces.some(({ name }) => has.joints.some((joint) => name.startsWith(`${joint.name}.force`))) ? [["forces", "Forces in the joints", "of the first body on the second"]] : []),
         ["grid", "Grid", ""],
     ];
     for (const [key, label, note] of rows) {
