@@ -112,7 +112,7 @@ def module_data(module: PageModule, places: Mapping[str, NumberPath]) -> dict[st
         ],
         "fixed": list(plan.fixed),
         "parameters": parameters,
-        "forces": [{"name": name, "unit": unit_of(quantities[name], unit)} for name in getattr(module, "forces", ())],
+        "forces": [{"name": name, "unit": unit_of(quantities[name], unit)} for name in module.forces],
     }
 
 
