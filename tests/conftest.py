@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
 
@@ -11,12 +11,12 @@ import pytest
 from hypothesis import settings
 
 from kinfmu.codegen.c import compiler
-from kinfmu.fmu.native import archive, sources
+from kinfmu.fmu.native import archive
 from kinfmu.sweep import library
+from tests import compiled_once
 
 GOLDEN = Path(__file__).parent / "golden"
 
-FILE_BY_FILE = compiler.compile_files
 SHIPPED_FLAGS = {module: module.FLAGS for module in (compiler, archive, library)}
 
 settings.register_profile("kinfmu", deadline=None, derandomize=True, database=None, max_examples=40)
@@ -39,28 +39,13 @@ def python_fmus() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def quickly_compiled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """C is compiled without optimization, which gives the same numbers, and once for all workers of a run.
-
-    The run time of a library is compiled as one unit, in half of the time.
-    """
-    run_time = {path.name for folder in (compiler.RUNTIME, sources.RUNTIME) for path in folder.glob("*.c")}
-    run_time |= set(library.RARE)
-
-    def compile_files(
-        cc: Sequence[str], files: Mapping[str, str], flags: Sequence[str], output: Path, rare: Sequence[str] = ()
-    ) -> None:
-        if "-O0" in flags and "-shared" in flags:
-            joined = [f'#include "{name}"\n' for name in compiler.units(files) if name in run_time]
-            files = {**files, "run_time.c": "".join(joined)}
-            rare = ()
-        FILE_BY_FILE(cc, files, flags, output, rare)
-
+    """C is compiled as `compiled_once` says, once for all workers of a run."""
     folder = tmp_path_factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:
         folder = folder.parent
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("KINFMU_CACHE", str(folder / "compiled"))
-        patch.setattr(compiler, "compile_files", compile_files)
+        patch.setattr(compiler, "compile_files", compiled_once.compile_files)
         for module, flags in SHIPPED_FLAGS.items():
             quick = ["-O0" if flag.startswith("-O") else flag for flag in flags if flag != "-march=native"]
             patch.setattr(module, "FLAGS", tuple(quick))
@@ -70,7 +55,7 @@ def quickly_compiled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]
 @pytest.fixture
 def optimized(monkeypatch: pytest.MonkeyPatch) -> None:
     """C is compiled with the flags of the package and file by file, as for a user."""
-    monkeypatch.setattr(compiler, "compile_files", FILE_BY_FILE)
+    monkeypatch.setattr(compiler, "compile_files", compiled_once.FILE_BY_FILE)
     for module, flags in SHIPPED_FLAGS.items():
         monkeypatch.setattr(module, "FLAGS", flags)
 

@@ -78,7 +78,7 @@ def native() -> Native:
 def native_message(native: Native, limit: float, asked: float) -> str:
     text = ctypes.create_string_buffer(480)
     found = NativeLimit((ctypes.c_double * 1)(limit), 0, False)
-    native.c.kf_append_limit(text, ctypes.byref(found), (ctypes.c_double * 1)(asked), -1)
+    native.c.probe_limit(text, ctypes.byref(found), (ctypes.c_double * 1)(asked))
     return text.value.decode()
 
 

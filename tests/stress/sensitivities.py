@@ -1,4 +1,6 @@
-"""Sensitivities of random mechanisms against differences of 50 digits: `python -m tests.stress.sensitivities`.
+"""Sensitivities of random mechanisms and of the gallery against differences of 50 digits.
+
+`python -m tests.stress.sensitivities` compares random mechanisms, with --gallery every mechanism of the gallery.
 
 The oracle reads the text of the mechanism's file and shares no code with kinfmu. It has three coordinates for each body
 and the rows of all joints and drivers. Poses and rates for a length p + h and for p - h are found by Newton in 80
@@ -24,6 +26,7 @@ from scipy.linalg import qr
 
 import kinfmu
 from kinfmu.errors import AmbiguousStartError, InconsistentError, MobilityError
+from kinfmu.gallery import names
 from kinfmu.mechanism.toml_text import text
 from tests.open_lengths import with_open_lengths
 from tests.power_series import Series, mp, sin_cos
@@ -34,6 +37,9 @@ WRONG = 1e-10  # of the largest number of its kind, or of the derivative of a le
 FAR = 1000  # sizes from the origin; lengths that are parameters are doubles
 REGULAR = 0.02  # margin; nearer to a singular point less than 1e-10 is left of doubles
 SAMPLES, LENGTHS = 2, 8  # at most, of each mechanism
+GALLERY_TIMES = np.array([0.031, 0.117, 0.36, 0.57, 0.81])  # of the run of a mechanism of the gallery
+GALLERY = -1  # in place of a seed
+NAMES = [name for name in names() if name != "cam_roller"]  # whose curve is not among the rows below
 STEP = mp.mpf("1e-30")
 EPS = mp.mpf(2) ** -52
 ROUNDINGS = 20.0  # a larger error than so many times that of rounded lengths and driver values is kinfmu's own
@@ -59,6 +65,13 @@ class Rows:
     def __init__(self, file: Mapping[str, Any]) -> None:
         self.bodies = [name for name in file["bodies"] if name != "ground"]
         self._file = file
+        self.lengths: dict[str, Any] = {}
+        self._expressions: dict[str, str] = {}  # parameters that follow from others
+        for name, value in file.get("parameters", {}).items():
+            try:
+                self.lengths[name] = mp.mpf(float(str(value).split()[0]))  # doubles
+            except ValueError:
+                self._expressions[name] = value
         self.points = {
             f"{body}.{name}": point
             for body, of in file["bodies"].items()
@@ -67,7 +80,9 @@ class Rows:
 
     def residual(self, q: Sequence[Any], u: Sequence[Any], lengths: Mapping[str, Any]) -> list[Any]:
         """All rows; q: x, y, phi of each moving body, u: driver values, lengths: by the names of parameters."""
-        self._lengths = lengths
+        self._lengths = {**lengths, "sqrt": lambda x: x**0.5}
+        for name, expression in self._expressions.items():
+            self._lengths[name] = self._number(expression)
         poses = {name: q[3 * k : 3 * k + 3] for k, name in enumerate(self.bodies)}
         frames = {name: (x, y, *turn(phi)) for name, (x, y, phi) in poses.items()} | {"ground": (0, 0, 1, 0)}
         angles = {name: phi for name, (_, _, phi) in poses.items()} | {"ground": 0}
@@ -103,6 +118,11 @@ class Rows:
             elif kind == "translational":
                 first, second = (angles[point.split(".")[0]] for point in joint["between"])
                 rows += [along(joint)[1], second - first - joint["angle"]]
+            elif kind == "coordinate":
+                rows.append(at(joint["of"])["xy".index(joint["axis"])] - self._number(joint.get("value", 0.0)))
+            elif kind == "rack_and_pinion":
+                turned = angles[joint["pinion"]] - angles[joint["between"][0].split(".")[0]]
+                rows.append(along(joint)[0] - self._number(joint["radius"]) * turned - joint["offset"])
             elif kind == "gear":
                 first, second = (angles[body] - angles[joint["carrier"]] for body in joint["between"])
                 rows.append(second - first * joint["ratio"] - joint["offset"])
@@ -113,13 +133,15 @@ class Rows:
                 rows.append(angles[driver["of"]] - target)
             elif driver["type"] == "slide":
                 rows.append(along(driver)[0] - target)
+            elif driver["type"] == "coordinate":
+                rows.append(at(driver["of"])["xy".index(driver["axis"])] - target)
             else:
                 dx, dy = between(driver)
                 rows.append(dx * dx + dy * dy - target * target)
         return rows
 
     def _number(self, entry: float | str) -> Any:
-        return self._lengths[entry] if isinstance(entry, str) else entry
+        return eval(entry, {}, self._lengths) if isinstance(entry, str) else entry  # noqa: S307  of our files
 
 
 class Oracle:
@@ -216,6 +238,31 @@ def compared(seed: int, family: str | None = None) -> Comparison:
     return result
 
 
+def compared_in_gallery(name: str, lengths: int | None = None, samples: slice = slice(None)) -> Comparison:
+    """Compare the sensitivities of a mechanism of the gallery with differences, over its own motion.
+
+    Args:
+        name: Name of the mechanism.
+        lengths: How many of its lengths, at most. Default: all of them.
+        samples: Which of GALLERY_TIMES. Default: all of them.
+
+    """
+    result = Comparison(GALLERY, name)
+    mechanism = with_open_lengths(kinfmu.load(name))
+    model = kinfmu.compile(mechanism, engine="python")
+    start, stop = mechanism.run.start, mechanism.run.stop
+    t = start + (stop - start) * GALLERY_TIMES[samples]
+    run = model.solve(t)
+    assert (run.status == 0).all()
+    inputs = run.inputs[:, ::3], run.inputs[:, 1::3]
+    names = run.input_names
+    driven = {str(names[3 * k + order]): inputs[order][:, k] for order in (0, 1) for k in range(len(names) // 3)}
+    chosen = model.parameters[:: -(-len(model.parameters) // lengths)] if lengths else model.parameters
+    found = model.sensitivities(wrt=chosen, **driven)
+    _compare(result, mechanism, model, run, found, inputs, range(len(t)))
+    return result
+
+
 def _compare(
     result: Comparison,
     mechanism: kinfmu.Mechanism,
@@ -227,7 +274,7 @@ def _compare(
 ) -> None:
     file = tomllib.loads(text(mechanism))
     rows = Rows(file)
-    exact = {name: mp.mpf(float(value.split()[0])) for name, value in file["parameters"].items()}  # doubles
+    exact = rows.lengths
     size = model.plan.size
     coordinates = [f"{body}.{c}" for body in rows.bodies for c in ("x", "y", "phi")]
     places = [(coordinates.index(name), k) for k, name in enumerate(found.outputs) if name in coordinates]
@@ -277,7 +324,7 @@ def _largest(
     largest = 0.0
     for theirs, mine, unit in zip(exactly, ours, (1.0, fastest), strict=True):
         for kind, least in ((is_angle, unit / size), (~is_angle, unit)):
-            scale = max(least, float(np.abs(theirs[kind]).max(initial=0.0)))
+            scale = max(least, float(np.abs(theirs[kind]).max(initial=0.0))) or 1.0  # 0: at rest
             error = float(np.abs(mine - theirs)[kind].max(initial=0.0)) / scale
             largest = max(largest, error if np.isfinite(error) else np.inf)
     return largest
@@ -301,8 +348,9 @@ def _judge(
 
 
 def _task(task: tuple[int, str | None]) -> Comparison:
+    seed, name = task
     try:
-        return compared(*task)
+        return compared_in_gallery(name or "") if seed == GALLERY else compared(seed, name)
     except Exception as error:  # it is a fault of this mechanism, and the next one goes on
         return Comparison(task[0], task[1] or "", faults=[f"{type(error).__name__}: {error}"])
 
@@ -313,11 +361,14 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=1000, help="mechanisms; 1000")
     parser.add_argument("--seed", type=int, default=0, help="of the first mechanism; 0")
     parser.add_argument("--family", help="one family alone")
+    parser.add_argument("--gallery", action="store_true", help="the mechanisms of the gallery, and no others")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes; one a core")
     given = parser.parse_args()
     begun = time.monotonic()
     found: list[Comparison] = []
-    tasks = [(seed, given.family) for seed in range(given.seed, given.seed + given.count)]
+    tasks: list[tuple[int, str | None]] = [(seed, given.family) for seed in range(given.seed, given.seed + given.count)]
+    if given.gallery:
+        tasks = [(GALLERY, name) for name in NAMES]
     with multiprocessing.get_context("spawn").Pool(given.jobs) as pool:
         for one in pool.imap_unordered(_task, tasks, CHUNK):
             found.append(one)

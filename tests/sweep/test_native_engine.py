@@ -211,9 +211,8 @@ def test_samples_past_a_limit_are_reported_and_the_branch_comes_back() -> None:
     assert [event.text for event in native.events] == [event.text for event in python.events]
 
 
-@pytest.mark.parametrize("turns", [1_000, 15_000])
-def test_after_thousands_of_turns_samples_are_as_good_as_at_first(turns: int) -> None:
-    u = 2.0 * np.pi * turns + np.linspace(0.0, 7.0, 700)  # the last ones fill no lanes
+def test_after_thousands_of_turns_samples_are_as_good_as_at_first() -> None:
+    u = 2.0 * np.pi * 15_000 + np.linspace(0.0, 7.0, 700)  # the last ones fill no lanes
     native, python = (kinfmu.solve(kinfmu.load("jansen_leg"), engine=engine, crank_angle=u) for engine in ENGINES)
     assert (native.status == 0).all()
     assert native.residual.max() <= 1e-14

@@ -18,7 +18,6 @@ from kinfmu import Mechanism
 from kinfmu.codegen.python import emit
 from kinfmu.codegen.python.stage import load_stage
 from kinfmu.errors import RequestError
-from kinfmu.gallery import names
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text
 from kinfmu.plan import compile_plan
@@ -29,6 +28,7 @@ from tests.fmu.test_parameters import LENGTHS, linkage
 from tests.mechanisms import wheels
 from tests.open_lengths import with_open_lengths
 from tests.oracle import Motion, mp
+from tests.stress.sensitivities import NAMES, compared_in_gallery
 
 ANGLES = np.array([0.1, 0.7, 1.9, 2.8, 4.4, 5.6])
 STEP = mp.mpf("1e-15")  # of differences in 50 digits: they keep 30
@@ -319,12 +319,19 @@ def test_a_block_solved_by_least_squares_has_its_consistent_derivative() -> None
 
 TENTH = (5 / 6, -5 / 21, 5 / 84, -5 / 504, 1 / 1260)  # weights of central differences of order 10
 EIGHTH = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
-SLOW = {"fourbar", "parallel_jaw"}  # nearly every length is refused, after long attempts to assemble
 
 
-@pytest.mark.parametrize("name", [name for name in names() if name not in SLOW])
-def test_gallery_with_open_lengths_agrees_with_central_differences(name: str) -> None:
-    mechanism = with_open_lengths(kinfmu.load(name))
+@pytest.mark.parametrize("name", NAMES)
+def test_gallery_with_open_lengths_agrees_with_fifty_digits(name: str) -> None:
+    """Seven lengths at one sample; all lengths at more samples: `python -m tests.stress.sensitivities --gallery`."""
+    found = compared_in_gallery(name, lengths=7, samples=slice(1, 2))
+    assert found.faults == []
+    assert found.compared > 0
+    assert found.worst <= 1e-12
+
+
+def test_a_cam_with_open_lengths_agrees_with_central_differences() -> None:
+    mechanism = with_open_lengths(kinfmu.load("cam_roller"))
     model = kinfmu.compile(mechanism, engine="python")
     start, stop = mechanism.run.start, mechanism.run.stop
     t = start + (stop - start) * np.array([0.031, 0.117, 0.36, 0.57, 0.81])

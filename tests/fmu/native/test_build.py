@@ -33,8 +33,7 @@ def _files(mechanism: kinfmu.Mechanism, version: str) -> dict[str, str]:
 
 
 @pytest.mark.usefixtures("optimized")
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
-@pytest.mark.parametrize("name", ["fourbar", "five_bar", "settable"])
+@pytest.mark.parametrize(("name", "version"), [("fourbar", "3.0"), ("five_bar", "2.0"), ("settable", "3.0")])
 def test_each_file_of_c_is_clean_under_strict_warnings(name: str, version: str) -> None:
     mechanism = linkage() if name == "settable" else kinfmu.load(name)
     assert compiler.shared_library(_files(mechanism, version), STRICT).exists()
@@ -101,7 +100,8 @@ def test_fmpy_compiles_the_sources_inside_and_the_result_is_the_same(
 
 @pytest.mark.skipif(find_spec("ziglang") is None, reason="other platforms need ziglang")
 def test_all_platforms_are_compiled_with_progress(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    quick = tuple(one for one in PLATFORMS if one.suffix != ".dll")  # zig's first library for windows takes minutes
+    # Zig's first library for windows takes minutes; of the others, one for each system.
+    quick = tuple(one for one in PLATFORMS if one.name in ("aarch64-linux", "aarch64-darwin"))
     monkeypatch.setattr(archive, "PLATFORMS", quick)
     seen: list[tuple[int, int]] = []
     here = tmp_path / "here"

@@ -13,8 +13,7 @@ from kinfmu.plan import SolvePlan
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Werror")
 SAME_SINES = "-DKF_LIBRARY_SINCOS"  # those of the C library, which Python has too: all else is compared to the bit
 PROBE = """\
-#include "solver.h"
-#include <string.h>
+#include "internal.h"
 size_t probe_solver(void);
 size_t probe_state(void);
 size_t probe_pose(void);
@@ -22,12 +21,29 @@ kf_pose *probe_anchor(kf_solver *solver);
 const char *probe_message(const kf_solver *solver);
 void probe_tolerance(kf_solver *solver, double tolerance);
 void probe_tell(const kf_pose *pose, double *z, double *numbers, int *counts);
+bool probe_bind(kf_solver *solver, const double *parameters);
+kf_status probe_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose);
+void probe_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double errors[3]);
+void probe_limit(char *message, const kf_limit *limit, const double *target);
 size_t probe_solver(void) { return sizeof(kf_solver); }
 size_t probe_state(void) { return KF_SOLVER_STATE; }
 size_t probe_pose(void) { return sizeof(kf_pose); }
 kf_pose *probe_anchor(kf_solver *solver) { return &solver->anchor; }
 const char *probe_message(const kf_solver *solver) { return solver->message; }
 void probe_tolerance(kf_solver *solver, double tolerance) { solver->tolerance = tolerance; }
+bool probe_bind(kf_solver *solver, const double *parameters) { return kf_solver_bind(solver, parameters); }
+kf_status probe_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
+{
+    return kf_solve(solver, start, u, pose);
+}
+void probe_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double errors[3])
+{
+    kf_errors(solver, pose, ud, udd, errors);
+}
+void probe_limit(char *message, const kf_limit *limit, const double *target)
+{
+    kf_append_limit(message, limit, target, -1);
+}
 void probe_tell(const kf_pose *pose, double *z, double *numbers, int *counts)
 {
     memcpy(z, pose->found.x, KF_UNKNOWNS * sizeof(double));
@@ -66,7 +82,7 @@ class Native:
         self.c.probe_anchor.restype = ctypes.c_void_p
         self.c.probe_message.restype = ctypes.c_char_p
         self.c.kf_margin.restype = ctypes.c_double
-        self.c.kf_solver_bind.restype = ctypes.c_bool
+        self.c.probe_bind.restype = ctypes.c_bool
         self.solver = ctypes.create_string_buffer(self.c.probe_solver())
         self.poses = [ctypes.create_string_buffer(self.c.probe_pose()) for _ in range(2)]
         self.c.kf_solver_start(self.solver)
@@ -78,7 +94,7 @@ class Native:
         self.found: Any = self.poses[0]
 
     def bind(self, values: Sequence[float]) -> str:
-        done = self.c.kf_solver_bind(self.solver, numbers(values))
+        done = self.c.probe_bind(self.solver, numbers(values))
         self.restart()
         assert done == (self.message == "")
         return self.message
@@ -89,7 +105,7 @@ class Native:
 
     def solve(self, u: Sequence[float]) -> Answer:
         """A trial from the committed pose."""
-        status = self.c.kf_solve(self.solver, self.good, numbers(u), self.found)
+        status = self.c.probe_solve(self.solver, self.good, numbers(u), self.found)
         answer = self.answer()
         assert answer.status == status
         return answer
@@ -127,5 +143,5 @@ class Native:
 
     def errors(self, ud: Sequence[float], udd: Sequence[float]) -> tuple[float, ...]:
         three = numbers([0.0] * 3)
-        self.c.kf_errors(self.solver, self.found, numbers(ud), numbers(udd), three)
+        self.c.probe_errors(self.solver, self.found, numbers(ud), numbers(udd), three)
         return tuple(three)
