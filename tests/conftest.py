@@ -17,7 +17,8 @@ from tests import compiled_once
 
 GOLDEN = Path(__file__).parent / "golden"
 
-SHIPPED_FLAGS = {module: module.FLAGS for module in (compiler, archive, library)}
+FLAGS = ((compiler, "FLAGS"), (compiler, "VECTORIZED"), (archive, "FLAGS"), (library, "FLAGS"))
+SHIPPED_FLAGS = {place: getattr(*place) for place in FLAGS}
 
 settings.register_profile("kinfmu", deadline=None, derandomize=True, database=None, max_examples=40)
 settings.register_profile("long", settings.get_profile("kinfmu"), max_examples=60)  # in .ci/run: --hypothesis-profile
@@ -46,9 +47,9 @@ def quickly_compiled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("KINFMU_CACHE", str(folder / "compiled"))
         patch.setattr(compiler, "compile_files", compiled_once.compile_files)
-        for module, flags in SHIPPED_FLAGS.items():
+        for (module, name), flags in SHIPPED_FLAGS.items():
             quick = ["-O0" if flag.startswith("-O") else flag for flag in flags if flag != "-march=native"]
-            patch.setattr(module, "FLAGS", tuple(quick))
+            patch.setattr(module, name, tuple(quick))
         yield
 
 
@@ -56,8 +57,8 @@ def quickly_compiled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]
 def optimized(monkeypatch: pytest.MonkeyPatch) -> None:
     """C is compiled with the flags of the package and file by file, as for a user."""
     monkeypatch.setattr(compiler, "compile_files", compiled_once.FILE_BY_FILE)
-    for module, flags in SHIPPED_FLAGS.items():
-        monkeypatch.setattr(module, "FLAGS", flags)
+    for (module, name), flags in SHIPPED_FLAGS.items():
+        monkeypatch.setattr(module, name, flags)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
