@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.codegen.c import compiler
+from kinfmu.codegen.c.model import curve_tables
 from kinfmu.codegen.c.text import array
-from kinfmu.codegen.python.stage import CompiledStage, stage_lines
+from kinfmu.codegen.python.stage import CompiledStage, stage_curves, stage_lines
 from kinfmu.codegen.writer import identifier
-from kinfmu.equations.graph import reachable
 from kinfmu.errors import KinfmuError
 from kinfmu.plan.steps import LinearSolve
 
@@ -52,14 +52,9 @@ class _Solve(NamedTuple):
 
 
 def is_printable(stage: CompiledStage) -> bool:
-    """Return True for a stage without curves and least squares, which stay in Python."""
-    steps = stage.steps
-    solves = [step for step in steps.steps if isinstance(step, LinearSolve)]
-    if any(len(step.jacobian) != len(step.jacobian[0]) for step in solves):
-        return False
-    roots = [step.node for step in steps.steps if not isinstance(step, LinearSolve)] + list(steps.results)
-    roots += [node for step in solves for row in (*step.jacobian, *step.columns) for node in row]
-    return all(node.op != "curve" for node in reachable(roots))
+    """Return True for a stage without least squares, which stay in Python."""
+    solves = [step for step in stage.steps.steps if isinstance(step, LinearSolve)]
+    return all(len(step.jacobian) == len(step.jacobian[0]) for step in solves)
 
 
 def stage_source(stage: CompiledStage) -> str:
@@ -72,7 +67,8 @@ def stage_source(stage: CompiledStage) -> str:
         solves.append(_Solve(len(rows), len(columns), entries, right, names))
         return [_BREAK]
 
-    lines, results = stage_lines(stage.steps, stage.given, {}, solve, FUNCTIONS)
+    curves = {data: f"&{name.lower()}" for data, name in stage_curves(stage.steps).items()}
+    lines, results = stage_lines(stage.steps, stage.given, curves, solve, FUNCTIONS)
     loops: list[list[str]] = [[]]
     for line in lines:
         if line == _BREAK:
@@ -99,8 +95,10 @@ def stage_source(stage: CompiledStage) -> str:
             f"#define KF_GIVEN {len(stage.given)}",
             f"#define KF_VALUES {values}",
             f"#define KF_RESULTS {len(results)}",
+            *(['#include "curve.h"'] if curves else []),
             '#include "stage.h"',
             "",
+            *curve_tables(curves),
             *array("static int places", stage.places),
             "",
             "static void fill(kf_numbers *x, kf_numbers *results)",
@@ -171,6 +169,8 @@ def load_native_stage(stage: CompiledStage) -> Callable[[Sequence[FloatArray | f
     """
     texts = {name: (Path(__file__).parent / name).read_text("utf-8") for name in HEADERS}
     files = {"evaluate.c": stage_source(stage)} | texts | compiler.sources(("sincos.h",))
+    if stage_curves(stage.steps):
+        files |= compiler.sources(("curve.h", "curve.c"))
     evaluate = compiler.load(files, compiler.VECTORIZED).kf_evaluate
     numbers, places, counts = (kind * len(stage.given) for kind in (ctypes.c_double, ctypes.c_size_t, ctypes.c_int64))
 

@@ -389,7 +389,7 @@ def test_samples_one_by_one_equal_samples_as_arrays() -> None:
 
 @pytest.mark.parametrize("name", ["stephenson_six_bar", "cam_roller", "five_bar"])
 def test_native_and_python_engine_give_the_same(name: str) -> None:
-    """Blocks of one and two unknowns, of more, and curves, which stay in Python."""
+    """Blocks of one and two unknowns, of more, and curves."""
     mechanism = with_open_lengths(kinfmu.load(name))
     t = np.linspace(0.0, 0.9 * mechanism.run.stop, 50)
     one, other = (kinfmu.compile(mechanism, engine=engine).sensitivities(t) for engine in ("python", "native"))

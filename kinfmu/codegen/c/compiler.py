@@ -25,7 +25,7 @@ from kinfmu.codegen.c import library_cache
 from kinfmu.errors import CompilerError
 
 RUNTIME = Path(__file__).parents[2] / "solver" / "c"
-MODEL = ("kinfmu.h", "sincos.h", "position.c", "linear.c", "curve.c")  # what a model needs of the run time
+MODEL = ("kinfmu.h", "curve.h", "sincos.h", "position.c", "linear.c", "curve.c")  # what a model needs of the run time
 SOLVER = (*MODEL, "solver.h", "internal.h", "pose.c", "hermite.c", "span.c", "trusted_step.c", "bridge.c", "build.c",
           "singularity_map.c", "survey.c", "tracks.c", "mixed.c", "limit.c", "advance.c", "message.c", "solver.c",
           "continuation.c", "worst_case_step.c", "estimate.c")  # fmt: skip

@@ -1,5 +1,6 @@
 /* A piecewise function of one variable: see kinfmu/solver/python/curve.py. */
-#include "kinfmu.h"
+#include "curve.h"
+
 #include "sincos.h"
 
 /* Return n! / (n - order)!, the factor of the derivative of s^n. */

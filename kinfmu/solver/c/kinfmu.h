@@ -9,6 +9,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "curve.h"
 #include "sizes.h"
 
 #define KF_MIXED (-1)
@@ -61,22 +62,6 @@ typedef struct {
     double largest, total, failed, enough;
     int iterations;
 } kf_newton;
-
-/* Pieces of a function of one variable: see kinfmu/solver/python/curve.py. */
-typedef struct {
-    double origin;
-    int count; /* of the coefficients, highest power first */
-    const double *coefficients;
-    double amplitude, frequency, phase;
-} kf_piece;
-
-typedef struct {
-    int count; /* of the pieces; one break less */
-    const double *breaks;
-    const kf_piece *pieces;
-} kf_curve;
-
-double kf_curve_at(const kf_curve *curve, int order, double x);
 
 /* The model: generated. The rates x1 end with the drivers' speeds, as x ends with their values, and the accelerations x2
  * with theirs. held: one flag for each block, NULL for none: the block's unknowns are given, not solved for.
