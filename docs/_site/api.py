@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 
 import kinfmu
+from _site.docstrings import DECLARING
 from _site.pages import Pages
 
 GROUPS = {  # the package of a public name, as the stub imports it: title of its page, what it is for
@@ -74,7 +75,8 @@ def _directive(name: str) -> str:
     module, _, last = name.rpartition(".")
     thing = getattr(import_module(module), last)
     if inspect.isclass(thing):
-        return f".. autoclass:: {name}\n   :members:\n\n"
+        members = "" if thing.__module__.split(".")[1] in DECLARING else "   :members:\n"
+        return f".. autoclass:: {name}\n{members}\n"
     return f".. autofunction:: {name}\n\n" if callable(thing) else f".. autodata:: {name}\n\n"
 
 

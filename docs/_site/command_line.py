@@ -25,8 +25,8 @@ def _section(parent: click.Context, name: str) -> str:
     records = [record for option in command.get_params(context) if (record := option.get_help_record(context))]
     usage = " ".join([context.command_path, *command.collect_usage_pieces(context)])
     parts = [f"## `{name}`", f"    {usage}", _plain(command.help or "")]
-    if records:
-        rows = [(f"`{names}`", _plain(text).replace("\n", " ")) for names, text in records]
+    rows = [(f"`{names}`", _plain(text).replace("\n", " ")) for names, text in records if text]
+    if rows:
         parts.append(table(("option", "meaning"), rows))
     if command.epilog:
         parts.append(f"    {command.epilog.removeprefix('Example: ')}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import fmpy
 
@@ -12,8 +13,9 @@ from _site.pages import Pages, table
 
 SHOWN = {
     "fourbar": "The four-bar of the gallery: one driver of an angle, no masses.",
-    "toggle_press": "The toggle press of the gallery: masses and loads, so forces and energies too.",
+    "engine": "The engine of the gallery: masses and a load, so forces and energies too.",
 }
+HEADINGS = {"input": "Inputs", "output": "Outputs", "parameter": "Parameters", "local": "Local variables"}
 
 
 def write(pages: Pages) -> None:
@@ -32,8 +34,19 @@ def _variables(name: str) -> str:
     with tempfile.TemporaryDirectory() as folder:
         fmu = kinfmu.build(kinfmu.load(name), Path(folder) / "model.fmu", flavour="python")
         described = fmpy.read_model_description(fmu)
-    rows = [
-        (str(v.valueReference), f"`{v.name}`", v.type, v.causality, v.unit or "", v.start or "", v.description or "")
-        for v in described.modelVariables
-    ]
-    return table(("", "name", "type", "causality", "unit", "start", "meaning"), rows)
+    parts = []
+    for causality, heading in HEADINGS.items():
+        rows = [
+            (str(v.valueReference), f"`{v.name}`", v.unit or "", v.start or "", _meaning(v))
+            for v in described.modelVariables
+            if v.causality == causality
+        ]
+        if rows:
+            parts.append(f"### {heading}\n\n{table(('', 'name', 'unit', 'start', 'meaning'), rows)}")
+    return "\n\n".join(parts)
+
+
+def _meaning(variable: Any) -> str:
+    """Return the description of a variable, and its type if it is not a number."""
+    kind = "" if variable.type == "Real" else f" ({variable.type})"
+    return f"{variable.description or ''}{kind}"
