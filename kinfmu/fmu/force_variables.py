@@ -9,6 +9,7 @@ from kinfmu.equations.graph import Node, symbols
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.fmu.interface import Variable
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.force_names import external_names
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import ForceSteps, force_names, force_steps
 from kinfmu.plan.reactions import reaction_names_of, reaction_steps, undetermined_reactions
@@ -47,7 +48,8 @@ def chosen_outputs(
         RequestError: A name is like that of a force, and no output.
 
     """
-    known = (*force_names(mechanism), *reaction_names_of(mechanism))
+    external = external_names(mechanism)  # these are inputs
+    known = (*(name for name in force_names(mechanism) if name not in external), *reaction_names_of(mechanism))
     if outputs is None or isinstance(outputs, str) or not known:
         return outputs, known if outputs is None else ()  # type: ignore[return-value]  # a text is refused later
     coordinates = [name for name in outputs if name not in known]

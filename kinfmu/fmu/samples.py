@@ -28,7 +28,7 @@ PERIOD = 0.5  # [s] of wall-clock time
 LAST_GOOD = int(Status.BRIDGED)  # compared in every sample, where an int is faster
 DISCARD, ERROR = 2, 3  # of FMI's statuses
 _LEVELS = ("info", "warning", "error", "error", "error", "info")  # of FMI's OK, Warning, Discard, Error, Fatal, Pending
-_FORCES = ("forces", "reactions", "shaking")
+_FORCES = ("forces", "loads", "reactions", "shaking")
 _REALS = ("values", "rates", "accelerations", "driven", "residual", "watch", *_FORCES, "margin", "errors")
 _ESTIMATES = 2  # number of parts at the end that follow from the others
 
@@ -61,8 +61,8 @@ class Samples:
         self._columns: tuple[Any, Any, Any] = self._t.data, self._status.data, self._iterations.data
         self._size = 0
         self._names = [variable.name for part in _REALS for variable in interface.part(part)]
-        self._force_names = _force_names(interface, mechanism, _FORCES[:1])
-        self._reaction_names = _force_names(interface, mechanism, _FORCES[1:])
+        self._force_names = _force_names(interface, mechanism, _FORCES[:2])
+        self._reaction_names = _force_names(interface, mechanism, _FORCES[2:])
         self._absent: frozenset[str] = frozenset()
         self._asked: list[int] | None = None  # columns that are read; None: all
         self._mechanism, self._model_description = mechanism, model_description
@@ -243,7 +243,7 @@ class Samples:
             watch_names=tuple(v.name.removeprefix("watch.") for v in interface.part("watch")),
             watch=part["watch"],
             force_names=self._force_names,
-            forces=part["forces"] if self._force_names else None,
+            forces=np.hstack([part["forces"], part["loads"]]) if self._force_names else None,
             reaction_names=self._reaction_names,
             reactions=np.hstack([part["reactions"], part["shaking"]]) if self._reaction_names else None,
             length_unit=interface.length_unit,

@@ -32,7 +32,7 @@ class HasForces(Protocol):
 
 
 def force_names(mechanism: HasForces) -> tuple[ForceName, ...]:
-    """Return the names of efforts, inertias and energies of a mechanism; none without masses and loads."""
+    """Return the names of efforts, inertias, energies and external loads; none without masses and loads."""
     has_masses = any(body.has_mass for body in mechanism.bodies)
     if not (has_masses or mechanism.loads):
         return ()
@@ -48,7 +48,13 @@ def force_names(mechanism: HasForces) -> tuple[ForceName, ...]:
                 quantity = Quantity(_INERTIAS.get((kind, other.quantity.kind), _MIXED_INERTIA))
                 names.append(ForceName(driver.name, noun, quantity))
     energies = ("kinetic_energy", "potential_energy") if has_masses else ("potential_energy",)
-    return (*names, *(ForceName("", energy, Quantity("energy")) for energy in energies))
+    names += [ForceName("", energy, Quantity("energy")) for energy in energies]
+    return (*names, *external_names(mechanism))
+
+
+def external_names(mechanism: HasForces) -> tuple[ForceName, ...]:
+    """Return the names of the efforts of external loads, which are those of their inputs."""
+    return tuple(ForceName("", name, name.quantity) for load in mechanism.loads for name in load.inputs())
 
 
 def effort_noun(kind: str) -> str:

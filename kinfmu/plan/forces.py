@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from kinfmu.equations.graph import Graph, Node
 from kinfmu.mechanism import Mechanism
-from kinfmu.mechanism.force_names import effort_noun, force_names
+from kinfmu.mechanism.force_names import effort_noun, external_names, force_names
 from kinfmu.plan.mechanics import Mechanics
 from kinfmu.plan.plan import SolvePlan
 from kinfmu.plan.steps import Step, needed_steps
@@ -119,6 +119,7 @@ def _forces(plan: SolvePlan, mechanics: Mechanics) -> dict[str, Node]:
             found[f"{driver.name}.reduced_inertia{suffix}"] = reduced
     found["kinetic_energy"] = _sum(graph, (one.amount * (one.rate * one.rate) for one in inertias)) * 0.5
     found["potential_energy"] = _potential_energy(plan, mechanics)
+    found |= {name: graph.symbol(name) for name in external_names(plan.mechanism)}
     return found
 
 

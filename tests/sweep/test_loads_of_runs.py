@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,10 @@ import pytest
 
 import kinfmu
 from kinfmu import Mechanism
+from kinfmu.log import read, write_mcap
 from kinfmu.mechanism.toml_file import parse
+from kinfmu.readings import Peak
+from tests.fmu.test_forces import press
 from tests.mechanisms import reference_fourbar
 
 PENDULUM = """
@@ -97,6 +101,23 @@ def test_efforts_of_a_pendulum_and_a_block_follow_their_formulas(length: str, ma
     np.testing.assert_allclose(run["swing.reduced_inertia.push"], 0.0, atol=1e-15)
     np.testing.assert_allclose(run["push.power"], force * (0.2 + 0.1 * T), rtol=1e-13)
     np.testing.assert_allclose(run["slide.force"], 3.0 * mass * G, rtol=1e-13)
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_external_loads_are_columns_of_the_run_in_records_and_measures(engine: str, tmp_path: Path) -> None:
+    mechanism, t = press(), np.linspace(0.0, 1.0, 41)
+    given = -200.0 * (1.0 + np.sin(9.0 * t))
+    run = kinfmu.solve(mechanism, t, engine=engine, work_force=given)
+    assert run.force_names[-1] == "work_force"
+    np.testing.assert_array_equal(run["work_force"], given)
+    assert next(column.unit for column in run.columns() if column.name == "work_force") == "N"
+    write_mcap(run, tmp_path / "run.mcap", channels=["work_force"])
+    np.testing.assert_array_equal(read(tmp_path / "run.mcap")["work_force"], given)
+    (found,) = kinfmu.measure(run, [Peak("peak", of="work_force")]).values()
+    assert found.value == pytest.approx(400.0, rel=1e-3)
+    driven = kinfmu.simulate(kinfmu.build(mechanism, tmp_path / "press.fmu", flavour="python"),
+                             inputs={"time": t, "work_force": given}, step=t[1])  # fmt: skip
+    np.testing.assert_allclose(driven["work_force"], given, rtol=1e-12)
 
 
 def test_an_external_load_that_is_not_given_is_zero() -> None:

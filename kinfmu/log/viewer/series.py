@@ -10,10 +10,11 @@ import numpy as np
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import axis_of, shown_range
 from kinfmu.scene import palette
-from kinfmu.units import Quantity, unit_of
+from kinfmu.units import ForceName, Quantity, unit_of
 
 ORDERS = ("position", "velocity", "acceleration")
 KINDS = ("angle", "length")
+SAME = 1e-9  # difference of two curves that look the same, of the largest value
 SMALLEST = 1e-17  # drawn in place of 0 on a logarithmic axis; smaller than round-off
 
 
@@ -65,10 +66,17 @@ def groups(run: Run) -> dict[tuple[str, str], Group]:
 
 
 def efforts(run: Run) -> list[Group]:
-    """Return efforts, bias efforts and power of the drivers, and the energies, one group for each unit."""
+    """Return efforts, bias efforts and power of the drivers, energies and external loads, one group for each unit.
+
+    A bias effort that equals the effort, as it does at constant speeds, would hide it and is left out.
+    """
     found = []
     for kind in ("torque", "force", "power", "energy"):
-        columns = [k for k, name in enumerate(run.force_names) if name.quantity.kind == kind and name not in run.absent]
+        columns = [
+            k
+            for k, name in enumerate(run.force_names)
+            if name.quantity.kind == kind and name not in run.absent and not _hides_effort(run, name)
+        ]
         if not columns or run.forces is None:
             continue
         values = np.where(run.good[:, None], run.forces[:, columns], np.nan)
@@ -105,6 +113,16 @@ def signals(run: Run) -> list[Group]:
             )
         )
     return found
+
+
+def _hides_effort(run: Run, name: ForceName) -> bool:
+    """Return True for a bias effort that equals its effort to round-off, in a run that keeps both."""
+    effort = f"{name.owner}.{name.noun.removeprefix('bias_')}"
+    if not name.noun.startswith("bias_") or effort in run.absent:
+        return False
+    own, other = run[name], run[effort]
+    largest = float(np.max(np.abs(other), initial=0.0, where=np.isfinite(other)))
+    return bool(np.all(~run.good | (np.abs(own - other) <= SAME * largest) | ~np.isfinite(own)))
 
 
 def _title(quantity: Quantity, length_unit: str) -> str:
