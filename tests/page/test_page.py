@@ -59,8 +59,10 @@ def test_dragged_crank_turns_through_its_whole_range_with_the_native_poses(chrom
         assert known[name] == pytest.approx(run[name][0], abs=1e-10)
 
 
-def test_dragged_bucket_moves_three_cylinders(chromium: Browser) -> None:
+def test_dragged_bucket_moves_three_cylinders_whose_sliders_end_at_their_limits(chromium: Browser) -> None:
+    limits = [(reach.low, reach.high) for reach in kinfmu.check(kinfmu.load("excavator")).ranges]
     with chromium.open(text_of("excavator")) as page:
+        assert np.array(page.get("k.linkage.ranges")) == pytest.approx(np.array(limits), abs=1e-7)
         x, y = page.at("bucket.tip")
         page.drag("bucket.tip", [(x - 8 * k, y - 3 * k) for k in range(1, 11)])
         assert page.at("bucket.tip") == pytest.approx((x - 80, y - 30), abs=3)

@@ -232,7 +232,8 @@ export class Linkage {
         if (driver.kind === "angle") return [start - TURN, start + TURN];
         const law = this.law.map((one) => one.u[k]);
         const [low, high] = [Math.min(...law), Math.max(...law)];
-        const [least, most] = driver.reach || [low, high];
+        const known = [...(driver.reach || []), ...driver.limits.map((limit) => limit.at), low, high];
+        const [least, most] = [Math.min(...known), Math.max(...known)];
         const spare = Math.max(0.5 * (high - low), 0.02 * this.data.size);
         const limits = driver.limits.map((limit) => limit.at);
         return [
