@@ -43,6 +43,7 @@ export function draw(pen, linkage, view, theme, show, extra) {
     painter.links(true);
     painter.bars();
     painter.links(false);
+    painter.racks();
     painter.slides();
     painter.cylinders();
     painter.pins(extra.held);
@@ -147,6 +148,10 @@ class Painter {
         for (const shape of this.all("spoke", "belt")) {
             this.pen.line(this.at(shape).map((p) => this.dot(p)), { width: 1.4, colour: this.edge(shape.colour) });
         }
+    }
+
+    // Racks are drawn over the links: a rack is often a link too.
+    racks() {
         for (const rack of this.all("rack")) this.rack(rack);
     }
 
