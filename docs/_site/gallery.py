@@ -23,9 +23,10 @@ def write(pages: Pages) -> None:
 
 
 def linked(_app: Any, page: str, source: list[str]) -> None:
-    """Lead links from a mechanism's folder to its page, and list the pages below gallery.md (a Sphinx event)."""
+    """Lead links from a mechanism's folder to its page, offer examples as files, list the gallery (a Sphinx event)."""
     up = "../" * page.count("/")
     source[0] = re.sub(r"\]\(\.\./fmus/(\w+)/README\.md\)", rf"]({up}gallery/\1.md)", source[0])
+    source[0] = re.sub(r"\[([^]]+)\]\((\.\./examples/[\w/.]+)\)", r"{download}`\1 <\2>`", source[0])
     if page == "gallery":
         names = "\n".join(f"gallery/{name}" for name in gallery.names())
         source[0] += f"\n```{{toctree}}\n:hidden:\n\n{names}\n```\n"

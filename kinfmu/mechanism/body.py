@@ -132,7 +132,7 @@ class Body:
 
     @property
     def has_mass(self) -> bool:
-        """True if a mass or a density is given: a number other than 0, or an expression."""
+        """True if a mass or a density is given, as a number other than 0 or as an expression."""
         given = (self.mass, self.density, self.areal_density)
         return any(not is_number(value) or _is_computed(value) or value != 0.0 for value in given)
 
