@@ -56,7 +56,7 @@ STIFFNESSES = {
 DAMPINGS = {"N s/m": 1.0, "Ns/m": 1.0, "N s/mm": 1e3, "kN s/m": 1e3}
 
 
-class Kind(NamedTuple):
+class QuantityKind(NamedTuple):
     """A quantity with a mass in it.
 
     Attributes:
@@ -80,19 +80,21 @@ def _per_angle(units: dict[str, float], word: str = "") -> dict[str, float]:
 
 
 KINDS = {
-    "mass": Kind("kg", KILOGRAMS, (1, 0, 0), "a mass"),
-    "inertia": Kind("kg m2", INERTIAS, (1, 2, 0), "a moment of inertia"),
-    "density": Kind("kg/m3", DENSITIES, (1, -3, 0), "a density"),
-    "areal_density": Kind("kg/m2", {"kg/m2": 1.0, "g/cm2": 10.0, "g/m2": 1e-3}, (1, -2, 0), "a mass by area"),
-    "force": Kind("N", NEWTONS, (1, 1, -2), "a force"),
-    "torque": Kind("N m", TORQUES, (1, 2, -2), "a torque"),
-    "mass_moment": Kind("kg m", {"kg m": 1.0, "kg mm": 1e-3, "g mm": 1e-6}, (1, 1, 0), "a mass times a length"),
-    "stiffness": Kind("N/m", STIFFNESSES, (1, 0, -2), "a stiffness"),
-    "torsional_stiffness": Kind("N m/rad", _per_angle(TORQUES), (1, 2, -2), "a torsional stiffness"),
-    "damping": Kind("N s/m", DAMPINGS, (1, 0, -1), "a damping coefficient"),
-    "torsional_damping": Kind("N m s/rad", _per_angle(TORQUES, " s"), (1, 2, -1), "a torsional damping coefficient"),
-    "energy": Kind("J", {"J": 1.0, "mJ": 1e-3, "kJ": 1e3}, (1, 2, -2), "an energy"),
-    "power": Kind("W", {"W": 1.0, "mW": 1e-3, "kW": 1e3}, (1, 2, -3), "a power"),
+    "mass": QuantityKind("kg", KILOGRAMS, (1, 0, 0), "a mass"),
+    "inertia": QuantityKind("kg m2", INERTIAS, (1, 2, 0), "a moment of inertia"),
+    "density": QuantityKind("kg/m3", DENSITIES, (1, -3, 0), "a density"),
+    "areal_density": QuantityKind("kg/m2", {"kg/m2": 1.0, "g/cm2": 10.0, "g/m2": 1e-3}, (1, -2, 0), "a mass by area"),
+    "force": QuantityKind("N", NEWTONS, (1, 1, -2), "a force"),
+    "torque": QuantityKind("N m", TORQUES, (1, 2, -2), "a torque"),
+    "mass_moment": QuantityKind("kg m", {"kg m": 1.0, "kg mm": 1e-3, "g mm": 1e-6}, (1, 1, 0), "a mass times a length"),
+    "stiffness": QuantityKind("N/m", STIFFNESSES, (1, 0, -2), "a stiffness"),
+    "torsional_stiffness": QuantityKind("N m/rad", _per_angle(TORQUES), (1, 2, -2), "a torsional stiffness"),
+    "damping": QuantityKind("N s/m", DAMPINGS, (1, 0, -1), "a damping coefficient"),
+    "torsional_damping": QuantityKind(
+        "N m s/rad", _per_angle(TORQUES, " s"), (1, 2, -1), "a torsional damping coefficient"
+    ),
+    "energy": QuantityKind("J", {"J": 1.0, "mJ": 1e-3, "kJ": 1e3}, (1, 2, -2), "an energy"),
+    "power": QuantityKind("W", {"W": 1.0, "mW": 1e-3, "kW": 1e3}, (1, 2, -3), "a power"),
 }
 
 

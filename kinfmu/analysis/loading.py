@@ -44,7 +44,7 @@ class Peak:
 
 
 @dataclass(frozen=True)
-class Span:
+class InertiaRange:
     """The smallest and the largest value of a reduced inertia."""
 
     name: str
@@ -64,7 +64,7 @@ class Loading:
 
     over: str
     efforts: tuple[Peak, ...] = ()
-    inertias: tuple[Span, ...] = ()
+    inertias: tuple[InertiaRange, ...] = ()
     reaction: Peak | None = None
     shaking: tuple[Peak, ...] = ()
     undetermined: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = ()
@@ -139,13 +139,13 @@ def _efforts(mechanism: Mechanism) -> list[str]:
     return [f"{driver.name}.{effort_noun(driver.quantity.kind)}" for driver in mechanism.drivers]
 
 
-def _inertias(run: Run) -> Iterator[Span]:
+def _inertias(run: Run) -> Iterator[InertiaRange]:
     """Yield the ranges of the reduced inertias."""
     for name in run.force_names:
         values = run[name][np.isfinite(run[name])]
         if name.noun.startswith("reduced_inertia") and len(values):
             unit = unit_of(name.quantity, run.length_unit)
-            yield Span(name, float(values.min()), float(values.max()), unit)
+            yield InertiaRange(name, float(values.min()), float(values.max()), unit)
 
 
 def _largest_reaction(run: Run) -> Peak | None:

@@ -39,7 +39,7 @@ from kinfmu.run.axis import TIME, axis_for
 from kinfmu.solver.python.status import Status
 from kinfmu.sweep import Model
 from kinfmu.sweep.designs import Batch, Driving, solve_batch, solve_by_library
-from kinfmu.sweep.driving import column_of, driven_by_inputs, run_times
+from kinfmu.sweep.driving import column_of, run_times
 from kinfmu.units import CoordinateName, InputName, Quantity, unit_of
 
 SAMPLES_AT_ONCE = 50_000  # of designs that are solved and measured together
@@ -94,7 +94,7 @@ class BatchReading:
         self._asked = dict(zip((one.name for one in self._readings), asked or mechanism.measures, strict=True))
         self._batch = batch = Batch(model, parameters)
         self.parameters, self._count = batch.parameters, batch.count
-        driven = driven_by_inputs(model.plan.drivers, inputs, rows=batch.count) if inputs else None
+        driven = batch.driven(inputs)
         times = column_of("t", run_times(mechanism.run) if t is None else t)
         if driven is not None:
             times = np.arange(driven[0].shape[-2], dtype=float)

@@ -26,17 +26,11 @@ from kinfmu.units import CoordinateName, ForceName
 
 __all__ = [
     "names_of_rows",
-    "reaction_names",
     "reaction_names_of",
     "reaction_steps",
     "row_names",
     "undetermined_reactions",
 ]
-
-
-def reaction_names(plan: SolvePlan) -> tuple[ForceName, ...]:
-    """Return the names of all reactions of a plan's mechanism; see `reaction_names_of`."""
-    return reaction_names_of(plan.mechanism)
 
 
 def undetermined_reactions(plan: SolvePlan) -> dict[ForceName, tuple[str, ...]]:
@@ -46,17 +40,19 @@ def undetermined_reactions(plan: SolvePlan) -> dict[ForceName, tuple[str, ...]]:
         for row in rows:
             shared[row] = tuple(dict.fromkeys((*shared.get(row, ()), *rows)))
     return {
-        name: shared[row] for row, name in zip(row_names(plan), reaction_names(plan), strict=False) if row in shared
+        name: shared[row]
+        for row, name in zip(row_names(plan), reaction_names_of(plan.mechanism), strict=False)
+        if row in shared
     }
 
 
 def row_names(plan: SolvePlan) -> list[str]:
-    """Return the names of the joints' rows, in the order of `reaction_names`."""
+    """Return the names of the joints' rows, in the order of `reaction_names_of`."""
     return [f"{joint.name}.{label}" for joint in plan.mechanism.joints for label in joint.labels]
 
 
 def reaction_steps(plan: SolvePlan, wanted: Container[str] | None = None) -> ForceSteps:
-    """Return the steps to the reactions of all joints and on the ground, in the order of `reaction_names`.
+    """Return the steps to the reactions of all joints and on the ground, in the order of `reaction_names_of`.
 
     Where redundant rows share a load, the steps give one of the possible distributions.
 
@@ -73,7 +69,7 @@ def reaction_steps(plan: SolvePlan, wanted: Container[str] | None = None) -> For
         for kind, scale in zip(joint.kinds(), joint.scales(), strict=True):
             effort = -(multipliers.get(len(results), zero) * scale)
             results.append(effort / mechanics.metre if kind == "length" else effort)
-    names = reaction_names(plan)
+    names = reaction_names_of(plan.mechanism)
     if wanted is None:
         results += shaking_nodes(plan, mechanics)
     return chosen_steps(names[: len(results)], results, mechanics.steps, wanted)

@@ -27,6 +27,7 @@ from kinfmu.run import FloatArray
 from kinfmu.studies.sampling import METHODS, Sampling
 from kinfmu.studies.variation import Grid, read_variation, whole_number
 from kinfmu.sweep import Model, compile, run_times  # noqa: A004  as re.compile
+from kinfmu.sweep.driving import numbers_of
 from kinfmu.sweep.engine import require_engine
 from kinfmu.sweep.model import WORTH_COMPILING
 
@@ -254,10 +255,7 @@ def _motion(mechanism: Mechanism, t: ArrayLike | None, inputs: Mapping[str, Arra
 
 
 def _samples(name: str, value: ArrayLike) -> FloatArray | float:
-    try:
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise RequestError(f"{name} must be a number or an array of numbers") from None
+    array = numbers_of(name, value, "a number or an array of numbers")
     if array.ndim > 1 or not array.size:
         raise RequestError(f"{name} must be a number or (n,), not of shape {array.shape}")
     return array if array.ndim else float(array)

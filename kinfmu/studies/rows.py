@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from kinfmu.errors import MissingPackageError, StudyError, suggestion
 from kinfmu.mechanism import Mechanism, toml_file
+from kinfmu.mechanism.valid import quoted
 from kinfmu.run import FloatArray
 from kinfmu.studies.definition import DESIGN, REASON, Study
 from kinfmu.studies.nominal import Nominal
@@ -48,6 +49,8 @@ class StudyRows:
             StudyError: The file cannot be read, or is not one of a study.
 
         """
+        if not isinstance(path, str | Path):
+            raise StudyError(f"path = {quoted(path)} must be the path of a Parquet file")
         return cls(Path(path))
 
     @classmethod

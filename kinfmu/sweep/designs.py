@@ -20,6 +20,7 @@ from kinfmu.plan.plan import PlanParameter
 from kinfmu.run import FloatArray, Run
 from kinfmu.solver.python.status import Status
 from kinfmu.sweep.arguments import Arguments, Settings
+from kinfmu.sweep.driving import driven_by_inputs, numbers_of
 from kinfmu.sweep.engine import Driven
 from kinfmu.units import CoordinateName
 
@@ -136,6 +137,25 @@ class Batch:
         if model.arguments.opens_expressions:
             self.values = np.array([self._followed(design) for design in range(self.count)])
         self.constants = self._rows(self.plan.law_constants)
+
+    def driven(self, inputs: Mapping[str, ArrayLike]) -> Driven | None:
+        """Return driver values, speeds and accelerations as `Driving` has them; None without inputs.
+
+        Raises:
+            RequestError: The inputs are invalid, or constants of the drivers' laws are given, without effect then.
+
+        """
+        if not inputs:
+            return None
+        drivers = {driver.name for driver in self.plan.drivers}
+        constants = {constant.name for constant in self.plan.law_constants}
+        unused = [name for name in self.parameters if name in constants and name.partition(".")[0] in drivers]
+        if unused:
+            raise RequestError(
+                f"{listed(unused)}: the laws of drivers have no effect where {listed(inputs)} is given; "
+                "leave them out, or give times in place of inputs"
+            )
+        return driven_by_inputs(self.plan.drivers, inputs, rows=self.count)
 
     def part(self, part: slice) -> Batch:
         """Return a batch of some of the designs."""
@@ -322,10 +342,8 @@ def _arrays(model: Solvable, parameters: Mapping[str, ArrayLike | str]) -> dict[
             arrays[name] = np.array([model.arguments.number(name, value)])
             continue
         model.arguments.number(name, 1.0)
-        try:
-            arrays[name] = np.atleast_1d(np.asarray(value, dtype=float))
-        except (TypeError, ValueError):
-            raise RequestError(f"parameter '{name}' must be numbers, or text with a unit for all designs") from None
+        valid = "numbers, or text with a unit for all designs"
+        arrays[name] = np.atleast_1d(numbers_of(f"parameter '{name}'", value, valid))
         if arrays[name].ndim != 1:
             raise RequestError(f"parameter '{name}' must be a number or (m,), not of shape {arrays[name].shape}")
     lengths = {len(array) for array in arrays.values()} - {1}

@@ -135,10 +135,7 @@ def column_of(name: str, values: ArrayLike, rows: int = 1) -> FloatArray:
         RequestError: They are no finite numbers, or have another shape.
 
     """
-    try:
-        array = np.atleast_1d(np.asarray(values, dtype=float))
-    except (TypeError, ValueError):
-        raise RequestError(f"{name} must be numbers") from None
+    array = np.atleast_1d(numbers_of(name, values))
     if array.ndim > 2 or (array.ndim == 2 and (rows == 1 or len(array) != rows)):
         rule = f"of shape (n,) or ({rows}, n)" if rows > 1 else "one-dimensional"
         raise RequestError(f"{name} must be {rule}, not of shape {array.shape}")
@@ -146,6 +143,17 @@ def column_of(name: str, values: ArrayLike, rows: int = 1) -> FloatArray:
         place = np.unravel_index(int(np.argmin(np.isfinite(array))), array.shape)
         raise RequestError(f"{name}[{', '.join(map(str, place))}] is not a finite number")
     return array
+
+
+def numbers_of(name: str, values: ArrayLike, what: str = "numbers") -> FloatArray:
+    """Return an array of floats; raise a RequestError for truth values and what is no number."""
+    is_truth = isinstance(values, bool) or getattr(getattr(values, "dtype", None), "kind", "") == "b"
+    if is_truth or (isinstance(values, list | tuple) and bool in set(map(type, values))):
+        raise RequestError(f"{name} must be {what}, not true or false")
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise RequestError(f"{name} must be {what}") from None
 
 
 def _refuse_huge(name: str, rates: FloatArray) -> None:

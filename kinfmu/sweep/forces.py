@@ -15,7 +15,7 @@ from kinfmu.errors import RequestError
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.forces import force_names, force_steps, loaded_coordinates
 from kinfmu.plan.origin import localized
-from kinfmu.plan.reactions import reaction_names, reaction_steps, undetermined_reactions
+from kinfmu.plan.reactions import reaction_names_of, reaction_steps, undetermined_reactions
 from kinfmu.plan.shaking import shaking_steps
 from kinfmu.plan.steps import derivative_name, law_symbol
 from kinfmu.plan.trace import parameter_symbol
@@ -95,7 +95,7 @@ class ForceModel:
         where the rows do not determine them, and for rows that share a load with redundant ones. Shaking force and
         moment follow from the motion alone.
         """
-        names = reaction_names(self.poses.plan)
+        names = reaction_names_of(self.poses.plan.mechanism)
         reactions, irregular = self._at_regular_samples(self._reaction_stage, run)
         reactions[:, [names.index(name) for name in undetermined_reactions(self.poses.plan)]] = np.nan
         bridged = irregular[run.poses.status[irregular] == Status.BRIDGED]

@@ -17,7 +17,7 @@ from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.mechanism.settings import read_tolerance
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.forces import force_names
-from kinfmu.plan.reactions import reaction_names
+from kinfmu.plan.reactions import reaction_names_of
 from kinfmu.processes import require_workers
 from kinfmu.run import Event, Run
 from kinfmu.run.axis import TIME, axis_for
@@ -92,7 +92,7 @@ class Model:
         self.parameters = tuple(parameter.name for parameter in plan.parameters)
         self._input_names = tuple(name for driver in plan.drivers for name in driver.inputs)
         self._watch_names = plan.watch_names
-        self._force_names, self._reaction_names = force_names(plan.mechanism), reaction_names(plan)
+        self._force_names, self._reaction_names = force_names(plan.mechanism), reaction_names_of(plan.mechanism)
         self._load_inputs = tuple(name for load in plan.mechanism.loads for name in load.inputs())
         self.arguments = Arguments(plan)
         self._solver = lru_cache(maxsize=_SOLVERS_KEPT)(self._new_solver)
@@ -264,7 +264,7 @@ class Model:
         if inputs and t is not None:
             raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
         batch = Batch(self, parameters)
-        driven = driven_by_inputs(self.plan.drivers, inputs, rows=batch.count) if inputs else None
+        driven = batch.driven(inputs)
         if driven is None:
             times = column_of("t", run_times(self.mechanism.run) if t is None else t)
         else:

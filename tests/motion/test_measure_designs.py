@@ -294,6 +294,7 @@ def test_the_result_is_a_table() -> None:
             "measures need samples over time or over one dri",
         ),
         ({"height": [1.0]}, [], {"crank_angle": TURN}, "there are no measures: "),
+        ({"crank.speed": [1.0]}, [READ[0]], {"crank_angle": TURN}, "crank.speed: the laws of drivers have no effect"),
         ({"height": [1.0]}, 5, {"crank_angle": TURN}, "measures = 5 must be a list of measures"),
         ({"height": [1.0]}, [READ[0]], {"crank_angle": TURN, "workers": 0}, "workers = 0 must be a positive whole"),
     ],

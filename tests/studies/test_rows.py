@@ -143,6 +143,8 @@ def test_it_shows_itself_in_notebooks() -> None:
 
 
 def test_another_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="path = 5 must be the path of a Parquet file"):
+        StudyResult.read(5)  # type: ignore[arg-type]
     other = tmp_path / "run.parquet"
     kinfmu.log.write_table(kinfmu.solve(linkage(), crank_angle=[0.0, 0.1]), other)
     with pytest.raises(StudyError, match="not the results of a study"):

@@ -180,6 +180,8 @@ def test_arguments_of_a_call_are_refused_likewise(tmp_path: Path) -> None:
     [
         ({5: {"values": [20]}}, {}, "[parameters.5]: parameters have names, not 5"),
         ({"crank": {"values": [20]}}, {"t": "x"}, "t must be a number or an array of numbers"),
+        ({"crank": {"values": [20]}}, {"t": True}, "t must be a number or an array of numbers, not true or false"),
+        ({"crank": {"values": [20, True]}}, {}, "[parameters.crank] values = true must be a number"),
         ({"crank": {"values": [20]}}, {"t": []}, "t must be a number or (n,), not of shape (0,)"),
         ({"crank": {"values": [20]}}, {"t": [[1, 2]]}, "t must be a number or (n,), not of shape (1, 2)"),
         ({"crank": {"values": [20]}}, {"crank_angle": []}, "crank_angle must be a number or (n,), not of shape (0,)"),

@@ -22,7 +22,6 @@ AT = {"crank": 20.0, "rocker": 50.0, "base": 40.0}
 
 def slope(name: str) -> float:
     """Return the derivative of the swing angle in 30 digits."""
-    mpmath.mp.dps = 30
 
     def closed(value: mpmath.mpf) -> mpmath.mpf:
         crank, rocker, base = (value if one == name else mpmath.mpf(AT[one]) for one in AT)
@@ -32,8 +31,9 @@ def slope(name: str) -> float:
 
         return angle(rocker + crank) - angle(rocker - crank)
 
-    assert float(closed(mpmath.mpf(AT[name]))) == pytest.approx(swing(**AT), rel=1e-12)
-    return float(mpmath.diff(closed, AT[name]))
+    with mpmath.workdps(30):
+        assert float(closed(mpmath.mpf(AT[name]))) == pytest.approx(swing(**AT), rel=1e-12)
+        return float(mpmath.diff(closed, AT[name]))
 
 
 def test_an_extreme_of_a_coordinate_has_exact_derivatives() -> None:

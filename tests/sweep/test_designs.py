@@ -158,6 +158,13 @@ def test_derivatives_that_nobody_wants_are_not_computed() -> None:
         ),
         ({"a": [[1.0]]}, {}, r"parameter 'a' must be a number or \(m,\), not of shape \(1, 1\)"),
         ({"a": ["1 mm", "2 mm"]}, {}, "parameter 'a' must be numbers"),
+        ({"a": [True, 1.0]}, {}, "parameter 'a' must be numbers, or text .*, not true or false"),
+        ({"a": np.array([True])}, {}, "parameter 'a' must be numbers, or text .*, not true or false"),
+        (
+            {"a": [38.0, 39.0], "crank.speed": [1.0, 2.0]},
+            {"crank_angle": [0.0]},
+            "crank.speed: the laws of drivers have no effect where crank_angle is given; leave them out, or give times",
+        ),
         ({"a": 1.0}, {"derivatives": 3}, "derivatives = 3 must be 0, 1 or 2"),
         (None, {}, "parameters must be arrays by name, such as"),
         ({"a": 1.0}, {"workers": 0}, "workers = 0 must be a positive whole number"),

@@ -10,7 +10,7 @@ static void least_norm(int m, int k, const double *factors, const double *right,
     const double *const columns = factors;
     const double *const reflectors = factors + m * k;
     int i, j;
-    memset(x, 0, m * sizeof *x);
+    memset(x, 0, (size_t)m * sizeof *x);
     for (i = 0; i < k; ++i) {
         double sum = right[i];
         for (j = 0; j < i; ++j) {
