@@ -25,6 +25,8 @@ static void evaluate(unsigned parts, double t, const double *const drive[3], con
             reactions[k] = NAN;
         }
     }
+#else
+    (void)is_bridged;
 #endif
 #if KF_STAGE_SHAKING
     if (parts & KF_BIT(KF_PART_SHAKING)) {
