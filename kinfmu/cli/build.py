@@ -46,9 +46,10 @@ from kinfmu.errors import listed
 )
 @click.option(
     "--drive",
-    type=click.Choice(["time", "inputs"]),
+    type=click.Choice(["time", "inputs", "torque"]),
     help="What moves the drivers: time, by the laws of the file, or inputs such as crank_angle. Default: time, or "
-    "inputs if a law is external. The FMU's parameter driven_by_time changes it.",
+    "inputs if a law is external. The FMU's parameter driven_by_time changes it. torque: efforts such as crank_torque "
+    "are inputs, and the FMU integrates the motion.",
 )
 @outputs_option
 @set_option

@@ -19,9 +19,11 @@ if TYPE_CHECKING:
 TOLERANCE = "solver.tolerance"
 DRIVEN_BY_TIME = "driven_by_time"
 RATES = "rates"
+INTEGRATOR_TOLERANCE = "integrator.tolerance"
 _ELSEWHERE = {
     TOLERANCE: "belongs to a run; use solve or simulate",
     DRIVEN_BY_TIME: "belongs to an FMU; use simulate, or set its default with build --drive",
+    INTEGRATOR_TOLERANCE: "belongs to a motion under torques; use simulate --drive torque",
     RATES: "belongs to an FMU; use simulate, with auto, estimated or wired",
 }
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from shlex import quote
+from typing import Any
 
 import click
 
@@ -14,7 +15,15 @@ from kinfmu.cli.arguments import InputFile, ModelName, OutputFile
 from kinfmu.cli.group import errors_as, errors_of, main, on_interrupt
 from kinfmu.cli.messages import Progress, report
 from kinfmu.cli.quantities import Time
-from kinfmu.cli.settings import DRIVEN_BY_TIME, RATES, TOLERANCE, as_values, checked_settings, set_option
+from kinfmu.cli.settings import (
+    DRIVEN_BY_TIME,
+    INTEGRATOR_TOLERANCE,
+    RATES,
+    TOLERANCE,
+    as_values,
+    checked_settings,
+    set_option,
+)
 from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.files.whole_file import suffix_of
 
@@ -32,6 +41,12 @@ LOGS = Path("logs")
     type=InputFile(),
     help="A CSV file that drives in place of the laws: columns time and inputs, such as crank_angle or "
     "'crank_angle [deg]'; linear between rows.",
+)
+@click.option(
+    "--drive",
+    type=click.Choice(["torque"]),
+    help="torque: efforts such as crank_torque are inputs, 0 by default, and the motion is integrated from the state "
+    "at the start, such as --set crank_speed=60rpm. For a MECH; an FMU has what it was built with.",
 )
 @click.option("--wrap", is_flag=True, help="Unwrap the angles of --input, such as a jump from 360 to 0 deg.")
 @set_option
@@ -61,6 +76,7 @@ def simulate(
     stop: float | None,
     step: float | None,
     inputs: Path | None,
+    drive: Any,
     wrap: bool,
     settings: tuple[tuple[str, str], ...],
     mcap: Path | None,
@@ -88,13 +104,14 @@ def simulate(
         if path is not None and not is_logged:
             raise click.UsageError(f"--channels none leaves nothing to write to {path}")
     with TemporaryDirectory(prefix="kinfmu_") as folder:
-        fmu, parameters = _fmu(model, settings, Path(folder), has_inputs=inputs is not None)
+        fmu, parameters = _fmu(model, settings, Path(folder), drive, has_inputs=inputs is not None)
         record, recording = _logs(model, mcap, rrd) if is_logged else (None, None)
         is_replaced = record is not None and record.exists()
         needs_folder = is_logged and mcap is None
         with _logs_folder() if needs_folder else nullcontext(), Progress() as progress, errors_as(str(fmu), model):
             run = simulated(
                 fmu,
+                drive=drive,
                 start=start,
                 stop=stop,
                 step=step,
@@ -116,7 +133,7 @@ def simulate(
 
 
 def _fmu(
-    model: str, settings: Sequence[tuple[str, str]], folder: Path, *, has_inputs: bool
+    model: str, settings: Sequence[tuple[str, str]], folder: Path, drive: Any, *, has_inputs: bool
 ) -> tuple[Path, dict[str, float | str | bool]]:
     """Return the FMU, built in `folder` if `model` is a mechanism, and the parameters to set in it."""
     from kinfmu.fmu import build
@@ -125,12 +142,16 @@ def _fmu(
     if suffix_of(model) in (".fmu", ".ssp"):
         return Path(model), as_values(settings)
     mech = gallery.load(model)
-    given = checked_settings(mech, settings, (TOLERANCE, DRIVEN_BY_TIME, RATES))
+    states = [name for driver in mech.drivers for name in driver.inputs()[:2]]
+    of_run = (TOLERANCE, DRIVEN_BY_TIME, RATES) if drive is None else (TOLERANCE, INTEGRATOR_TOLERANCE, *states)
+    given = checked_settings(mech, settings, of_run)
     with errors_of(model):
         mech = given.mechanism()
         has_load_inputs = any(load.inputs() for load in mech.loads)  # a table may give these alone
-        drive = "inputs" if has_inputs and not has_load_inputs else default_drive(mech)
-        fmu = build(mech, folder, flavour="python", drive=drive)  # compiling would take longer than this one run
+        by_inputs = has_inputs and not has_load_inputs
+        chosen = drive or ("inputs" if by_inputs else default_drive(mech))
+        flavour = "native" if drive else "python"  # compiling takes longer than a run, but for an integrator's steps
+        fmu = build(mech, folder, flavour=flavour, drive=chosen)
     return fmu, dict(given.of_run)
 
 

@@ -13,6 +13,7 @@ from kinfmu.dynamics.equation import EquationOfMotion
 from kinfmu.dynamics.stepping import METHODS, Sample, Stepper
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.mechanism import require_masses
 from kinfmu.mechanism.valid import is_number, quoted
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.forces import effort_noun
@@ -69,11 +70,7 @@ def torque_driven(
         raise RequestError(f"tolerance = {quoted(tolerance)} must be {LEAST_TOLERANCE:g} to {MOST_TOLERANCE:g}")
     if method not in METHODS:
         raise RequestError(f"method {quoted(method)} is not known{suggestion(method, METHODS)}; {listed(METHODS)}")
-    if not mechanism.has_masses:
-        raise RequestError(
-            f"mechanism '{mechanism.name}' has no masses, so that efforts do not determine its motion; "
-            "give its bodies a mass or an inertia"
-        )
+    require_masses(mechanism)
     changed = continued(mechanism, parameters or {})
     plan = compile_plan(changed.mechanism, None, [])
     ends = (float(times[0]), float(times[-1]))

@@ -42,7 +42,9 @@ def build(
         flavour: 'native' (C, for all hosts) or 'python' (through pythonfmu, for hosts that are Python processes).
             Default: native where a C compiler is found, else python.
         drive: Default of the parameter `driven_by_time`: 'time' (the laws in the file drive) or 'inputs'. Default:
-            time, but inputs if a driver's law is external.
+            time, but inputs if a driver's law is external. 'torque': efforts such as crank_torque are inputs, and the
+            FMU integrates angle and speed of each driver, or, in model exchange, declares them as states; the laws
+            give their start values. The mechanism needs masses.
         outputs: Coordinates such as 'coupler.x', forces such as 'crank.torque' and reactions such as 'pin.force_x' that
             the FMU has. Default: all, with the forces of mechanisms with masses or loads, without reactions that
             redundant joints leave undetermined. What no output needs is not solved.
@@ -54,7 +56,7 @@ def build(
         Path of the file.
 
     Raises:
-        RequestError: If a choice is unknown, or two choices exclude each other.
+        RequestError: If a choice is unknown, or two choices exclude each other, or efforts do not determine the motion.
         MechanismError: If the mechanism is not valid.
         AssemblyError: If the mechanism cannot be assembled.
         CompilerError: If no compiler is found.
@@ -71,8 +73,15 @@ def build(
 
     path = _file(path, mechanism.name)
     coordinates, names = chosen_outputs(mechanism, outputs)
-    plan = compile_plan(mechanism, coordinates, solved=loaded_coordinates(mechanism) if names else ())
-    forces = force_stages(plan, names, are_default=outputs is None) if names else {}
+    owned, forces = None, {}
+    if drive == "torque":
+        from kinfmu.fmu.owned_motion import owned_motion
+
+        plan, owned = owned_motion(compile_plan(mechanism, coordinates, solved=loaded_coordinates(mechanism)))
+    else:
+        plan = compile_plan(mechanism, coordinates, solved=loaded_coordinates(mechanism) if names else ())
+    if names:
+        forces = force_stages(plan, names, are_default=outputs is None)
     if flavour == "python":
         from kinfmu.fmu import python_flavour
 
@@ -80,7 +89,7 @@ def build(
     else:
         from kinfmu.fmu.native import archive
 
-        data = archive.archive(plan, drive, VERSION, FMI_VERSIONS[fmi], platforms, progress, forces)
+        data = archive.archive(plan, drive, VERSION, FMI_VERSIONS[fmi], platforms, progress, forces, owned)
     _write(path, data)
     return path
 
@@ -99,6 +108,8 @@ def _check(flavour: str, drive: str, fmi: int, platforms: str) -> None:
         raise RequestError(
             f"platforms = '{platforms}' is not known{suggestion(platforms, PLATFORMS)}; known: {listed(PLATFORMS)}"
         )
+    if flavour == "python" and drive == "torque":
+        raise RequestError("drive = 'torque' needs flavour = 'native'")
     if flavour == "python" and (fmi != 2 or platforms != "host"):
         choice = f"fmi = {fmi}" if fmi != 2 else f"platforms = '{platforms}'"
         raise RequestError(f"{choice} needs flavour = 'native'; the python flavour is FMI 2.0 on pythonfmu's platforms")

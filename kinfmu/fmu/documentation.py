@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from html import escape
 
 from kinfmu.fmu.interface import Interface, Variable
@@ -41,13 +42,7 @@ text-align: left; vertical-align: top }}</style></head>
 <h1>{title}</h1>
 <p>Kinematics of a planar mechanism, solved to round-off. Unit of length: {unit}; angles in rad.</p>
 <h2>Drivers</h2>
-<p>If <code>driven_by_time</code> is true, the law in the mechanism file drives; its constants are parameters. If it is
-false, the inputs drive: {inputs}. A get after a set returns values at the new inputs, without a step between them.
-Speed and acceleration inputs may be left unconnected. Co-simulation then estimates them from the samples until they
-are first set to a value other than 0; the errors of the estimates fall with the step as h<sup>2</sup> and h. Model
-exchange does not estimate: unconnected inputs are 0. <code>solver.error_qd</code> and <code>solver.error_qdd</code>
-include these errors. Where the errors are unknown (<code>solver.error_qd</code> at the first two samples,
-<code>solver.error_qdd</code> at the first three) they are {unknown:g}.</p>
+{drivers}
 <h2>When a pose cannot be reached</h2>
 <p><code>solver.status</code> reports it, outputs keep the last good values, <code>solver.message</code> states driver,
 value and limit, and the next step returns Discard (in native FMUs also a get of positions, rates and accelerations).
@@ -61,6 +56,20 @@ The host may set other inputs and continue. Status: {statuses}.</p>
 </body>
 </html>
 """
+_BY_LAWS_OR_INPUTS = """\
+<p>If <code>driven_by_time</code> is true, the law in the mechanism file drives; its constants are parameters. If it is
+false, the inputs drive: {inputs}. A get after a set returns values at the new inputs, without a step between them.
+Speed and acceleration inputs may be left unconnected. Co-simulation then estimates them from the samples until they
+are first set to a value other than 0; the errors of the estimates fall with the step as h<sup>2</sup> and h. Model
+exchange does not estimate: unconnected inputs are 0. <code>solver.error_qd</code> and <code>solver.error_qdd</code>
+include these errors. Where the errors are unknown (<code>solver.error_qd</code> at the first two samples,
+<code>solver.error_qdd</code> at the first three) they are {unknown:g}.</p>"""
+_BY_EFFORTS = """\
+<p>The efforts {inputs} are inputs, 0 at the start. The FMU owns the motion: {states} are states, with settable start
+values. In co-simulation it integrates them by an embedded Runge-Kutta pair of order 8, with the error of a step kept
+below <code>integrator.tolerance</code>; inputs are held during a step of the host, and jumps of loads over time restart
+the integrator. Model exchange gives the states to the host. A motion ends at a limit of its drivers: the step returns
+Discard, and the states stay those at its start; in model exchange the FMU asks to terminate.</p>"""
 
 
 def licence(*others: str) -> str:
@@ -82,11 +91,23 @@ def page(interface: Interface) -> str:
     return _PAGE.format(
         title=escape(interface.title or interface.name),
         unit=escape(interface.length_unit),
-        unknown=UNKNOWN_ERROR,
-        inputs=", ".join(f"<code>{escape(v.name)}</code>" for v in interface.part("inputs")) or "there are none",
+        drivers=_drivers(interface),
         statuses=", ".join(f"{int(status)} {status.name.lower()}" for status in Status),
         rows="\n".join(_row(variable) for variable in interface),
     )
+
+
+def _drivers(interface: Interface) -> str:
+    """Return the paragraph on what moves the drivers."""
+    if interface.part("states"):
+        states = [variable for variable in interface.part("states") if variable.start is not None]
+        return _BY_EFFORTS.format(inputs=_listed(interface.part("efforts")), states=_listed(states))
+    inputs = _listed(interface.part("inputs")) or "there are none"
+    return _BY_LAWS_OR_INPUTS.format(inputs=inputs, unknown=UNKNOWN_ERROR)
+
+
+def _listed(variables: Iterable[Variable]) -> str:
+    return ", ".join(f"<code>{escape(variable.name)}</code>" for variable in variables)
 
 
 def _row(variable: Variable) -> str:

@@ -11,8 +11,8 @@ from kinfmu.errors import FmuError
 from kinfmu.mechanism import RunSettings
 from kinfmu.units import display_units
 
-Drive = Literal["time", "inputs"]
-DRIVES: tuple[Drive, ...] = ("time", "inputs")
+Drive = Literal["time", "inputs", "torque"]
+DRIVES: tuple[Drive, ...] = ("time", "inputs", "torque")
 STATUS_TYPE, RATES_TYPE = "Status", "Rates"  # names of the enumerations' types
 
 _ANGLES_SHOWN_IN_DEGREES = ("rad", "rad/s", "rad/s2")
@@ -113,6 +113,16 @@ class Interface:
     def part(self, name: str) -> tuple[Variable, ...]:
         """Return the variables of a part, none if the FMU does not have that part."""
         return next((part.variables for part in self.parts if part.name == name), ())
+
+    @property
+    def motion(self) -> tuple[Variable, ...]:
+        """Value, speed and acceleration of each driver: inputs, or, if the FMU owns the motion, states."""
+        return self.part("states") or self.part("inputs")
+
+    @property
+    def derivatives(self) -> tuple[Variable, ...]:
+        """The derivatives of the continuous states, in their order."""
+        return tuple(variable for variable in self.part("states") if variable.derivative_of)
 
     def value_references(self) -> dict[str, int]:
         """Return the value references by name."""

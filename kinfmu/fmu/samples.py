@@ -11,7 +11,7 @@ import numpy as np
 
 from kinfmu.fmu.block_estimates import BlockEstimates
 from kinfmu.fmu.description import Description
-from kinfmu.fmu.interface import Interface
+from kinfmu.fmu.interface import Interface, Variable
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.fmu.slaves import LoadedSlave
 from kinfmu.mechanism import Mechanism
@@ -52,7 +52,8 @@ class Samples:
         model_description: str,
     ) -> None:
         interface = self._interface = about.interface
-        self._ends: list[int] = np.cumsum([len(interface.part(part)) for part in _REALS]).tolist()
+        columns = [self._variables(part) for part in _REALS]
+        self._ends: list[int] = np.cumsum([len(variables) for variables in columns]).tolist()
         self._most = count + 1  # samples, and a last one without numbers
         self._reals = np.empty((0, self._ends[-1]))  # the columns that are read
         self._t = np.empty(self._most)
@@ -60,7 +61,7 @@ class Samples:
         # Items of memoryviews are assigned faster than those of arrays.
         self._columns: tuple[Any, Any, Any] = self._t.data, self._status.data, self._iterations.data
         self._size = 0
-        self._names = [variable.name for part in _REALS for variable in interface.part(part)]
+        self._names = [variable.name for variables in columns for variable in variables]
         self._force_names = _force_names(interface, mechanism, _FORCES[:2])
         self._reaction_names = _force_names(interface, mechanism, _FORCES[2:])
         self._absent: frozenset[str] = frozenset()
@@ -83,6 +84,10 @@ class Samples:
         self._piece = 1  # number of samples passed to the sink at once
         self._full_at = self._most + 1  # number of samples at which the next piece is passed
         self._due = inf  # wall-clock time at which the next piece is passed in any case
+
+    def _variables(self, part: str) -> tuple[Variable, ...]:
+        """Return the variables of a part; the driver values in effect are states if the FMU owns the motion."""
+        return self._interface.part(part) or (self._interface.part("states") if part == "driven" else ())
 
     def log(self, status: int, text: str) -> None:
         """Store a message of the FMU as an event at the current time."""
@@ -149,7 +154,7 @@ class Samples:
         self, asked: Sequence[int], estimates: Callable[[], BlockEstimates | None]
     ) -> BlockEstimates | None:
         """Return the estimates and store the places of the columns they need; None if one of these is not read."""
-        found = estimates() if len(self._drivers) == len(self._interface.part("driven")) else None
+        found = estimates() if len(self._drivers) == len(self._variables("driven")) else None
         places = {self._names[k]: place for place, k in enumerate(asked)}
         if found is None or not places.keys() >= set(found.unknowns):
             return None
@@ -233,7 +238,7 @@ class Samples:
             rates=part["rates"],
             accelerations=part["accelerations"],
             fixed=self.fixed,
-            input_names=tuple(variable.name for variable in interface.part("inputs")),
+            input_names=tuple(variable.name for variable in interface.motion),
             inputs=part["driven"],
             status=self._status[rows].copy(),
             iterations=iterations,

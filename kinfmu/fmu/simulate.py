@@ -6,7 +6,6 @@ loop sets at t_k, gets, records, then steps.
 
 from __future__ import annotations
 
-import math
 import signal
 import threading
 import zlib
@@ -23,14 +22,14 @@ from kinfmu.errors import FmuError, MechanismError, RequestError, listed
 from kinfmu.fmu import description
 from kinfmu.fmu.block_estimates import BlockEstimates, block_estimates
 from kinfmu.fmu.estimated_rates import Rates
+from kinfmu.fmu.fmu_settings import fmu_settings
 from kinfmu.fmu.input_table import InputTable, input_notes, input_table, undriven
-from kinfmu.fmu.interface import Interface, Variable
+from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.samples import DISCARD, ERROR, Samples
 from kinfmu.fmu.slaves import LoadedSlave, slave
+from kinfmu.fmu.torque_variables import INTEGRATOR_TOLERANCE
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, MECHANISM, text_in, unpacked
 from kinfmu.mechanism import Mechanism, RunSettings, toml_file
-from kinfmu.mechanism.settings import Settable, read_tolerance
-from kinfmu.mechanism.valid import quoted
 from kinfmu.run import MOST_SAMPLES, Run
 from kinfmu.run.channels import kept_samples
 from kinfmu.run.run import Sink
@@ -89,7 +88,7 @@ def simulate(
 
     Args:
         fmu_path: File of the FMU or of the SSP; a mechanism with masses for drive="torque".
-        drive: 'torque' for a mechanism; None for an FMU.
+        drive: 'torque' for a mechanism. Default: what the FMU was built for.
         start: Start time [s]. Default: of the FMU's default experiment; with inputs, of their first row.
         stop: Stop time [s]. Default: of the FMU's default experiment; with inputs, of their last row.
         step: Step [s]. Default: of the FMU's default experiment.
@@ -97,9 +96,9 @@ def simulate(
             or a mapping of arrays by name; linear between rows. `driven_by_time` is then false by default, unless all
             of them are efforts of external loads.
         parameters: Values by name, such as {"crank.speed": 2.0} or {"crank.speed": "20 rpm"}.
-        state: With a mechanism: initial values and speeds, such as {"crank_angle": 0.5, "crank_speed": 2.0} [rad,
-            rad/s]. Default: those of the laws at the start.
-        tolerance: With a mechanism: error of a step, relative, and absolute in rad and sizes. Default: 1e-9.
+        state: With a mechanism, or its FMU built with drive="torque": initial values and speeds, such as
+            {"crank_angle": 0.5, "crank_speed": 2.0} [rad, rad/s]. Default: those of the laws at the start.
+        tolerance: In the same cases: error of a step, relative, and absolute in rad and sizes. Default: 1e-9.
         method: With a mechanism: 'DOP853' or, for stiff springs and dampers, 'Radau', of scipy.integrate. Default:
             'DOP853'.
         wrap: True: angles among the inputs that jump by a turn, such as from 2 pi to 0, are unwrapped. False: such a
@@ -147,10 +146,10 @@ def simulate(
             sink.add(run)
             sink.end(run, "")
         return run
-    only = {"drive": drive, "state": state, "tolerance": tolerance, "method": method}
-    given = [name for name, value in only.items() if value is not None]
-    if given:
-        raise RequestError(f"{listed(given)}: for a mechanism driven by torques, not for FMU {fmu_path}")
+    only = {"drive": drive, "state": state, "tolerance": tolerance}
+    own = [name for name, value in only.items() if value is not None]
+    if method is not None:
+        raise RequestError(f"method: for a mechanism driven by torques, not for FMU {fmu_path}")
     path = Path(fmu_path)
     if not is_own(path):
         from kinfmu.fmu.system.simulate import simulate_system  # imports this module
@@ -176,6 +175,12 @@ def simulate(
             xml = text_in(path, folder, DESCRIPTION, LARGEST_DESCRIPTION)
             about = description.read(xml.encode(), str(path))
             interface = about.interface
+            if own and (not interface.part("states") or drive not in (None, "torque")):
+                raise RequestError(
+                    f"{listed(own)}: for a mechanism driven by torques, or its FMU, not for FMU {fmu_path}"
+                )
+            given = dict(parameters or {}) | dict(state or {})
+            given |= {} if tolerance is None else {INTEGRATOR_TOLERANCE.name: tolerance}
             if wrap and inputs is None:
                 raise RequestError("wrap unwraps angles among the inputs, and no inputs are given")
             table = None if inputs is None else input_table(inputs, interface, wrap=wrap)
@@ -186,12 +191,12 @@ def simulate(
             mechanism = toml_file.parse(text_in(path, folder, MECHANISM), f"{path}: {MECHANISM}")
             try:
                 drives = table is not None and any(v.name in table.names for v in interface.part("inputs"))
-                settings = _settings(interface, mechanism.settable, parameters or {}, has_inputs=drives)
+                settings = fmu_settings(interface, mechanism.settable, given, has_inputs=drives)
             except RequestError as error:
                 raise RequestError(f"{path}: {error}") from None
             mechanism = as_set(mechanism, settings)
             samples = Samples(about, len(kept), settings=settings, mechanism=mechanism, model_description=xml)
-            if not _time_drives(interface, settings):
+            if interface.part("inputs") and not _time_drives(interface, settings):
                 samples.extend(undriven(interface, table, float(t[0])))
             if table is not None:
                 samples.extend(input_notes(interface, table, start, stop))
@@ -258,51 +263,8 @@ def times(span: RunSettings | InputTable, start: float | None, stop: float | Non
     return t
 
 
-def _settings(
-    interface: Interface, settable: Settable, parameters: Mapping[str, float | str | bool], *, has_inputs: bool
-) -> dict[str, float | bool | str]:
-    """Return the checked parameters to set in the FMU; with inputs of drivers, `driven_by_time` is false by default."""
-    known = {variable.name: variable for variable in interface if variable.causality == "parameter"}
-    chosen: dict[str, float | bool | str] = {}
-    for name, value in parameters.items():
-        if name not in known:
-            raise settable.unknown(name, list(known))
-        if name in settable.names:
-            chosen[name] = settable.number(name, value)
-        elif known[name].type == "Boolean":
-            if value not in (False, True):
-                raise RequestError(f"{name} = {quoted(value)} must be true or false")
-            chosen[name] = bool(value)
-        elif known[name].type == "Enumeration":
-            chosen[name] = _rates(value)
-        else:
-            chosen[name] = _tolerance(known[name], value)
-    if has_inputs:
-        chosen.setdefault("driven_by_time", False)
-    return chosen
-
-
-def _rates(value: float | str | bool) -> str:
-    """Return the name of a value of the parameter `rates`, given as name or number."""
-    names = {mode.name.lower(): mode for mode in Rates}
-    for name, mode in names.items():
-        if str(value).lower() == name or (not isinstance(value, str) and value == mode):
-            return name
-    raise RequestError(f"rates = {quoted(value)} must be auto, estimated or wired")
-
-
-def _tolerance(variable: Variable, value: float | str | bool) -> float:
-    """Return the tolerance if it is in the range that its variable declares."""
-    tolerance = read_tolerance(variable.name, value)
-    least, most = variable.minimum or 0.0, math.inf if variable.maximum is None else variable.maximum
-    if not least <= tolerance <= most:
-        raise RequestError(f"{variable.name} = {tolerance:g} must be at least {least:g}, at most {most:g}")
-    return tolerance
-
-
 def _time_drives(interface: Interface, parameters: Mapping[str, float | bool | str]) -> bool:
-    (switch,) = interface.part("drive")
-    return bool(parameters.get(switch.name, switch.start))
+    return any(bool(parameters.get(switch.name, switch.start)) for switch in interface.part("drive"))
 
 
 def _initialize(
@@ -343,6 +305,8 @@ def _estimates(
 
     first: inputs at the first sample.
     """
+    if interface.part("states"):  # the estimates need the accelerations that the FMU computes
+        return None
     if not _time_drives(interface, settings):
         given = set() if table is None else {name for name, value in zip(table.names, first, strict=True) if value}
         rates = {variable.name for k, variable in enumerate(interface.part("inputs")) if k % 3}

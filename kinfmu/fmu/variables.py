@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Literal, NamedTuple
@@ -12,6 +12,7 @@ from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.force_variables import force_parts
 from kinfmu.fmu.interface import RATES_TYPE, STATUS_TYPE, Drive, Interface, InterfacePart, Variable
 from kinfmu.fmu.layout import UNKNOWN_ERROR
+from kinfmu.fmu.torque_variables import with_states
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.trace import is_parameter
@@ -80,15 +81,18 @@ def interface(
     *,
     has_time: bool = False,
     forces: Mapping[str, ForceSteps] = MappingProxyType({}),
+    starts: Sequence[float] = (),
 ) -> Interface:
     """Return the variables of the FMU of a plan.
 
     Args:
         plan: Plan of the mechanism.
-        drive: Default of the parameter `driven_by_time`: 'time' (true) or 'inputs' (false).
+        drive: Default of the parameter `driven_by_time`: 'time' (true) or 'inputs' (false); 'torque': angles and speeds
+            are states, and efforts are inputs.
         has_time: True for FMI 3.0: time is the last variable, and what the drivers move depends on it and on tunable
             parameters, which FMI 3.0 counts as known after initialization.
         forces: Stages of the forces that are outputs, by part. Default: none.
+        starts: With 'torque': value and speed of each driver at the start.
 
     Returns:
         The variables, part by part.
@@ -131,17 +135,23 @@ def interface(
         "message": [_MESSAGE],
     }
     parts = [InterfacePart(name, tuple(variables)) for name, variables in lists.items()]
+    if drive == "torque":
+        parts = with_states(plan, parts, starts, has_time=has_time)
     if has_time:
+        owns = drive == "torque"  # then only forces and laws of loads depend on time
         tunable = {variable.name for part in parts for variable in part.variables if variable.variability == "tunable"}
-        parts = [InterfacePart(part.name, tuple(_in_fmi3(one, tunable) for one in part.variables)) for part in parts]
+        parts = [
+            InterfacePart(part.name, tuple(_in_fmi3(one, tunable, has_time=not owns) for one in part.variables))
+            for part in parts
+        ]
         parts.append(InterfacePart("time", (_TIME,)))
     return Interface(
         mechanism.name, mechanism.title, mechanism.length_unit, mechanism.run, len(plan.coordinates), tuple(parts)
     )
 
 
-def _in_fmi3(variable: Variable, tunable: Collection[str]) -> Variable:
-    """Return the variable with the dependencies of FMI 3.0: also time and tunable parameters, if it has any.
+def _in_fmi3(variable: Variable, tunable: Collection[str], *, has_time: bool) -> Variable:
+    """Return the variable with the dependencies of FMI 3.0: also tunable parameters, and time, if it has any.
 
     Fixed parameters are not among the dependencies of outputs: they can no longer change.
     """
@@ -149,10 +159,11 @@ def _in_fmi3(variable: Variable, tunable: Collection[str]) -> Variable:
         return variable
     initial = variable.initial_dependencies or ()
     now = tuple(name for name in initial if name in tunable)
+    time = (_TIME.name,) if has_time else ()
     return replace(
         variable,
-        dependencies=(*variable.dependencies, *now, _TIME.name),
-        initial_dependencies=(*initial, _TIME.name),
+        dependencies=(*variable.dependencies, *now, *time),
+        initial_dependencies=(*initial, *time),
     )
 
 

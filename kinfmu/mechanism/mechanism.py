@@ -209,6 +209,15 @@ class Mechanism(Displayed):
         return replace(self, parameters=parameters, drivers=drivers)
 
 
+def require_masses(mechanism: Mechanism) -> None:
+    """Raise a RequestError if no body has a mass or an inertia, so that efforts determine no motion."""
+    if not mechanism.has_masses:
+        raise RequestError(
+            f"mechanism '{mechanism.name}' has no masses, so that efforts do not determine its motion; "
+            "give its bodies a mass or an inertia"
+        )
+
+
 def require_mechanism(value: object, purpose: str) -> None:
     """Raise a RequestError if a value is not a Mechanism, such as its name or path; purpose: 'solve'."""
     if isinstance(value, str | PurePath):

@@ -36,7 +36,7 @@ ENUMERATIONS: dict[str, Mapping[Any, str]] = {  # by name of the type: items and
     STATUS_TYPE: _STATUS_WORDS,
     RATES_TYPE: _RATES_WORDS,
 }
-UnknownKind = Literal["outputs", "initial"]
+UnknownKind = Literal["outputs", "derivatives", "initial"]
 Unknowns = dict[
     str, tuple[tuple[str, str], ...] | None
 ]  # by name: dependencies with their kinds, or None if not listed
@@ -131,13 +131,14 @@ def attributes(variable: Variable, references: Mapping[str, int]) -> dict[str, s
     return found | ({"initial": variable.initial} if variable.initial else {})
 
 
-def shown(variable: Variable, kinds: Collection[str]) -> Variable:
+def shown(variable: Variable, kinds: Collection[str], interface: Interface) -> Variable:
     """Return the variable as a description with these kinds of simulation lists it.
 
-    With model exchange it is not declared as the derivative of another one: some importers, OMSimulator among them,
-    take every derivative for that of a continuous state, and there are no states.
+    With model exchange or states only derivatives of states are declared as derivatives: some importers, OMSimulator
+    among them, take every derivative for one of these.
     """
-    return replace(variable, derivative_of=None) if "ModelExchange" in kinds else variable
+    hides = ("ModelExchange" in kinds or bool(interface.derivatives)) and variable not in interface.derivatives
+    return replace(variable, derivative_of=None) if hides else variable
 
 
 def typed(variable: Variable) -> dict[str, str]:
@@ -157,22 +158,24 @@ def unknowns(
 ) -> list[tuple[Variable, dict[str, str]]]:
     """Return the unknowns of the model structure with the attributes of their dependencies.
 
-    These are the outputs; the initial unknowns also include calculated parameters. The kind `fixed` states that the
+    These are the outputs, or the derivatives of continuous states; the initial unknowns are the outputs that are
+    calculated, and calculated parameters. The kind `fixed` states that the
     factor depends on fixed parameters alone, `driven_by_time` among them; for initial unknowns FMI allows only
     `dependent` and `constant`.
 
     Args:
         interface: Variables of the FMU.
-        kind: "outputs" or "initial".
+        kind: "outputs", "derivatives" or "initial".
         places: Number by which dependencies are listed, by name of the variable.
 
     """
-    causalities = ("output",) if kind == "outputs" else ("output", "calculatedParameter")
+    is_initial = kind == "initial"
+    causalities = ("output", "calculatedParameter") if is_initial else ("output",)
     found = []
-    for variable in interface:
-        if variable.causality in causalities:
-            names = variable.dependencies if kind == "outputs" else variable.initial_dependencies
-            linear_in = variable.linear_in if kind == "outputs" else ()
+    for variable in interface.derivatives if kind == "derivatives" else interface:
+        if variable.causality in causalities and not (is_initial and variable.initial == "exact"):
+            names = variable.initial_dependencies if is_initial else variable.dependencies
+            linear_in = () if is_initial else variable.linear_in
             listed: dict[str, str] = {}
             if names is not None:
                 ordered = sorted(names, key=places.__getitem__)

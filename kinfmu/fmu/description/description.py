@@ -171,8 +171,9 @@ def _check(interface: Interface) -> None:
     for name, variables in _FIXED_PARTS.items():
         if not set(variables) <= set(_names(interface.part(name))):
             raise FmuError(f"part {name} does not hold {listed(variables)}")
+    owns = bool(interface.part("states"))
     switches = interface.part("drive")
-    if [(variable.type, type(variable.start)) for variable in switches] != [("Boolean", bool)]:
+    if not owns and [(variable.type, type(variable.start)) for variable in switches] != [("Boolean", bool)]:
         raise FmuError("part drive must be one Boolean variable with a start value")
     _check_motion(interface)
 
@@ -191,8 +192,13 @@ def _check_motion(interface: Interface) -> None:
             raise FmuError(f"part {part} does not hold the derivatives of the outputs")
     if not 0 <= interface.coordinate_count <= len(outputs):
         raise FmuError(f"{interface.coordinate_count} of {len(outputs)} outputs cannot be coordinates")
-    inputs = _names(interface.part("inputs"))
-    if read_inputs(inputs) is None or _names(interface.part("driven")) != [f"driven.{name}" for name in inputs]:
+    motion = _names(interface.motion)
+    if read_inputs(motion) is None:
+        raise FmuError("part inputs, or states, does not hold three variables for each driver")
+    if interface.part("states"):
+        if 3 * len(interface.part("efforts")) != len(motion) or 3 * len(interface.derivatives) != 2 * len(motion):
+            raise FmuError("parts states and efforts do not hold value, speed, acceleration and effort of each driver")
+    elif _names(interface.part("driven")) != [f"driven.{name}" for name in motion]:
         raise FmuError("part driven does not hold the inputs, three for each driver")
     for name in _names(interface.part("watch")):
         if not name.startswith("watch."):

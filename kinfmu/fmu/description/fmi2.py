@@ -32,7 +32,7 @@ def write(root: Element, interface: Interface, kinds: Mapping[str, dict[str, str
     references = interface.value_references()
     variables = SubElement(root, "ModelVariables")
     for variable in interface:
-        _variable(variables, common.shown(variable, kinds), references)
+        _variable(variables, common.shown(variable, kinds, interface), references)
     _structure(root, interface, references)
 
 
@@ -45,10 +45,19 @@ def _variable(parent: Element, variable: Variable, references: Mapping[str, int]
 
 
 def _structure(root: Element, interface: Interface, references: Mapping[str, int]) -> None:
-    """Write Outputs and InitialUnknowns. Indices, like value references, are places in the list, from 1."""
+    """Write Outputs, Derivatives of states, and InitialUnknowns.
+
+    Indices, like value references, are places in the list, from 1.
+    """
     structure = SubElement(root, "ModelStructure")
-    lists: tuple[tuple[str, common.UnknownKind], ...] = (("Outputs", "outputs"), ("InitialUnknowns", "initial"))
+    lists: tuple[tuple[str, common.UnknownKind], ...] = (
+        ("Outputs", "outputs"),
+        ("Derivatives", "derivatives"),
+        ("InitialUnknowns", "initial"),
+    )
     for element, kind in lists:
+        if kind == "derivatives" and not interface.derivatives:
+            continue
         parent = SubElement(structure, element)
         for variable, depends in common.unknowns(interface, kind, references):
             SubElement(parent, "Unknown", {"index": str(references[variable.name])} | depends)

@@ -34,7 +34,7 @@ def write(root: Element, interface: Interface, kinds: Mapping[str, dict[str, str
     references = interface.value_references()
     variables = SubElement(root, "ModelVariables")
     for variable in interface:
-        _variable(variables, common.shown(variable, kinds), references)
+        _variable(variables, common.shown(variable, kinds, interface), references)
     _structure(root, interface, references)
     common.annotation(SubElement(SubElement(root, "Annotations"), "Annotation", type=common.TOOL), interface)
 
@@ -47,9 +47,13 @@ def _variable(parent: Element, variable: Variable, references: Mapping[str, int]
 
 
 def _structure(root: Element, interface: Interface, references: Mapping[str, int]) -> None:
-    """Write Output and InitialUnknown elements, by value references."""
+    """Write Output, ContinuousStateDerivative and InitialUnknown elements, by value references."""
     structure = SubElement(root, "ModelStructure")
-    lists: tuple[tuple[str, common.UnknownKind], ...] = (("Output", "outputs"), ("InitialUnknown", "initial"))
+    lists: tuple[tuple[str, common.UnknownKind], ...] = (
+        ("Output", "outputs"),
+        ("ContinuousStateDerivative", "derivatives"),
+        ("InitialUnknown", "initial"),
+    )
     for element, kind in lists:
         for variable, depends in common.unknowns(interface, kind, references):
             SubElement(structure, element, {"valueReference": str(references[variable.name])} | depends)

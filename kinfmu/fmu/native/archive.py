@@ -24,6 +24,7 @@ from kinfmu.fmu.description import Description, FmiVersion
 from kinfmu.fmu.interface import Drive, Interface
 from kinfmu.fmu.native.platforms import PLATFORMS, Platform, host
 from kinfmu.fmu.native.sources import headers, sources
+from kinfmu.fmu.owned_motion import OwnedMotion
 from kinfmu.fmu.variables import interface
 from kinfmu.mechanism import toml_text
 from kinfmu.plan import SolvePlan
@@ -52,6 +53,9 @@ CAPABILITIES: dict[FmiVersion, dict[str, dict[str, float | bool]]] = {
         | {"maxOutputDerivativeOrder": 2, "hasEventMode": False},
     },
 }
+_OWNING = CAPABILITIES | {  # the integrator holds inputs during a step
+    "2.0": CAPABILITIES["2.0"] | {"CoSimulation": CAPABILITIES["2.0"]["CoSimulation"] | {"canInterpolateInputs": False}}
+}
 
 
 def archive(
@@ -62,6 +66,7 @@ def archive(
     platforms: str,
     progress: Callable[[int, int], None] | None = None,
     forces: Mapping[str, ForceSteps] = MappingProxyType({}),
+    owned: OwnedMotion | None = None,
 ) -> bytes:
     """Return the FMU of a plan; the same plan and the same compiler give the same bytes.
 
@@ -73,6 +78,7 @@ def archive(
         platforms: 'host', compiled by the system's compiler, or 'all', compiled by zig.
         progress: Called with (platforms done, number of platforms).
         forces: Stages of the forces that are outputs, by part. Default: none.
+        owned: Motion of the drivers, if efforts drive. Default: inputs or laws give it.
 
     Returns:
         Bytes of the zip archive.
@@ -81,9 +87,10 @@ def archive(
         CompilerError: If no compiler is found.
 
     """
-    variables = interface(plan, drive, has_time=fmi == "3.0", forces=forces)
-    unnamed = _contents(plan, variables, version, fmi, "", forces)
-    contents = _contents(plan, variables, version, fmi, token(digest(unnamed)), forces)
+    starts = owned.starts if owned else ()
+    variables = interface(plan, drive, has_time=fmi == "3.0", forces=forces, starts=starts)
+    unnamed = _contents(plan, variables, version, fmi, "", forces, owned)
+    contents = _contents(plan, variables, version, fmi, token(digest(unnamed)), forces, owned)
     wanted = [host()] if platforms == "host" else list(PLATFORMS)
     for done, platform in enumerate(wanted):
         if progress is not None:
@@ -102,13 +109,14 @@ def _contents(
     fmi: FmiVersion,
     guid: str,
     forces: Mapping[str, ForceSteps],
+    owned: OwnedMotion | None = None,
 ) -> dict[str, bytes]:
     """Return every file except the binaries, by path in the FMU."""
-    code = sources(plan, variables, fmi, guid, forces)
+    code = sources(plan, variables, fmi, guid, forces, owned.inertia if owned else None)
     units = tuple(compiler.units(code))
     about = Description(variables, guid, variables.name, f"kinfmu {version}", fmi, units if fmi == "2.0" else ())
     contents = {
-        "modelDescription.xml": description.write(about, CAPABILITIES[fmi]),
+        "modelDescription.xml": description.write(about, CAPABILITIES[fmi] if owned is None else _OWNING[fmi]),
         "documentation/index.html": documentation.page(variables).encode(),
         "documentation/licenses/license.txt": documentation.licence().encode(),
         "resources/mechanism.toml": toml_text.text(plan.mechanism).encode(),

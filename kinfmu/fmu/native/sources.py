@@ -10,20 +10,24 @@ from pathlib import Path
 from types import MappingProxyType
 
 from kinfmu.codegen.c import compiler, emit
+from kinfmu.codegen.c.dormand_prince import dormand_prince
 from kinfmu.codegen.c.forces import emit_forces
 from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
 from kinfmu.codegen.forces import STAGES
 from kinfmu.codegen.python.forces import solves
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.errors import MissingPackageError
+from kinfmu.fmu import dormand_prince as pair
 from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.trace import parameter_symbol
+from kinfmu.units import METRES
 
 RUNTIME = Path(__file__).with_name("runtime")
+_NO_VARIABLE = "0xfffffffeu"
 NOT_REAL = ("counts", "ok", "drive", "rate_source", "message", "time")  # parts after those of Real variables
 HEADERS = {
     "2.0": ("fmi2TypesPlatform.h", "fmi2FunctionTypes.h", "fmi2Functions.h"),
@@ -46,6 +50,11 @@ _HINTS = (  # in short steps, vector loads of values just stored stall, and bran
     "#endif",
 )
 _OF_FORCES = re.compile(r"^#if KF_FORCES\n.*?^#endif\n", re.DOTALL | re.MULTILINE)  # left out where there are none
+_BY_OWNER = re.compile(
+    r"^#if (?P<negated>!)?KF_TORQUE\n(?P<first>.*?)(?:^#else\n(?P<second>.*?))?^#endif\n", re.DOTALL | re.MULTILINE
+)
+_OF_TORQUE = ("limits.c", "torque.c")
+_HEADER_OF_TORQUE = "torque.h"
 _OTHER_VERSION = {"2.0": "fmi3.c", "3.0": "fmi2.c"}
 
 
@@ -55,6 +64,7 @@ def sources(
     version: str,
     token: str,
     forces: Mapping[str, ForceSteps] = MappingProxyType({}),
+    inertia: ForceSteps | None = None,
 ) -> dict[str, str]:
     """Return all C files and headers of the FMU by name, except the headers of FMI.
 
@@ -64,10 +74,19 @@ def sources(
         version: Version of FMI, "2.0" or "3.0".
         token: Hash of the FMU's content.
         forces: Stages of the forces that are outputs, by part. Default: none.
+        inertia: Steps to bias efforts and reduced inertia, if the FMU owns the motion of its drivers.
 
     """
+    owns = inertia is not None
     instance = {file.name: file.read_text("utf-8") for file in sorted(RUNTIME.iterdir()) if file.suffix in (".c", ".h")}
+    instance = {name: _chosen(text, owns=owns) for name, text in instance.items()}
     del instance[_OTHER_VERSION[version]]
+    if inertia is None:
+        for name in (*_OF_TORQUE, _HEADER_OF_TORQUE):
+            del instance[name]
+    else:
+        instance["inertia.c"] = emit_forces(plan, inertia, "inertia") + _si_units(plan)
+        instance["dormand_prince.h"] = dormand_prince(pair.C, pair.A, b=pair.B, e3=pair.E3, e5=pair.E5)
     if not forces:
         del instance["forces_at.c"], instance["solutions.c"]
         instance = {name: _OF_FORCES.sub("", text) for name, text in instance.items()}
@@ -76,16 +95,33 @@ def sources(
             del instance["solutions.c"]
         instance |= {f"{stage}.c": emit_forces(plan, steps, stage) for stage, steps in forces.items()}
     tables = {"interface.h": _header(plan, variables, version, token), "interface.c": _tables(variables)}
-    tables |= {"step.c": _step(version), "events.c": _events(plan)}
+    tables |= {"step.c": _step(version, owns=owns), "events.c": _events(plan)}
     files = emit(plan) | compiler.sources(compiler.SOLVER) | instance | tables
     return dict(sorted(_prefixed(files, version).items()))
 
 
-def _step(version: str) -> str:
+def _chosen(text: str, *, owns: bool) -> str:
+    """Return a file of the runtime with the lines for an FMU that owns the motion of its drivers, or for any other."""
+
+    def choice(match: re.Match[str]) -> str:
+        yes, no = match["first"], match["second"] or ""
+        return yes if (match["negated"] is None) == owns else no
+
+    return _BY_OWNER.sub(choice, text)
+
+
+def _si_units(plan: SolvePlan) -> str:
+    """Return the table of the units of the drivers in SI units."""
+    metre = METRES[plan.mechanism.length_unit]
+    factors = [metre if driver.quantity.kind == "length" else 1.0 for driver in plan.drivers]
+    return "\n".join(["", *array("double kf_in_si", factors), ""])
+
+
+def _step(version: str, *, owns: bool = False) -> str:
     """Return step.c, which joins the files that a step uses, so that the compiler can inline small functions."""
     lines = ["/* The functions of set, step and get as one unit. Files included here are not compiled separately. */"]
     lines += _HINTS
-    lines += [f'#include "{name}"' for name in (*_STEP, f"fmi{version[0]}.c")]
+    lines += [f'#include "{name}"' for name in (*_STEP, *(_OF_TORQUE if owns else ()), f"fmi{version[0]}.c")]
     return "\n".join(lines) + "\n"
 
 
@@ -119,9 +155,13 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
     real = sum(len(variables.part(name)) for name in names)
     words = _WORDS[version]
     counts = {stage: len(variables.part(stage)) for stage in STAGES}
-    forces = [f"#define KF_FORCES {sum(counts.values())} /* of all stages */"]
+    owns = bool(variables.part("states"))
+    total = sum(counts.values()) or int(owns)
+    forces = [f"#define KF_FORCES {total} /* of all stages */"]
     forces += [f"#define KF_STAGE_{stage.upper()} {count}" for stage, count in counts.items()]
-    forces = [*forces, f"#define KF_LOADS {len(variables.part('loads'))}", ""] if sum(counts.values()) else []
+    forces += [f"#define KF_LOADS {len(variables.part('loads'))}"]
+    forces += ["#define KF_PART_INPUTS KF_PART_STATES"] if owns else []
+    forces = [*forces, ""] if total else []
     bits, not_real = ("unsigned", 1 << 31) if forces else ("unsigned short", 1 << 15)
     lines = [
         f"/* Variables of the FMU of {variables.name}: generated from its mechanism, not to be edited. */",
@@ -143,8 +183,8 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
         f"#define KF_STATUS {references['solver.status']}",
         f"#define KF_ITERATIONS {references['solver.iterations']}",
         f"#define KF_SOLVER_OK {references['solver.ok']}",
-        f"#define KF_DRIVEN_BY_TIME {references['driven_by_time']}",
-        f"#define KF_RATES {references['rates']}",
+        f"#define KF_DRIVEN_BY_TIME {references.get('driven_by_time', _NO_VARIABLE)}",
+        f"#define KF_RATES {references.get('rates', _NO_VARIABLE)}",
         *(f"#define KF_RATES_{mode.name} {int(mode)}" for mode in Rates),
         f"#define KF_MESSAGE_TEXT {references['solver.message']}",
         f"#define KF_TIME {references.get('time', '0xffffffffu /* FMI 2.0 has no such variable */')}",
@@ -175,7 +215,8 @@ def _tables(variables: Interface) -> str:
     """Return interface.c: names, start values and limits of the variables."""
     parts = [part for part in variables.parts if part.name not in NOT_REAL]
     real = [variable for part in parts for variable in part.variables]
-    (drive,), (rates,) = variables.part("drive"), variables.part("rate_source")
+    drives = [variable.start for variable in variables.part("drive")] or [False]
+    rates = [variable.start for variable in variables.part("rate_source")] or [Rates.WIRED]
     place = _numbers(len(part.variables) for part in parts)
     has_forces = any(variables.part(stage) for stage in STAGES)
     bits, not_real = ("unsigned", "0x80000000u") if has_forces else ("unsigned short", 1 << 15)
@@ -189,8 +230,8 @@ def _tables(variables: Interface) -> str:
         *array(f"{bits} kf_bit_of", [1 << k for k in place] + [not_real] * (len(list(variables)) - len(real) + 1)),
         *array("double kf_real_starts", [float(variable.start or 0.0) for variable in real]),
         *array("bool kf_real_is_positive", booleans(positive)),
-        f"const bool kf_driven_by_time_start = {'true' if drive.start else 'false'};",
-        f"const int kf_rates_start = {int(rates.start or 0)};",
+        f"const bool kf_driven_by_time_start = {'true' if drives[0] else 'false'};",
+        f"const int kf_rates_start = {int(rates[0] or 0)};",
         f"const double kf_start_time = {float(variables.experiment.start)!r};",
     ]
     return "\n".join(lines) + "\n"

@@ -72,6 +72,59 @@ static void add_bilinear(kf_state *s, const double *v, const double *w, double f
     }
 }
 
+#if KF_TORQUE
+/* The accelerations of the drivers by differences along states, efforts, loads and time. */
+static kf_answer direction_of_states(kf_instance *instance, const double *seed, double time_seed, kf_direction *direction)
+{
+    kf_state *const s = &instance->now;
+    double u[KF_DRIVERS], ud[KF_DRIVERS], udd[KF_DRIVERS], efforts[KF_DRIVERS], loads[KF_ROOM(KF_LOADS)];
+    const double margin = fmax(kf_margin(&s->solver, kf_shown(s)), SMALLEST);
+    double fastest, h;
+    int k, j, sign, tries;
+    bool done = false;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        direction->du[k] = seed[3 * k];
+        direction->dv[k] = seed[3 * k + 1];
+    }
+    fastest = largest_rate(direction->du);
+    h = fastest > 0.0 ? STEP * margin * margin / fastest : 1.0;
+    if (time_seed != 0.0) {
+        h = fmin(h, STEP / fabs(time_seed));
+    }
+    for (tries = 0; tries < TRIES && !done; ++tries, h *= 0.5) {
+        memset(direction->da, 0, sizeof direction->da);
+        done = true;
+        for (j = 1; j <= 3 && done; ++j) {
+            for (sign = -1; sign <= 1 && done; sign += 2) {
+                const double by = sign * j * h;
+                kf_pose *pose = kf_shown(s);
+                for (k = 0; k < KF_DRIVERS; ++k) {
+                    u[k] = s->u[k] + by * seed[3 * k];
+                    ud[k] = s->ud[k] + by * seed[3 * k + 1];
+                    efforts[k] = KF_REAL(s, KF_PART_EFFORTS)[k] + by * seed[kf_part_first[KF_PART_EFFORTS] + k];
+                }
+                for (k = 0; k < KF_LOADS; ++k) {
+                    loads[k] = KF_REAL(s, KF_PART_LOADS)[k] + by * seed[kf_part_first[KF_PART_LOADS] + k];
+                }
+                if (fastest > 0.0) {
+                    pose = &instance->track[0];
+                    done = KF_GOOD(kf_solve(&s->solver, &s->poses[s->committed], u, pose));
+                }
+                done = done && kf_accelerations(&s->solver, pose, s->time + by * time_seed, ud, efforts, loads, udd);
+                for (k = 0; done && k < KF_DRIVERS; ++k) {
+                    direction->da[k] += sign * weights[j - 1] / h * udd[k];
+                }
+            }
+        }
+    }
+    if (fastest > 0.0 && s->asked != s->committed) { /* the trials may have overwritten maps of the pose shown */
+        s->solved = false;
+        kf_ask(instance);
+    }
+    return done ? KF_DONE : kf_answered(instance, KF_DISCARD,
+                                        "there is no directional derivative: no pose near this one can be reached");
+}
+#else
 /* Return how the drivers move with the inputs; estimated rates follow the values that they are estimated from. */
 static void direction_of_inputs(kf_state *s, const double *seed, kf_direction *direction)
 {
@@ -129,6 +182,7 @@ static void direction_of_time(kf_state *s, const double *seed, double time_seed,
     }
 }
 
+#endif
 /* Evaluate the parts at driver values u, with speeds and accelerations, by a solver from a start. */
 static bool try_at(kf_solver *solver, kf_pose *start, kf_pose *pose, const double *const drive[3], unsigned parts,
                    double *row)
@@ -189,6 +243,17 @@ static bool add_differences(kf_instance *instance, const double *du, kf_solver *
             if (other && s->driven_by_time) { /* drivers may depend on parameters, too */
                 kf_drive(&other->model, s->time, KF_REAL(s, KF_PART_CONSTANTS), u, ud, udd);
             }
+#if KF_TORQUE
+            if (other) { /* accelerations depend on parameters, too */
+                if (!KF_GOOD(kf_solve(solver, start, u, pose)) ||
+                    !kf_accelerations(solver, pose, s->time, ud, KF_REAL(s, KF_PART_EFFORTS), KF_REAL(s, KF_PART_LOADS), udd)) {
+                    return false;
+                }
+                for (k = 0; k < KF_DRIVERS; ++k) {
+                    instance->trial[3 * k + 2] = udd[k];
+                }
+            }
+#endif
             if (!try_at(solver, start, pose, drive, parts, instance->trial)) {
                 return false;
             }
@@ -269,11 +334,18 @@ static kf_answer along(kf_instance *instance, double time_seed, unsigned parts)
     int k;
     memset(&direction, 0, sizeof direction);
     memset(slope, 0, sizeof instance->slope);
+#if KF_TORQUE
+    answer = direction_of_states(instance, seed, time_seed, &direction);
+    if (answer != KF_DONE) {
+        return answer;
+    }
+#else
     if (s->driven_by_time) {
         direction_of_time(s, seed + kf_part_first[KF_PART_CONSTANTS], time_seed, &direction);
     } else {
         direction_of_inputs(s, seed, &direction);
     }
+#endif
     add_rates(s, direction.du, slope + kf_part_first[KF_PART_VALUES]);
     add_rates(s, direction.dv, slope + kf_part_first[KF_PART_RATES]);
     add_bilinear(s, s->ud, direction.du, 1.0, slope + kf_part_first[KF_PART_RATES]);
@@ -294,7 +366,11 @@ static kf_answer along(kf_instance *instance, double time_seed, unsigned parts)
         answer = differences(instance, direction.du, NULL, NULL, largest_rate(direction.du), parts & ~linear & ~KF_BIT(KF_PART_DRIVEN));
     }
     if (answer == KF_DONE) {
+#if KF_TORQUE
+        answer = along_parameters(instance, seed + kf_part_first[KF_PART_PARAMETERS], parts);
+#else
         answer = along_parameters(instance, seed + kf_part_first[KF_PART_PARAMETERS], parts & ~KF_BIT(KF_PART_DRIVEN));
+#endif
     }
     return answer;
 }
@@ -314,6 +390,11 @@ static bool is_known(const kf_state *s, unsigned reference)
     if (place >= KF_REALS) {
         return reference == KF_TIME;
     }
+#if KF_TORQUE
+    if (kf_part_of[place] == KF_PART_STATES) {
+        return place % 3 != 2;
+    }
+#endif
     return (KF_BIT(kf_part_of[place]) & KF_GIVEN_PARTS) != 0 &&
            (kf_part_of[place] != KF_PART_PARAMETERS || s->mode <= KF_INITIALIZATION);
 }
@@ -379,6 +460,11 @@ kf_answer kf_set_input_derivative(kf_instance *instance, unsigned reference, int
     kf_state *const s = &instance->now;
     const char *const name = kf_name_of(reference);
     const unsigned place = KF_PLACE(reference);
+#if KF_TORQUE
+    if (place < KF_REALS) {
+        return kf_answered(instance, KF_ERROR, "%s: this FMU integrates by itself and takes no derivatives of inputs", name);
+    }
+#endif
     if (place >= 3 * KF_DRIVERS) {
         return kf_not_settable(instance, reference, KF_REAL_WORD);
     }

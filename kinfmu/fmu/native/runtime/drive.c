@@ -225,6 +225,9 @@ void kf_law(const kf_state *s, double t, double *u, double *ud, double *udd)
 /* u, ud, udd of the requested pose. */
 void kf_asked_drive(const kf_state *s, double *u, double *ud, double *udd)
 {
+#if KF_TORQUE
+    kf_state_drive((kf_state *)s, u, ud, udd);
+#else
     if (s->driven_by_time) {
         kf_drive(&s->solver.model, s->time, KF_REAL(s, KF_PART_CONSTANTS), u, ud, udd);
     } else if (s->ended && !s->touched) {
@@ -234,6 +237,7 @@ void kf_asked_drive(const kf_state *s, double *u, double *ud, double *udd)
         kf_moment(s, &t, u);
         by_inputs(s, s->real, t, u, ud, udd);
     }
+#endif
 }
 
 /* u, ud, udd of the last commit, from which the last good values come; at rest before the first. */

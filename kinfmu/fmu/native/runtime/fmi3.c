@@ -107,13 +107,22 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
                        "this FMU is for co-simulation and model exchange, not for scheduled execution", false);
 }
 
+#if KF_TORQUE
+/* In co-simulation the tolerance is that of the integrator. */
+#else
 /* Newton always goes to round-off, whatever the tolerance. */
+#endif
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
 {
     if (instance == NULL) {
         return fmi3Error;
     }
+#if KF_TORQUE
+    if (toleranceDefined) {
+        kf_set_tolerance(common(instance), tolerance);
+    }
+#endif
     if (kf_set_experiment(common(instance), startTime, stopTimeDefined, stopTime) != KF_DONE) {
         return fmi3Error;
     }
@@ -268,7 +277,11 @@ fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference 
     return unsupported(instance, "activateModelPartition: this FMU is not for scheduled execution");
 }
 
+#if KF_TORQUE
+/* Events are jumps of loads over time and changes of status. */
+#else
 /* Events are jumps of drivers over time and changes of status; there are no continuous states. */
+#endif
 
 fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance)
 {
@@ -310,7 +323,15 @@ fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventI
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nContinuousStates)
 {
+#if KF_TORQUE
+    const fmi3Status status = zero(instance, nContinuousStates);
+    if (status == fmi3OK) {
+        *nContinuousStates = 2 * KF_DRIVERS;
+    }
+    return status;
+#else
     return zero(instance, nContinuousStates);
+#endif
 }
 
 /* Co-simulation. */

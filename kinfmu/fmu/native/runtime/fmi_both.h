@@ -124,7 +124,11 @@ FMI(Status) FMI(DeserializeFMUState)(void *c, const FMI(Byte) bytes[], size_t si
     return c ? (FMI(Status))kf_deserialize(common(c), (const unsigned char *)bytes, size, state) : FMI(Error);
 }
 
+#if KF_TORQUE
+/* Model exchange: value and speed of each driver are states; events are jumps of loads over time and changes of status. */
+#else
 /* Model exchange: there are no continuous states; events are jumps of drivers over time and changes of status. */
+#endif
 
 FMI(Status) FMI(EnterEventMode)(void *c)
 {
@@ -149,7 +153,11 @@ FMI(Status) FMI(CompletedIntegratorStep)(void *c, FMI(Boolean) noSetFMUStatePrio
     bool wants_event = false;
     const kf_answer answer = c ? kf_complete_integrator_step(common(c), &wants_event) : KF_ERROR;
     put(enterEventMode, wants_event);
+#if KF_TORQUE
+    put(terminateSimulation, c && common(c)->now.terminated);
+#else
     put(terminateSimulation, false);
+#endif
     return (FMI(Status))answer;
 }
 
@@ -158,6 +166,39 @@ FMI(Status) FMI(SetTime)(void *c, double time)
     return c ? (FMI(Status))kf_set_time(common(c), time) : FMI(Error);
 }
 
+#if KF_TORQUE
+FMI(Status) FMI(SetContinuousStates)(void *c, const double states[], size_t count)
+{
+    return c ? (FMI(Status))kf_set_states(common(c), states, count) : FMI(Error);
+}
+
+FMI(Status) FMI(GetContinuousStateDerivatives)(void *c, double derivatives[], size_t count)
+{
+    return c ? (FMI(Status))kf_get_state_derivatives(common(c), derivatives, count) : FMI(Error);
+}
+
+FMI(Status) FMI(GetEventIndicators)(void *c, double indicators[], size_t count)
+{
+    return count == 0 && c ? FMI(OK) : unsupported(c, "there are no event indicators");
+}
+
+FMI(Status) FMI(GetContinuousStates)(void *c, double states[], size_t count)
+{
+    return c ? (FMI(Status))kf_get_states(common(c), states, count) : FMI(Error);
+}
+
+FMI(Status) FMI(GetNominalsOfContinuousStates)(void *c, double nominals[], size_t count)
+{
+    size_t k;
+    if (c == NULL || nominals == NULL || count != 2 * KF_DRIVERS) {
+        return unsupported(c, "there are two continuous states for each driver");
+    }
+    for (k = 0; k < count; ++k) {
+        nominals[k] = kf_driver_is_angle[k / 2] ? 1.0 : KF_SIZE;
+    }
+    return FMI(OK);
+}
+#else
 static FMI(Status) no_states(void *c, size_t count)
 {
     return count == 0 && c ? FMI(OK) : unsupported(c, "there are no continuous states and no event indicators");
@@ -187,3 +228,4 @@ FMI(Status) FMI(GetNominalsOfContinuousStates)(void *c, double nominals[], size_
 {
     return no_states(c, count);
 }
+#endif

@@ -169,6 +169,7 @@ static KF_RARE kf_answer discard(kf_instance *instance, double time, double step
     return kf_answered(instance, KF_DISCARD, "at t = %g s: %s", at, s->message);
 }
 
+#if !KF_TORQUE
 /* The inputs at the end of a step that follows their derivatives: sum of d^n h^n / n!. Beyond KF_LARGEST of them
  * or their rates there is no pose.
  */
@@ -229,7 +230,41 @@ static kf_answer step_by_inputs(kf_instance *instance, double time, double step)
     s->moving = false;
     return KF_DONE;
 }
+#endif
 
+#if KF_TORQUE
+/* When efforts drive, states and pose at both ends of a step are committed. */
+static kf_answer step_by_efforts(kf_instance *instance, double time, double step)
+{
+    kf_state *const s = &instance->now;
+    double reached;
+    if (s->ahead) {
+        kf_forget(s);
+    }
+    s->time = time;
+    if (!KF_GOOD(kf_ask(instance))) {
+        return discard(instance, time, step, time);
+    }
+    kf_forget_motion(s); /* loads may depend on time */
+    kf_find_drive(s);
+    commit(s, time, step);
+    if (!kf_integrate(instance, time + step, &reached)) {
+        return discard(instance, time, step, reached);
+    }
+    kf_find_drive(s);
+    commit(s, s->time, step);
+    return KF_DONE;
+}
+
+/* The host's tolerance, within the bounds of the integrator's. */
+void kf_set_tolerance(kf_instance *instance, double tolerance)
+{
+    if (!instance->now.model_exchange && tolerance > 0.0) {
+        KF_REAL(&instance->now, KF_PART_TOLERANCE)[1] = fmin(fmax(tolerance, 1e-13), 1e-4);
+    }
+}
+
+#else
 /* When time drives, the poses at both ends of a step are committed. */
 static kf_answer step_by_time(kf_instance *instance, double time, double step)
 {
@@ -257,6 +292,7 @@ static kf_answer step_by_time(kf_instance *instance, double time, double step)
     commit(s, s->time, step);
     return KF_DONE;
 }
+#endif
 
 /* Warn once if inputs were set although time drives. */
 static kf_answer warn_of_inputs(kf_instance *instance)
@@ -314,12 +350,16 @@ kf_answer kf_step(kf_instance *instance, double time, double step)
         !is_all_but_inside(s, time, step)) {
         return refuse_step(instance, time, step);
     }
+#if KF_TORQUE
+    done = step_by_efforts(instance, time, step);
+#else
     if (s->driven_by_time) {
         answer = warn_of_inputs(instance);
         done = step_by_time(instance, time, step);
     } else {
         done = step_by_inputs(instance, time, step);
     }
+#endif
     if (done == KF_DONE) {
         s->failed = s->terminated = false;
         s->last_time = end;
@@ -382,6 +422,15 @@ kf_answer kf_exit_initialization(kf_instance *instance)
     if (!KF_GOOD(kf_ask(instance))) {
         return kf_answered(instance, KF_ERROR, "initialization fails: at t = %g s: %s", s->time, s->message);
     }
+#if KF_TORQUE
+    kf_find_drive(s);
+    if (!isfinite(s->udd[0])) {
+        const int k = kf_massless(&s->solver, kf_shown(s), s->time, s->ud, KF_REAL(s, KF_PART_LOADS));
+        return kf_answered(instance, KF_ERROR, "initialization fails: driver %s: its reduced inertia is 0, so that efforts do "
+                      "not determine its motion; give a body that it moves a mass or an inertia", kf_driver_names[k < 0 ? 0 : k]);
+    }
+    commit(s, s->time, 0.0);
+#endif
     s->mode = s->model_exchange ? KF_EVENTS : KF_STEPPING;
     return KF_DONE;
 }
@@ -421,6 +470,9 @@ static void move_to(kf_state *s, double time)
         if (s->driven_by_time) {
             kf_forget(s);
         }
+#if KF_TORQUE
+        kf_forget_motion(s); /* loads may depend on time */
+#endif
     }
 }
 
@@ -454,6 +506,16 @@ kf_answer kf_complete_integrator_step(kf_instance *instance, bool *wants_event)
     if (is_past_stop(s, last, s->time - last)) {
         return past_stop(instance, "completedIntegratorStep", last, s->time - last);
     }
+#if KF_TORQUE
+    {
+        double reached;
+        s->terminated = kf_passes_limit(instance, &reached);
+        if (s->terminated) {
+            return kf_answered(instance, KF_WARN, "at t = %g s: %s", reached, s->message);
+        }
+        kf_find_drive(s);
+    }
+#endif
     *wants_event = kf_holds(s) && s->status != s->held_status;
     commit(s, s->time, 0.0);
     return warn_of_inputs(instance);
@@ -472,9 +534,11 @@ bool kf_next_event(const kf_instance *instance, double *time)
     const kf_state *const s = &instance->now;
     double jumps[KF_ROOM(KF_JUMPS)], periods[KF_ROOM(KF_JUMPS)], next = INFINITY;
     int k;
+#if !KF_TORQUE
     if (!s->driven_by_time) {
         return false;
     }
+#endif
     kf_jumps(&s->solver.model, KF_REAL(s, KF_PART_CONSTANTS), jumps, periods);
     for (k = 0; k < KF_JUMPS; ++k) {
         const double past = periods[k] > 0.0 ? floor((s->time - jumps[k]) / periods[k]) : 0.0;

@@ -79,6 +79,9 @@ typedef struct {
     bool failed, terminated;
     double failed_time, failed_step, last_time;
     double start_time, stop_time; /* of the experiment; the stop time is DBL_MAX if none was given */
+#if KF_TORQUE
+    double step_size; /* that the integrator would take next, 0 at the start */
+#endif
     kf_status held_status; /* discrete variables of model exchange, which stay between events */
     int held_iterations;
     char held_message[KF_MESSAGE];
@@ -104,6 +107,9 @@ typedef struct {
     bool silent;
     unsigned muted; /* one bit for each category */
     kf_list list;
+#if KF_TORQUE
+    kf_pose track[2]; /* of the integrator */
+#endif
     double seed[KF_REALS], slope[KF_REALS], total[KF_REALS], trial[KF_REALS]; /* of directional derivatives */
 } kf_instance;
 
@@ -119,6 +125,9 @@ kf_answer kf_set_logging(kf_instance *instance, bool on, size_t count, const cha
 bool kf_token_fits(const char *token);
 void kf_start(kf_instance *instance, bool model_exchange);
 kf_answer kf_set_experiment(kf_instance *instance, double start_time, bool has_stop_time, double stop_time);
+#if KF_TORQUE
+void kf_set_tolerance(kf_instance *instance, double tolerance);
+#endif
 kf_answer kf_enter_initialization(kf_instance *instance);
 kf_answer kf_exit_initialization(kf_instance *instance);
 kf_answer kf_step(kf_instance *instance, double time, double step);
@@ -173,6 +182,17 @@ kf_answer kf_deserialize(kf_instance *instance, const unsigned char *bytes, size
     (KF_BIT(KF_PART_INPUTS) | KF_BIT(KF_PART_CONSTANTS) | KF_BIT(KF_PART_PARAMETERS) | KF_BIT(KF_PART_TOLERANCE) |      \
      KF_BIT(KF_PART_LOADS))
 #endif
+#if KF_TORQUE
+#undef KF_POSE_PARTS
+#undef KF_GIVEN_PARTS
+#define KF_PART_DRIVEN KF_PART_STATES
+#define KF_POSE_PARTS                                                                                                  \
+    (KF_BIT(KF_PART_VALUES) | KF_BIT(KF_PART_RATES) | KF_BIT(KF_PART_ACCELERATIONS) | KF_BIT(KF_PART_ERRORS) |          \
+     KF_BIT(KF_PART_WATCH) | KF_FORCE_PARTS)
+#define KF_GIVEN_PARTS                                                                                                 \
+    (KF_BIT(KF_PART_CONSTANTS) | KF_BIT(KF_PART_PARAMETERS) | KF_BIT(KF_PART_TOLERANCE) | KF_BIT(KF_PART_EFFORTS) |     \
+     KF_BIT(KF_PART_LOADS))
+#endif
 #define KF_REAL(state, part) ((state)->real + kf_part_first[part])
 
 #if KF_FORCES
@@ -189,6 +209,21 @@ void kf_forces_of_trial(kf_state *state, const kf_solver *solver, kf_pose *pose,
                         unsigned parts, double *row);
 void kf_add_force_slopes(kf_state *state, const double *dv, const double *da, const double *loads, double dt,
                          unsigned parts, double *slope);
+#endif
+#if KF_TORQUE
+extern const double kf_in_si[KF_DRIVERS]; /* units of the drivers */
+void kf_inertia(double time, const double *u, const double *ud, const double *udd, const double *z, const double *zd,
+                const double *zdd, const double *slopes, const double *efforts, const double *parameters,
+                double *forces); /* generated: bias efforts, then the reduced inertia's upper triangle, row by row */
+bool kf_accelerations(const kf_solver *solver, kf_pose *pose, double t, const double *ud, const double *efforts,
+                      const double *loads, double *udd);
+int kf_massless(const kf_solver *solver, kf_pose *pose, double t, const double *ud, const double *loads);
+void kf_state_drive(kf_state *state, double *u, double *ud, double *udd);
+bool kf_integrate(kf_instance *instance, double end, double *reached);
+bool kf_passes_limit(kf_instance *instance, double *reached);
+kf_answer kf_set_states(kf_instance *instance, const double *states, size_t count);
+kf_answer kf_get_states(kf_instance *instance, double *states, size_t count);
+kf_answer kf_get_state_derivatives(kf_instance *instance, double *derivatives, size_t count);
 #endif
 void kf_forget(kf_state *state);        /* the driver values may have changed */
 void kf_forget_motion(kf_state *state); /* the rates may have changed */

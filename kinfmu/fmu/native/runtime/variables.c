@@ -35,6 +35,23 @@ kf_answer kf_not_settable(const kf_instance *instance, unsigned reference, const
 
 /* Get */
 
+#if KF_TORQUE
+/* Accelerations that no reduced inertia determines are refused. */
+static kf_answer find_motion(kf_instance *instance)
+{
+    kf_state *const s = &instance->now;
+    int k;
+    kf_find_drive(s);
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        if (!isfinite(s->udd[k])) {
+            return kf_answered(instance, KF_DISCARD, "at t = %g s: the reduced inertia is singular, or a number is not finite",
+                               s->time);
+        }
+    }
+    return KF_DONE;
+}
+
+#endif
 /* Compute positions, rates and accelerations together if more than one is wanted: common terms are computed once. */
 static KF_WHOLE void read_motion(kf_state *s, unsigned parts)
 {
@@ -47,6 +64,7 @@ static KF_WHOLE void read_motion(kf_state *s, unsigned parts)
     kf_motion(&s->solver, kf_shown(s), s->ud, s->udd, values, rates, accelerations);
 }
 
+#if !KF_TORQUE
 /* The effective driver values: those requested, even where they are unreachable. */
 static void read_driven(kf_state *s)
 {
@@ -61,6 +79,7 @@ static void read_driven(kf_state *s)
     }
 }
 
+#endif
 /* Bring parts (a bit each) up to date; Discard if their pose is unreachable: then they keep the last good values. */
 kf_answer kf_read(kf_instance *instance, unsigned parts)
 {
@@ -69,6 +88,11 @@ kf_answer kf_read(kf_instance *instance, unsigned parts)
     const unsigned missing = parts & ~s->known;
     if (missing) {
         kf_ask(instance);
+#if KF_TORQUE
+        if ((missing & (KF_POSE_PARTS | KF_BIT(KF_PART_STATES))) && KF_GOOD(s->status) && find_motion(instance) != KF_DONE) {
+            return KF_DISCARD;
+        }
+#endif
         if (missing & motion) {
             read_motion(s, missing);
         }
@@ -90,9 +114,11 @@ kf_answer kf_read(kf_instance *instance, unsigned parts)
             if (missing & KF_BIT(KF_PART_WATCH)) {
                 kf_watches(&s->solver.model, &kf_shown(s)->found, KF_REAL(s, KF_PART_WATCH));
             }
+#if !KF_TORQUE
             if (missing & KF_BIT(KF_PART_DRIVEN)) {
                 read_driven(s);
             }
+#endif
             if (missing & KF_BIT(KF_PART_FIXED)) {
                 kf_fixed(&s->solver.model, KF_REAL(s, KF_PART_FIXED));
             }
@@ -226,9 +252,15 @@ static KF_RARE kf_answer set_other(kf_instance *instance, unsigned reference, do
             kf_forget(s);
         }
         s->known &= ~KF_FORCE_PARTS;
+#if KF_TORQUE
+        kf_forget_motion(s);
+#endif
         return KF_DONE;
     }
     if (part != KF_PART_LOADS)
+#endif
+#if KF_TORQUE
+    if (part != KF_PART_EFFORTS && (part != KF_PART_STATES || place % 3 == 2))
 #endif
     if (part != KF_PART_INPUTS && part != KF_PART_CONSTANTS && part != KF_PART_PARAMETERS && part != KF_PART_TOLERANCE) {
         return kf_not_settable(instance, reference, KF_REAL_WORD);
@@ -240,6 +272,24 @@ static KF_RARE kf_answer set_other(kf_instance *instance, unsigned reference, do
         return kf_answered(instance, KF_ERROR, "%s = %g is too large: at most %g is taken; %.17g stays", name, value, KF_LARGEST,
                            s->real[place]);
     }
+#if KF_TORQUE
+    if (part == KF_PART_EFFORTS) {
+        if (s->ahead) {
+            kf_forget(s);
+        }
+        s->real[place] = value;
+        kf_touch(s);
+        kf_forget_motion(s);
+        return KF_DONE;
+    }
+    if (part == KF_PART_STATES && s->mode > KF_INITIALIZATION) {
+        return kf_answered(instance, KF_ERROR, "%s = %.17g comes too late: it is a state, which the FMU integrates once it is "
+                      "initialized", name, value);
+    }
+    if (part == KF_PART_TOLERANCE && (int)place > kf_part_first[part] && !(value >= 1e-13 && value <= 1e-4)) {
+        return kf_answered(instance, KF_ERROR, "%s = %g must be 1e-13 to 0.0001; %.17g stays", name, value, s->real[place]);
+    }
+#endif
     if (kf_real_is_positive[place] && !(value > 0.0)) {
         return kf_answered(instance, KF_ERROR, "%s = %.17g must be positive; %.17g stays", name, value, s->real[place]);
     }
@@ -256,6 +306,7 @@ static KF_RARE kf_answer set_other(kf_instance *instance, unsigned reference, do
     return KF_DONE;
 }
 
+#if !KF_TORQUE
 /* Input number k, the value finite. */
 static void set_input(kf_state *s, unsigned k, double value)
 {
@@ -277,6 +328,7 @@ static void set_input(kf_state *s, unsigned k, double value)
     }
     kf_touch(s);
 }
+#endif
 
 /* Refuse to set: an array is NULL, or the instance is terminated. */
 static KF_RARE kf_answer set_nothing(const kf_instance *instance, const unsigned *references, size_t count,
@@ -298,9 +350,15 @@ kf_answer kf_set_real(kf_instance *instance, const unsigned *references, size_t 
     for (k = 0; k < count; ++k) {
         const unsigned place = KF_PLACE(references[k]);
         const double value = values[k];
+#if KF_TORQUE
+        (void)s;
+        (void)place;
+        {
+#else
         if (place < 3 * KF_DRIVERS && fabs(value) <= KF_LARGEST) { /* inputs come first */
             set_input(s, place, value);
         } else {
+#endif
             const kf_answer answer = set_other(instance, references[k], value);
             if (answer != KF_DONE) {
                 return answer;

@@ -1,0 +1,200 @@
+/* Limits of the drivers, which end a motion under efforts. See kinfmu/dynamics/stepping.py.
+ *
+ * At a limit (a dead centre of a driver) the reduced inertia grows without bound, and u(t) is a parabola that touches the
+ * limit: steps could cross its top and return on the same branch, where the mechanism itself would not. So every step in which
+ * a speed changes its sign, or a pose is near a singular one, is searched for a pose at a limit.
+ */
+#include "torque.h"
+#include "internal.h"
+
+#include <math.h>
+#include <string.h>
+
+#define NEAR 0.5       /* determinant below which steps of several drivers are searched */
+#define DIPS 0.3       /* of the determinants at both ends of a step: a smaller one between may be a limit */
+#define SUSPECT 0.3    /* determinant at a turning point that may be a limit */
+#define REFINED 2      /* times that a suspect step is divided by SHARE, until its interpolation is good enough */
+#define SHARE 4.0
+#define PLACES 8       /* of a step at which the search begins */
+#define HALVINGS 60    /* of the time of a turning point: to its last digit */
+#define SECTIONS 40    /* golden ones, of the time of the smallest determinant */
+#define GOLDEN 0.6180339887498949
+#define TOUCHING 1e-3  /* determinant at the turning point that counts as a limit: about 1e-6 rad from it */
+#define ARRIVED 1e-4   /* determinant within about 1e-8 rad of a limit: nearer poses lose digits of the accelerations */
+#define ERRORS 10.0    /* tolerances by which the turning point may miss the limit */
+
+static const double beyond[4] = {1e-6, 1e-4, 1e-2, 0.3}; /* [rad, sizes] past a limit, where the solver states why it is one */
+
+/* 1 rad, or the size of the mechanism. */
+double kf_unit(int driver)
+{
+    return kf_driver_is_angle[driver] ? 1.0 : KF_SIZE;
+}
+
+/* Return whether a motion at u with speeds ud ends there: whether the poses past it are not reached. */
+bool kf_ends_at(kf_course *course, double t, const double *u, const double *ud)
+{
+    double target[KF_DRIVERS], largest = 0.0;
+    int k, place;
+    kf_follow(course, u); /* if not: from the last good pose */
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        largest = fmax(largest, fabs(ud[k]) / kf_unit(k));
+    }
+    for (place = 0; place < 4; ++place) {
+        for (k = 0; k < KF_DRIVERS; ++k) {
+            target[k] = KF_POSE_U(course->here)[k] + beyond[place] * ud[k] / (largest > 0.0 ? largest : 1.0);
+        }
+        course->status = kf_solve(&course->instance->now.solver, course->here, target, course->spare);
+        if (!KF_GOOD(course->status)) {
+            course->reached = t;
+            course->is_limit = true;
+            return true;
+        }
+    }
+    return false;
+}
+
+/* How long the fastest driver goes on with its deceleration; 0 if it does not slow down. */
+static double time_to_rest(const kf_end *end)
+{
+    const double *const ud = end->y + KF_DRIVERS, *const udd = end->f + KF_DRIVERS;
+    int k, fastest = 0;
+    for (k = 1; k < KF_DRIVERS; ++k) {
+        fastest = fabs(ud[k]) > fabs(ud[fastest]) ? k : fastest;
+    }
+    return ud[fastest] * udd[fastest] < 0.0 ? -ud[fastest] / udd[fastest] : 0.0;
+}
+
+/* Driver values within a step, by values, speeds and accelerations at both ends; rates: speeds in their place. */
+static void within(const kf_end *before, const kf_end *after, double t, double *u, double *rates)
+{
+    const kf_end *const ends[2] = {before, after};
+    const double nodes[2] = {before->t, after->t};
+    double samples[2][3], values[3];
+    kf_hermite polynomial;
+    int k, i;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        for (i = 0; i < 2; ++i) {
+            samples[i][0] = ends[i]->y[k];
+            samples[i][1] = ends[i]->y[KF_DRIVERS + k];
+            samples[i][2] = ends[i]->f[KF_DRIVERS + k];
+        }
+        kf_hermite_through(2, nodes, (const double(*)[3])samples, &polynomial);
+        kf_hermite_at(&polynomial, t, values);
+        u[k] = values[0];
+        rates[k] = values[1];
+    }
+}
+
+#if KF_DRIVERS == 1
+/* When the speed of the only driver changes its sign within a step. */
+static double critical_time(kf_course *course, const kf_end *before, const kf_end *after)
+{
+    double low = before->t, high = after->t, u, rate;
+    int k;
+    (void)course;
+    for (k = 0; k < HALVINGS; ++k) {
+        const double middle = 0.5 * (low + high);
+        within(before, after, middle, &u, &rate);
+        if (rate * before->y[1] > 0.0) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return 0.5 * (low + high);
+}
+#else
+/* The determinant at a time within a step; 0 where the pose is not reached. */
+static double margin_within(kf_course *course, const kf_end *before, const kf_end *after, double t)
+{
+    double u[KF_DRIVERS], rates[KF_DRIVERS];
+    within(before, after, t, u, rates);
+    return kf_follow(course, u) ? course->here->found.margin : 0.0;
+}
+
+/* The time of the smallest determinant within a step. */
+static double critical_time(kf_course *course, const kf_end *before, const kf_end *after)
+{
+    const double length = after->t - before->t;
+    double least = INFINITY, low, high, near, far, of_near, of_far;
+    int k, place = 0;
+    for (k = 0; k <= PLACES; ++k) {
+        const double margin = margin_within(course, before, after, before->t + length * k / PLACES);
+        if (margin < least) {
+            least = margin;
+            place = k;
+        }
+    }
+    low = before->t + length * (place > 0 ? place - 1 : 0) / PLACES;
+    high = before->t + length * (place < PLACES ? place + 1 : PLACES) / PLACES;
+    near = high - GOLDEN * (high - low);
+    far = low + GOLDEN * (high - low);
+    of_near = margin_within(course, before, after, near);
+    of_far = margin_within(course, before, after, far);
+    for (k = 0; k < SECTIONS; ++k) {
+        if (of_near < of_far) {
+            high = far;
+            far = near;
+            of_far = of_near;
+            near = high - GOLDEN * (high - low);
+            of_near = margin_within(course, before, after, near);
+        } else {
+            low = near;
+            near = far;
+            of_near = of_far;
+            far = low + GOLDEN * (high - low);
+            of_far = margin_within(course, before, after, far);
+        }
+    }
+    return 0.5 * (low + high);
+}
+#endif
+
+static void take_long_steps(kf_course *course)
+{
+    course->refined = 0;
+    course->longest = course->span;
+}
+
+/* Search a step for a limit. A step that may have one is repeated in smaller steps first. */
+kf_verdict kf_search_limit(kf_course *course, const kf_end *before, const kf_end *after)
+{
+    const double *const ud = before->y + KF_DRIVERS;
+    const double least = fmin(before->margin, after->margin);
+    double u[KF_DRIVERS], rates[KF_DRIVERS], t, margin;
+    bool turns = false, is_reached, is_suspect;
+    int k;
+    if (course->refined && before->t >= course->suspect_until) { /* it had none */
+        take_long_steps(course);
+    }
+    if (after->margin < ARRIVED && !after->is_bridged) {
+        return kf_ends_at(course, after->t + time_to_rest(after), after->y, ud) ? KF_ENDS : KF_GOES_ON;
+    }
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        turns = turns || (ud[k] != 0.0 && ud[k] * after->y[KF_DRIVERS + k] <= 0.0);
+    }
+    if (!turns && (KF_DRIVERS == 1 || least >= NEAR)) {
+        return KF_GOES_ON;
+    }
+    t = critical_time(course, before, after);
+    within(before, after, t, u, rates);
+    is_reached = kf_follow(course, u);
+    margin = is_reached ? course->here->found.margin : 0.0;
+    is_suspect = !is_reached || !(course->here->status == KF_BRIDGED || margin > (KF_DRIVERS == 1 ? SUSPECT : DIPS * least));
+    if (is_suspect && course->refined < REFINED) {
+        ++course->refined;
+        course->suspect_until = after->t;
+        course->longest = course->size = (after->t - before->t) / SHARE;
+        kf_follow(course, before->y);
+        return KF_REPEATS;
+    }
+    if (is_suspect && margin <= sqrt(fmax(TOUCHING * TOUCHING, ERRORS * course->tolerance))) {
+        return kf_ends_at(course, t, is_reached ? u : before->y, ud) ? KF_ENDS : KF_GOES_ON;
+    }
+    if (is_suspect) {
+        take_long_steps(course);
+    }
+    kf_follow(course, after->y);
+    return KF_GOES_ON;
+}

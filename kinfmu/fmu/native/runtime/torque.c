@@ -1,0 +1,416 @@
+/* Motion of the drivers under efforts:
+ *
+ *     J(u) udd = T - bias(u, ud)        u: driver values, T: efforts, J: reduced inertia
+ *
+ * J and the bias efforts come from one motion with accelerations of 0 and from the rates at unit speeds, which on a bridge
+ * are interpolated where the blocks are singular. Steps are of order 8 with error estimates of orders 5 and 3: Hairer,
+ * Norsett, Wanner: Solving Ordinary Differential Equations I, section II.10.
+ */
+#include "torque.h"
+#include "dormand_prince.h"
+#include "internal.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define SAFETY 0.9
+#define SHRINKS 0.2    /* a step is at least so much of the refused one */
+#define GROWS 10.0     /* and at most so much of the one before */
+#define ORDER 8.0
+#define STEEP 1.0      /* reaches that a driver moves in a step at most, so that no limit is passed in it */
+#define FIRST 0.01     /* reaches that it moves in the first step */
+#define DETERMINED 1e-12 /* of a span between jumps: laws are read on that side of a jump */
+#define ROUNDED 2e-14  /* of the times at its ends: a jump is known so well */
+#define LEAST 10.0     /* roundings of the time that a step is long at least */
+#define MOST 1000000   /* steps of the integrator in one step of the host */
+
+static const double resting[KF_DRIVERS];
+
+/* The accelerations of the drivers at a good pose; false: reduced inertias do not determine them. */
+bool kf_accelerations(const kf_solver *solver, kf_pose *pose, double t, const double *ud, const double *efforts,
+                      const double *loads, double *udd)
+{
+    const kf_model *const model = &solver->model;
+    const double *const u = KF_POSE_U(pose);
+    double found[KF_DRIVERS + KF_DRIVERS * (KF_DRIVERS + 1) / 2];
+    int k;
+#if KF_DRIVERS == 1
+    double zd[KF_ROOM(KF_UNKNOWNS)], zdd[KF_ROOM(KF_UNKNOWNS)];
+    kf_tangent(model, pose);
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        zd[k] = pose->x1[k] * ud[0];
+        zdd[k] = pose->x2[k] * (ud[0] * ud[0]);
+    }
+    kf_inertia(t, u, ud, resting, pose->found.x, zd, zdd, pose->x1, loads, model->parameters, found);
+    udd[0] = (efforts[0] - found[0]) / found[1] / kf_in_si[0];
+    return found[1] > 0.0 && isfinite(udd[0]);
+#else
+    double slopes[KF_ROOM(KF_DRIVERS * KF_UNKNOWNS)], unit[KF_DRIVERS];
+    double matrix[KF_DRIVERS * KF_DRIVERS], right[KF_DRIVERS], factors[KF_LU_ROOM(KF_DRIVERS)], determinant;
+    int j, place = KF_DRIVERS;
+    bool good = true;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        memset(unit, 0, sizeof unit);
+        unit[k] = 1.0;
+        kf_rates_in_time(model, pose, unit, NULL);
+        memcpy(slopes + k * KF_UNKNOWNS, pose->x1, KF_UNKNOWNS * sizeof *slopes);
+    }
+    kf_rates_in_time(model, pose, ud, resting);
+    kf_inertia(t, u, ud, resting, pose->found.x, pose->x1, pose->x2, slopes, loads, model->parameters, found);
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        right[k] = efforts[k] - found[k];
+        for (j = k; j < KF_DRIVERS; ++j) {
+            matrix[k * KF_DRIVERS + j] = matrix[j * KF_DRIVERS + k] = found[place++];
+        }
+        good = good && matrix[k * KF_DRIVERS + k] > 0.0;
+    }
+    if (!good || !kf_lu(KF_DRIVERS, matrix, factors, &determinant)) {
+        return false;
+    }
+    kf_lu_solve(KF_DRIVERS, factors, right, udd);
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        udd[k] /= kf_in_si[k];
+        good = good && isfinite(udd[k]);
+    }
+    return good;
+#endif
+}
+
+/* Return the first driver without reduced inertia at a good pose, or -1. */
+int kf_massless(const kf_solver *solver, kf_pose *pose, double t, const double *ud, const double *loads)
+{
+    double none[KF_DRIVERS], one[KF_DRIVERS], a[KF_DRIVERS], b[KF_DRIVERS];
+    int k;
+    memset(none, 0, sizeof none);
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        memset(one, 0, sizeof one);
+        one[k] = 1.0;
+        if (!kf_accelerations(solver, pose, t, ud, none, loads, a) || !kf_accelerations(solver, pose, t, ud, one, loads, b)) {
+            return k;
+        }
+    }
+    return -1;
+}
+
+/* u, ud, udd of the states; the accelerations are NaN where the reduced inertia does not determine them. */
+void kf_state_drive(kf_state *s, double *u, double *ud, double *udd)
+{
+    int k;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        u[k] = s->real[3 * k];
+        ud[k] = s->real[3 * k + 1];
+    }
+    if (!KF_GOOD(s->status) || !kf_accelerations(&s->solver, kf_shown(s), s->time, ud, KF_REAL(s, KF_PART_EFFORTS),
+                                                 KF_REAL(s, KF_PART_LOADS), udd)) {
+        for (k = 0; k < KF_DRIVERS; ++k) {
+            udd[k] = NAN;
+        }
+    }
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        s->real[3 * k + 2] = udd[k];
+    }
+}
+
+static kf_answer check_count(const kf_instance *instance, const double *numbers, size_t count)
+{
+    if (numbers == NULL || count != KF_NUMBERS) {
+        return kf_answered(instance, KF_ERROR, "%zu numbers for %d continuous states", numbers ? count : 0, KF_NUMBERS);
+    }
+    return KF_DONE;
+}
+
+/* The states of model exchange: value and speed of each driver. */
+kf_answer kf_set_states(kf_instance *instance, const double *states, size_t count)
+{
+    kf_state *const s = &instance->now;
+    kf_answer answer = check_count(instance, states, count);
+    size_t k;
+    if (answer == KF_DONE && s->mode != KF_CONTINUOUS) {
+        answer = kf_answered(instance, KF_ERROR, "setContinuousStates: the instance is not in continuous-time mode");
+    }
+    for (k = 0; answer == KF_DONE && k < KF_NUMBERS; ++k) {
+        if (!(fabs(states[k]) <= KF_LARGEST)) {
+            return kf_answered(instance, KF_DISCARD, "%s = %g is no finite number", kf_variable_names[3 * (k / 2) + k % 2], states[k]);
+        }
+    }
+    for (k = 0; answer == KF_DONE && k < KF_NUMBERS; ++k) {
+        s->real[3 * (k / 2) + k % 2] = states[k];
+    }
+    kf_touch(s);
+    kf_forget(s);
+    return answer;
+}
+
+kf_answer kf_get_states(kf_instance *instance, double *states, size_t count)
+{
+    const kf_answer answer = check_count(instance, states, count);
+    size_t k;
+    for (k = 0; answer == KF_DONE && k < KF_NUMBERS; ++k) {
+        states[k] = instance->now.real[3 * (k / 2) + k % 2];
+    }
+    return answer;
+}
+
+kf_answer kf_get_state_derivatives(kf_instance *instance, double *derivatives, size_t count)
+{
+    kf_answer answer = check_count(instance, derivatives, count);
+    size_t k;
+    if (answer == KF_DONE) {
+        answer = kf_read(instance, KF_BIT(KF_PART_STATES) | KF_BIT(KF_PART_VALUES));
+    }
+    for (k = 0; answer == KF_DONE && k < KF_NUMBERS; ++k) {
+        derivatives[k] = instance->now.real[3 * (k / 2) + k % 2 + 1];
+    }
+    return answer;
+}
+
+/* Follow the last good pose to u; if it is not reached, that one stays. */
+bool kf_follow(kf_course *course, const double *u)
+{
+    kf_pose *const found = course->spare;
+    if (!KF_GOOD(kf_solve(&course->instance->now.solver, course->here, u, found))) {
+        return false;
+    }
+    course->spare = course->here;
+    course->here = found;
+    return true;
+}
+
+/* f: the derivative of a state y at t. */
+static bool derive(kf_course *course, double t, const double *y, double *f)
+{
+    const double at = fmin(fmax(t, course->low), course->high);
+    memcpy(f, y + KF_DRIVERS, KF_DRIVERS * sizeof *f);
+    return kf_follow(course, y) && kf_accelerations(&course->instance->now.solver, course->here, at, y + KF_DRIVERS,
+                                                    course->efforts, course->loads, f + KF_DRIVERS);
+}
+
+static bool complete(kf_course *course, kf_end *end)
+{
+    if (!derive(course, end->t, end->y, end->f)) {
+        return false;
+    }
+    end->margin = course->here->found.margin;
+    end->is_bridged = course->here->status == KF_BRIDGED;
+    return true;
+}
+
+/* Try a step of size h to `to`, whose time is given; return its error, 1 is that allowed; infinite if a pose is not reached. */
+static double attempt(kf_course *course, const kf_end *from, double h, kf_end *to)
+{
+    double k[KF_STAGES][KF_NUMBERS], y[KF_NUMBERS], fifth = 0.0, third = 0.0, error;
+    int stage, i, j;
+    memcpy(k[0], from->f, sizeof k[0]);
+    for (stage = 1; stage < KF_STAGES; ++stage) {
+        for (i = 0; i < KF_NUMBERS; ++i) {
+            double sum = 0.0;
+            for (j = 0; j < stage; ++j) {
+                sum += kf_dp_a[stage * KF_STAGES + j] * k[j][i];
+            }
+            y[i] = from->y[i] + h * sum;
+        }
+        if (!derive(course, from->t + kf_dp_c[stage] * h, y, k[stage])) {
+            return INFINITY;
+        }
+    }
+    for (i = 0; i < KF_NUMBERS; ++i) {
+        const int driver = i % KF_DRIVERS;
+        double sum = 0.0, of_fifth = 0.0, of_third = 0.0, scale = kf_reach[driver];
+        for (j = 0; j < KF_STAGES; ++j) {
+            sum += kf_dp_b[j] * k[j][i];
+            of_fifth += kf_dp_e5[j] * k[j][i];
+            of_third += kf_dp_e3[j] * k[j][i];
+        }
+        to->y[i] = from->y[i] + h * sum;
+        if (i >= KF_DRIVERS) {
+            scale = fmax(scale, fmax(fabs(from->y[i]), fabs(to->y[i])));
+        }
+        of_fifth /= scale;
+        of_third /= scale;
+        fifth += of_fifth * of_fifth;
+        third += of_third * of_third;
+    }
+    error = fifth + 0.01 * third;
+    error = error > 0.0 ? h * fifth / sqrt(error * KF_NUMBERS) / course->tolerance : 0.0;
+    return error < 1.0 && !complete(course, to) ? INFINITY : error;
+}
+
+/* The size of a step in which no driver moves by more than `share` of its reach, with its speed and acceleration. */
+static double size_for(const kf_end *at, double share)
+{
+    double fastest = 0.0;
+    int k;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        const double acceleration = fabs(at->f[KF_DRIVERS + k]);
+        const double reach = share * kf_reach[k];
+        fastest = fmax(fastest, fabs(at->y[KF_DRIVERS + k]) / reach + sqrt(acceleration / reach));
+    }
+    return fastest > 0.0 ? 1.0 / fastest : INFINITY;
+}
+
+static bool fail(kf_course *course, const kf_end *at)
+{
+    if (!kf_ends_at(course, at->t, at->y, at->y + KF_DRIVERS)) {
+        course->status = KF_NOT_CONVERGED;
+        course->reached = at->t;
+    }
+    return false;
+}
+
+/* Step to the end of a span without jumps. */
+static bool advance(kf_course *course, kf_end *at, double last)
+{
+    while (at->t < last) {
+        const double least = LEAST * DBL_EPSILON * fmax(fabs(at->t), fabs(last));
+        const double asked = fmin(fmin(course->size, course->longest), size_for(at, STEEP));
+        double h = asked, error, grown;
+        bool refused = false, is_last;
+        kf_end to;
+        if (++course->steps > MOST) {
+            return fail(course, at);
+        }
+        for (;;) {
+            is_last = h >= last - at->t - least;
+            h = is_last ? last - at->t : h;
+            to.t = is_last ? last : at->t + h;
+            error = attempt(course, at, h, &to);
+            if (error < 1.0) {
+                break;
+            }
+            refused = true;
+            h *= error < INFINITY ? fmax(SHRINKS, SAFETY * pow(error, -1.0 / ORDER)) : SHRINKS;
+            if (!(h > least)) {
+                return fail(course, at);
+            }
+        }
+        grown = h * (error > 0.0 ? fmin(GROWS, SAFETY * pow(error, -1.0 / ORDER)) : GROWS);
+        course->size = refused ? fmin(h, grown) : is_last ? fmax(grown, course->size) : grown;
+        switch (kf_search_limit(course, at, &to)) {
+        case KF_ENDS:
+            return false;
+        case KF_REPEATS:
+            break;
+        default:
+            *at = to;
+        }
+    }
+    return true;
+}
+
+/* Why a motion ended early, in the state's message. */
+static void explain(kf_state *s, const kf_course *course)
+{
+    const char *const why = course->is_limit ? "the motion ends at a limit"
+                            : course->steps > MOST ? "the motion needs too many steps; take a larger integrator.tolerance"
+                                                   : "the motion cannot be integrated";
+    const char *const reason = course->is_limit ? s->solver.message : "the reduced inertia is singular, or a number is not finite";
+    if (course->steps > MOST) {
+        snprintf(s->message, sizeof s->message, "%s", why);
+    } else {
+        snprintf(s->message, sizeof s->message, "%s: %.*s", why, (int)(sizeof s->message - 40), reason);
+    }
+}
+
+/* Integrate the states from the present time to `end`. If the motion ends before, at `reached`, states and pose stay, the status
+ * is that of the poses past its end, and the message states why.
+ */
+bool kf_integrate(kf_instance *instance, double end, double *reached)
+{
+    kf_state *const s = &instance->now;
+    const double start = s->time;
+    kf_course course;
+    kf_end at;
+    int k;
+    memset(&course, 0, sizeof course);
+    instance->track[0] = *kf_shown(s);
+    course.instance = instance;
+    course.here = &instance->track[0];
+    course.spare = &instance->track[1];
+    course.efforts = KF_REAL(s, KF_PART_EFFORTS);
+    course.loads = KF_REAL(s, KF_PART_LOADS);
+    course.tolerance = KF_REAL(s, KF_PART_TOLERANCE)[1];
+    course.size = s->step_size;
+    at.t = start;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        at.y[k] = s->real[3 * k];
+        at.y[KF_DRIVERS + k] = s->real[3 * k + 1];
+    }
+    while (at.t < end) {
+        double jump, last = end, inside;
+        bool done;
+        s->time = at.t;
+        if (kf_next_event(instance, &jump)) {
+            last = fmin(last, jump);
+        }
+        inside = fmin(DETERMINED * (last - at.t) + ROUNDED * (fabs(at.t) + fabs(last)), 0.25 * (last - at.t));
+        course.low = at.t + inside;
+        course.high = last - inside;
+        course.longest = course.span = last - at.t;
+        course.refined = 0;
+        done = complete(&course, &at);
+        if (done) {
+            course.size = course.size > 0.0 ? course.size : size_for(&at, FIRST);
+            done = advance(&course, &at, last);
+        } else {
+            fail(&course, &at);
+        }
+        if (!done) {
+            *reached = course.reached;
+            explain(s, &course);
+            s->time = start;
+            kf_follow(&course, s->committed_u); /* maps of the committed pose may have been overwritten */
+            s->poses[s->committed] = *course.here;
+            s->asked = !s->committed;
+            s->status = course.status;
+            s->solved = s->ahead = true;
+            kf_forget_motion(s);
+            return false;
+        }
+    }
+    s->time = end;
+    s->step_size = course.size < INFINITY ? course.size : 0.0;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        s->real[3 * k] = at.y[k];
+        s->real[3 * k + 1] = at.y[KF_DRIVERS + k];
+    }
+    s->asked = !s->committed;
+    s->poses[s->asked] = *course.here;
+    s->status = course.here->status;
+    s->message[0] = '\0';
+    s->solved = true;
+    kf_forget_motion(s);
+    return true;
+}
+
+/* Return whether a host's step, from the committed states, passes a limit; then the status is that past it. In most steps no
+ * speed changes its sign far from singular poses, and there is nothing to integrate.
+ */
+bool kf_passes_limit(kf_instance *instance, double *reached)
+{
+    kf_state *const s = &instance->now;
+    const double now = s->time, last = s->samples ? s->history[s->samples - 1].t : now;
+    double kept[3 * KF_DRIVERS];
+    const double margin = fmin(s->poses[s->committed].found.margin, kf_shown(s)->found.margin);
+    bool turns = false, passes;
+    int k;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        turns = turns || s->committed_inputs[3 * k + 1] * s->real[3 * k + 1] < 0.0;
+    }
+    if (!(last < now) || !(turns || (KF_DRIVERS > 1 && margin < 0.1) || margin < 1e-3)) {
+        return false;
+    }
+    memcpy(kept, s->real, sizeof kept);
+    memcpy(s->real, s->committed_inputs, sizeof kept);
+    s->asked = s->committed;
+    s->time = last;
+    passes = !kf_integrate(instance, now, reached);
+    s->time = now;
+    memcpy(s->real, kept, sizeof kept);
+    if (!passes) {
+        kf_forget(s);
+        kf_ask(instance);
+    }
+    return passes;
+}

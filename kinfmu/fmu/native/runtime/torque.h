@@ -1,0 +1,38 @@
+/* Motion of the drivers under efforts: see torque.c and limits.c. */
+#ifndef KF_TORQUE_H
+#define KF_TORQUE_H
+
+#include "instance.h"
+
+#define KF_NUMBERS (2 * KF_DRIVERS) /* values, then speeds */
+
+/* One end of a step: time, state, its derivative, and how near its pose is to a singular one. */
+typedef struct {
+    double t, y[KF_NUMBERS], f[KF_NUMBERS], margin;
+    bool is_bridged;
+} kf_end;
+
+/* A motion while it is integrated.
+ *
+ * here: the last good pose, from which the next is followed; low, high: times at which laws are read, inside a span
+ * without jumps; size: of the next step; longest: of all steps; refined: how often the present step was divided to search it
+ * for a limit, which may be before `suspect_until`; status and message of the solver, and `reached`: where it ends.
+ */
+typedef struct {
+    kf_instance *instance;
+    kf_pose *here, *spare;
+    const double *efforts, *loads;
+    double tolerance, low, high, span, size, longest, suspect_until, reached;
+    int refined, steps;
+    kf_status status;
+    bool is_limit;
+} kf_course;
+
+typedef enum { KF_GOES_ON, KF_REPEATS, KF_ENDS } kf_verdict;
+
+bool kf_follow(kf_course *course, const double *u);
+kf_verdict kf_search_limit(kf_course *course, const kf_end *before, const kf_end *after);
+bool kf_ends_at(kf_course *course, double t, const double *u, const double *ud);
+double kf_unit(int driver);
+
+#endif

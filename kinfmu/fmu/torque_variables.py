@@ -1,0 +1,143 @@
+"""The variables of an FMU that owns the motion of its drivers: efforts are inputs, angle and speed are states.
+
+They are those of an FMU whose drivers inputs move, except that each input of a driver is computed here: value and speed
+by integration, the acceleration from the efforts. So what depends on an acceleration depends on all states and efforts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from kinfmu.codegen.forces import STAGES
+from kinfmu.fmu.force_variables import load_variables
+from kinfmu.fmu.interface import InterfacePart, Variable
+from kinfmu.laws import External
+from kinfmu.loads.following import Following
+from kinfmu.mechanism import Mechanism
+from kinfmu.plan import SolvePlan
+from kinfmu.plan.forces import effort_noun
+from kinfmu.units import Quantity, unit_of
+
+STATES, EFFORTS, INPUTS = "states", "efforts", "inputs"  # parts
+INTEGRATOR_TOLERANCE = Variable(
+    "integrator.tolerance",
+    "Real",
+    "parameter",
+    "tunable",
+    "Error of a step of the integrator: relative to 1 rad or the mechanism's size, and to the speed. Co-simulation",
+    initial="exact",
+    unit="1",
+    start=1e-9,
+    minimum=1e-13,  # smaller ones are rounding
+    maximum=1e-4,  # larger ones do not tell a limit from a turn before it
+)
+_LEFT_OUT = ("driven", "drive", "rate_source")
+_GONE = ("driven_by_time", "rates")
+_WORDS = (("", "state"), ("rate of ", "state"), ("acceleration of ", "of the efforts"))
+
+
+def effort_names(plan: SolvePlan) -> list[str]:
+    """Return the names of the inputs for the efforts of the drivers, such as 'crank_torque'."""
+    return [f"{driver.name}_{effort_noun(driver.quantity.kind)}" for driver in plan.drivers]
+
+
+def depends_on_time(mechanism: Mechanism) -> bool:
+    """Return whether a load follows a law over time, so that accelerations depend on it."""
+    return any(
+        isinstance(load, Following) and load.over is None and not isinstance(load.law, External)
+        for load in mechanism.loads
+    )
+
+
+def with_states(
+    plan: SolvePlan, parts: Iterable[InterfacePart], starts: Sequence[float], *, has_time: bool
+) -> list[InterfacePart]:
+    """Return the parts of an FMU that owns the motion, from those of one that inputs drive.
+
+    Args:
+        plan: Plan of the mechanism.
+        parts: Of the other FMU, with `loads` and `forces`.
+        starts: Value and speed of each driver at the start.
+        has_time: True if time is a variable, of which dependencies are stated.
+
+    """
+    mechanism = plan.mechanism
+    by_name = {part.name: part for part in parts}
+    if "loads" not in by_name:  # no force is an output
+        added = {"loads": tuple(load_variables(mechanism))} | dict.fromkeys(STAGES, ())
+        at = list(by_name).index("fixed") + 1
+        items = list(by_name.items())
+        by_name = dict([*items[:at], *((name, InterfacePart(name, one)) for name, one in added.items()), *items[at:]])
+    loads = [variable.name for variable in by_name["loads"].variables]
+    moving = [name for driver in plan.drivers for name in driver.inputs[:2]]
+    time = ["time"] if has_time and depends_on_time(mechanism) else []
+    moved_by = (*moving, *effort_names(plan), *loads, *time)
+    behind: dict[str, Sequence[str]] = {driver.inputs[2]: moved_by for driver in plan.drivers}
+    result = []
+    for name, part in by_name.items():
+        if name in _LEFT_OUT:
+            continue
+        if name == INPUTS:
+            result.append(InterfacePart(STATES, tuple(_states(plan, starts, behind))))
+        elif name == "constants":  # the laws of drivers have no effect
+            result.append(InterfacePart(name, ()))
+        elif name == "tolerance":
+            result.append(InterfacePart(name, (*part.variables, INTEGRATOR_TOLERANCE)))
+        else:
+            dropped = {constant.name for constant in plan.law_constants} | set(_GONE)
+            result.append(InterfacePart(name, tuple(_behind(one, behind, dropped) for one in part.variables)))
+        if name == "fixed":
+            result.append(InterfacePart(EFFORTS, tuple(_efforts(plan))))
+    return result
+
+
+def _states(plan: SolvePlan, starts: Sequence[float], behind: Mapping[str, Sequence[str]]) -> Iterator[Variable]:
+    parameters = tuple(parameter.name for parameter in plan.parameters)
+    for k, driver in enumerate(plan.drivers):
+        for order, (name, (words, origin)) in enumerate(zip(driver.inputs, _WORDS, strict=True)):
+            is_state = order < 2
+            yield Variable(
+                name,
+                "Real",
+                "output",
+                "continuous",
+                f"Driver {driver.name}: {words}{driver.quantity.kind} ({origin})",
+                initial="exact" if is_state else "calculated",
+                unit=unit_of(Quantity(driver.quantity.kind, order), plan.mechanism.length_unit),
+                start=starts[2 * k + order] if is_state else None,
+                derivative_of=driver.inputs[order - 1] if order else None,
+                dependencies=(name,) if is_state else tuple(behind[name]),
+                linear_in=(name,) if is_state else (),
+                initial_dependencies=None if is_state else (*behind[name], *parameters),
+            )
+
+
+def _efforts(plan: SolvePlan) -> Iterator[Variable]:
+    for driver, name in zip(plan.drivers, effort_names(plan), strict=True):
+        noun = effort_noun(driver.quantity.kind)
+        yield Variable(
+            name,
+            "Real",
+            "input",
+            "continuous",
+            f"Driver {driver.name}: {noun} of the drive on the mechanism",
+            unit=unit_of(Quantity(noun), plan.mechanism.length_unit),
+            start=0.0,
+        )
+
+
+def _behind(variable: Variable, behind: Mapping[str, Sequence[str]], dropped: set[str]) -> Variable:
+    """Return a variable with states and efforts among its dependencies, in place of accelerations."""
+
+    def exact(names: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        if names is None:
+            return None
+        found = [one for name in names for one in behind.get(name, (name,)) if one not in dropped]
+        return tuple(dict.fromkeys(found))
+
+    return replace(
+        variable,
+        dependencies=exact(variable.dependencies),
+        initial_dependencies=exact(variable.initial_dependencies),
+    )
