@@ -309,7 +309,7 @@ static void explain(kf_state *s, const kf_course *course)
     if (course->steps > MOST) {
         snprintf(s->message, sizeof s->message, "%s", why);
     } else {
-        snprintf(s->message, sizeof s->message, "%s: %.*s", why, (int)(sizeof s->message - 40), reason);
+        snprintf(s->message, sizeof s->message, "%s: %.*s", why, (int)(sizeof s->message - 80), reason);
     }
 }
 
