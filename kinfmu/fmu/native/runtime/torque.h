@@ -16,7 +16,7 @@ typedef struct {
  *
  * here: the last good pose, from which the next is followed; low, high: times at which laws are read, inside a span
  * without jumps; size: of the next step; longest: of all steps; refined: how often the present step was divided to search it
- * for a limit, which may be before `suspect_until`; status and message of the solver, and `reached`: where it ends.
+ * for a limit, which may be before `suspect_until`; status and message of the solver, and `reached`: the time of its end.
  */
 typedef struct {
     kf_instance *instance;
