@@ -27,7 +27,6 @@ from kinfmu.fmu.input_table import InputTable, input_notes, input_table, undrive
 from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.samples import DISCARD, ERROR, Samples
 from kinfmu.fmu.slaves import LoadedSlave, slave
-from kinfmu.fmu.torque_variables import INTEGRATOR_TOLERANCE
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, MECHANISM, text_in, unpacked
 from kinfmu.mechanism import Mechanism, RunSettings, toml_file
 from kinfmu.run import MOST_SAMPLES, Run
@@ -39,6 +38,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 BEGINNING = 4096  # bytes of a model description that hold the attributes of its first tag
+INTEGRATOR_TOLERANCE = "integrator.tolerance"  # of an FMU that owns the motion of its drivers
 LAST_STEP = 1e-6  # of a step: a shorter remainder before `stop` is rounding, not a step
 
 
@@ -180,7 +180,7 @@ def simulate(
                     f"{listed(own)}: for a mechanism driven by torques, or its FMU, not for FMU {fmu_path}"
                 )
             given = dict(parameters or {}) | dict(state or {})
-            given |= {} if tolerance is None else {INTEGRATOR_TOLERANCE.name: tolerance}
+            given |= {} if tolerance is None else {INTEGRATOR_TOLERANCE: tolerance}
             if wrap and inputs is None:
                 raise RequestError("wrap unwraps angles among the inputs, and no inputs are given")
             table = None if inputs is None else input_table(inputs, interface, wrap=wrap)
