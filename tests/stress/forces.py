@@ -1,8 +1,8 @@
 """Forces of random mechanisms against free-body diagrams in 50 digits: `python -m tests.stress.forces`.
 
-Random masses, gravity and loads are put on the mechanisms of the families. Efforts by virtual work, reduced inertias
-and reactions are compared with those of `statics`; reactions and efforts have to balance every body; and the work of
-efforts and loads over a stretch has to be the change of energy.
+Random masses, gravity and loads are put on the mechanisms of the families. Efforts by virtual work, reduced inertias,
+reactions, shaking force and shaking moment are compared with those of `statics`; reactions and efforts have to balance
+every body; and the work of efforts and loads over a stretch has to be the change of energy.
 """
 
 from __future__ import annotations
@@ -53,6 +53,7 @@ NATIVE_EVERY = 8  # one mechanism of so many is solved by the native engine
 MARGIN, HALF = 0.1, 0.05  # of a stretch: margin at its middle, half width [rad, sizes]
 NODES = (20, 80, 320)  # of Gauss; more where it does not converge with less, as beside a narrow place
 CHUNK = 5
+SHAKING = ("shaking_force_x", "shaking_force_y", "shaking_moment")
 RATES = {"x": "vx", "y": "vy", "phi": "omega"}
 
 
@@ -66,6 +67,7 @@ class Comparison:
     inertias: float = 0.0
     reactions: float = 0.0
     balance: float = 0.0
+    shaking: float = 0.0
     energy: float = 0.0
     samples: int = 0
     stretches: int = 0
@@ -220,6 +222,15 @@ def _compare(
         error = judged("reduced inertia", matrix, lambda b: b.inertias, np.where(scale > 0, scale, 1))
         result.inertias = max(result.inertias, error)
     _reactions(result, run, which, sample, statics, exact, judged, ours)
+    columns = list(SHAKING)
+    ours = np.array([run[name][sample] for name in columns])
+    largest = np.array([np.abs(run[name][which]).max() for name in columns])
+    terms = np.abs(exact.open).reshape(-1, 3)  # of the moving bodies; on the ground they may cancel
+    force = max(terms[:, :2].sum() / float(statics.metre), largest[:2].max()) or 1.0
+    arms = np.abs(guess.reshape(-1, 3)[:, :2])
+    moment = max(terms[:, 2].sum() + (terms[:, :2] * arms[:, ::-1]).sum(), largest[2]) or 1.0
+    scale = np.array([force, force, moment])
+    result.shaking = max(result.shaking, judged("shaking force", ours, lambda b: b.shaking, scale))
 
 
 def _reactions(
@@ -353,7 +364,7 @@ def main() -> int:
                 print(f"seed {one.seed}, {one.family}: {fault}", flush=True)
             if len(found) % 50 == 0:
                 print(f"{len(found)} of {len(tasks)}, {time.monotonic() - begun:.0f} s", file=sys.stderr, flush=True)
-    for what in ("efforts", "inertias", "reactions", "balance", "energy"):
+    for what in ("efforts", "inertias", "reactions", "balance", "shaking", "energy"):
         worst = max(found, key=lambda one: float(getattr(one, what)))
         print(f"{what}: worst relative error {getattr(worst, what):.2g} (seed {worst.seed}, {worst.family})")
     print(

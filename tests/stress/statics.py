@@ -116,7 +116,8 @@ class Balance(NamedTuple):
 
     efforts: of the drivers; reactions: by name; shared: names of reactions to which a self-stress may be added;
     open: what the rows balance along each coordinate; gradients: of the rows, one row each (rows, coordinates); per:
-    effort of each row, or reaction, over its multiplier; inertias: the reduced inertia, a matrix.
+    effort of each row, or reaction, over its multiplier; inertias: the reduced inertia, a matrix; shaking: force (x, y)
+    and moment on the ground.
     """
 
     efforts: Floats
@@ -126,6 +127,7 @@ class Balance(NamedTuple):
     gradients: Floats
     per: Floats
     inertias: Floats
+    shaking: Floats
 
 
 class Statics:
@@ -160,7 +162,7 @@ class Statics:
         inverse = mp.matrix(np.linalg.inv(gradients[chosen]).tolist())
         moved = self._moved(q, [Series([a, b, c / 2]) for a, b, c in zip(plain, ud, udd, strict=True)], chosen, inverse)
         exact = self.jacobian([one.c[0] for one in moved], plain)
-        open_ones = self._open(moved)
+        open_ones, of_loads = self._open(moved)
         square = mp.matrix([[exact[k, j] for k in chosen] for j in range(len(q))])
         multipliers = [mp.mpf(0)] * exact.rows
         for k, one in zip(chosen, mp.lu_solve(square, mp.matrix(open_ones)), strict=True):
@@ -179,6 +181,7 @@ class Statics:
             gradients=np.array(exact.tolist(), dtype=float),
             per=np.array([float(one) for one in per]),
             inertias=self._inertias(square, chosen, per, [one.c[0] for one in moved]),
+            shaking=self._shaking(exact, multipliers, [one.c[0] for one in moved], of_loads),
         )
 
     def _moved(self, q: list[Any], u: Sequence[Series], chosen: Sequence[int], inverse: Any) -> list[Series]:
@@ -201,8 +204,18 @@ class Statics:
         arm_x, arm_y = c * a - s * b, s * a + c * b
         return arm_x, arm_y, x * self.metre + arm_x, y * self.metre + arm_y
 
-    def _open(self, moved: Sequence[Series]) -> list[Any]:
-        """M qdd - Q along each coordinate [J per unit of the coordinate]."""
+    def _shaking(self, rows: Any, multipliers: Sequence[Any], q: Sequence[Any], of_loads: Sequence[Any]) -> Floats:
+        """Force and moment on the ground: what all rows exert on it, against what they exert on bodies, and loads."""
+        f_x, f_y, moment = of_loads
+        on_bodies = [mp.fdot(multipliers, rows[:, k]) for k in range(len(q))]
+        for k in range(0, len(q), 3):
+            x, y, turning = on_bodies[k : k + 3]
+            f_x, f_y = f_x - x / self.metre, f_y - y / self.metre
+            moment -= turning + q[k] * y - q[k + 1] * x
+        return np.array([float(one) for one in (f_x, f_y, moment)])
+
+    def _open(self, moved: Sequence[Series]) -> tuple[list[Any], list[Any]]:
+        """M qdd - Q along each coordinate [J per unit of the coordinate]; what loads exert on the ground."""
         gravity = self.file.get("gravity", {"x": 0, "y": 0})
         g_x, g_y = (mp.mpf(gravity[axis]) * self.metre for axis in ("x", "y"))
         frames, found = {"ground": STANDING}, []
@@ -220,7 +233,7 @@ class Statics:
             turning = inertia * 2 * moved[3 * k + 2].c[2] + arm_x.c[0] * f_y - arm_y.c[0] * f_x
             on = loads[name]
             found += [(f_x - on[0]) * self.metre, (f_y - on[1]) * self.metre, turning - on[2]]
-        return found
+        return found, loads["ground"]
 
     def _per(self, u: Sequence[Any]) -> list[Any]:
         """Force or torque of each row, over its multiplier."""
