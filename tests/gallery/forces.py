@@ -104,6 +104,26 @@ def engine(t: float, at: Motion) -> FreeBodies:  # noqa: ARG001
     return bodies
 
 
+# -------------------------------------------------------------------------------------------------------- four-bar
+
+
+@forces
+def fourbar_loaded(t: float, at: Motion) -> FreeBodies:  # noqa: ARG001
+    """Crank and rocker with counterweights; the coupler is a flat steel bar, 100 x 20 x 8."""
+    bodies = FreeBodies(MM)
+    c, p = Vector(110, 0), _at(at, "coupler")
+    mass = decimal(7850) * 100 * 20 * 8 / 10**9
+    bodies.body("crank", ORIGIN, at["crank.phi"], 1.2, Vector(0, 0), 700e-6)
+    bodies.body("coupler", p, at["coupler.phi"], mass, Vector(50, 0), mass * (100**2 + 20**2) / 12 / 10**6)
+    bodies.body("rocker", c, at["rocker.phi"], 0.5, Vector(20, 0), 600e-6)
+    bodies.motor("crank", "crank")
+    bodies.pin("O", GROUND, "crank", ORIGIN)
+    bodies.pin("P", "crank", "coupler", p)
+    bodies.pin("Q", "coupler", "rocker", p + turned(at["coupler.phi"], 100))
+    bodies.pin("C", GROUND, "rocker", c)
+    return bodies
+
+
 # ---------------------------------------------------------------------------------------------------- toggle press
 
 

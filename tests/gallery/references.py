@@ -143,6 +143,15 @@ def crank_rocker(u: Series) -> Coordinates:
     }
 
 
+@reference(crank_angle=turning(0, 1800))
+def fourbar_loaded(u: Series) -> Coordinates:
+    """A crank-rocker: 40, 100, 90 on a ground of 110."""
+    c = Vector(110, 0)
+    p = turned(u, 40)
+    q = meet(p, 100, c, 90, LEFT)
+    return {"crank.phi": u, **body("coupler", p, heading(q - p, 1)), "rocker.phi": heading(q - c, 2)}
+
+
 @reference(crank_angle=turning(0, 360))
 def double_crank(u: Series) -> Coordinates:
     """A drag link: 60, 55, 60 on a ground of 20."""
