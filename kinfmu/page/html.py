@@ -18,16 +18,28 @@ from kinfmu.page.opened import opened
 _WEB = Path(__file__).parent / "web"
 _SCRIPTS = (
     "geometry",
+    "numbers",
+    "colours",
     "pen",
     "view",
     "engine",
     "linkage",
+    "marks",
     "drawing",
     "design",
     "grips",
     "plots",
     "exports",
+    "elements",
+    "values",
     "panels",
+    "arrows",
+    "frames",
+    "motion",
+    "transport",
+    "address",
+    "hand",
+    "keyboard",
     "main",
 )
 _IMPORT = re.compile(r"^import .*\n", re.MULTILINE)

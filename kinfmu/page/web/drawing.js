@@ -1,37 +1,9 @@
 // The drawing of a linkage: shapes, pins, names, curves, arrows, marks.
 
-import { distance, outline, placed, seen, TURN } from "./geometry.js";
-
-// ---- colours
-
-export const THEMES = {
-    light: { paper: "#ffffff", ink: "#1c2430", quiet: "#5b6675", grid: "#e9edf2", accent: "#0b5cad", bad: "#b3261e", pin: "#ffffff", isDark: false },
-    dark: { paper: "#12171d", ink: "#e8edf3", quiet: "#9aa7b6", grid: "#1f2730", accent: "#6cb6ff", bad: "#ff9b93", pin: "#12171d", isDark: true },
-};
-
-function mix(colour, other, part) {
-    return colour.map((value, k) => Math.round(value + part * (other[k] - value)));
-}
-
-export function css([r, g, b], alpha = 1) {
-    return alpha < 1 ? `rgba(${r},${g},${b},${alpha})` : `rgb(${r},${g},${b})`;
-}
-
-export function edgeOf(colour, theme) {
-    return css(theme.isDark ? mix(colour, [255, 255, 255], 0.25) : mix(colour, [0, 0, 0], 0.45));
-}
-
-export function fillOf(colour, theme) {
-    return css(theme.isDark ? mix(colour, [18, 23, 29], 0.55) : mix(colour, [255, 255, 255], 0.5));
-}
-
-function paleOf(colour, theme) {
-    return css(theme.isDark ? mix(colour, [18, 23, 29], 0.78) : mix(colour, [255, 255, 255], 0.82));
-}
-
-const GREY = [150, 150, 150];
-
-// ---- the linkage
+import { edgeOf, fillOf, GREY, paleOf } from "./colours.js";
+import { distance, outline, placed } from "./geometry.js";
+import { marks } from "./marks.js";
+import { niceStep, number } from "./numbers.js";
 
 // Draw a pose; show: what is switched on; view: from the plane to pixels.
 export function draw(pen, linkage, view, theme, show, extra) {
@@ -47,7 +19,7 @@ export function draw(pen, linkage, view, theme, show, extra) {
     painter.slides();
     painter.cylinders();
     painter.pins(extra.held);
-    painter.marks(show, extra);
+    marks(painter, show, extra.arrows);
     if (show.names) painter.names();
 }
 
@@ -320,89 +292,6 @@ class Painter {
         if (held) pen.circle(...this.dot(held), radius + 6, { width: 2.5, colour: theme.accent });
     }
 
-    // ---- what is measured
-
-    marks(show, extra) {
-        const { linkage, pen, theme, view } = this;
-        if (show.limits) this.driverMarks();
-        if (show.transmission) {
-            for (const { angle, at, arms } of linkage.transmissions()) {
-                const p = this.dot(at);
-                const r = 30;
-                const [a, b] = arms.map(([x, y]) => Math.atan2(y, x));
-                const sweep = Math.atan2(Math.sin(b - a), Math.cos(b - a));
-                const arc = Array.from({ length: 25 }, (_, k) => {
-                    const w = a + (sweep * k) / 24;
-                    return [p[0] + r * Math.cos(w), p[1] - r * Math.sin(w)];
-                });
-                const acute = Math.min(angle, Math.PI - angle);
-                const colour = acute < (40 * Math.PI) / 180 ? theme.bad : theme.accent;
-                pen.line(arc, { width: 2, colour });
-                const w = a + sweep / 2;
-                const label = `${degrees(angle, 1)}${acute < (40 * Math.PI) / 180 ? " poor" : ""}`;
-                this.name(label, [[p[0] + (r + 6) * Math.cos(w), p[1] - (r + 6) * Math.sin(w)]], colour, 14, -1);
-            }
-        }
-        if (show.centres) {
-            const shown = linkage.centres().map(({ at, label }) => ({ p: this.dot(at), label }));
-            const merged = [];
-            for (const one of shown) {
-                const same = merged.find((other) => distance(other.p, one.p) < 2);
-                if (same) same.label += `, ${one.label}`;
-                else merged.push(one);
-            }
-            for (const { p, label } of merged) {
-                if (p[0] < -20 || p[1] < -20 || p[0] > view.width + 20 || p[1] > view.height + 20) continue;
-                pen.line([[p[0] - 5, p[1] - 5], [p[0] + 5, p[1] + 5]], { width: 2, colour: theme.accent });
-                pen.line([[p[0] - 5, p[1] + 5], [p[0] + 5, p[1] - 5]], { width: 2, colour: theme.accent });
-                this.name(`P${label}`, [p], theme.accent, 12, -1);
-            }
-        }
-        for (const arrow of extra.arrows) this.arrow(arrow);
-    }
-
-    arrow({ from, along, colour, text }) {
-        const a = this.dot(from);
-        const b = [a[0] + along[0], a[1] - along[1]];
-        const length = distance(a, b);
-        if (length < 2) return;
-        const [x, y] = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
-        const head = Math.min(10, 0.6 * length);
-        const base = [b[0] - head * x, b[1] - head * y];
-        const ink = css(colour(this.theme));
-        this.pen.line([a, base], { width: 2.4, colour: ink });
-        this.pen.line([b, [base[0] - 0.4 * head * y, base[1] + 0.4 * head * x], [base[0] + 0.4 * head * y, base[1] - 0.4 * head * x]], { width: 1, colour: ink, fill: ink, closed: true });
-        if (text) this.name(text, [b], ink, 10, -1);
-    }
-
-    // Mark the range of a turning driver, its limits and change points on a circle about its pivot.
-    driverMarks() {
-        const { linkage, pen, theme } = this;
-        linkage.data.drivers.forEach((driver, k) => {
-            if (driver.kind !== "angle" || driver.pivot === null || driver.pivot === undefined) return;
-            const centre = this.dot(linkage.point(driver.pivot));
-            const body = linkage.bodies.indexOf(driver.body);
-            const reach = Math.max(...linkage.data.points.map((_, i) => (linkage.bodyOf[i] === body ? distance(this.dot(linkage.point(i)), centre) : 0)));
-            const radius = Math.max(reach, 24) + 16;
-            const base = linkage.bodyPose(body)[2] - linkage.u[k];
-            const tip = linkage.data.points.reduce((best, _, i) => (linkage.bodyOf[i] === body && distance(linkage.local(i), linkage.local(driver.pivot)) > distance(linkage.local(best), linkage.local(driver.pivot)) ? i : best), driver.pivot);
-            const [tx, ty] = linkage.local(tip).map((value, i) => value - linkage.local(driver.pivot)[i]);
-            const turn = base + (tx || ty ? Math.atan2(ty, tx) : 0);
-            const on = (u, r) => [centre[0] + r * Math.cos(u + turn), centre[1] - r * Math.sin(u + turn)];
-            const [low, high] = linkage.ranges[k];
-            const span = Math.min(high - low, TURN);
-            pen.line(Array.from({ length: 73 }, (_, i) => on(low + (span * i) / 72, radius)), { width: 1.4, colour: theme.quiet, dash: [2, 4] });
-            const mark = (u, colour, label) => {
-                pen.line([on(u, radius - 7), on(u, radius + 7)], { width: 3, colour });
-                this.name(label, [on(u, radius + 8)], colour, 14, -1);
-            };
-            for (const limit of linkage.limits) if (limit.driver === k) mark(limit.at, theme.bad, `limit ${degrees(limit.at, 1)}`);
-            if (linkage.which === "written") for (const at of driver.changePoints) mark(at, theme.accent, `change point ${degrees(at, 1)}`);
-            const p = on(linkage.u[k], radius);
-            pen.circle(...p, 4, { colour: theme.accent, fill: theme.accent });
-        });
-    }
-
     // ---- names: the most important first, where they cover nothing
 
     names() {
@@ -440,22 +329,4 @@ function middlesOf(points, closed) {
 function centreOf(points) {
     const sum = points.reduce(([x, y], p) => [x + p[0], y + p[1]], [0, 0]);
     return sum.map((value) => value / points.length);
-}
-
-export function niceStep(wanted) {
-    const tens = 10 ** Math.floor(Math.log10(wanted));
-    return [1, 2, 5, 10].find((step) => step * tens >= wanted) * tens;
-}
-
-export function number(value, digits = 5) {
-    if (value === 0 || Math.abs(value) < 1e-13) return "0";
-    return String(Number(value.toPrecision(digits)));
-}
-
-export function degrees(angle, decimals = 2) {
-    return `${Number(((angle * 180) / Math.PI).toFixed(decimals)) + 0}\u00b0`;
-}
-
-export function bodySeen(linkage, body, p) {
-    return seen(linkage.bodyPose(body), ...p);
 }

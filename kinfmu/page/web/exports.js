@@ -1,7 +1,8 @@
 // Files to take away: the mechanism with its lengths as set, tables, drawings, and the command that builds the FMU.
 
 import { SvgPen } from "./pen.js";
-import { draw, THEMES } from "./drawing.js";
+import { THEMES } from "./colours.js";
+import { draw } from "./drawing.js";
 import { quantities, sampled } from "./plots.js";
 
 export function download(name, text, type) {

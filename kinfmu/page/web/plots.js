@@ -1,6 +1,6 @@
 // Plots of quantities over time or the driver, with one cursor for all.
 
-import { degrees, niceStep, number } from "./drawing.js";
+import { degrees, niceStep, number } from "./numbers.js";
 import { FONT } from "./pen.js";
 
 const SAMPLES = 360;

@@ -1,0 +1,108 @@
+// The hand on the drawing: mouse, touch and wheel.
+
+import { gripAt, parametersOf, pinAt, place, pull, stretch } from "./grips.js";
+
+export class Hand {
+    constructor(page) {
+        this.page = page;
+        this.held = null; // the place that is held, for the drawing
+        const { canvas, view } = page;
+        const held = new Map(); // pointers on the canvas
+        let drag = null;
+        const at = (event) => {
+            const box = canvas.getBoundingClientRect();
+            return [event.clientX - box.left, event.clientY - box.top];
+        };
+        const reach = (event) => (event.pointerType === "touch" ? 26 : 13) / view.scale;
+        canvas.addEventListener("pointerdown", (event) => {
+            canvas.setPointerCapture(event.pointerId);
+            held.set(event.pointerId, at(event));
+            page.hint("");
+            if (held.size === 2) {
+                drag = { kind: "pinch" };
+                this.held = null;
+                return;
+            }
+            drag = this.#grab(view.plane(at(event)), reach(event)) || { kind: "pan" };
+            if (drag.kind !== "pan") page.motion.play(false);
+            canvas.classList.add("dragging");
+            page.refresh();
+        });
+        canvas.addEventListener("pointermove", (event) => {
+            const p = at(event);
+            const before = held.get(event.pointerId);
+            if (!before) {
+                canvas.classList.toggle("grip", Boolean(this.#grab(view.plane(p), reach(event))));
+                return;
+            }
+            if (drag?.kind === "pinch" && held.size === 2) {
+                const [other] = [...held].filter(([id]) => id !== event.pointerId).map(([, place_]) => place_);
+                const [was, is] = [before, p].map((one) => Math.hypot(one[0] - other[0], one[1] - other[1]));
+                if (was > 0 && is > 0) view.zoom(is / was, [(p[0] + other[0]) / 2, (p[1] + other[1]) / 2]);
+                view.pan((p[0] - before[0]) / 2, (p[1] - before[1]) / 2);
+                page.refresh();
+            } else if (drag?.kind === "pan") {
+                view.pan(p[0] - before[0], p[1] - before[1]);
+                page.refresh();
+            } else if (drag) page.refresh(() => this.#drag(drag, view.plane(p)));
+            held.set(event.pointerId, p);
+        });
+        const release = (event) => {
+            held.delete(event.pointerId);
+            if (drag?.kind === "pin") page.commit();
+            if (drag?.kind === "grip") page.address.write();
+            drag = null;
+            this.held = null;
+            canvas.classList.remove("dragging");
+            page.refresh();
+        };
+        canvas.addEventListener("pointerup", release);
+        canvas.addEventListener("pointercancel", release);
+        canvas.addEventListener("wheel", (event) => {
+            event.preventDefault();
+            page.zoom(Math.exp(-0.0016 * event.deltaY * (event.deltaMode ? 20 : 1)), at(event));
+        }, { passive: false });
+        canvas.addEventListener("dblclick", (event) => this.#toggleCurve(view.plane(at(event)), reach(event)));
+    }
+
+    #grab(p, reach) {
+        const { linkage, mode } = this.page;
+        if (mode === "lengths") {
+            const point = pinAt(linkage, p, reach);
+            return point === null ? null : { kind: "pin", point, names: null };
+        }
+        const grip = gripAt(linkage, p, reach);
+        return grip && { kind: "grip", grip };
+    }
+
+    #drag(drag, target) {
+        const { page } = this;
+        const { linkage, design, motion } = page;
+        if (drag.kind === "grip") {
+            const isReached = pull(linkage, drag.grip, target);
+            motion.blocked = isReached ? "" : linkage.failure;
+            this.held = place(linkage, drag.grip);
+            return;
+        }
+        drag.names ||= parametersOf(linkage, design, drag.point);
+        if (!drag.names.length) {
+            page.hint("No value that is not locked moves this pin.");
+            return;
+        }
+        const isReached = stretch(linkage, design, drag.point, drag.names, target);
+        motion.blocked = isReached ? "" : linkage.failure;
+        this.held = linkage.point(drag.point);
+        page.reshape();
+    }
+
+    #toggleCurve(p, reach) {
+        const { linkage, drawn, traces } = this.page;
+        const point = pinAt(linkage, p, reach);
+        if (point === null) return;
+        const found = drawn.findIndex((one) => one.point === point);
+        if (found >= 0) drawn.splice(found, 1);
+        else drawn.push({ point, colour: linkage.data.bodies[linkage.bodyOf[point]].colour });
+        traces.delete(point);
+        this.page.reshape();
+    }
+}

@@ -1,0 +1,92 @@
+// Marks on the drawing: transmission angles, instant centres, arrows, limits and change points of drivers.
+
+import { css } from "./colours.js";
+import { distance, TURN } from "./geometry.js";
+import { degrees } from "./numbers.js";
+
+export function marks(painter, show, arrows) {
+    if (show.limits) driverMarks(painter);
+    if (show.transmission) transmissions(painter);
+    if (show.centres) centres(painter);
+    for (const one of arrows) arrow(painter, one);
+}
+
+function transmissions(painter) {
+    const { linkage, pen, theme } = painter;
+    for (const { angle, at, arms } of linkage.transmissions()) {
+        const p = painter.dot(at);
+        const r = 30;
+        const [a, b] = arms.map(([x, y]) => Math.atan2(y, x));
+        const sweep = Math.atan2(Math.sin(b - a), Math.cos(b - a));
+        const arc = Array.from({ length: 25 }, (_, k) => {
+            const w = a + (sweep * k) / 24;
+            return [p[0] + r * Math.cos(w), p[1] - r * Math.sin(w)];
+        });
+        const acute = Math.min(angle, Math.PI - angle);
+        const colour = acute < (40 * Math.PI) / 180 ? theme.bad : theme.accent;
+        pen.line(arc, { width: 2, colour });
+        const w = a + sweep / 2;
+        const label = `${degrees(angle, 1)}${acute < (40 * Math.PI) / 180 ? " poor" : ""}`;
+        painter.name(label, [[p[0] + (r + 6) * Math.cos(w), p[1] - (r + 6) * Math.sin(w)]], colour, 14, -1);
+    }
+}
+
+function centres(painter) {
+    const { linkage, pen, theme, view } = painter;
+    const shown = linkage.centres().map(({ at, label }) => ({ p: painter.dot(at), label }));
+    const merged = [];
+    for (const one of shown) {
+        const same = merged.find((other) => distance(other.p, one.p) < 2);
+        if (same) same.label += `, ${one.label}`;
+        else merged.push(one);
+    }
+    for (const { p, label } of merged) {
+        if (p[0] < -20 || p[1] < -20 || p[0] > view.width + 20 || p[1] > view.height + 20) continue;
+        pen.line([[p[0] - 5, p[1] - 5], [p[0] + 5, p[1] + 5]], { width: 2, colour: theme.accent });
+        pen.line([[p[0] - 5, p[1] + 5], [p[0] + 5, p[1] - 5]], { width: 2, colour: theme.accent });
+        painter.name(`P${label}`, [p], theme.accent, 12, -1);
+    }
+}
+
+// Draw an arrow; its text is next to its head.
+function arrow(painter, { from, along, colour, text }) {
+    const a = painter.dot(from);
+    const b = [a[0] + along[0], a[1] - along[1]];
+    const length = distance(a, b);
+    if (length < 2) return;
+    const [x, y] = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
+    const head = Math.min(10, 0.6 * length);
+    const base = [b[0] - head * x, b[1] - head * y];
+    const ink = css(colour(painter.theme));
+    painter.pen.line([a, base], { width: 2.4, colour: ink });
+    painter.pen.line([b, [base[0] - 0.4 * head * y, base[1] + 0.4 * head * x], [base[0] + 0.4 * head * y, base[1] - 0.4 * head * x]], { width: 1, colour: ink, fill: ink, closed: true });
+    if (text) painter.name(text, [b], ink, 10, -1);
+}
+
+// Mark the range of a turning driver, its limits and change points on a circle about its pivot.
+function driverMarks(painter) {
+    const { linkage, pen, theme } = painter;
+    linkage.data.drivers.forEach((driver, k) => {
+        if (driver.kind !== "angle" || driver.pivot === null || driver.pivot === undefined) return;
+        const centre = painter.dot(linkage.point(driver.pivot));
+        const body = linkage.bodies.indexOf(driver.body);
+        const reach = Math.max(...linkage.data.points.map((_, i) => (linkage.bodyOf[i] === body ? distance(painter.dot(linkage.point(i)), centre) : 0)));
+        const radius = Math.max(reach, 24) + 16;
+        const base = linkage.bodyPose(body)[2] - linkage.u[k];
+        const tip = linkage.data.points.reduce((best, _, i) => (linkage.bodyOf[i] === body && distance(linkage.local(i), linkage.local(driver.pivot)) > distance(linkage.local(best), linkage.local(driver.pivot)) ? i : best), driver.pivot);
+        const [tx, ty] = linkage.local(tip).map((value, i) => value - linkage.local(driver.pivot)[i]);
+        const turn = base + (tx || ty ? Math.atan2(ty, tx) : 0);
+        const on = (u, r) => [centre[0] + r * Math.cos(u + turn), centre[1] - r * Math.sin(u + turn)];
+        const [low, high] = linkage.ranges[k];
+        const span = Math.min(high - low, TURN);
+        pen.line(Array.from({ length: 73 }, (_, i) => on(low + (span * i) / 72, radius)), { width: 1.4, colour: theme.quiet, dash: [2, 4] });
+        const mark = (u, colour, label) => {
+            pen.line([on(u, radius - 7), on(u, radius + 7)], { width: 3, colour });
+            painter.name(label, [on(u, radius + 8)], colour, 14, -1);
+        };
+        for (const limit of linkage.limits) if (limit.driver === k) mark(limit.at, theme.bad, `limit ${degrees(limit.at, 1)}`);
+        if (linkage.which === "written") for (const at of driver.changePoints) mark(at, theme.accent, `change point ${degrees(at, 1)}`);
+        const p = on(linkage.u[k], radius);
+        pen.circle(...p, 4, { colour: theme.accent, fill: theme.accent });
+    });
+}

@@ -1,0 +1,74 @@
+// Motion: play and pause, and moves of single drivers.
+
+import { TURN } from "./geometry.js";
+
+export class Motion {
+    constructor(page) {
+        this.page = page;
+        this.linkage = page.linkage;
+        this.isPlaying = false;
+        this.blocked = ""; // why the last move stopped
+    }
+
+    play(isPlaying = !this.isPlaying) {
+        this.isPlaying = isPlaying;
+        this.page.transport.showPlaying(isPlaying);
+        if (!isPlaying) {
+            this.page.address.write();
+            return;
+        }
+        const { linkage } = this;
+        const t = linkage.timeNear(linkage.u);
+        linkage.t = t >= linkage.data.run.to - 1e-9 ? linkage.data.run.from : t;
+        const law = linkage.shown.driven(linkage.t).u;
+        this.glide = linkage.u.map((value, k) => (linkage.data.drivers[k].turns ? value - law[k] - TURN * Math.round((value - law[k]) / TURN) : value - law[k]));
+        this.clock = null;
+        this.page.refresh();
+    }
+
+    // Go on in time to the frame that the browser shows now.
+    advance(now) {
+        const { linkage } = this;
+        const { from, to } = linkage.data.run;
+        const elapsed = this.clock === null ? 0 : Math.min((now - this.clock) / 1000, 0.1);
+        this.clock = now;
+        let t = linkage.t + elapsed * this.page.transport.speed;
+        if (t > to) {
+            t = from + ((t - from) % (to - from));
+            if (!this.#repeats()) this.glide = null;
+        }
+        if (this.glide) {
+            this.glide = this.glide.map((gap) => gap * Math.exp(-6 * elapsed));
+            if (this.glide.every((gap) => Math.abs(gap) < 1e-9)) this.glide = null;
+        }
+        if (!linkage.goToTime(t, this.glide)) {
+            this.play(false);
+            this.blocked = linkage.failure;
+        } else this.blocked = "";
+    }
+
+    #repeats() {
+        return this.linkage.data.drivers.every((driver) => driver.turns);
+    }
+
+    // Move a driver to a value, as far as the mechanism goes.
+    move(k, value) {
+        const u = this.linkage.u.slice();
+        u[k] = value;
+        this.linkage.t = this.linkage.timeNear(u);
+        const isReached = this.linkage.goTowards(u);
+        this.blocked = isReached ? "" : this.linkage.failure;
+        if (!this.page.design.isOk && isReached) this.page.recover();
+        return isReached;
+    }
+
+    // Move to a place in a plot.
+    pick(over, x) {
+        this.play(false);
+        this.page.refresh(() => {
+            if (over === "driver") this.move(0, x);
+            else this.blocked = this.linkage.goToTime(x) ? "" : this.linkage.failure;
+        });
+        this.page.address.writeSoon();
+    }
+}
