@@ -21,7 +21,7 @@ from kinfmu.plan.steps import LinearSolve
 
 FloatArray = NDArray[np.float64]
 HEADERS = ("stage.h", "stream.h", "vectors.h")
-FUNCTIONS = {"sin": "kf_sin_lane", "cos": "kf_cos_lane"}
+FUNCTIONS = {"sin": "kf_sin_lane", "cos": "kf_cos_lane", "atan2": "kf_atan2"}
 LINE = 8  # numbers in a line of the caches
 ITEM = 8  # [bytes] of a number
 LARGE = 1 << 20  # numbers; larger tables are written past the caches

@@ -26,7 +26,6 @@ from tests.page.engines import (
 MEMBERS = (*gallery.names(), "fourbar_chain:100")
 CLOSE = 1e-11  # of the largest number of a table
 NARROW = 1e-8  # of the same, at poses interpolated across a singular point
-LIBRARY = ("cam_roller",)  # its atan2 is that of the C library: another last digit in a page and in a native library
 
 pytestmark = needs_node
 
@@ -42,9 +41,6 @@ def test_every_mechanism_has_the_bits_of_the_native_engine(tmp_path: Path) -> No
         expected = rows_of(run)
         assert sweep["status"] == run.status.tolist(), name
         found = table(sweep["values"], expected.shape[1])
-        if name in LIBRARY:
-            assert np.abs(found - expected).max() < 1e-14 * np.abs(expected).max()
-            continue
         assert np.array_equal(found, expected, equal_nan=True), name
         good = run.status <= Status.BRIDGED
         assert np.array_equal(np.array(drag["rows"])[good], expected[good]), name

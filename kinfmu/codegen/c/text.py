@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 _WIDTH = 110
 
-FUNCTIONS = {"sin": "kf_sin", "cos": "kf_cos", "sincos": "kf_sincos"}  # of solver/c/sincos.h
+FUNCTIONS = {"sin": "kf_sin", "cos": "kf_cos", "sincos": "kf_sincos", "atan2": "kf_atan2"}  # of solver/c/sincos.h
 
 
 def wrapped(head: str, items: Sequence[str], tail: str, indent: str = "    ") -> list[str]:

@@ -1,4 +1,4 @@
-/* Sine and cosine, the same on every platform and cheaper than the C library's.
+/* Sine, cosine and atan2, the same on every platform; sine and cosine are cheaper than the C library's.
  *
  *     x = n pi/2 + r, |r| <= pi/4     with pi/2 in two parts (Cody and Waite)
  *     sin r, cos r                    by fdlibm's polynomials, summed in pairs, which lets less wait for less (Estrin)
@@ -83,6 +83,84 @@ static inline double kf_cos(double x)
     double sine, cosine;
     kf_sincos(x, &sine, &cosine);
     return cosine;
+}
+
+/* Veltkamp: the upper 26 bits of a, exactly; |a| < 2^996. */
+static inline double kf_upper(double a)
+{
+    const double c = 134217729.0 * a;
+    return c - (c - a);
+}
+
+/* atan2(y, x) in (-pi, pi], within one ulp; signed zeros, infinities and NaN as in C99.
+ *
+ *     atan(y/x) = atan t + atan r,  r = (y - t x)/(x + t y)     t of 0, 1/2, 1, 3/2, infinity; |r| <= 7/16
+ *
+ * Breakpoints and polynomial are fdlibm's. The multiple of pi/2 and atan t are one constant in two parts, so that there
+ * is one last sum; y - t x is exact up to the rounding of r, and for t = 0 the remainder of the quotient is added.
+ */
+static inline double kf_atan2(double y, double x)
+{
+#ifdef KF_LIBRARY_SINCOS
+    return atan2(y, x);
+#else
+    static const double upper[2][5] = {
+        {0.0, 4.63647609000806093515e-01, 7.85398163397448278999e-01, 9.82793723247329054082e-01,
+            1.57079632679489655800e+00},
+        {3.14159265358979311600e+00, 2.67794504458898696697e+00, 2.35619449019234483700e+00, 2.15879893034246395089e+00,
+            1.57079632679489655800e+00},
+    };
+    static const double lower[2][5] = {
+        {0.0, 2.26987774529616870924e-17, 3.06161699786838301793e-17, 1.39033110312309984516e-17,
+            6.12323399573676603587e-17},
+        {1.22464679914735320717e-16, 1.55277053693031466809e-16, 9.18485099360514843750e-17, 2.19583671346019967064e-16,
+            6.12323399573676603587e-17},
+    };
+    const int left = signbit(x) != 0;
+    double b = fabs(y), a = fabs(x), t, r, z, w, tail = 0.0, angle;
+    int k;
+    if (a != a || b != b) {
+        return x + y;
+    }
+    if (a > 1e300 || b > 1e300) { /* sums and splits stay finite; of infinities the ratio counts */
+        const int endless = isinf(a) || isinf(b);
+        a = endless ? (isinf(a) ? 1.0 : 0.0) : a * 0x1p-40;
+        b = endless ? (isinf(b) ? 1.0 : 0.0) : b * 0x1p-40;
+    } else if (a < 1e-150 && b < 1e-150) { /* exact products stay above the smallest number */
+        a *= 0x1p+600;
+        b *= 0x1p+600;
+    }
+    if (b == 0.0) {
+        return copysign(upper[left][0], y);
+    }
+    k = b < 0.4375 * a ? 0 : b < 0.6875 * a ? 1 : b < 1.1875 * a ? 2 : b < 2.4375 * a ? 3 : 4;
+    if (k == 0) {
+        r = b / a;
+        if (r > 1e-9) { /* below, r is atan r and the remainder less than half an ulp of it */
+            const double ru = kf_upper(r), au = kf_upper(a), p = r * a;
+            const double rest = ((ru * au - p) + ru * (a - au) + (r - ru) * au) + (r - ru) * (a - au);
+            tail = ((b - p) - rest) / a;
+        }
+    } else if (k == 4) {
+        r = -a / b;
+    } else {
+        const double au = kf_upper(a);
+        t = 0.5 * k;
+        r = ((b - t * au) - t * (a - au)) / (a + t * b);
+    }
+    z = r * r;
+    w = z * z;
+    tail -= r * (z * (3.33333333333329318027e-01 + w * (1.42857142725034663711e-01 + w * (9.09088713343650656196e-02
+        + w * (6.66107313738753120669e-02 + w * (4.97687799461593236017e-02 + w * 1.62858201153657823623e-02)))))
+        + w * (-1.99999999998764832476e-01 + w * (-1.11111104054623557880e-01 + w * (-7.69187620504482999495e-02
+        + w * (-5.83357013379057348645e-02 + w * -3.65315727442169155270e-02)))));
+    if (left) {
+        r = -r;
+        tail = -tail;
+    }
+    angle = k == 0 && !left ? r + tail : upper[left][k] + (r + (lower[left][k] + tail));
+    return copysign(angle, y);
+#endif
 }
 
 #endif

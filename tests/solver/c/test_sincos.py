@@ -1,4 +1,4 @@
-"""Sine and cosine of the run time in C, compared with 50 digits."""
+"""Sine, cosine and atan2 of the run time in C, compared with 50 digits."""
 
 from __future__ import annotations
 
@@ -17,6 +17,14 @@ CALLS = """\
 #include "sincos.h"
 void one_by_one(long n, const double *x, double *sine, double *cosine);
 void side_by_side(long n, const double *x, double *sine, double *cosine);
+void directions(long n, const double *y, const double *x, double *angle);
+void directions(long n, const double *y, const double *x, double *angle)
+{
+    long k;
+    for (k = 0; k < n; ++k) {
+        angle[k] = kf_atan2(y[k], x[k]);
+    }
+}
 void one_by_one(long n, const double *x, double *sine, double *cosine)
 {
     long k;
@@ -90,3 +98,47 @@ def test_the_sine_of_nan_and_infinity_is_nan(library: Any) -> None:
     x = np.array([math.nan, math.inf, -math.inf])
     for function in (library.one_by_one, library.side_by_side):
         assert np.isnan(evaluated(function, x)).all()
+
+
+def directions(library: Any, y: Any, x: Any) -> np.ndarray[Any, Any]:
+    """kf_atan2 of each pair."""
+    pointer = ctypes.POINTER(ctypes.c_double)
+    pair = [np.array(values, np.float64) for values in (y, x)]
+    angle = np.empty_like(pair[0])
+    library.directions(ctypes.c_long(angle.size), *(values.ctypes.data_as(pointer) for values in (*pair, angle)))
+    return angle
+
+
+def points() -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+    """In all directions, at the limits of the formulas and next to them, of very unlike and of extreme sizes."""
+    random = np.random.default_rng(10)
+    turn = random.uniform(-math.pi, math.pi, 6000)
+    limits = np.repeat([0.4375, 0.5, 0.6875, 1.0, 1.1875, 1.5, 2.4375], 60)
+    near = limits * (1 + random.integers(-3, 4, limits.size) * 2.0**-52)
+    base = random.uniform(1, 2, limits.size)
+    wide = 10.0 ** random.uniform(-300, 300, (2, 3000))
+    tiny, huge = (10.0 ** random.uniform(*sizes, (2, 1000)) for sizes in ((-322, -307), (299, 308)))
+    y = np.concatenate([np.sin(turn), base * near, wide[0], tiny[0], huge[0], np.sin(turn) * 1e-160])
+    x = np.concatenate([np.cos(turn), base, wide[1], tiny[1], huge[1], np.cos(turn) * 1e-160])
+    signs = random.choice([-1.0, 1.0], (2, len(x)))
+    return y * signs[0], x * signs[1]
+
+
+def test_atan2_is_right_within_one_ulp(library: Any) -> None:
+    y, x = points()
+    found = directions(library, y, x)
+    with mpmath.workdps(50):
+        exact = [mpmath.atan2(mpmath.mpf(b), mpmath.mpf(a)) for b, a in zip(y.tolist(), x.tolist(), strict=True)]
+        gaps = np.array([float(abs(mpmath.mpf(one) - e)) for one, e in zip(found.tolist(), exact, strict=True)])
+    ulp = np.spacing(np.abs([float(e) for e in exact]))
+    assert (gaps <= ulp).all()
+    usual = np.abs(found) > 1e-300
+    assert (gaps[usual] / ulp[usual]).max() < 0.85
+
+
+def test_atan2_of_zeros_infinities_and_nan_is_that_of_c99(library: Any) -> None:
+    special = [0.0, -0.0, 1.0, -1.0, 5e-324, -5e-324, 1.7e308, -1.7e308, math.inf, -math.inf, math.nan]
+    y, x = (values.ravel() for values in np.meshgrid(special, special))
+    found, expected = directions(library, y, x), np.array(list(map(math.atan2, y.tolist(), x.tolist())))
+    np.testing.assert_allclose(found, expected, rtol=2.3e-16, atol=0.0)
+    np.testing.assert_array_equal(np.signbit(found), np.signbit(expected))
