@@ -48,11 +48,20 @@ class InputFile(_File):
         return path
 
 
+STANDARD_OUTPUT = Path("-")
+
+
 class OutputFile(_File):
-    """A file to write into an existing folder."""
+    """A file to write into an existing folder; or_standard_output: '-' is STANDARD_OUTPUT."""
+
+    def __init__(self, *suffixes: str, or_standard_output: bool = False) -> None:
+        super().__init__(*suffixes)
+        self.or_standard_output = or_standard_output
 
     def read(self, text: str) -> Path:
         path = Path(text)
+        if self.or_standard_output and path == STANDARD_OUTPUT:
+            return path
         _check_suffix(path, self.suffixes)
         if _is_folder(path):
             raise ValueError(f"{path}: is a folder; the name of a file is needed")

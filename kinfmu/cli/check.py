@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from kinfmu.analysis import Assemblies, Report
     from kinfmu.mechanism import Mechanism
 
-FIGURES = (".svg", ".png")
+FIGURES = (".svg", ".png", ".pdf")
 
 
 @main.command(epilog="Example: kinfmu check fourbar --figure fourbar.svg")
@@ -27,7 +27,9 @@ FIGURES = (".svg", ".png")
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON, for programs.")
 @click.option("--matrices", is_flag=True, help="Also print the Jacobians at the start pose and at singular points.")
 @click.option("--assemblies", is_flag=True, help="List the ways to assemble the mechanism, and how to choose one.")
-@click.option("--figure", "picture", type=OutputFile(*FIGURES), help="Draw the mechanism with its names: .svg or .png.")
+@click.option(
+    "--figure", "picture", type=OutputFile(*FIGURES), help="Draw the mechanism with its names: .svg, .png or .pdf."
+)
 @click.option("--at", metavar="VALUE", help="Driver value of the pose that --figure draws, such as 45deg or 20mm.")
 @set_option
 def check(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kinfmu.cli.arguments import InputFile, OutputFile, names_in
+from kinfmu.cli.arguments import STANDARD_OUTPUT, InputFile, OutputFile, names_in
 from kinfmu.cli.group import main
 from kinfmu.cli.quantities import on_axis
 from kinfmu.errors import RequestError, listed
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
     from kinfmu.run import Run
 
 
-TABLES, PLOTS, ANIMATIONS = (".csv", ".parquet", ".npz"), (".svg", ".png"), (".gif",)
+TABLES, PLOTS, ANIMATIONS = (".csv", ".parquet", ".npz"), (".svg", ".png", ".pdf"), (".gif",)
 FORMATS = (*TABLES, *PLOTS, *ANIMATIONS)
 
 
-def _write(run: Run, path: Path, columns: Sequence[str]) -> None:
+def _write(run: Run, path: Path, columns: Sequence[str], *, units: bool) -> None:
     """Write a run in the format of the path's suffix."""
     if suffix_of(path) in TABLES:
         from kinfmu.log import write_table
 
-        write_table(run, path, columns or None)
+        write_table(run, path, columns or None, units=units)
     elif suffix_of(path) in PLOTS:
         from kinfmu.draw import plot
 
@@ -78,9 +78,9 @@ def _between(run: Run, start: str | None, stop: str | None) -> Run:
 @click.option(
     "-o",
     "output",
-    type=OutputFile(*FORMATS),
+    type=OutputFile(*FORMATS, or_standard_output=True),
     required=True,
-    help=f"The file to write: {listed(FORMATS)}.",
+    help=f"The file to write: {listed(FORMATS)}; - prints a table as CSV.",
 )
 @click.option(
     "--columns",
@@ -92,18 +92,28 @@ def _between(run: Run, start: str | None, stop: str | None) -> Run:
     "--start", metavar="VALUE", help="First sample: time [s], or driver value of solve --angle, such as 30deg."
 )
 @click.option("--stop", metavar="VALUE", help="Last sample: time [s], or driver value of solve --angle, such as 90deg.")
-def export(run: Path, output: Path, columns: str | None, start: str | None, stop: str | None) -> None:
+@click.option("--units", is_flag=True, help="Write units into the first line of a CSV file: coupler.x [m].")
+def export(run: Path, output: Path, columns: str | None, start: str | None, stop: str | None, units: bool) -> None:
     """Write a run as a table, as plots or as an animation.
 
-    RUN is a record (.mcap) of simulate or solve. Tables in Parquet and npz contain the units. Plots (.svg, .png) show
-    coordinates, velocities and accelerations against time, or against the driver of a solve --angle. A .gif shows the
-    moving linkage.
+    RUN is a record (.mcap) of simulate or solve. Tables in Parquet and npz contain the units. Plots (.svg, .png, .pdf)
+    show coordinates, velocities and accelerations against time, or against the driver of a solve --angle. A .gif shows
+    the moving linkage.
     """
     from kinfmu.log import read
+    from kinfmu.log.table import csv_lines
 
-    suffix = suffix_of(output)
+    suffix = ".csv" if output == STANDARD_OUTPUT else suffix_of(output)
+    if units and suffix != ".csv":
+        where = "Parquet and npz always hold the units" if suffix in TABLES else "plots show the units at their axes"
+        raise click.UsageError(f"--units: only for .csv, not {suffix}; {where}")
     if columns is not None and suffix in ANIMATIONS:
         valid = listed((*TABLES, *PLOTS))
         raise click.UsageError(f"--columns {columns}: only for tables and plots, {valid}, not {suffix}")
-    _write(_between(read(run), start, stop), output, names_in(columns) or ())
+    part = _between(read(run), start, stop)
+    if output == STANDARD_OUTPUT:
+        for line in csv_lines(part, names_in(columns), units=units):
+            click.echo(line, nl=False)
+        return
+    _write(part, output, names_in(columns) or (), units=units)
     click.echo(f"written: {output}")

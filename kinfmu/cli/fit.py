@@ -16,7 +16,9 @@ from kinfmu.errors import KinfmuError
 @main.command(epilog="Example: kinfmu fit curve.toml -o fitted.toml --figure fitted.svg")
 @click.argument("file", type=InputFile(".toml"), metavar="FILE")
 @click.option("-o", "output", type=OutputFile(".toml"), help="Write the mechanism found: a mechanism file, .toml.")
-@click.option("--figure", "picture", type=OutputFile(*FIGURES), help="Draw what is wanted and reached: .svg or .png.")
+@click.option(
+    "--figure", "picture", type=OutputFile(*FIGURES), help="Draw what is wanted and reached: .svg, .png or .pdf."
+)
 @click.option("--starts", type=click.IntRange(1), default=16, show_default=True, help="Number of whole searches.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the start points.")
 @click.option("--workers", type=click.IntRange(1), help="Number of processes. Default: one for each core.")

@@ -15,7 +15,7 @@ from kinfmu.files.whole_file import suffix_of, write_whole
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SUFFIXES = (".svg", ".png")
+SUFFIXES = (".svg", ".png", ".pdf")
 DOTS_PER_INCH = 150  # of a PNG
 _NEEDS_MATPLOTLIB = "drawing needs matplotlib: pip install 'kinfmu[figures]'"
 
@@ -40,7 +40,7 @@ def check_target(function: str, path: object, ax: object) -> None:
 
 
 def write(paths: Path | tuple[Path, ...], draw: Callable[[], Figure]) -> None:
-    """Write the figure of `draw` into one or several .svg or .png files; equal figures give equal bytes.
+    """Write the figure of `draw` into one or several .svg, .png or .pdf files; equal figures give equal bytes.
 
     FigureError for another suffix or a file that cannot be written, MissingPackageError without matplotlib.
     """
@@ -72,6 +72,7 @@ def figure_style(subject: object) -> Iterator[None]:
         mpl.rcdefaults()
         mpl.rcParams["svg.fonttype"] = "none"  # text as text
         mpl.rcParams["svg.hashsalt"] = "kinfmu"  # the same identifiers every time
+        mpl.rcParams["pdf.fonttype"] = 42  # letters as outlines that programs can edit and search
         mpl.rcParams["font.family"] = ["DejaVu Sans"]  # comes with matplotlib
         yield
 
@@ -95,6 +96,8 @@ def _image(figure: Figure, suffix: str) -> bytes:
     file = io.BytesIO()
     if suffix == ".svg":
         figure.savefig(file, format="svg", metadata={"Date": None})
+    elif suffix == ".pdf":
+        figure.savefig(file, format="pdf", metadata={"CreationDate": None})
     else:
         figure.savefig(file, format="png", dpi=DOTS_PER_INCH)
     return file.getvalue()

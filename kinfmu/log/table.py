@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from kinfmu.run.run import arrow_table
 ROWS = 4096  # of a CSV file converted at once: Python's numbers take four times the memory
 
 
-def write_table(run: Run, path: str | Path, columns: Sequence[str] | None = None) -> None:
+def write_table(run: Run, path: str | Path, columns: Sequence[str] | None = None, *, units: bool = False) -> None:
     """Write columns of `run` to a .csv, .parquet or .npz file, in the run's order.
 
     CSV: one line of names, then one line per sample, as `pandas.read_csv(path)` reads it; samples without numbers are
@@ -30,6 +31,7 @@ def write_table(run: Run, path: str | Path, columns: Sequence[str] | None = None
         path: The file; its suffix chooses the format.
         columns: Names such as 'coupler.x', 'coupler.*', 'q' or '-error', see kinfmu.run.channels; time and status are
             always written. Default: all columns.
+        units: True: names in the first line of a CSV file have their units, such as 'coupler.x [m]'.
 
     Raises:
         RequestError: The run has no column of that name.
@@ -37,7 +39,7 @@ def write_table(run: Run, path: str | Path, columns: Sequence[str] | None = None
         MissingPackageError: Parquet without pyarrow.
 
     """
-    writers = {".csv": _write_csv, ".parquet": _write_parquet, ".npz": _write_npz}
+    writers = {".csv": partial(_write_csv, units=units), ".parquet": _write_parquet, ".npz": _write_npz}
     suffix = suffix_of(path)
     if suffix not in writers:
         raise LogError(f"{path}: '{suffix}' is not a known format of tables; known: {listed(writers)}")
@@ -51,14 +53,20 @@ def _columns(run: Run) -> list[Column]:
     return [column._replace(values=column.values + 0) for column in run.columns()]
 
 
-def _write_csv(run: Run, path: Path) -> None:
-    columns = _columns(run)
+def csv_lines(run: Run, columns: Sequence[str] | None = None, *, units: bool = False) -> Iterator[str]:
+    """Yield the lines of a CSV table, each with its end; arguments and errors as in `write_table`."""
+    chosen = _columns(run if columns is None else select(run, columns))
+    names = [f"{column.name} [{column.unit}]" if units else column.name for column in chosen]
+    yield ",".join(map(_quoted, names)) + "\n"
+    for start in range(0, len(run), ROWS):
+        block = (column.values[start : start + ROWS].tolist() for column in chosen)
+        for row in zip(*block, strict=True):
+            yield ",".join(map(repr, row)) + "\n"  # repr: shortest text of the same bits
+
+
+def _write_csv(run: Run, path: Path, *, units: bool) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
-        file.write(",".join(_quoted(column.name) for column in columns) + "\n")
-        for start in range(0, len(run), ROWS):
-            block = (column.values[start : start + ROWS].tolist() for column in columns)
-            rows = zip(*block, strict=True)
-            file.writelines(",".join(map(repr, row)) + "\n" for row in rows)  # repr: shortest text of the same bits
+        file.writelines(csv_lines(run, units=units))
 
 
 def _quoted(name: str) -> str:

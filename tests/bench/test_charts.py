@@ -91,8 +91,10 @@ def test_equal_numbers_give_equal_bytes_in_both_formats(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_written_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(FigureError, match=r"chart\.pdf: '\.pdf' is not a known format of figures; known: \.svg, \.png"):
-        write((tmp_path / "chart.svg", tmp_path / "chart.pdf"), lambda: near_singular(NEAR))
+    with pytest.raises(
+        FigureError, match=r"chart\.eps: '\.eps' is not a known format of figures; known: \.svg, \.png, \.pdf"
+    ):
+        write((tmp_path / "chart.svg", tmp_path / "chart.eps"), lambda: near_singular(NEAR))
     with pytest.raises(FigureError, match=r"cannot be written \(No such file or directory\)"):
         draw(tmp_path / "nowhere", MEASURED, NEAR)
     monkeypatch.setitem(sys.modules, "matplotlib", None)

@@ -36,7 +36,7 @@ WRONG_USAGE = [
     ("check contradictin.toml", "did you mean 'contradicting.toml'?"),
     ("check folder.toml", "folder.toml: is a folder"),
     ("check fourbar_chain:0", "the count must be a whole number from 1 to"),
-    ("check fourbar --figure four.gif", "four.gif: its name must end in one of .svg, .png"),
+    ("check fourbar --figure four.gif", "four.gif: its name must end in one of .svg, .png, .pdf"),
     ("check fourbar --figure none/four.svg", "none/four.svg: there is no folder 'none'"),
     ("check fourbar --set a=1", "there is no parameter 'a'"),
     ("check fourbar --set crank.speed=1mm", "unit 'mm' must be one of rad/s"),

@@ -108,7 +108,7 @@ def test_a_column_that_is_not_there_is_reported(record: Path, refuses: Callable[
     assert message.startswith(expected)
     assert not (tmp_path / "run.csv").exists()
     message = refuses("export", record, "-o", "run.gif", "--columns", "coupler.x")
-    assert message == "--columns coupler.x: only for tables and plots, .csv, .parquet, .npz, .svg, .png, not .gif"
+    assert message == "--columns coupler.x: only for tables and plots, .csv, .parquet, .npz, .svg, .png, .pdf, not .gif"
     message = refuses("export", record, "-o", "run.svg", "--columns", "cupler.x")
     expected = "the run has no coordinate 'cupler.x'; did you mean 'coupler.x'?; coordinates: crank.phi, "
     assert message.startswith(expected)
@@ -126,3 +126,16 @@ def test_a_part_of_a_run_is_exported(
     assert "no samples up to -1 s; its" in refuses("export", record, "-o", "run.csv", "--stop", "-1")
     message = refuses("export", record, "-o", "run.csv", "--start", "0.2", "--stop", "0.4")
     assert "no samples from 0.2 to 0.4 s; its" in message
+
+
+def test_a_table_is_printed_and_its_names_have_units(
+    record: Path, command: Command, refuses: Callable[..., str]
+) -> None:
+    assert command("export", record, "-o", "run.csv", "--columns", "coupler.v*", "--units").exit_code == 0
+    written = Path("run.csv").read_text(encoding="utf-8")
+    assert written.splitlines()[0] == "time [s],coupler.vx [m/s],coupler.vy [m/s],solver.status [1]"
+    printed = command("export", record, "-o", "-", "--columns", "coupler.v*", "--units")
+    assert (printed.exit_code, printed.stdout, printed.stderr) == (0, written, "")
+    message = refuses("export", record, "-o", "run.npz", "--units")
+    assert message == "--units: only for .csv, not .npz; Parquet and npz always hold the units"
+    assert "channel 'cupler.x' is not known" in refuses("export", record, "-o", "-", "--columns", "cupler.x")

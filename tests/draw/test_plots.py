@@ -49,9 +49,9 @@ def test_all_generalized_coordinates_are_plotted_if_none_are_named(run: Run, tmp
 
 
 def test_the_same_run_gives_the_same_bytes(run: Run, tmp_path: Path) -> None:
-    for name in ("a.svg", "b.svg", "a.png", "b.png"):
+    for name in ("a.svg", "b.svg", "a.png", "b.png", "a.pdf", "b.pdf"):
         plot(run, tmp_path / name, ["A.x"])
-    for suffix in ("svg", "png"):
+    for suffix in ("svg", "png", "pdf"):
         assert (tmp_path / f"a.{suffix}").read_bytes() == (tmp_path / f"b.{suffix}").read_bytes()
 
 
@@ -103,7 +103,9 @@ def test_a_column_that_was_not_kept_is_an_empty_panel_with_a_note(run: Run) -> N
 def test_what_cannot_be_plotted_is_reported(run: Run, tmp_path: Path) -> None:
     with pytest.raises(RequestError, match=r"the run has no coordinate 'cupler\.x'; did you mean 'coupler\.x'\?"):
         plot(run, tmp_path / "run.svg", ["cupler.x"])
-    with pytest.raises(FigureError, match=r"run\.jpg: '\.jpg' is not a known format of figures; known: \.svg, \.png"):
+    with pytest.raises(
+        FigureError, match=r"run\.jpg: '\.jpg' is not a known format of figures; known: \.svg, \.png, \.pdf"
+    ):
         plot(run, tmp_path / "run.jpg")
     names = tuple(CoordinateName(f"body{k}", "x") for k in range(31))
     table = np.zeros((181, 31))
