@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -23,7 +23,7 @@ TABLES, PLOTS, ANIMATIONS = (".csv", ".parquet", ".npz"), (".svg", ".png", ".pdf
 FORMATS = (*TABLES, *PLOTS, *ANIMATIONS)
 
 
-def _write(run: Run, path: Path, columns: Sequence[str], *, units: bool) -> None:
+def _write(run: Run, path: Path, columns: Sequence[str], *, units: bool, **how: Any) -> None:
     """Write a run in the format of the path's suffix."""
     if suffix_of(path) in TABLES:
         from kinfmu.log import write_table
@@ -32,7 +32,7 @@ def _write(run: Run, path: Path, columns: Sequence[str], *, units: bool) -> None
     elif suffix_of(path) in PLOTS:
         from kinfmu.draw import plot
 
-        plot(run, path, columns)
+        plot(run, path, columns, **how)
     else:
         from kinfmu.draw import animate
 
@@ -75,6 +75,7 @@ def _between(run: Run, start: str | None, stop: str | None) -> Run:
 
 @main.command(epilog="Example: kinfmu export logs/fourbar.mcap -o fourbar.svg --columns coupler.x,rocker.phi")
 @click.argument("run", type=InputFile(".mcap"))
+@click.argument("other", required=False, type=InputFile(".mcap"))
 @click.option(
     "-o",
     "output",
@@ -85,19 +86,41 @@ def _between(run: Run, start: str | None, stop: str | None) -> Run:
 @click.option(
     "--columns",
     metavar="NAMES",
-    help="Columns of a table or coordinates of a plot, with the names of simulate --channels: coupler.x, coupler.*, q, "
-    "-error. A table always contains time and status. Default: all columns; for plots, all of q.",
+    help="Columns of a table or a plot, with the names of simulate --channels: coupler.x, 'coupler.*', q, crank_angle, "
+    "solver.margin, -error. A table always contains time and status. Default: all columns; for plots, all of q.",
 )
+@click.option(
+    "--x",
+    "across",
+    metavar="NAMES",
+    help="The column along the horizontal axis of a plot, or one for each column: --x P.x,Q.x --columns P.y,Q.y.",
+)
+@click.option("--overlay", is_flag=True, help="Plot columns of one unit in one panel: --columns left.phi,right.phi.")
+@click.option("--polar", is_flag=True, help="Plot over the polar angle: the driver's, or that of --x.")
+@click.option("--degrees", is_flag=True, help="Plot angles in deg. Driver values and angles of --x always are.")
 @click.option(
     "--start", metavar="VALUE", help="First sample: time [s], or driver value of solve --angle, such as 30deg."
 )
 @click.option("--stop", metavar="VALUE", help="Last sample: time [s], or driver value of solve --angle, such as 90deg.")
 @click.option("--units", is_flag=True, help="Write units into the first line of a CSV file: coupler.x [m].")
-def export(run: Path, output: Path, columns: str | None, start: str | None, stop: str | None, units: bool) -> None:
+def export(
+    run: Path,
+    other: Path | None,
+    output: Path,
+    columns: str | None,
+    across: str | None,
+    overlay: bool,
+    polar: bool,
+    degrees: bool,
+    start: str | None,
+    stop: str | None,
+    units: bool,
+) -> None:
     """Write a run as a table, as plots or as an animation.
 
     RUN is a record (.mcap) of simulate or solve. Tables in Parquet and npz contain the units. Plots (.svg, .png, .pdf)
-    show coordinates, velocities and accelerations against time, or against the driver of a solve --angle. A .gif shows
+    show coordinates, velocities and accelerations against time, or against the driver of a solve --angle. With --x,
+    --overlay or --polar, exactly the named columns are curves. OTHER is a second run for the same plot. A .gif shows
     the moving linkage.
     """
     from kinfmu.log import read
@@ -107,6 +130,10 @@ def export(run: Path, output: Path, columns: str | None, start: str | None, stop
     if units and suffix != ".csv":
         where = "Parquet and npz always hold the units" if suffix in TABLES else "plots show the units at their axes"
         raise click.UsageError(f"--units: only for .csv, not {suffix}; {where}")
+    plot_only = {"--x": across, "--overlay": overlay, "--polar": polar, "--degrees": degrees, "a second run": other}
+    given = [name for name, value in plot_only.items() if value]
+    if given and suffix not in PLOTS:
+        raise click.UsageError(f"{listed(given)}: only for plots, {listed(PLOTS)}, not {suffix}")
     if columns is not None and suffix in ANIMATIONS:
         valid = listed((*TABLES, *PLOTS))
         raise click.UsageError(f"--columns {columns}: only for tables and plots, {valid}, not {suffix}")
@@ -115,5 +142,8 @@ def export(run: Path, output: Path, columns: str | None, start: str | None, stop
         for line in csv_lines(part, names_in(columns), units=units):
             click.echo(line, nl=False)
         return
-    _write(part, output, names_in(columns) or (), units=units)
+    how: dict[str, Any] = {"x": names_in(across) or (), "overlaid": overlay, "polar": polar, "degrees": degrees}
+    if other is not None:
+        how |= {"other": _between(read(other), start, stop), "names": (run.stem, other.stem)}
+    _write(part, output, names_in(columns) or (), units=units, **how)
     click.echo(f"written: {output}")

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from kinfmu.draw.sheet import FONT, GREY, INK, ink
+from kinfmu.run import FloatArray
 from kinfmu.scene.palette import Colour
 
 if TYPE_CHECKING:
@@ -34,6 +37,16 @@ def dress(axes: Axes, title: str) -> None:
     axes.grid(visible=True, which="major", linewidth=0.5, color=ink(LIGHT))
     axes.set_axisbelow(True)
     axes.set_title(title, fontsize=FONT + 1.0, loc="left", color=ink(INK), parse_math=False)
+
+
+def powers_of_ten(axes: Axes, values: FloatArray) -> None:
+    """Give axes a vertical scale of whole powers of ten around positive values."""
+    known = values[np.isfinite(values)]
+    axes.set_yscale("log")
+    if len(known):
+        low, high = np.floor(np.log10(known.min())), np.ceil(np.log10(known.max()))
+        axes.set_ylim(10.0**low, 10.0 ** max(high, low + 1.0))
+    axes.yaxis.set_minor_formatter(lambda *_: "")
 
 
 def named(axes: Axes, at: tuple[float, float], text: str, colour: Colour, **where: Any) -> None:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.draw.abscissa import abscissa, degrees_of, raised
 from kinfmu.draw.sheet import ink
 from kinfmu.errors import FigureError, RequestError, suggestion
 from kinfmu.run import FloatArray, Run
-from kinfmu.run.axis import axis_of
 from kinfmu.scene import palette
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ LOST: palette.Colour = (246, 222, 222)
 _BINS = 1500  # of a long run; each shows its least and its greatest value
 
 
-def curves(axes: Axes, run: Run, columns: Sequence[str] = ()) -> Axes:
+def curves(axes: Axes, run: Run, columns: Sequence[str] = (), x: str = "", *, degrees: bool = False) -> Axes:
     """Draw columns of a run into `axes` and return it; arguments and errors as in `plot` with `ax`."""
     names = _columns(run, columns)
     units = {place.name: place.unit for place in run.places()}
@@ -35,19 +35,20 @@ def curves(axes: Axes, run: Run, columns: Sequence[str] = ()) -> Axes:
             )
     if not len(run) or not names:
         raise FigureError(f"the run has no {'samples' if names else 'coordinates'} to plot")
-    axis = axis_of(run)
+    across = abscissa(run, x)
+    shown, factor = degrees_of(units[names[0]]) if degrees else (units[names[0]], 1.0)
     for name in names:
-        values = np.where(run.good, np.asarray(run[name], dtype=float), np.nan)
-        rows = rows_of(values)
+        values = np.where(run.good, np.asarray(run[name], dtype=float), np.nan) * factor
+        rows = np.union1d(rows_of(values), rows_of(across.values))
         is_curve = np.isfinite(values).sum() > 1
-        axes.plot(axis.values[rows], values[rows], marker="" if is_curve else "o", label=name)
-    axes.set_xlabel(axis.label)
-    unit = units[names[0]].replace("2", "\N{SUPERSCRIPT TWO}")
+        axes.plot(across.values[rows], values[rows], marker="" if is_curve else "o", label=name)
+    axes.set_xlabel(across.label)
+    unit = raised(shown)
     label = f"{names[0]} [{unit}]" if len(names) == 1 else f"[{unit}]"
     axes.set_ylabel(label if axes.get_ylabel() in ("", label) else f"[{unit}]")
     if len(axes.lines) > 1:
         axes.legend()
-    for first, last in gaps(run, axis.values):
+    for first, last in gaps(run, across.values) if across.is_axis else ():
         axes.axvspan(first, last, color=ink(LOST), linewidth=0.0, zorder=0.0)
     return axes
 

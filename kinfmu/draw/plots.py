@@ -8,16 +8,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 
-from kinfmu.draw.chart import SMALL, dress
+from kinfmu.draw.abscissa import TICK_STEPS, degrees_of, labelled
+from kinfmu.draw.chart import SMALL, dress, powers_of_ten
 from kinfmu.draw.curves import LOST, curves, gaps, rows_of
+from kinfmu.draw.overlay import LEAST, check_comparable, is_logarithmic, overlay, overlay_sheet, sheet_title, values_of
 from kinfmu.draw.sheet import FONT, GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
 from kinfmu.draw.writing import check_suffix, check_target, write
 from kinfmu.errors import FigureError, RequestError
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import ROUND_OFF, Axis, axis_of, shown_range
-from kinfmu.run.channels import coordinates, forces
+from kinfmu.run.channels import chosen_columns, coordinates, forces
 from kinfmu.scene import palette
-from kinfmu.units import CoordinateName, ForceName, SignalName, unit_of
+from kinfmu.units import CoordinateName, ForceName, InputName, SignalName, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,65 +32,117 @@ _WIDTH, _HEIGHT = 244.0, 96.0  # [pt], of a panel with its margins
 _LEFT, _RIGHT, _TOP, _BOTTOM = 56.0, 22.0, 44.0, 34.0  # [pt] around all panels; the last tick has half its number there
 _BETWEEN, _GAP, _BLOCK_GAP = 62.0, 14.0, 52.0  # [pt] between coordinates, their panels, and rows of coordinates
 _EDGE = 8.0  # [pt] around the title
+_DIAGNOSTICS = ("solver.", "watch.")
 _FORCES: palette.Colour = (185, 28, 28)  # that of driving arrows in drawings
 _LABEL = 40.0  # [pt] from an axis to its name
 
 
 @overload
-def plot(run: Run, path: str | Path, columns: Sequence[str] = (), *, ax: None = None) -> None: ...
+def plot(
+    run: Run,
+    path: str | Path,
+    columns: Sequence[str] = (),
+    *,
+    ax: None = None,
+    x: str | Sequence[str] = (),
+    overlaid: bool = False,
+    polar: bool = False,
+    degrees: bool = False,
+    other: Run | None = None,
+    names: tuple[str, str] = ("A", "B"),
+) -> None: ...
 
 
 @overload
-def plot(run: Run, path: None = None, columns: Sequence[str] = (), *, ax: Axes) -> Axes: ...
+def plot(
+    run: Run,
+    path: None = None,
+    columns: Sequence[str] = (),
+    *,
+    ax: Axes,
+    x: str | Sequence[str] = (),
+    degrees: bool = False,
+) -> Axes: ...
 
 
 def plot(
-    run: Run, path: str | Path | None = None, columns: Sequence[str] = (), *, ax: Axes | None = None
+    run: Run,
+    path: str | Path | None = None,
+    columns: Sequence[str] = (),
+    *,
+    ax: Axes | None = None,
+    x: str | Sequence[str] = (),
+    overlaid: bool = False,
+    polar: bool = False,
+    degrees: bool = False,
+    other: Run | None = None,
+    names: tuple[str, str] = ("A", "B"),
 ) -> Axes | None:
-    """Draw `run` over its axis, usually time: coordinates into a .svg or .png file, or columns into Axes of matplotlib.
+    """Draw `run` over its axis, usually time, or over any column, into a file or into Axes of matplotlib.
 
     In a file, each coordinate has three panels: position, velocity and acceleration, in rad and the mechanism's unit of
-    length. With masses or loads, efforts and energies have a panel each, and so have reactions that are named, in SI
-    units. Samples without numbers are gaps on a tinted background; a panel of a column that was not kept has the text
-    "not kept". The same run gives the same bytes. Into Axes, each column is a curve with its name as the label, in your
-    settings of matplotlib; several calls draw several runs into the same Axes.
+    length; so has each driver whose inputs are named. Diagnostics that are named have a panel each; residuals, margin
+    and errors on a scale of powers of ten. With masses or loads, efforts and energies have a panel each, and so have
+    reactions that are named, in SI units. Samples without numbers are gaps on a tinted background; a panel of a column
+    that was not kept has the text "not kept". The same run gives the same bytes. Into Axes, each column is a curve with
+    its name as the label, in your settings of matplotlib; several calls draw several runs into the same Axes.
+
+    With `x`, `overlaid` or `polar` the named columns themselves are the curves, those of one unit in one panel. Angles
+    along the horizontal axis are in degrees. Positions over positions, such as coupler curves, have equal scales.
 
     Args:
         run: The run.
-        path: The .svg or .png file.
+        path: The .svg, .png or .pdf file.
         columns: Of a file: names such as 'coupler.x', 'coupler.*', 'q', '-crank.phi' or 'reactions', as in tables.
             Default: all generalized coordinates, efforts and energies. With `ax`: columns of one unit, such as
             'coupler.vx', with * for any letters. Default: all generalized coordinates, if they have one unit.
         ax: Axes to draw into, in place of a file.
+        x: The column along the horizontal axis, or one for each curve. Default: time, or the driver's value.
+        overlaid: True: curves of one unit in one panel.
+        polar: True: the horizontal axis, an angle, is the polar angle.
+        degrees: True: angles in deg, and angular rates in deg/s and deg/s2.
+        other: A second run, drawn narrow over the first one, which is wide.
+        names: Of the two runs, for the title.
 
     Returns:
         `ax`; None for a file.
 
     Raises:
-        RequestError: A name is not a coordinate or a force or, with `ax`, not a column.
-        FigureError: There are more than MOST_COORDINATES coordinates, the run has no samples, the suffix is unknown, or
-            the file cannot be written; neither or both of `path` and `ax` are given; curves for `ax` have two units.
+        RequestError: A name is not a column, or chooses nothing that moves.
+        KinfmuError: A run does not hold a column.
+        FigureError: There are too many curves for one sheet, the run has no samples, the suffix is unknown, or the file
+            cannot be written; neither or both of `path` and `ax` are given; curves for `ax` have two units; a polar
+            plot has no angle; the two runs have different units or axes.
         MissingPackageError: matplotlib is not installed.
 
     """
     check_target("plot", path, ax)
+    xs = (x,) if isinstance(x, str) else tuple(x)
     if ax is not None:
-        return curves(ax, run, columns)
+        if overlaid or polar or other is not None or len(xs) > 1:
+            raise FigureError("overlaid, polar, other and several x are for files; call plot again to add curves to ax")
+        return curves(ax, run, columns, *xs, degrees=degrees)
     path = Path(str(path))
     check_suffix(path)
-    stacks = _chosen(run, columns, path)
-    write(path, lambda: _sheet(run, stacks))
+    runs = (run,) if other is None else (run, other)
+    check_comparable(runs)
+    if xs or overlaid or polar:
+        shown = overlay(runs, names, columns, xs, degrees=degrees, polar=polar)
+        write(path, lambda: overlay_sheet(shown))
+    else:
+        stacks = _chosen(run, columns, path)
+        write(path, lambda: _sheet(runs, stacks, names, degrees=degrees))
     return None
 
 
 class Panel(NamedTuple):
-    """A panel: a column, its name on the axis, its unit, order of derivative, and the coordinate, force or signal."""
+    """A panel: a column, its name on the axis, its unit, order of derivative, and the coordinate, force, ... it is."""
 
     column: str
     label: str
     unit: str
     order: int
-    name: CoordinateName | ForceName | SignalName
+    name: CoordinateName | ForceName | SignalName | InputName | str  # a diagnostic is only a str
 
 
 class Stack(NamedTuple):
@@ -100,6 +154,15 @@ class Stack(NamedTuple):
 
 def stacks_of(run: Run, columns: Sequence[str]) -> list[Stack]:
     """Return what to plot: a stack for each coordinate, and for the forces of each driver or joint."""
+    others = _inputs_and_diagnostics(run, columns)
+    if others:
+        columns = [name for name in columns if not _only_chooses(run, name, others)]
+    found = _of_coordinates_and_forces(run, columns) if columns or not others else []
+    return found + _of_others(run, others)
+
+
+def _of_coordinates_and_forces(run: Run, columns: Sequence[str]) -> list[Stack]:
+    """Return the stacks of coordinates, forces and signals."""
     chosen = forces(run, columns)
     names = list(columns)
     if chosen and not any(name.startswith("-") for name in names):
@@ -122,6 +185,46 @@ def stacks_of(run: Run, columns: Sequence[str]) -> list[Stack]:
         panels = [_of_force(name, run.length_unit) for name in own]
         title = owner or ("signals" if isinstance(own[0], SignalName) else "energy")
         found += [Stack(title, tuple(panels[k : k + _PANELS])) for k in range(0, len(panels), _PANELS)]
+    return found
+
+
+def _inputs_and_diagnostics(run: Run, columns: Sequence[str]) -> list[str]:
+    """Return the inputs and diagnostics that names choose; none if the first name begins with a minus."""
+    if not columns or columns[0].startswith("-"):
+        return []
+    known = {*run.input_names, *(place.name for place in run.places(kept=False) if place.name.startswith(_DIAGNOSTICS))}
+    chosen: list[str] = []
+    for name in columns:
+        try:
+            found = set(chosen_columns(run, [name]))
+        except RequestError:
+            continue  # reported with the coordinates
+        chosen += [column for column in chosen_columns(run, [name]) if column in found & known and name != "all"]
+    return list(dict.fromkeys(chosen))
+
+
+def _only_chooses(run: Run, name: str, others: Sequence[str]) -> bool:
+    """Return True if all columns that a name chooses are among others."""
+    try:
+        return set(chosen_columns(run, [name])) <= {*others}
+    except RequestError:
+        return False
+
+
+def _of_others(run: Run, columns: Sequence[str]) -> list[Stack]:
+    """Return a stack for each driver whose inputs are chosen, and stacks of diagnostics."""
+    found = []
+    units = {place.name: place.unit for place in run.places(kept=False)}
+    inputs = [name for name in run.input_names if name in columns]
+    for driver in dict.fromkeys(name.driver for name in inputs):
+        own = [name for name in inputs if name.driver == driver]
+        label = {name: name.removeprefix(f"{driver}_") for name in own}
+        panels = [Panel(name, label[name], units[name], name.quantity.order, name) for name in own]
+        found.append(Stack(driver, tuple(panels)))
+    for owner in ("solver", "watch"):
+        of_owner = [column for column in columns if column.startswith(f"{owner}.")]
+        panels = [Panel(column, column.removeprefix(f"{owner}."), units[column], 0, column) for column in of_owner]
+        found += [Stack(owner, tuple(panels[k : k + _PANELS])) for k in range(0, len(panels), _PANELS)]
     return found
 
 
@@ -156,15 +259,17 @@ def _chosen(run: Run, columns: Sequence[str], path: Path) -> list[Stack]:
     return stacks
 
 
-def _sheet(run: Run, stacks: Sequence[Stack]) -> Figure:
+def _sheet(
+    runs: Sequence[Run], stacks: Sequence[Stack], names: tuple[str, str] = ("A", "B"), *, degrees: bool = False
+) -> Figure:
     from matplotlib.figure import Figure
 
-    axis = axis_of(run)
+    axis = axis_of(runs[0])
     abreast = min(len(stacks), _ABREAST)
     rows = [stacks[k : k + _ABREAST] for k in range(0, len(stacks), _ABREAST)]
     blocks = [max(len(stack.panels) for stack in row) * _HEIGHT + _BLOCK_GAP for row in rows]
     width = _LEFT + abreast * _WIDTH - _BETWEEN + _RIGHT
-    title = title_lines(run.info.get("title") or run.info.get("name") or "", width - 2.0 * _EDGE)
+    title = title_lines(sheet_title(runs, names), width - 2.0 * _EDGE)
     above = _TOP + max(len(title) - 1, 0) * TITLE_LINE
     height = above + sum(blocks) - _BLOCK_GAP - _GAP + _BOTTOM
     made = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
@@ -179,7 +284,7 @@ def _sheet(run: Run, stacks: Sequence[Stack]) -> Figure:
             size = ((_WIDTH - _BETWEEN) / width, (_HEIGHT - _GAP) / height)
             axes = made.add_axes((left / width, (top - _HEIGHT + _GAP) / height, *size))
             panels.append(axes)
-            _panel(axes, run, axis, panel)
+            _panel(axes, runs, panel, degrees=degrees)
         for axes in panels[:-1]:
             axes.tick_params(labelbottom=False)
         panels[0].set_title(stack.title, fontsize=FONT + 1.0, loc="left", color=ink(INK), parse_math=False)
@@ -189,36 +294,47 @@ def _sheet(run: Run, stacks: Sequence[Stack]) -> Figure:
     return made
 
 
-def _panel(axes: Axes, run: Run, axis: Axis, panel: Panel) -> None:
-    """Draw one curve over the whole run."""
-    is_kept = panel.column not in run.absent
-    values = np.full(len(run), np.nan)
-    if is_kept:
-        values = np.where(run.good, np.asarray(run[panel.column], dtype=float), np.nan)
-    known = values[np.isfinite(values)]
-    rows = rows_of(values)
-    is_force = not isinstance(panel.name, CoordinateName)
-    colour = ink(_FORCES if is_force else (palette.BODIES[5], palette.BODIES[2], palette.BODIES[4])[panel.order])
-    look: dict[str, Any] = {"color": colour, "linewidth": 1.2, "solid_joinstyle": "round"}
-    if len(known) < 2:
-        look |= {"marker": "o", "markersize": 3.0}
-    axes.plot(axis.values[rows], values[rows], **look)
+def _panel(axes: Axes, runs: Sequence[Run], panel: Panel, *, degrees: bool) -> None:
+    """Draw one curve over each whole run."""
+    is_force = isinstance(panel.name, (ForceName, SignalName))
+    is_log = is_logarithmic(panel.column)
+    unit, factor = degrees_of(panel.unit) if degrees else (panel.unit, 1.0)
+    colour = _FORCES if is_force else (palette.BODIES[5], palette.BODIES[2], palette.BODIES[4])[panel.order]
+    everything = []
+    for number, run in enumerate(runs):
+        is_wide = number + 1 < len(runs)
+        values = np.full(len(run), np.nan)
+        if panel.column not in run.absent:
+            values = values_of(run, panel.column)
+        everything.append(values[np.isfinite(values)])
+        shown = np.maximum(np.abs(values), LEAST) if is_log else values * factor
+        rows = rows_of(values)
+        look: dict[str, Any] = {"color": ink(palette.lighter(colour) if is_wide else colour)}
+        look |= {"linewidth": 3.6 if is_wide else 1.2, "solid_joinstyle": "round"}
+        if len(everything[-1]) < 2:
+            look |= {"marker": "o", "markersize": 3.0}
+        axes.plot(axis_of(run).values[rows], shown[rows], **look)
     dress(axes, "")
-    axes.set_xlim(*_span(axis.values))
-    shown = _shown(run, axis, panel, known)
-    if shown:
-        axes.set_ylim(*shown)
-    axes.locator_params(axis="y", nbins=4)
-    axes.yaxis.set_major_formatter(lambda value, _: f"{value:.4g}".replace("-", "\N{MINUS SIGN}"))
-    unit = panel.unit.replace("2", "\N{SUPERSCRIPT TWO}")
-    axes.set_ylabel(
-        panel.label if unit == "1" else f"{panel.label} [{unit}]", fontsize=SMALL, color=ink(GREY), labelpad=3.0
-    )
+    run, axis, known = runs[0], axis_of(runs[0]), np.concatenate(everything)
+    axes.set_xlim(*_span(np.concatenate([axis_of(one).values for one in runs])))
+    if axis.unit == "deg":
+        axes.locator_params(axis="x", nbins=6, steps=TICK_STEPS)
+    if is_log:
+        powers_of_ten(axes, np.maximum(np.abs(known), LEAST))
+    else:
+        limits = _shown(run, axis, panel, known)
+        if limits:
+            axes.set_ylim(limits[0] * factor, limits[1] * factor)
+        axes.locator_params(axis="y", nbins=4)
+        axes.yaxis.set_major_formatter(lambda value, _: f"{value:.4g}".replace("-", "\N{MINUS SIGN}"))
+    axes.set_ylabel(labelled(panel.label, unit), fontsize=SMALL, color=ink(GREY), labelpad=3.0)
+    is_kept = all(panel.column not in one.absent for one in runs)
     if not is_kept or (is_force and not len(known)):
         words = "not determined" if is_kept else "not kept"
         axes.text(0.5, 0.5, words, fontsize=SMALL, ha="center", transform=axes.transAxes, color=ink(GREY))
-    for first, last in gaps(run, axis.values):
-        axes.axvspan(first, last, color=ink(LOST), linewidth=0.0, zorder=0.0)
+    for one in runs:
+        for first, last in gaps(one, axis_of(one).values):
+            axes.axvspan(first, last, color=ink(LOST), linewidth=0.0, zorder=0.0)
 
 
 def _shown(run: Run, axis: Axis, panel: Panel, known: FloatArray) -> tuple[float, float] | None:
@@ -236,7 +352,7 @@ def _shown(run: Run, axis: Axis, panel: Panel, known: FloatArray) -> tuple[float
 def _usual(run: Run, axis: Axis, panel: Panel) -> float:
     """Return the size of what is like a curve: positions with their derivatives, or efforts of the same quantity."""
     name = panel.name
-    if isinstance(name, SignalName):
+    if not isinstance(name, (CoordinateName, ForceName)):
         return float(np.max(np.abs(run[name]), initial=0.0, where=np.isfinite(run[name])))
     if isinstance(name, ForceName):
         tables = ((run.force_names, run.forces), (run.reaction_names, run.reactions))

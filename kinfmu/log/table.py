@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -39,7 +39,11 @@ def write_table(run: Run, path: str | Path, columns: Sequence[str] | None = None
         MissingPackageError: Parquet without pyarrow.
 
     """
-    writers = {".csv": partial(_write_csv, units=units), ".parquet": _write_parquet, ".npz": _write_npz}
+    writers: dict[str, Callable[[Run, Path], None]] = {
+        ".csv": partial(_write_csv, units=units),
+        ".parquet": _write_parquet,
+        ".npz": _write_npz,
+    }
     suffix = suffix_of(path)
     if suffix not in writers:
         raise LogError(f"{path}: '{suffix}' is not a known format of tables; known: {listed(writers)}")

@@ -104,6 +104,35 @@ def select(run: Run, channels: Sequence[str] | None = None, rate: float | None =
     return part.without(absent_columns(run, channels))
 
 
+def chosen_columns(run: Run, names: Sequence[str]) -> tuple[str, ...]:
+    """Return the columns that `names` choose, in the order named; constants by their own names.
+
+    Args:
+        run: The run.
+        names: As in `absent_columns`; columns that were not kept too.
+
+    Returns:
+        Names of the columns.
+
+    Raises:
+        RequestError: A name is unknown.
+
+    """
+    groups = _groups(run)
+    columns = [place.name for place in run.places(kept=False)]
+    constants = {name.derivative(order) for name in run.fixed for order in range(3)}
+    usual = [name for name in columns if name not in ("time", *ALWAYS)]
+    kept = dict.fromkeys(usual if names and names[0].startswith("-") else ())
+    for name in names:
+        bare = name.removeprefix("-")
+        found = {bare} if bare in constants else _chosen(bare, groups, columns)
+        if name.startswith("-"):
+            kept = {column: None for column in kept if column not in found}
+        else:
+            kept |= dict.fromkeys([column for column in columns if column in found] or sorted(found & constants))
+    return tuple(kept)
+
+
 def coordinates(run: Run, names: Sequence[str]) -> tuple[CoordinateName, ...]:
     """Return the coordinates of which `names` choose a column, in the order named.
 

@@ -139,3 +139,17 @@ def test_a_table_is_printed_and_its_names_have_units(
     message = refuses("export", record, "-o", "run.npz", "--units")
     assert message == "--units: only for .csv, not .npz; Parquet and npz always hold the units"
     assert "channel 'cupler.x' is not known" in refuses("export", record, "-o", "-", "--columns", "cupler.x")
+
+
+def test_a_column_is_plotted_over_another(record: Path, command: Command, refuses: Callable[..., str]) -> None:
+    over = ("--x", "coupler.x", "--columns", "coupler.y")
+    assert command("export", record, record, "-o", "run.svg", *over).exit_code == 0
+    text = Path("run.svg").read_text(encoding="utf-8")
+    assert ">coupler.x [m]<" in text
+    assert "run (wide), run (narrow)<" in text
+    assert command("export", record, "-o", "run.pdf", "--overlay", "--degrees", "--columns", "*.phi").exit_code == 0
+    assert Path("run.pdf").read_bytes().startswith(b"%PDF")
+    message = refuses("export", record, "-o", "run.csv", "--x", "coupler.x", "--polar")
+    assert message == "--x, --polar: only for plots, .svg, .png, .pdf, not .csv"
+    message = refuses("export", record, record, "-o", "run.gif")
+    assert message == "a second run: only for plots, .svg, .png, .pdf, not .gif"

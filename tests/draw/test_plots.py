@@ -28,7 +28,7 @@ def run() -> Run:
 
 
 def test_each_coordinate_is_three_panels_with_its_numbers_and_units(run: Run) -> None:
-    panels = _sheet(run, stacks_of(run, ["coupler.x", "rocker.phi"])).axes
+    panels = _sheet([run], stacks_of(run, ["coupler.x", "rocker.phi"])).axes
     assert [panel.get_ylabel() for panel in panels] == [
         "x [m]",
         "vx [m/s]",
@@ -61,7 +61,7 @@ def test_a_gap_breaks_the_curve_on_a_tinted_ground(run: Run) -> None:
     assert gaps(with_gap(run, 0, 180), run.t) == [(0.0, 180.0)]
     assert gaps(with_gap(with_gap(run, 0, 3), 170, 180), run.t) == [(0.0, 4.0), (169.0, 180.0)]
     assert gaps(run, run.t) == []
-    panel = _sheet(gap, stacks_of(gap, ["coupler.x"])).axes[0]
+    panel = _sheet([gap], stacks_of(gap, ["coupler.x"])).axes[0]
     assert len(panel.patches) == 1
     assert np.flatnonzero(np.isnan(panel.lines[0].get_ydata())).tolist() == list(range(100, 121))
 
@@ -90,13 +90,13 @@ def test_a_long_run_is_drawn_by_its_extremes() -> None:
 def test_one_sample_and_a_constant_coordinate_are_plotted_too(run: Run, tmp_path: Path) -> None:
     plot(fourbar(np.array([60.0])), tmp_path / "one.png", ["coupler.x"])
     plot(with_gap(run, 0, 180), tmp_path / "none.png", ["coupler.x"])
-    panels = _sheet(run, stacks_of(run, ["rocker.x"])).axes
+    panels = _sheet([run], stacks_of(run, ["rocker.x"])).axes
     assert set(panels[0].lines[0].get_ydata()) == {1.0}
     assert set(panels[1].lines[0].get_ydata()) == {0.0}
 
 
 def test_a_column_that_was_not_kept_is_an_empty_panel_with_a_note(run: Run) -> None:
-    panels = _sheet(select(run, ["q"]), stacks_of(select(run, ["q"]), ["coupler.x"])).axes
+    panels = _sheet([select(run, ["q"])], stacks_of(select(run, ["q"]), ["coupler.x"])).axes
     assert [[text.get_text() for text in panel.texts] for panel in panels] == [[], ["not kept"], ["not kept"]]
 
 
@@ -125,7 +125,7 @@ def heavy() -> Run:
 def test_efforts_and_energies_are_panels_with_their_units(heavy: Run) -> None:
     stacks = stacks_of(heavy, ["forces"])
     assert [stack.title for stack in stacks] == ["crank", "crank", "energy"]
-    panels = _sheet(heavy, stacks).axes
+    panels = _sheet([heavy], stacks).axes
     assert [panel.get_ylabel() for panel in panels] == [
         "torque [N m]",
         "power [W]",
@@ -152,5 +152,5 @@ def test_reactions_are_plotted_if_they_are_named(heavy: Run) -> None:
 
 def test_reactions_without_values_say_so() -> None:
     run = kinfmu.solve(loaded("fourbar"), np.arange(5.0))
-    (axes,) = _sheet(run, stacks_of(run, ["AB.force"])).axes
+    (axes,) = _sheet([run], stacks_of(run, ["AB.force"])).axes
     assert [text.get_text() for text in axes.texts] == ["not determined"]

@@ -1,0 +1,288 @@
+"""Overlays: columns of one or two runs over any other column, one panel for each unit; polar plots."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kinfmu.draw.abscissa import TICK_STEPS, Abscissa, abscissa, degrees_of, labelled, unit_in
+from kinfmu.draw.chart import SMALL, dress, powers_of_ten
+from kinfmu.draw.curves import LOST, gaps, rows_of
+from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
+from kinfmu.errors import FigureError
+from kinfmu.run import FloatArray, Run
+from kinfmu.run.axis import ROUND_OFF, axis_of, shown_range
+from kinfmu.run.channels import chosen_columns
+from kinfmu.scene import palette
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MOST_PANELS = 8  # more make a sheet too large to print
+MOST_CURVES = 18  # of a panel: so many colours differ
+_WIDTH, _HEIGHT, _SQUARE = 420.0, 130.0, 330.0  # [pt] of a panel; of one with equal axes, and of a polar one
+_LEFT, _RIGHT, _TOP, _BOTTOM, _GAP = 60.0, 24.0, 34.0, 34.0, 16.0  # [pt] around and between panels
+_LEGEND_LINE, _LEGEND_COLUMNS = 12.0, 3  # [pt]; names in a line of a legend
+_EDGE = 8.0  # [pt] around the title
+_WIDE, _NARROW = 3.6, 1.2  # [pt], curves of the first of two runs and of the second one or of a single one
+LOGARITHMIC = ("solver.residual", "solver.margin", "solver.error_", "watch.")  # columns on a scale of powers of ten
+LEAST = 1e-18  # smallest value on such a scale: zeros have no logarithm
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What an overlay shows.
+
+    runs: one or two; names: of the two runs; columns: of the panels; xs: columns of the horizontal axis, one or one for
+    each column, none for the axis of the run; degrees: angles of columns in degrees; polar: the horizontal axis is the
+    polar angle.
+    """
+
+    runs: tuple[Run, ...]
+    names: tuple[str, str]
+    columns: tuple[str, ...]
+    xs: tuple[str, ...]
+    degrees: bool
+    polar: bool
+
+    def x(self, run: Run, column: str) -> Abscissa:
+        """Return the horizontal axis of a column's curve."""
+        if len(self.xs) <= 1:
+            return abscissa(run, *self.xs)
+        return abscissa(run, self.xs[self.columns.index(column)])
+
+    def unit(self, column: str) -> tuple[str, float]:
+        """Return the unit in which a column is shown, and its factor."""
+        unit = unit_in(self.runs[0], column)
+        return degrees_of(unit) if self.degrees else (unit, 1.0)
+
+    def panels(self) -> list[list[str]]:
+        """Return the columns of each panel: those of one unit and one kind of scale."""
+        found: dict[tuple[str, bool], list[str]] = {}
+        for column in self.columns:
+            found.setdefault((self.unit(column)[0], is_logarithmic(column)), []).append(column)
+        return list(found.values())
+
+
+def is_logarithmic(column: str) -> bool:
+    """Return True for diagnostics that are shown on a scale of powers of ten."""
+    return column.startswith(LOGARITHMIC)
+
+
+def overlay(
+    runs: Sequence[Run], names: tuple[str, str], columns: Sequence[str], xs: Sequence[str], **how: bool
+) -> Shown:
+    """Return what an overlay shows after checking it; arguments and errors as in `plot`."""
+    first = runs[0]
+    chosen = chosen_columns(first, columns) if columns else tuple(first.names or first.outputs)
+    if len(xs) > 1 and len(xs) != len(chosen):
+        raise FigureError(
+            f"x names {len(xs)} columns for {len(chosen)} curves; name one for all curves, or one for each of them"
+        )
+    shown = Shown(tuple(runs), names, chosen, tuple(xs), **how)
+    for run in runs:
+        if not len(run) or not chosen:
+            raise FigureError(f"the run has no {'samples' if chosen else 'columns'} to plot")
+        for column in (*chosen, *xs):
+            run[column]  # reports what the run does not hold
+    if shown.polar:
+        for column in chosen:
+            shown.x(first, column).angles  # noqa: B018  reports axes that are no angles
+    labels = {(shown.x(run, column).unit, shown.x(run, column).is_axis) for run in runs for column in chosen}
+    if len(labels) > 1:
+        units = " and ".join(sorted(unit or "numbers" for unit, _ in labels))
+        raise FigureError(f"one horizontal axis cannot show {units}; name columns x of one unit that both runs hold")
+    panels = shown.panels()
+    most = max(map(len, panels))
+    if len(panels) > MOST_PANELS or most > MOST_CURVES:
+        raise FigureError(
+            f"{len(chosen)} columns make {len(panels)} panels with up to {most} curves; a sheet holds {MOST_PANELS} "
+            f"panels of {MOST_CURVES} curves; choose some of them by name, such as {chosen[0]}"
+        )
+    return shown
+
+
+def overlay_sheet(shown: Shown) -> Figure:
+    """Return the figure of an overlay: the panels of all units below each other, with a legend above each."""
+    from matplotlib.figure import Figure
+
+    panels = shown.panels()
+    equal = [_is_map(shown, panel) for panel in panels]
+    sizes = [(_SQUARE, _SQUARE) if shown.polar or square else (_WIDTH, _HEIGHT) for square in equal]
+    legends = [_legend_height(shown, panel) for panel in panels]
+    title = sheet_title(shown.runs, shown.names)
+    width = _LEFT + max(size[0] for size in sizes) + _RIGHT
+    lines = title_lines(title, width - 2.0 * _EDGE)
+    above = _TOP + max(len(lines) - 1, 0) * TITLE_LINE
+    polar_margin = 22.0 if shown.polar else 0.0  # [pt]; angles are written around
+    heights = [size[1] + legend + _GAP + 2.0 * polar_margin for size, legend in zip(sizes, legends, strict=True)]
+    labels_below = any(equal)
+    height = above + sum(heights) - _GAP + _BOTTOM + (_BOTTOM * (len(panels) - 1) if labels_below else 0.0)
+    made = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
+    look: dict[str, Any] = {"fontsize": TITLE_FONT, "va": "top", "color": ink(INK), "parse_math": False}
+    made.text(_EDGE / width, 1.0 - _EDGE / height, "\n".join(lines), **look)
+    top = height - above
+    for number, panel in enumerate(panels):
+        (wide, high), legend = sizes[number], legends[number]
+        box = (_LEFT / width, (top - legend - polar_margin - high) / height, wide / width, high / height)
+        axes = made.add_axes(box, projection="polar" if shown.polar else None)
+        _panel(axes, shown, panel)
+        is_last = number == len(panels) - 1
+        if equal[number]:
+            axes.set_aspect("equal", adjustable="datalim")
+        if not shown.polar:
+            axes.yaxis.set_label_coords(-44.0 / wide, 0.5)
+            if is_last or labels_below:
+                axes.set_xlabel(_x_label(shown), fontsize=SMALL, color=ink(GREY), labelpad=1.0)
+            else:
+                axes.tick_params(labelbottom=False)
+        top -= heights[number] + (_BOTTOM if labels_below else 0.0)
+    return made
+
+
+def check_comparable(runs: Sequence[Run]) -> None:
+    """Raise a FigureError for two runs whose units of length or axes differ."""
+    a, b = runs[0], runs[-1]
+    if a.length_unit != b.length_unit:
+        raise FigureError(f"the runs measure lengths in {a.length_unit} and {b.length_unit}; they need the same unit")
+    labels = [axis_of(run).label for run in (a, b)]
+    per = [axis_of(run).per for run in (a, b)]
+    if labels[0] != labels[1] or per[0] != per[1]:
+        raise FigureError(
+            f"the runs are over {labels[0]} and {labels[1]}, with rates per {per[0]} and per {per[1]}; two runs in one "
+            "plot need the same axis and rates"
+        )
+
+
+def sheet_title(runs: Sequence[Run], names: tuple[str, str]) -> str:
+    """Return the title of a run, with the names of two runs."""
+    info = runs[0].info
+    title = info.get("title") or info.get("name") or ""
+    if len(runs) == 1:
+        return title
+    a, b = names
+    return f"{title}{': ' if title else ''}{a} (wide), {b} (narrow)"
+
+
+def _x_label(shown: Shown) -> str:
+    first = shown.x(shown.runs[0], shown.columns[0])
+    if len(shown.xs) <= 1:
+        return first.label
+    axes = {name.rpartition(".")[2] for name in shown.xs}
+    return labelled(axes.pop() if len(axes) == 1 else "", first.unit).strip()
+
+
+def _is_map(shown: Shown, panel: Sequence[str]) -> bool:
+    """Return True if both axes are positions in the plane: then a length has the same size on both."""
+    run = shown.runs[0]
+    lengths = {str(name) for name in (*run.outputs, *run.fixed) if not name.is_angle}
+    return not shown.polar and bool(shown.xs) and lengths.issuperset((*panel, *shown.xs))
+
+
+def _legend_height(shown: Shown, panel: Sequence[str]) -> float:
+    rows = -(-len(panel) // _LEGEND_COLUMNS) if len(panel) > 1 or shown.polar else 0
+    return rows * _LEGEND_LINE + (6.0 if rows else 0.0)
+
+
+def _panel(axes: Any, shown: Shown, panel: Sequence[str]) -> None:
+    """Draw the curves of one unit."""
+    unit, factor = shown.unit(panel[0])
+    is_log = is_logarithmic(panel[0])
+    everything = []
+    for number, run in enumerate(shown.runs):
+        is_wide = len(shown.runs) == 2 and number == 0
+        for index, column in enumerate(panel):
+            x = shown.x(run, column)
+            along = x.angles if shown.polar else x.values
+            values = values_of(run, column) * factor
+            if is_log:
+                values = np.maximum(np.abs(values), LEAST)
+            colour = curve_colour(index)
+            rows = np.union1d(rows_of(values), rows_of(along))
+            look: dict[str, Any] = {"color": ink(palette.lighter(colour) if is_wide else colour)}
+            if np.isfinite(values).sum() < 2:
+                look |= {"marker": "o", "markersize": 3.0}
+            label = column if number == len(shown.runs) - 1 else "_"
+            axes.plot(along[rows], values[rows], linewidth=_WIDE if is_wide else _NARROW, label=label, **look)
+            everything.append(values)
+    _scales(axes, shown, panel, np.concatenate(everything), unit)
+    if len(panel) > 1 or shown.polar:
+        _legend(axes, shown, panel)
+
+
+def _scales(axes: Any, shown: Shown, panel: Sequence[str], values: FloatArray, unit: str) -> None:
+    """Give a panel its scales, names and grid."""
+    x = shown.x(shown.runs[0], panel[0])
+    grey = ink(GREY)
+    if shown.polar:
+        axes.tick_params(labelsize=SMALL, labelcolor=grey)
+        axes.grid(linewidth=0.5, color=ink((228, 228, 228)))
+        axes.spines["polar"].set(linewidth=0.6, color=grey)
+        known = values[np.isfinite(values)]
+        if len(known) and known.min() >= 0.0:
+            axes.set_rmin(0.0)
+        return
+    dress(axes, "")
+    if is_logarithmic(panel[0]):
+        powers_of_ten(axes, values)
+    elif not _is_map(shown, panel):
+        shown_values = _range(values)
+        if shown_values:
+            axes.set_ylim(*shown_values)
+        axes.yaxis.set_major_formatter(lambda value, _: f"{value:.4g}".replace("-", "\N{MINUS SIGN}"))
+    if x.is_angle:
+        axes.locator_params(axis="x", nbins=9, steps=TICK_STEPS)
+        axes.margins(x=0.01)
+    name = panel[0] if len(panel) == 1 else ""
+    axes.set_ylabel(labelled(name, unit).strip(), fontsize=SMALL, color=grey, labelpad=3.0, parse_math=False)
+    if x.is_axis and not any(name.startswith("solver.status") for name in panel):
+        for run in shown.runs:
+            for first, last in gaps(run, shown.x(run, panel[0]).values):
+                axes.axvspan(first, last, color=ink(LOST), linewidth=0.0, zorder=0.0)
+
+
+def _range(values: FloatArray) -> tuple[float, float] | None:
+    """Return a range in which noise about a constant is a straight line; None for matplotlib's default."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return -1.0, 1.0
+    size = float(np.abs(known).max())
+    if np.ptp(known) <= ROUND_OFF * size:
+        middle, half = float(known.mean()), 0.5 * size or 1.0
+        return middle - half, middle + half
+    return shown_range(known, 0.0)
+
+
+def _legend(axes: Axes, shown: Shown, panel: Sequence[str]) -> None:
+    """Write the names of the curves above their panel; in a polar plot with the unit."""
+    handles, labels = axes.get_legend_handles_labels()
+    if shown.polar:
+        unit = shown.unit(panel[0])[0]
+        labels = [labelled(label, unit) for label in labels]
+    where: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.06 if shown.polar else 1.0)}
+    made = axes.legend(
+        handles, labels, ncols=_LEGEND_COLUMNS, frameon=False, fontsize=SMALL, borderaxespad=0.2, borderpad=0.2,
+        labelspacing=0.3, handlelength=1.6, labelcolor=ink(GREY), **where,
+    )  # fmt: skip
+    for text in made.get_texts():
+        text.set_parse_math(False)
+
+
+def curve_colour(index: int) -> palette.Colour:
+    """Return the colour of a curve by its number; those of the palette that are visible on white come first."""
+    order = (5, 4, 2, 3, 0, 1)
+    turn, place = divmod(index, len(order))
+    colour = palette.BODIES[order[place]]
+    return (colour, palette.darker(colour), palette.lighter(colour), palette.GROUND)[min(turn, 3)]
+
+
+def values_of(run: Run, column: str) -> FloatArray:
+    """Return a column as numbers: NaN where a sample has none; inputs and counts are known at all samples."""
+    values = np.asarray(run[column], dtype=float)
+    if column in run.input_names or column in ("time", "solver.status", "solver.iterations"):
+        return values
+    return np.where(run.good, values, np.nan)
