@@ -85,7 +85,7 @@ def build(
     if flavour == "python":
         from kinfmu.fmu import python_flavour
 
-        data = python_flavour.archive(plan, drive, VERSION, forces)
+        data = python_flavour.archive(plan, drive, VERSION, forces, owned)
     else:
         from kinfmu.fmu.native import archive
 
@@ -108,8 +108,6 @@ def _check(flavour: str, drive: str, fmi: int, platforms: str) -> None:
         raise RequestError(
             f"platforms = '{platforms}' is not known{suggestion(platforms, PLATFORMS)}; known: {listed(PLATFORMS)}"
         )
-    if flavour == "python" and drive == "torque":
-        raise RequestError("drive = 'torque' needs flavour = 'native'")
     if flavour == "python" and (fmi != 2 or platforms != "host"):
         choice = f"fmi = {fmi}" if fmi != 2 else f"platforms = '{platforms}'"
         raise RequestError(f"{choice} needs flavour = 'native'; the python flavour is FMI 2.0 on pythonfmu's platforms")

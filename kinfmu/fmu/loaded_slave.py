@@ -16,9 +16,8 @@ from kinfmu.fmu.estimated_rates import LARGEST
 from kinfmu.fmu.layout import NOT_A_NUMBER, Numbers
 from kinfmu.fmu.slave import MechanismSlave
 from kinfmu.fmu.slave_outputs import Shown
-from kinfmu.solver.python.pose import tangent_of
 from kinfmu.solver.python.status import Status
-from kinfmu.solver.python.tracks import rates_in_time
+from kinfmu.solver.python.tracks import sample_rates
 
 
 class LoadedSlave(MechanismSlave):
@@ -85,16 +84,7 @@ class LoadedSlave(MechanismSlave):
             return self._unknown[stage]
         model, pose = self._solver.model, shown.pose
         u, ud, udd = self._drive(shown)
-        if len(u) == 1:
-            slopes, second = tangent_of(model, pose)
-            v, a = ud[0], udd[0]
-            zd = tuple([d * v for d in slopes])
-            zdd = tuple([dd * (v * v) + d * a for d, dd in zip(slopes, second, strict=True)])
-        else:
-            rest = (0.0,) * len(u)
-            unit = [tuple([float(k == number) for k in range(len(u))]) for number in range(len(u))]
-            slopes = tuple([d for speeds in unit for d in rates_in_time(model, pose, speeds, rest)[0]])
-            zd, zdd = rates_in_time(model, pose, ud, udd)
+        zd, zdd, slopes = sample_rates(model, pose, ud, udd)
         time = self._time
         if not self._driven_by_time and self._history and (shown.stale or not self._touched):
             time = self._history[-1][0]  # of the sample that is shown

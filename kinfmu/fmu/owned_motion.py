@@ -15,6 +15,7 @@ from kinfmu.mechanism.mechanism import require_masses
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import ForceSteps, effort_noun, force_steps
 from kinfmu.plan.mechanics import Mechanics
+from kinfmu.units import METRES
 
 
 class OwnedMotion(NamedTuple):
@@ -69,3 +70,9 @@ def _jumps_of_loads(plan: SolvePlan) -> tuple[tuple[Node, Node], ...]:
             jumps = load.law.jumps(**{key: constant.value for key, constant in load.law.constants().items()})
             found += [(mechanics.graph.lift(at), mechanics.graph.lift(jumps.period)) for at in jumps.at]
     return tuple(found)
+
+
+def units_in_si(plan: SolvePlan) -> tuple[float, ...]:
+    """Return the units of the drivers in SI units."""
+    metre = METRES[plan.mechanism.length_unit]
+    return tuple(metre if driver.quantity.kind == "length" else 1.0 for driver in plan.drivers)

@@ -5,7 +5,8 @@
     binaries/<platform>/<identifier>.so|dll       pythonfmu's, unchanged
     resources/slavemodule.txt                     names the module that holds the slave class
     resources/<package>_slave.py                  the slave class, with its model and layout
-    resources/<package>/solver/                   the solver, and the emitted model; forces, if they are outputs
+    resources/<package>/solver/                   the solver, and the emitted model; forces, if they are outputs;
+                                                  reduced inertia, if efforts drive
     resources/<package>/{fmu,pythonfmu}/          the base classes of the slave: kinfmu's and pythonfmu's
     resources/mechanism.toml
 
@@ -19,7 +20,7 @@ from __future__ import annotations
 import ast
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import distribution
 from importlib.resources import files
 from types import MappingProxyType
@@ -27,10 +28,12 @@ from types import MappingProxyType
 from kinfmu.codegen.forces import STAGES
 from kinfmu.codegen.python import emit
 from kinfmu.codegen.python.forces import emit_forces, solves
+from kinfmu.codegen.python.jumps import emit_jumps
 from kinfmu.errors import FmuError
 from kinfmu.fmu import description, documentation
 from kinfmu.fmu.archive import digest, token, zipped
 from kinfmu.fmu.interface import Drive, Interface
+from kinfmu.fmu.owned_motion import OwnedMotion, units_in_si
 from kinfmu.fmu.variables import interface
 from kinfmu.mechanism import toml_text
 from kinfmu.plan import SolvePlan
@@ -48,7 +51,12 @@ CAPABILITIES = {
 }
 RUN_TIME = ("slave.py", "slave_settings.py", "slave_outputs.py", "layout.py", "estimated_rates.py")  # of this package
 BASE_CLASS = ("_version.py", "default_experiment.py", "enums.py", "fmi2slave.py", "logmsg.py", "variables.py")
-PARTS_WITH_START = ("inputs", "constants", "parameters", "tolerance", "fixed", "drive", "rate_source", "loads")
+WITH_FORCES = ("loaded_slave.py",)
+WITH_EFFORTS = ("equation_of_motion.py", "torque_limits.py", "torque_steps.py", "torque_slave.py", "dormand_prince.py")
+PARTS_WITH_START = (
+    *("inputs", "constants", "parameters", "tolerance", "fixed", "drive", "rate_source", "loads"),
+    *("states", "efforts"),
+)
 
 EXTERNAL_DEPENDENCIES = """\
 This FMU runs Python code in the process of its host. It needs:
@@ -60,16 +68,11 @@ It needs no Python packages: what it imports is the standard library and the mod
 An FMU of the same mechanism that needs none of this is the native one: kinfmu build MECH --flavour native
 """
 
-_LOADED_IMPORTS = """\
-from {package}.fmu.layout import Layout, PartLayout
-from {package}.fmu.loaded_slave import LoadedSlave
-from {package}.fmu.slave import hold
-from {package}.solver import {modules}
-"""
 _IMPORTS = """\
 from {package}.fmu.layout import Layout, PartLayout
-from {package}.fmu.slave import MechanismSlave, hold
-from {package}.solver import model
+from {package}.fmu.{module} import {base}
+from {package}.fmu.slave import hold
+from {package}.solver import {modules}
 """
 _ENTRY = '''"""The slave of the FMU '{name}'."""
 
@@ -81,7 +84,7 @@ class Slave({base}):
     """{title}"""
 
     model = model
-{forces}    layout = Layout(
+{attributes}    layout = Layout(
         token={token!r},
         start_time={start!r},
         parts=(
@@ -92,7 +95,11 @@ class Slave({base}):
 
 
 def archive(
-    plan: SolvePlan, drive: Drive, version: str, forces: Mapping[str, ForceSteps] = MappingProxyType({})
+    plan: SolvePlan,
+    drive: Drive,
+    version: str,
+    forces: Mapping[str, ForceSteps] = MappingProxyType({}),
+    owned: OwnedMotion | None = None,
 ) -> bytes:
     """Return the FMU of a plan; the same plan gives the same bytes.
 
@@ -101,6 +108,7 @@ def archive(
         drive: Default of the parameter `driven_by_time`: 'time' (true) or 'inputs' (false).
         version: Version of kinfmu.
         forces: Stages of the forces that are outputs, by part. Default: none.
+        owned: Motion of the drivers, if efforts drive. Default: inputs or laws give it.
 
     Returns:
         Bytes of the zip archive.
@@ -109,20 +117,21 @@ def archive(
         FmuError: If pythonfmu is installed without its binaries.
 
     """
-    variables = interface(plan, drive, forces=forces)
-    contents = _contents(plan, variables, version)
-    if forces:
-        contents |= {f"kinfmu/solver/{stage}.py": emit_forces(plan, steps).encode() for stage, steps in forces.items()}
-        if any(map(solves, forces.values())):
-            contents["kinfmu/solver/solutions.py"] = (
-                files("kinfmu.codegen.python").joinpath("solutions.py").read_bytes()
-            )
-        contents["kinfmu/fmu/loaded_slave.py"] = files("kinfmu.fmu").joinpath("loaded_slave.py").read_bytes()
-        contents = dict(sorted(contents.items()))
-    return zipped(_named(contents, variables, version, digest(contents)))
+    variables = interface(plan, drive, forces=forces, starts=owned.starts if owned else ())
+    in_si = units_in_si(plan) if owned else ()
+    contents = _contents(plan, variables, version, in_si)
+    stages = dict(forces) | ({"inertia": owned.inertia} if owned else {})
+    contents |= {f"kinfmu/solver/{stage}.py": emit_forces(plan, steps).encode() for stage, steps in stages.items()}
+    if any(map(solves, stages.values())):
+        contents["kinfmu/solver/solutions.py"] = files("kinfmu.codegen.python").joinpath("solutions.py").read_bytes()
+    if owned:
+        contents["kinfmu/solver/jumps.py"] = emit_jumps(plan).encode()
+    added = (*(WITH_FORCES if stages else ()), *(WITH_EFFORTS if owned else ()))
+    contents |= {f"kinfmu/fmu/{name}": files("kinfmu.fmu").joinpath(name).read_bytes() for name in added}
+    return zipped(_named(dict(sorted(contents.items())), variables, version, digest(contents), in_si))
 
 
-def _contents(plan: SolvePlan, variables: Interface, version: str) -> dict[str, bytes]:
+def _contents(plan: SolvePlan, variables: Interface, version: str, in_si: Sequence[float]) -> dict[str, bytes]:
     """Return every file by path in the FMU, still under the names `kinfmu` and `pythonfmu` and without a token."""
     import pythonfmu
 
@@ -136,7 +145,7 @@ def _contents(plan: SolvePlan, variables: Interface, version: str) -> dict[str, 
         "kinfmu/fmu/__init__.py": b'"""The slave."""\n',
         "kinfmu/pythonfmu/__init__.py": b'"""The base class of pythonfmu."""\n',
         "kinfmu/solver/model.py": emit(plan).encode(),
-        "kinfmu_slave.py": _entry(variables, token="").encode(),
+        "kinfmu_slave.py": _entry(variables, "", in_si).encode(),
     }
     contents |= {f"kinfmu/fmu/{name}": fmu.joinpath(name).read_bytes() for name in RUN_TIME}
     contents |= {f"kinfmu/solver/{f.name}": f.read_bytes() for f in solver.iterdir() if f.name.endswith(".py")}
@@ -178,19 +187,29 @@ def _description(variables: Interface, version: str, guid: str) -> bytes:
     )
 
 
-def _entry(variables: Interface, token: str, package: str = "kinfmu") -> str:
+def _entry(variables: Interface, token: str, in_si: Sequence[float], package: str = "kinfmu") -> str:
     parts = []
     for part in variables.parts:
         starts = tuple(variable.start for variable in part.variables) if part.name in PARTS_WITH_START else ()
+        if part.name == "states":  # accelerations have no start
+            starts = tuple(float(start or 0.0) for start in starts)
         parts.append(f"            PartLayout({part.name!r}, {part.names!r}, {starts!r}),")
     stages = [stage for stage in STAGES if variables.part(stage)]
+    modules, attributes = [*stages, "model"], []
+    if stages or in_si:
+        attributes.append(f"stages = {{{', '.join(f'{one!r}: {one}.forces' for one in stages)}}}")
+    if in_si:
+        modules += ["inertia", "jumps"]
+        attributes += ["inertia = staticmethod(inertia.forces)", "jumps = staticmethod(jumps.jumps)"]
+        attributes.append(f"in_si = {tuple(in_si)!r}")
+    base, module = ("LoadedSlave", "loaded_slave") if stages else ("MechanismSlave", "slave")
+    if in_si:
+        base, module = "TorqueSlave", "torque_slave"
     return _ENTRY.format(
         name=variables.name,
-        imports=(_LOADED_IMPORTS if stages else _IMPORTS).format(
-            package=package, modules=", ".join(sorted([*stages, "model"]))
-        ),
-        base="LoadedSlave" if stages else "MechanismSlave",
-        forces=f"    stages = {{{', '.join(f'{one!r}: {one}.forces' for one in stages)}}}\n" if stages else "",
+        imports=_IMPORTS.format(package=package, module=module, base=base, modules=", ".join(sorted(modules))),
+        base=base,
+        attributes="".join(f"    {line}\n" for line in attributes),
         title=repr(variables.title or variables.name)[1:-1].replace('"', "'"),
         token=token,
         start=float(variables.experiment.start),
@@ -198,7 +217,9 @@ def _entry(variables: Interface, token: str, package: str = "kinfmu") -> str:
     )
 
 
-def _named(contents: Mapping[str, bytes], variables: Interface, version: str, digits: str) -> dict[str, bytes]:
+def _named(
+    contents: Mapping[str, bytes], variables: Interface, version: str, digits: str, in_si: Sequence[float]
+) -> dict[str, bytes]:
     """Return the files under their final names; check that modules import only each other and the standard library."""
     package = f"kinfmu_{variables.name}_{digits[:12]}"
     guid = token(digits)
@@ -210,7 +231,7 @@ def _named(contents: Mapping[str, bytes], variables: Interface, version: str, di
         elif path != "modelDescription.xml":
             named[path] = data
     del named["kinfmu_slave.py"]
-    named[f"resources/{package}_slave.py"] = _entry(variables, guid, package).encode()
+    named[f"resources/{package}_slave.py"] = _entry(variables, guid, in_si, package).encode()
     named["resources/slavemodule.txt"] = f"{package}_slave".encode()
     _check_imports(named, package)
     return named

@@ -34,7 +34,7 @@ PLAIN = (  # attributes, without the underscore, that are a number or a truth va
 )
 
 
-def _numbers(values: Sequence[float], like: Sequence[float]) -> Numbers:
+def as_numbers(values: Sequence[float], like: Sequence[float]) -> Numbers:
     """Return as many numbers as there are in `like`; raise a ValueError or TypeError for anything else."""
     return tuple([float(value) for value, _ in zip(values, like, strict=True)])
 
@@ -210,16 +210,16 @@ class MechanismSlave(SlaveSettings):
     def _restore(self, state: dict[str, Any]) -> None:
         for name in PLAIN:
             setattr(self, f"_{name}", state[name])
-        self._inputs = list(_numbers(state["inputs"], self._inputs))
-        self._constants = _numbers(state["constants"], self._constants)
-        self._parameters = _numbers(state["parameters"], self._parameters)
+        self._inputs = list(as_numbers(state["inputs"], self._inputs))
+        self._constants = as_numbers(state["constants"], self._constants)
+        self._parameters = as_numbers(state["parameters"], self._parameters)
         self._tolerance = float(state["tolerance"])
         self._wired = set(state["wired"])
         self._refused = dict(state["refused"])
         self._unbound = False
         self._solver = with_parameters(self.model, self._parameters, self._tolerance)
         self._committed = self._solver.restore(state["committed"])
-        self._committed_inputs = _numbers(state["committed_inputs"], self._inputs)
+        self._committed_inputs = as_numbers(state["committed_inputs"], self._inputs)
         self._history = tuple((t, tuple(u)) for t, u in state["history"])
         self._forget()
 

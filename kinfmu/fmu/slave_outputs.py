@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
-from kinfmu.fmu.estimated_rates import LARGEST, Sample, errors_of_estimated_rates, estimated_rates
+from kinfmu.fmu.estimated_rates import LARGEST, Rates, Sample, errors_of_estimated_rates, estimated_rates
 from kinfmu.fmu.layout import NOT_A_NUMBER, UNKNOWN_ERROR, Fetch, Layout, Numbers, Places, plan_fetch
 from kinfmu.solver.python import Pose, Status, UnsolvableModel, with_parameters
 
@@ -45,13 +45,14 @@ class SlaveOutputs(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no typ
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         parts = {part.name: part for part in self.layout.parts}
-        self._inputs: list[float] = list(parts["inputs"].starts)  # value, speed, acceleration of each driver
+        moving = parts["inputs" if "inputs" in parts else "states"]  # states: see torque_slave.py
+        self._inputs: list[float] = list(moving.starts)  # value, speed, acceleration of each driver
         self._input_starts = list(self._inputs)
         self._constants: Numbers = parts["constants"].starts
         self._parameters: Numbers = parts["parameters"].starts
         self._tolerance: float = parts["tolerance"].starts[0]
-        self._driven_by_time: bool = parts["drive"].starts[0]
-        self._rates: int = parts["rate_source"].starts[0]
+        self._driven_by_time: bool = "drive" in parts and parts["drive"].starts[0]
+        self._rates: int = parts["rate_source"].starts[0] if "rate_source" in parts else Rates.WIRED
         self._references = Places(self.layout)
         self._fetches: dict[tuple[int, ...], Fetch] = {}
         self._last_read: list[int] = []  # value references of the last get_real

@@ -58,8 +58,14 @@ def test_two_builds_under_two_hash_seeds_are_the_same_bytes(name: str, tmp_path:
 def test_fmu_runs_in_a_fresh_process_that_has_never_seen_kinfmu(fourbar: Path, tmp_path: Path) -> None:
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     done = subprocess.run(
-        [sys.executable, "-c", STEP, str(fourbar)], env=environment, cwd=tmp_path, check=True, capture_output=True
+        [sys.executable, "-X", "faulthandler", "-c", STEP, str(fourbar)],
+        env=environment,
+        cwd=tmp_path,
+        check=False,
+        capture_output=True,
+        text=True,
     )
+    assert done.returncode == 0, done.stderr
     assert float(done.stdout) == pytest.approx(1.5, abs=1e-12)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
@@ -23,7 +24,7 @@ from kinfmu.laws.sequence import Segment
 from kinfmu.loads import Damper, ForceAlong, TorqueOn
 from kinfmu.solver.python.status import Status
 from tests.dynamics.test_torque_driven import G, five_bar, heavy, pendulum
-from tests.fmu.host import DISCARD, ERROR, LAST_SUCCESSFUL_TIME, OK, Host, answer
+from tests.fmu.host import DISCARD, LAST_SUCCESSFUL_TIME, OK, Host
 from tests.mechanisms import fourbar
 
 PUSH = MotionSequence((Segment("dwell", 0.35), Segment("simple_harmonic", 0.1, 4.0), Segment("dwell", 1.0)))
@@ -52,7 +53,7 @@ MECHANISMS: dict[str, Callable[[], Mechanism]] = {
     "arms": lambda: replace(heavy(five_bar(), gravity=(0, -G)), name="arms"),
     "parallelogram": lambda: heavy(kinfmu.load("fourbar")),
 }
-FLAVOURS = [("native", 2), ("native", 3)]
+FLAVOURS = [("native", 2), ("native", 3), ("python", 2)]
 of_each_flavour = pytest.mark.parametrize(("flavour", "fmi"), FLAVOURS)
 
 
@@ -160,10 +161,14 @@ def test_two_drivers_keep_the_energy(flavour: str, fmi: int, start: Callable[...
     assert host.get(*names) == pytest.approx([exact[name][-1] for name in names], abs=1e-8)
 
 
-@pytest.mark.parametrize("tolerance", [1e-5, 1e-9, 1e-12])
-def test_a_motion_ends_at_its_limit_and_stays_before_it(tolerance: float, start: Callable[..., Host]) -> None:
+@pytest.mark.parametrize(
+    ("flavour", "tolerance"), [("native", 1e-5), ("native", 1e-9), ("native", 1e-12), ("python", 1e-9)]
+)
+def test_a_motion_ends_at_its_limit_and_stays_before_it(
+    flavour: str, tolerance: float, start: Callable[..., Host]
+) -> None:
     """The step is discarded with the reason and the time; a smaller one reaches up to the limit."""
-    host = start("rocker", "native", 2, crank_angle=0.5, crank_speed=0.1, integrator__tolerance=tolerance)
+    host = start("rocker", flavour, 2, crank_angle=0.5, crank_speed=0.1, integrator__tolerance=tolerance)
     limit = -math.acos((2.0**2 + 1.0**2 - (0.9 + 1.5) ** 2) / (2 * 2.0 * 1.0))
     steps(host, 69)
     before = host.get("crank_angle", "crank_speed")
@@ -175,6 +180,7 @@ def test_a_motion_ends_at_its_limit_and_stays_before_it(tolerance: float, start:
     assert "\n" not in message
     assert host.fmu.getRealStatus(LAST_SUCCESSFUL_TIME) == 0.69
     assert host.count("solver.status") == Status.OUTSIDE
+    assert host.message().startswith("the motion ends at a limit: crank = -1.7619")
     assert host.get("crank_angle", "crank_speed") == before
     assert host.step(0.69, 0.003) == OK
     assert limit < host.get("crank_angle")[0] < before[0]
@@ -228,17 +234,18 @@ def test_hosts_integrate_the_states_in_model_exchange(fmi: int, fmu_of: Callable
     assert {0.35, 0.45} <= {round(t, 9) for t in found["time"].tolist()}
 
 
-def test_it_passes_change_points_over_bridges(start: Callable[..., Host]) -> None:
+@pytest.mark.parametrize("flavour", ["native", "python"])
+def test_it_passes_change_points_over_bridges(flavour: str, start: Callable[..., Host]) -> None:
     """The reduced inertia of a parallelogram is constant, and so is its speed."""
-    host = start("parallelogram", "native", 2, crank_speed=7.0)
+    host = start("parallelogram", flavour, 2, crank_speed=7.0)
     first = host.get("crank_angle")[0]
     seen = set()
-    for k in range(300):
+    for k in range(100):
         assert host.step(k * WINDOW, WINDOW) == OK
         seen.add(host.count("solver.status"))
         assert math.isfinite(host.get("crank.reduced_inertia")[0])
     assert Status.BRIDGED in seen
-    assert host.get("crank_angle")[0] - first == pytest.approx(7.0 * 3.0, abs=1e-9)
+    assert host.get("crank_angle")[0] - first == pytest.approx(7.0 * 1.0, abs=1e-9)
 
 
 @of_each_flavour
@@ -310,14 +317,14 @@ def test_the_description_is_valid_and_declares_the_states(flavour: str, fmi: int
 def test_wrong_values_are_refused(flavour: str, fmi: int, start: Callable[..., Host]) -> None:
     host = start("motor", flavour, fmi)
     for values, text in (
-        ({"crank_angle": 1.0}, "crank_angle = 1 comes too late: it is a state"),
-        ({"crank_acceleration": 1.0}, "crank_acceleration"),
-        ({"crank_torque": math.nan}, "crank_torque = nan is not a finite number"),
-        ({"integrator.tolerance": 0.1}, "integrator.tolerance = 0.1 must be 1e-13 to 0.0001"),
+        ({"crank_angle": 1.0}, r"crank_angle = 1(\.0)? comes too late: it is a state"),
+        ({"crank_acceleration": 1.0}, r"crank_acceleration .*that can be set"),
+        ({"crank_torque": math.nan}, r"crank_torque = nan is not a finite number"),
+        ({"crank_torque": 1e101}, r"crank_torque = 1e\+101 is too large: at most 1e\+100 is taken; 0(\.0)? stays"),
+        ({"integrator.tolerance": 0.1}, r"integrator.tolerance = 0.1 must be 1e-13 to 0.0001"),
     ):
-        host.messages.clear()
-        assert answer(host.set, values) == ERROR
-        assert any(text in message for _, message in host.messages), host.messages
+        assert re.search(text, host.refusal(values))
+        assert host.step_after_refusal(0.0, 0.0) == OK
 
 
 def test_a_mechanism_that_no_effort_determines_is_refused(tmp_path: Path) -> None:

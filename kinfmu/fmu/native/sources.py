@@ -21,10 +21,10 @@ from kinfmu.fmu import dormand_prince as pair
 from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.layout import UNKNOWN_ERROR
+from kinfmu.fmu.owned_motion import units_in_si
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.trace import parameter_symbol
-from kinfmu.units import METRES
 
 RUNTIME = Path(__file__).with_name("runtime")
 _NO_VARIABLE = "0xfffffffeu"
@@ -85,7 +85,9 @@ def sources(
         for name in (*_OF_TORQUE, _HEADER_OF_TORQUE):
             del instance[name]
     else:
-        instance["inertia.c"] = emit_forces(plan, inertia, "inertia") + _si_units(plan)
+        instance["inertia.c"] = "\n".join(
+            [emit_forces(plan, inertia, "inertia"), *array("double kf_in_si", units_in_si(plan)), ""]
+        )
         instance["dormand_prince.h"] = dormand_prince(pair.C, pair.A, b=pair.B, e3=pair.E3, e5=pair.E5)
     if not forces:
         del instance["forces_at.c"], instance["solutions.c"]
@@ -108,13 +110,6 @@ def _chosen(text: str, *, owns: bool) -> str:
         return yes if (match["negated"] is None) == owns else no
 
     return _BY_OWNER.sub(choice, text)
-
-
-def _si_units(plan: SolvePlan) -> str:
-    """Return the table of the units of the drivers in SI units."""
-    metre = METRES[plan.mechanism.length_unit]
-    factors = [metre if driver.quantity.kind == "length" else 1.0 for driver in plan.drivers]
-    return "\n".join(["", *array("double kf_in_si", factors), ""])
 
 
 def _step(version: str, *, owns: bool = False) -> str:

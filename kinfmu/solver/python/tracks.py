@@ -320,3 +320,16 @@ def rates_in_time(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple[Ve
             second = track.put([v * v * dd + a * d for d, dd in zip(zd, zdd, strict=True)], second)
     zd = tuple(model.velocity(pose.values, ud, first, held))
     return zd, tuple(model.acceleration(pose.values, ud, udd, zd, second, held))
+
+
+def sample_rates(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple[Vector, Vector, Vector]:
+    """Return first and second derivative of the unknowns in time, and dz/du, for one driver after another."""
+    if len(ud) == 1:
+        slopes, second = tangent_of(model, pose)
+        v, a = ud[0], udd[0]
+        zd = tuple([d * v for d in slopes])
+        return zd, tuple([dd * (v * v) + d * a for d, dd in zip(slopes, second, strict=True)]), slopes
+    rest = (0.0,) * len(ud)
+    unit = [tuple([float(k == number) for k in range(len(ud))]) for number in range(len(ud))]
+    slopes = tuple([d for speeds in unit for d in rates_in_time(model, pose, speeds, rest)[0]])
+    return *rates_in_time(model, pose, ud, udd), slopes

@@ -244,6 +244,11 @@ static KF_RARE kf_answer set_other(kf_instance *instance, unsigned reference, do
     const unsigned place = KF_PLACE(reference);
     const int part = place < KF_REALS ? kf_part_of[place] : KF_PARTS;
     const char *const name = kf_name_of(reference);
+#if KF_TORQUE
+    if (part == KF_PART_STATES && place % 3 == 2) { /* an acceleration is no state */
+        return kf_not_settable(instance, reference, KF_REAL_WORD);
+    }
+#endif
 #if KF_FORCES
     if (part == KF_PART_LOADS && fabs(value) <= KF_LARGEST) {
         s->real[place] = value;
@@ -260,7 +265,7 @@ static KF_RARE kf_answer set_other(kf_instance *instance, unsigned reference, do
     if (part != KF_PART_LOADS)
 #endif
 #if KF_TORQUE
-    if (part != KF_PART_EFFORTS && (part != KF_PART_STATES || place % 3 == 2))
+    if (part != KF_PART_EFFORTS)
 #endif
     if (part != KF_PART_INPUTS && part != KF_PART_CONSTANTS && part != KF_PART_PARAMETERS && part != KF_PART_TOLERANCE) {
         return kf_not_settable(instance, reference, KF_REAL_WORD);
