@@ -29,6 +29,7 @@ from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.toml_text import text
 from kinfmu.page.module import PageModule
 from kinfmu.page.opened import AXES, place_text
+from kinfmu.plan.reactions import undetermined_reactions
 from kinfmu.scene import palette
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.shape import Shape
@@ -113,6 +114,9 @@ def module_data(module: PageModule, places: Mapping[str, NumberPath]) -> dict[st
         "fixed": list(plan.fixed),
         "parameters": parameters,
         "forces": [{"name": name, "unit": unit_of(quantities[name], unit)} for name in module.forces],
+        "reactions": [{"name": name, "unit": unit_of(quantities[name], unit)} for name in module.reactions],
+        "undetermined": list(dict.fromkeys(name.owner for name in undetermined_reactions(plan))),
+        "externals": list(module.loads),
     }
 
 

@@ -12,7 +12,7 @@ from kinfmu.analysis import Report, check
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.page.describe import describe, module_data, written_file
-from kinfmu.page.module import page_module
+from kinfmu.page.module import packed, page_module
 from kinfmu.page.opened import opened
 
 _WEB = Path(__file__).parent / "web"
@@ -42,6 +42,7 @@ _SCRIPTS = (
     "keyboard",
     "main",
 )
+_MOST_NUMBERS = 400  # of a file that its page can change: the C code of more is too long for a small page
 _IMPORT = re.compile(r"^import .*\n", re.MULTILINE)
 _EXPORT = re.compile(r"^export ", re.MULTILINE)
 
@@ -50,7 +51,8 @@ def page(mechanism: Mechanism, *, report: Report | None = None) -> str:
     """Return a page in which a mechanism is dragged: one HTML file that works offline, without any request.
 
     It computes with the C code of the FMU, compiled to WebAssembly: as long as no number of the file but a parameter is
-    changed, positions, velocities and accelerations equal those of the FMU to the bit.
+    changed, positions, velocities and accelerations equal those of the FMU to the bit. In pages of files with more than
+    400 numbers only parameters and laws can be changed, and the page states so.
 
     Args:
         mechanism: The mechanism.
@@ -70,7 +72,8 @@ def page(mechanism: Mechanism, *, report: Report | None = None) -> str:
         raise report.problem
     as_written = page_module(mechanism)
     change = opened(mechanism)
-    places = change.places
+    is_large = len(change.places) > _MOST_NUMBERS
+    places = {} if is_large else change.places
     modules = {
         "written": module_data(as_written, {}),
         "opened": module_data(page_module(change.mechanism, change.labels), places) if places else None,
@@ -78,6 +81,7 @@ def page(mechanism: Mechanism, *, report: Report | None = None) -> str:
     data = describe(mechanism, report) | {
         "size": as_written.plan.size,
         "modules": modules,
+        "closedNumbers": len(change.places) if is_large else 0,
         "file": written_file(mechanism, as_written, places),
     }
     return _filled(
@@ -85,7 +89,7 @@ def page(mechanism: Mechanism, *, report: Report | None = None) -> str:
         {
             "title": html.escape(mechanism.name),
             "style": (_WEB / "style.css").read_text("utf-8"),
-            "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
+            "data": packed(json.dumps(data, separators=(",", ":"), allow_nan=False).encode()),
             "script": "\n".join(_script(name) for name in _SCRIPTS),
         },
     )

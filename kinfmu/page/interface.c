@@ -27,13 +27,13 @@ static double bound[KF_ROOM(KF_PARAMETERS + KF_CONSTANTS)];
 static double drive[3][KF_DRIVERS];
 static double motion[3][KF_ROOM(KF_OUTPUTS)], swept[3][KF_ROOM(KF_OUTPUTS)];
 static double errors[3], fixed[KF_ROOM(KF_FIXED)], points[KF_ROOM(2 * KF_POINTS)];
-static double forces[KF_ROOM(KF_FORCES)], efforts[KF_ROOM(KF_LOADS)];
+static double forces[KF_ROOM(KF_FORCES)], efforts[KF_ROOM(KF_LOADS)], reactions[KF_ROOM(KF_REACTIONS)];
 
 /* The arrays, in the order that web/engine.js gives their numbers. */
 double *kf_page_place(int which)
 {
     double *const places[] = {settings, bound, drive[0], motion[0], swept[0],
-                              errors,   fixed, points,   forces,    efforts};
+                              errors,   fixed, points,   forces,    efforts,   reactions};
     return places[which];
 }
 
@@ -41,7 +41,7 @@ int kf_page_length(int which)
 {
     static const int lengths[] = {KF_PARAMETERS + KF_CONSTANTS, KF_PARAMETERS + KF_CONSTANTS, 3 * KF_DRIVERS,
                                   3 * KF_OUTPUTS, 3 * KF_OUTPUTS, 3, KF_FIXED, 2 * KF_POINTS,
-                                  KF_FORCES, KF_LOADS};
+                                  KF_FORCES, KF_LOADS, KF_REACTIONS};
     return lengths[which];
 }
 
@@ -194,13 +194,14 @@ void kf_page_errors(void)
     kf_errors(&followers[shown].solver, pose_of(&followers[shown]), drive[1], drive[2], errors);
 }
 
-/* Compute the forces of a pose with the drive and the efforts, at a time of the laws of loads. */
-static void find_forces(kf_follower *follower, double time)
+/* Compute the forces of a pose with the drive and the efforts, at a time of the laws of loads, or its reactions. */
+static void find_forces(kf_follower *follower, double time, bool are_reactions)
 {
 #if KF_FORCES
     const kf_model *const model = &follower->solver.model;
     kf_pose *const pose = pose_of(follower);
     double zd[KF_ROOM(KF_UNKNOWNS)], zdd[KF_ROOM(KF_UNKNOWNS)], slopes[KF_ROOM(KF_DRIVERS * KF_UNKNOWNS)];
+    const double *const x = pose->found.x, *const p = model->parameters;
     int k;
 #if KF_DRIVERS == 1
     kf_tangent(model, pose);
@@ -220,16 +221,30 @@ static void find_forces(kf_follower *follower, double time)
     memcpy(zd, pose->x1, sizeof zd);
     memcpy(zdd, pose->x2, sizeof zdd);
 #endif
-    kf_forces(time, drive[0], drive[1], drive[2], pose->found.x, zd, zdd, slopes, efforts, model->parameters, forces);
+    if (!are_reactions) {
+        kf_forces(time, drive[0], drive[1], drive[2], x, zd, zdd, slopes, efforts, p, forces);
+        return;
+    }
+    kf_reactions(time, drive[0], drive[1], drive[2], x, zd, zdd, slopes, efforts, p, reactions);
+    for (k = 0; pose->status == KF_BRIDGED && k < KF_OF_JOINTS; ++k) {
+        reactions[k] = NAN; /* the blocks do not give them there */
+    }
+    kf_shaking(time, drive[0], drive[1], drive[2], x, zd, zdd, slopes, efforts, p, reactions + KF_OF_JOINTS);
 #else
     (void)follower;
     (void)time;
+    (void)are_reactions;
 #endif
 }
 
 void kf_page_forces(double time)
 {
-    find_forces(&followers[shown], time);
+    find_forces(&followers[shown], time, false);
+}
+
+void kf_page_reactions(double time)
+{
+    find_forces(&followers[shown], time, true);
 }
 
 /* Begin a sweep: it starts where the branch is known, and leaves the pose shown. */
@@ -250,7 +265,7 @@ int kf_page_sample(int orders, double time)
         kf_motion(&follower->solver, pose, drive[1], drive[2], swept[0], orders > 1 ? swept[1] : NULL,
                   orders > 2 ? swept[2] : NULL);
         if (orders > 3) {
-            find_forces(follower, time);
+            find_forces(follower, time, false);
         }
     }
     return (int)pose->status;

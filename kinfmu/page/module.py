@@ -19,8 +19,11 @@ from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
 from kinfmu.codegen.forces import load_inputs
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.force_names import shaking_names
 from kinfmu.plan import SolvePlan, compile_plan
-from kinfmu.plan.forces import force_names, force_steps, loaded_coordinates
+from kinfmu.plan.forces import ForceSteps, force_names, force_steps, loaded_coordinates
+from kinfmu.plan.reactions import reaction_names, reaction_steps, undetermined_reactions
+from kinfmu.plan.shaking import shaking_steps
 from kinfmu.plan.trace import Tracer, parameter_symbol
 
 FOLLOWER = ("follower.h", "follower.c")
@@ -36,6 +39,7 @@ EXPORTS = (
     "kf_page_margin",
     "kf_page_errors",
     "kf_page_forces",
+    "kf_page_reactions",
     "kf_page_sweep",
     "kf_page_sample",
 )
@@ -52,6 +56,8 @@ class PageModule(NamedTuple):
         points: The points 'body.point' whose places in their bodies it returns.
         parameters: Names of what it can bind, in its order: parameters, or their labels, then constants of the laws.
         forces: Names of its forces; none without masses and loads.
+        reactions: Names of the reactions of joints, without those that redundant rows leave undetermined, then of
+            shaking force and moment; none without masses and loads.
 
     """
 
@@ -60,6 +66,7 @@ class PageModule(NamedTuple):
     points: tuple[str, ...]
     parameters: tuple[str, ...]
     forces: tuple[str, ...]
+    reactions: tuple[str, ...]
 
     @property
     def loads(self) -> tuple[str, ...]:
@@ -68,8 +75,13 @@ class PageModule(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The module for a page: compressed by gzip, in base64."""
-        return base64.b64encode(gzip.compress(self.data, 9, mtime=0)).decode()
+        """The module for a page."""
+        return packed(self.data)
+
+
+def packed(data: bytes) -> str:
+    """Return data for a page: compressed by gzip, in base64."""
+    return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
 
 
 def page_module(mechanism: Mechanism, labels: Mapping[str, str] | None = None) -> PageModule:
@@ -91,7 +103,8 @@ def page_module(mechanism: Mechanism, labels: Mapping[str, str] | None = None) -
     data = compiler.wasm_module(page_sources(plan, points, labels), EXPORTS, FLAGS)
     parameters = (labels.get(parameter.name, parameter.name) for parameter in plan.parameters)
     constants = (constant.name for constant in plan.law_constants)
-    return PageModule(data, plan, points, (*parameters, *constants), names)
+    reactions = [name for steps in _reaction_stages(plan).values() for name in steps.names]
+    return PageModule(data, plan, points, (*parameters, *constants), names, tuple(reactions))
 
 
 def page_sources(plan: SolvePlan, points: Sequence[str], labels: Mapping[str, str]) -> dict[str, str]:
@@ -102,12 +115,24 @@ def page_sources(plan: SolvePlan, points: Sequence[str], labels: Mapping[str, st
     lines = ["/* The whole module as one unit. Files included here are not compiled separately. */"]
     lines += [f'#include "{name}"' for name in sorted(files) if name.endswith(".c")]
     names = force_names(plan.mechanism)
-    forces = {"forces.c": emit_forces(plan, force_steps(plan, names, given_coefficients=True))} if names else {}
-    return files | {"page.c": "\n".join(lines) + "\n"} | forces
+    stages = {"forces": force_steps(plan, names, given_coefficients=True)} if names else {}
+    stages |= _reaction_stages(plan)
+    files |= {f"{stage}.c": emit_forces(plan, steps, stage) for stage, steps in stages.items()}
+    return files | {"page.c": "\n".join(lines) + "\n"}
+
+
+def _reaction_stages(plan: SolvePlan) -> dict[str, ForceSteps]:
+    """Return the steps to reactions of joints, and to shaking force and moment; none without masses and loads."""
+    if not reaction_names(plan):
+        return {}
+    undetermined, of_ground = undetermined_reactions(plan), shaking_names(plan.mechanism)
+    of_joints = [name for name in reaction_names(plan) if name not in undetermined and name not in of_ground]
+    return {"reactions": reaction_steps(plan, of_joints), "shaking": shaking_steps(plan)}
 
 
 def _header(plan: SolvePlan, points: Sequence[str]) -> str:
     constants = plan.law_constants
+    counts = [len(steps.names) for steps in _reaction_stages(plan).values()] or [0]
     lines = [
         f"/* What the page of {plan.mechanism.name} needs to know: generated from its mechanism, not to be edited. */",
         "#ifndef KF_INSTANCE_H",
@@ -117,10 +142,12 @@ def _header(plan: SolvePlan, points: Sequence[str]) -> str:
         "",
         f"#define KF_POINTS {len(points)}",
         f"#define KF_FORCES {len(force_names(plan.mechanism))}",
+        f"#define KF_REACTIONS {sum(counts)} /* of joints, then shaking force and moment */",
+        f"#define KF_OF_JOINTS {counts[0]}",
         f"#define KF_LOADS {len(load_inputs(plan))} /* efforts of external loads */",
         f"#define KF_START {plan.mechanism.run.start!r} /* [s] of the laws */",
         "",
-        *(f"{SIGNATURE.format(stage=stage)};" for stage in ("forces",)),
+        *(f"{SIGNATURE.format(stage=stage)};" for stage in ("forces", "reactions", "shaking")),
         "",
         *array("static char *const kf_constant_names", [string(one.name) for one in constants]),
         *array("static bool kf_constant_is_positive", booleans(one.is_positive for one in constants)),

@@ -84,19 +84,32 @@ def swept(native: Callable[[str], StepByStep], tmp_path_factory: pytest.TempPath
     first, count = 3 * len(loaded.plan.outputs), len(loaded.forces)
     u, ud, udd = (values.ravel().tolist() for values in driven_of(run))
     columns = list(range(first, first + count))
-    calls = [["sweep", u, columns, ud, udd, TIMES.tolist()], ["at", u[-3:], ud[-3:], udd[-3:]], ["forces", TIMES[-1]]]
+    calls = [
+        ["sweep", u, columns, ud, udd, TIMES.tolist()],
+        ["at", u[-3:], ud[-3:], udd[-3:]],
+        ["forces", TIMES[-1]],
+        ["reactions", TIMES[-1]],
+    ]
     jobs.append((loaded, calls))
     found = answers(tmp_path_factory.mktemp("page"), jobs)
     return {"runs": {**runs, LOADED: run}, **dict(zip([*MEMBERS, "refused", "bound", LOADED], found, strict=True))}
 
 
 def test_forces_are_those_of_a_run(swept: dict[str, Any]) -> None:
-    run, (sweep, status, forces) = swept["runs"][LOADED], swept[LOADED]
+    run, (sweep, status, forces, _) = swept["runs"][LOADED], swept[LOADED]
     found = table(sweep["values"], len(run.force_names))
     assert status == Status.OK
     assert np.abs(found - run.forces).max() < 1e-12 * np.abs(run.forces).max()
     assert np.abs(forces - run.forces[-1]).max() < 1e-12 * np.abs(run.forces).max()
     assert swept["refused"][7] is None  # a leg without masses
+
+
+def test_reactions_and_shaking_force_are_those_of_a_run(swept: dict[str, Any]) -> None:
+    run, reactions = swept["runs"][LOADED], swept[LOADED][-1]
+    names = page_module(kinfmu.load(LOADED)).reactions
+    assert names == run.reaction_names
+    assert names[-3:] == ("shaking_force_x", "shaking_force_y", "shaking_moment")
+    assert np.abs(reactions - run.reactions[-1]).max() < 1e-12 * np.abs(run.reactions).max()
 
 
 @pytest.mark.parametrize("name", MEMBERS)

@@ -167,6 +167,26 @@ def test_pin_dragged_too_far_stays_where_the_lengths_close(chromium: Browser) ->
         assert page.errors == []
 
 
+def test_forces_in_joints_are_drawn_to_one_scale_and_only_computed_when_shown(chromium: Browser) -> None:
+    mech = kinfmu.load("engine")
+    angle = 0.7
+    run = kinfmu.solve(mech, crank_angle=[angle], crank_speed=[100.0 * math.pi])
+    with chromium.open(text_of("engine")) as page:
+        page.get("k.linkage.shown.reactions = () => { throw new Error('not shown'); }")
+        page.move(angle)
+        page.get("delete k.linkage.shown.reactions")
+        page.tab.click("#tab-show")
+        page.tab.click("#show-forces")
+        page.tab.click("#show-shaking")
+        page.settle()
+        drawn, legend = page.get("k.extra().arrows"), page.get("k.extra().legend")
+        assert page.errors == []
+    assert [one["text"].split(" N ")[1] for one in legend] == ["in joints", "shaking force"]
+    scale = legend[0]["length"] / float(legend[0]["text"].split(" ")[0])  # [pixel/N]
+    at_pin = drawn[1]["along"]
+    assert at_pin == pytest.approx([scale * run["P.force_x"][0], scale * run["P.force_y"][0]], rel=1e-6)
+
+
 def test_click_in_a_plot_moves_the_crank(chromium: Browser) -> None:
     with chromium.open(text_of("crank_rocker")) as page:
         page.tab.click("#tab-plots")

@@ -19,7 +19,7 @@ export function draw(pen, linkage, view, theme, show, extra) {
     painter.slides();
     painter.cylinders();
     painter.pins(extra.held);
-    marks(painter, show, extra.arrows);
+    marks(painter, show, extra);
     if (show.names) painter.names();
 }
 

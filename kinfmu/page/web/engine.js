@@ -2,15 +2,20 @@
 //
 // All arrays are views of the module's memory: they hold until the next call that writes them, and are not to be kept.
 
-const ARRAYS = ["settings", "bound", "drive", "motion", "swept", "errors", "fixed", "points", "forces", "efforts"]; // as in interface.c
+const ARRAYS = ["settings", "bound", "drive", "motion", "swept", "errors", "fixed", "points", "forces", "efforts", "reactions"]; // as in interface.c
 const BRIDGED = 2; // the last status of a pose with numbers: see kinfmu.Status
 
+// Return the bytes that `packed` of kinfmu/page/module.py made a text: gzip in base64.
+export async function unpacked(text) {
+  const bytes = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Response(stream).arrayBuffer();
+}
+
 export class Engine {
-  // Return the engine of a module: text is gzip in base64, as PageModule.text gives it.
+  // Return the engine of a module: text as PageModule.text gives it.
   static async load(text) {
-    const packed = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
-    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
-    const { instance } = await WebAssembly.instantiate(await new Response(stream).arrayBuffer(), {});
+    const { instance } = await WebAssembly.instantiate(await unpacked(text), {});
     return new Engine(instance.exports);
   }
 
@@ -103,6 +108,14 @@ export class Engine {
     this.#load(efforts);
     this.#code.kf_page_forces(t);
     return this.#arrays.forces;
+  }
+
+  // Reactions of joints, NaN where a pose is interpolated across a singular point, then shaking force and moment: as
+  // `forces`, with the efforts set there.
+  reactions(t = NaN) {
+    if (this.#arrays.reactions.length === 0) return null;
+    this.#code.kf_page_reactions(t);
+    return this.#arrays.reactions;
   }
 
   // Positions at many driver values us (samples x drivers), followed from the start; the pose stays.

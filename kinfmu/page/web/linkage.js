@@ -4,6 +4,8 @@ import { TURN, placed, remainder } from "./geometry.js";
 
 const CURVE = 720; // points of a coupler curve
 const BOX = 73; // poses that decide what fits into the view
+const FORCES = 90; // poses of a run that decide the scale of forces
+const USUAL = 0.99; // part of the forces that are not outliers
 const LAW = 400; // times at which the laws are tabled
 
 export class Linkage {
@@ -40,13 +42,16 @@ export class Linkage {
 
     // ---- pose
 
-    #keep(u) {
+    #keep(u, rates) {
         this.pose = this.poseOf(this.shown);
         this.u = Float64Array.from(u);
+        this.rates = rates;
+        let known = null;
+        this.pose.reactions = () => (known ??= this.#reactionsAgain()); // the engine may be elsewhere by then
         this.failure = "";
     }
 
-    // Return a copy of the pose of an engine.
+    // Return a copy of the pose of an engine; its reactions are computed when they are read, while the engine is there.
     poseOf(engine, t = this.t) {
         const fixed = engine.fixed();
         const joined = (values, rest) => {
@@ -62,6 +67,7 @@ export class Linkage {
             qd: joined(engine.qd),
             qdd: joined(engine.qdd),
             forces: forces ? Float64Array.from(forces) : null,
+            reactions: () => this.#reactionsOf(engine, t),
             locals,
             triples,
         };
@@ -69,13 +75,13 @@ export class Linkage {
 
     // Move to driver values; return true if the pose is reached. The last good pose stays otherwise.
     goTo(u, rates = null) {
-        const { ud, udd } = rates || this.ratesNear(u);
+        const { ud, udd } = rates || this.ratesNear();
         const status = this.shown.at(Float64Array.from(u), ud, udd);
         if (!isGood(status)) {
             this.failure = this.shown.message || "This pose is unreachable.";
             return false;
         }
-        this.#keep(u);
+        this.#keep(u, { ud, udd });
         return true;
     }
 
@@ -329,6 +335,36 @@ export class Linkage {
     }
 
     // ---- quantities
+
+    #reactionsAgain() {
+        this.shown.at(this.u, this.rates.ud, this.rates.udd);
+        return this.#reactionsOf(this.shown, this.t);
+    }
+
+    // Return reactions by name: of joints, and shaking force and moment; null without masses and loads.
+    #reactionsOf(engine, t) {
+        const values = engine.reactions(t);
+        return values && new Map(this.part.reactions.map(({ name }, k) => [name, values[k]]));
+    }
+
+    // Return the largest of the forces of a kind over the run, without outliers; read(pose): their sizes.
+    largestForce(kind, read) {
+        const known = this.largest?.get(kind);
+        if (known && known.changed === this.changed) return known.most;
+        const { run } = this.data;
+        const sizes = [];
+        this.probe.restart();
+        for (let k = 0; k <= FORCES; k++) {
+            const t = run.from + ((run.to - run.from) * k) / FORCES;
+            const { u, ud, udd } = this.probe.driven(t);
+            if (!isGood(this.probe.at(u, ud, udd))) continue;
+            sizes.push(...read(this.poseOf(this.probe, t)).filter(Number.isFinite));
+        }
+        sizes.sort((a, b) => a - b);
+        const most = sizes.length ? sizes[Math.floor(USUAL * (sizes.length - 1))] : 0;
+        this.largest = (this.largest || new Map()).set(kind, { changed: this.changed, most });
+        return most;
+    }
 
     // Visit poses over the driver ("driver") or the run ("time"): visit(x, pose or null).
     visit(over, count, visit) {

@@ -6,7 +6,7 @@ import { THEMES } from "./colours.js";
 import { Design } from "./design.js";
 import { draw } from "./drawing.js";
 import { $, breakable, element } from "./elements.js";
-import { Engine } from "./engine.js";
+import { Engine, unpacked } from "./engine.js";
 import { Frames } from "./frames.js";
 import { Hand } from "./hand.js";
 import { keyboard } from "./keyboard.js";
@@ -26,7 +26,7 @@ class Page {
         this.linkage = linkage;
         this.design = new Design(linkage);
         this.view = new View();
-        this.show = { names: true, curves: true, traces: false, velocity: false, acceleration: false, transmission: loops.length > 0 && loops.length < 3, centres: false, limits: true, forces: false, grid: true };
+        this.show = { names: true, curves: true, traces: false, velocity: false, acceleration: false, transmission: loops.length > 0 && loops.length < 3, centres: false, limits: true, forces: false, shaking: false, grid: true };
         this.drawn = interest.map(({ point, colour }) => ({ point, colour })); // points with curves
         this.curves = [];
         this.traces = new Map();
@@ -101,7 +101,8 @@ class Page {
     extra() {
         const curves = this.drawn.map(({ colour }, k) => ({ line: this.curves[k] || [], colour }));
         if (this.show.traces) for (const [point, line] of this.traces) curves.push({ line, colour: this.drawn.find((one) => one.point === point)?.colour || [90, 90, 90], isTrace: true });
-        return { curves, arrows: arrows(this), held: this.hand.held, isGhost: !this.design.isOk };
+        const { found, legend } = arrows(this);
+        return { curves, arrows: found, legend, held: this.hand.held, isGhost: !this.design.isOk };
     }
 
     #trace() {
@@ -302,8 +303,8 @@ function fineness(linkage) {
 }
 
 async function start() {
-    const data = JSON.parse($("data").textContent);
     try {
+        const data = JSON.parse(new TextDecoder().decode(await unpacked($("data").textContent)));
         const engines = {};
         for (const [which, part] of Object.entries(data.modules)) {
             engines[which] = part && [await Engine.load(part.text, part), await Engine.load(part.text, part)];

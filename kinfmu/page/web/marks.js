@@ -4,11 +4,20 @@ import { css } from "./colours.js";
 import { distance, TURN } from "./geometry.js";
 import { degrees } from "./numbers.js";
 
-export function marks(painter, show, arrows) {
+export function marks(painter, show, { arrows, legend }) {
     if (show.limits) driverMarks(painter);
     if (show.transmission) transmissions(painter);
     if (show.centres) centres(painter);
     for (const one of arrows) arrow(painter, one);
+    legend.forEach((one, k) => scale(painter, one, k));
+}
+
+// Draw a line of the legend: an arrow of a round force and its size.
+function scale({ pen, theme, view }, { length, colour, text }, row) {
+    const [x, y] = [34, view.height - 28 - 20 * row];
+    pen.line([[x - 6, y], [x + length + 12 + 6.9 * text.length, y]], { width: 20, colour: theme.paper, cap: "butt" });
+    head(pen, [x, y], [x + length, y], css(colour));
+    pen.text(x + length + 10, y, text, { colour: css(colour), size: 12 });
 }
 
 function transmissions(painter) {
@@ -48,18 +57,24 @@ function centres(painter) {
     }
 }
 
+// Draw a line from a to b that ends with the head of an arrow.
+function head(pen, a, b, ink) {
+    const length = distance(a, b);
+    const [x, y] = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
+    const size = Math.min(10, 0.6 * length);
+    const base = [b[0] - size * x, b[1] - size * y];
+    pen.line([a, base], { width: 2.4, colour: ink });
+    pen.line([b, [base[0] - 0.4 * size * y, base[1] + 0.4 * size * x], [base[0] + 0.4 * size * y, base[1] - 0.4 * size * x]], { width: 1, colour: ink, fill: ink, closed: true });
+}
+
 // Draw an arrow; its text is next to its head.
 function arrow(painter, { from, along, colour, text }) {
     const a = painter.dot(from);
     const b = [a[0] + along[0], a[1] - along[1]];
     const length = distance(a, b);
     if (length < 2) return;
-    const [x, y] = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
-    const head = Math.min(10, 0.6 * length);
-    const base = [b[0] - head * x, b[1] - head * y];
-    const ink = css(colour(painter.theme));
-    painter.pen.line([a, base], { width: 2.4, colour: ink });
-    painter.pen.line([b, [base[0] - 0.4 * head * y, base[1] + 0.4 * head * x], [base[0] + 0.4 * head * y, base[1] - 0.4 * head * x]], { width: 1, colour: ink, fill: ink, closed: true });
+    const ink = css(colour);
+    head(painter.pen, a, b, ink);
     if (text) painter.name(text, [b], ink, 10, -1);
 }
 

@@ -86,16 +86,17 @@ export class Plots {
 
 export function showPanel(page, root) {
     const has = page.linkage.data;
+    const { undetermined, externals } = page.linkage.part;
     const rows = [
         ["names", "Names", ""],
         ["curves", "Curves of the points of interest", ""],
-        ["traces", "Trace while it moves", "the last turn of every drawn point"],
+        ["traces", "Trace while it moves", "the last 600 places of each drawn point"],
         ["velocity", "Velocities", ""],
         ["acceleration", "Accelerations", ""],
         ...(has.loops.length ? [["transmission", "Transmission angle", "red below 40\u00b0 or above 140\u00b0"]] : []),
         ["centres", "Instant centres", "1 is the ground, then the bodies in the order of the file"],
         ["limits", "Limits and change points", "on the circle of the driver"],
-        ...(page.linkage.part.forces.some(({ name }) => has.joints.some((joint) => name.startsWith(`${joint.name}.force`))) ? [["forces", "Forces in the joints", "of the first body on the second"]] : []),
+        ...(page.linkage.part.reactions.length ? [["forces", "Forces in the joints", `of the first body on the second${undetermined.length ? `; undetermined: ${undetermined.join(", ")}` : ""}`], ["shaking", "Shaking force", "on the ground, drawn at its origin"]] : []),
         ["grid", "Grid", ""],
     ];
     for (const [key, label, note] of rows) {
@@ -108,6 +109,7 @@ export function showPanel(page, root) {
         if (note) text.append(element("small", { textContent: note }));
         root.append(element("label", { className: "check" }, box, text));
     }
+    if (externals.length) root.append(element("p", { className: "quiet", textContent: `Loads from outside are 0 in this page: ${externals.join(", ")}.` }));
     if (page.linkage.bodies.length <= 13) {
         const numbers = page.linkage.bodies.map((name, k) => `${k + 1} ${name}`).join(", ");
         root.append(element("p", { className: "quiet", textContent: `Bodies: ${numbers}.` }));

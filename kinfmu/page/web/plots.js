@@ -26,6 +26,9 @@ export function quantities(linkage) {
     linkage.part.forces.forEach(({ name, unit }, k) => {
         found.push({ id: name, label: name, group: "forces", unit, read: (one, pose) => (pose.forces ? pose.forces[k] : NaN) });
     });
+    linkage.part.reactions.forEach(({ name, unit }) => {
+        found.push({ id: name, label: name, group: "reactions", unit, read: (_, pose) => pose.reactions().get(name) });
+    });
     return found;
 }
 

@@ -12,7 +12,7 @@ export class Values {
         const own = linkage.parameters.filter((one) => !one.isPlace && !one.isLaw);
         const places = linkage.parameters.filter((one) => one.isPlace);
         const laws = linkage.parameters.filter((one) => one.isLaw);
-        if (!linkage.parameters.length) root.append(element("p", { className: "quiet", textContent: "This mechanism has no numbers to change." }));
+        if (!linkage.parameters.length && !linkage.data.closedNumbers) root.append(element("p", { className: "quiet", textContent: "This mechanism has no numbers to change." }));
         own.forEach((one) => root.append(this.#row(one)));
         const groups = Map.groupBy ? Map.groupBy(places, (one) => one.group) : grouped(places);
         const isOpen = !own.length && places.length <= 60;
@@ -24,6 +24,8 @@ export class Values {
             root.append(group);
         }
         if (laws.length) root.append(this.#group("Laws of the drivers", laws, false));
+        const { closedNumbers } = linkage.data;
+        if (closedNumbers) root.append(element("p", { className: "quiet", textContent: `The file has ${closedNumbers} coordinates of points and numbers of joints. They can be changed in the file; the pages of files with at most 400 change them too.` }));
         this.isReady = true;
         this.update();
     }
