@@ -19,10 +19,10 @@ from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
 from kinfmu.codegen.forces import load_inputs
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.mechanism import Mechanism
-from kinfmu.mechanism.force_names import shaking_names
+from kinfmu.mechanism.force_names import reaction_names_of, shaking_names
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.forces import ForceSteps, force_names, force_steps, loaded_coordinates
-from kinfmu.plan.reactions import reaction_names, reaction_steps, undetermined_reactions
+from kinfmu.plan.reactions import reaction_steps, undetermined_reactions
 from kinfmu.plan.shaking import shaking_steps
 from kinfmu.plan.trace import Tracer, parameter_symbol
 
@@ -123,10 +123,12 @@ def page_sources(plan: SolvePlan, points: Sequence[str], labels: Mapping[str, st
 
 def _reaction_stages(plan: SolvePlan) -> dict[str, ForceSteps]:
     """Return the steps to reactions of joints, and to shaking force and moment; none without masses and loads."""
-    if not reaction_names(plan):
+    if not reaction_names_of(plan.mechanism):
         return {}
     undetermined, of_ground = undetermined_reactions(plan), shaking_names(plan.mechanism)
-    of_joints = [name for name in reaction_names(plan) if name not in undetermined and name not in of_ground]
+    of_joints = [
+        name for name in reaction_names_of(plan.mechanism) if name not in undetermined and name not in of_ground
+    ]
     return {"reactions": reaction_steps(plan, of_joints), "shaking": shaking_steps(plan)}
 
 
