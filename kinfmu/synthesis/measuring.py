@@ -72,10 +72,12 @@ class Measuring:
             KinfmuError: The design cannot be assembled, or a measure has no value.
 
         """
-        found = self._measured({name: np.array([value]) for name, value in parameters.items()}, self.aims)
+        reasons: dict[int, str] = {}
+        found = self._measured({name: np.array([value]) for name, value in parameters.items()}, self.aims, reasons)
         for aim, value in zip(self.aims, found[:, 0], strict=True):
             if not np.isfinite(value):
-                raise KinfmuError(f"measure '{aim.name}' has no value: some samples are not reached")
+                reason = reasons.get(0, "some samples are not reached")
+                raise KinfmuError(f"measure '{aim.name}' has no value: {reason}")
         return found[:, 0]
 
     def slopes(
@@ -92,14 +94,19 @@ class Measuring:
         slopes = (values[:, 0::2] - values[:, 1::2]) / (steps[0] - steps[1])
         return np.asarray(np.nan_to_num(slopes))  # 0 at the edge of what can be assembled
 
-    def _measured(self, parameters: Mapping[str, FloatArray], aims: Sequence[Aim]) -> FloatArray:
-        """Return the values (aims, m) of designs; NaN where there is none."""
+    def _measured(
+        self, parameters: Mapping[str, FloatArray], aims: Sequence[Aim], reasons: dict[int, str] | None = None
+    ) -> FloatArray:
+        """Return the values (aims, m) of designs; NaN where there is none, for the reasons that are added by design."""
         margins = [aim for aim in aims if isinstance(aim.reading, LowestMargin)]  # of the samples: nothing to refine
         others = [aim for aim in aims if aim not in margins]
         found: dict[str, FloatArray] = {}
         if others:
             readings = [_renamed(aim.reading, aim.name) for aim in others]
-            found |= measure_designs(self.model, parameters, readings, anew=False, **self.inputs).values
+            table = measure_designs(self.model, parameters, readings, anew=False, **self.inputs)
+            found |= table.values
+            if reasons is not None:
+                reasons |= table.reasons
         if margins:
             rows = zip(*(values.tolist() for values in parameters.values()), strict=True)
             lowest = np.array([self._lowest_margin(dict(zip(parameters, row, strict=True))) for row in rows])

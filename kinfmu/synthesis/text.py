@@ -23,8 +23,8 @@ def report(result: FitOutcome) -> list[str]:
         f"{result.tried} designs tried"
     ]
     if result.refused:
-        count = sum(result.refused.values())
-        lines.append(f"  {count} of them refused: they cannot be assembled or do not reach all samples")
+        count, reason = sum(result.refused.values()), max(result.refused, key=lambda one: result.refused[one])
+        lines.append(f"  {count} of them refused, for example: {reason}")
     unit = argument_unit(result.problem)
     for one in result.errors:
         lines += ["", *_target(one, unit)]
