@@ -12,7 +12,7 @@ from kinfmu.codegen.c import compiler
 from kinfmu.fmu.interface import Drive
 from kinfmu.fmu.native.sources import headers, sources
 from kinfmu.fmu.variables import interface
-from kinfmu.plan import compile_plan
+from tests.fmu.planned import planned
 from tests.fmu.test_parameters import linkage
 from tests.fuzz.summary import Summary, seeds
 
@@ -48,6 +48,8 @@ VARIANTS = [
     Variant("triple_rocker", 3, "time", "thread"),
     Variant("double_pendulum", 2, "inputs", "address"),
     Variant("excavator", 3, "time", "address"),
+    Variant("excavator_loaded", 3, "inputs", "thread"),
+    Variant("engine", 2, "time", "address"),
 ]
 
 
@@ -84,10 +86,11 @@ def _program(variant: Variant, folder: Path) -> Path:
     """The program of a variant, compiled when it is first wanted."""
     path = folder / "_".join(map(str, variant))
     if not path.exists():
-        plan = compile_plan(linkage() if variant.mechanism == "settable" else kinfmu.load(variant.mechanism))
-        variables = interface(plan, variant.drive, has_time=variant.fmi == 3)
+        plan, forces = planned(linkage() if variant.mechanism == "settable" else kinfmu.load(variant.mechanism))
+        variables = interface(plan, variant.drive, has_time=variant.fmi == 3, forces=forces)
         version = f"{variant.fmi}.0"
-        files = sources(plan, variables, version, TOKEN) | headers(version) | {DRIVER.name: DRIVER.read_text("utf-8")}
+        files = sources(plan, variables, version, TOKEN, forces) | headers(version)
+        files[DRIVER.name] = DRIVER.read_text("utf-8")
         flags = ("-std=c99", "-g", "-O0", "-ffp-contract=off", "-pthread")
         compiler.compile_files(
             compiler.command(), files, (*flags, f"-DFMI={variant.fmi}", *SANITIZERS[variant.sanitizer]), path

@@ -87,16 +87,13 @@ static int step(instance c, double t, double h)
 
 int main(void)
 {
-    unsigned outputs[OUTPUTS], angle = 1, parameter = (unsigned)(PARAMETER);
+    unsigned outputs[OUTPUTS] = {OUTPUT_REFERENCES}, angle = 1, parameter = (unsigned)(PARAMETER);
     double values[OUTPUTS], others[OUTPUTS], begin, u, one = 1.0, nan_value = NAN, known;
     void *state = NULL, *again = NULL;
     unsigned char *bytes;
     size_t size = 0;
     instance c;
     int k;
-    for (k = 0; k < OUTPUTS; ++k) {
-        outputs[k] = (unsigned)(FIRST_OUTPUT + k);
-    }
     CHECK(start("{wrong}") == NULL)
     c = start(TOKEN);
     CHECK(c != NULL)

@@ -21,10 +21,11 @@ import pytest
 import kinfmu
 from kinfmu.fmu import description
 from tests.fmu.conftest import Build
+from tests.fmu.planned import planned
 
 PYTHON = os.environ.get("KINFMU_HOSTS", sys.executable)
-STEP, COUNT = 0.05, 40
-NAMES = ("coupler.x", "coupler.phi", "rocker.omega")
+STEP, COUNT = 0.013, 40
+NAMES = ("coupler.x", "coupler.phi", "rocker.omega", "crank.torque", "O.force_x", "shaking_moment")
 
 OSP = """
 import sys
@@ -112,20 +113,20 @@ def _wanted(name: str, times: np.ndarray) -> np.ndarray:
 @pytest.mark.skipif(not _has("libcosimpy"), reason="libcosimpy is not installed")
 def test_osp_steps_it(built_native: Build, tmp_path: Path) -> None:
     from kinfmu.fmu.variables import interface
-    from kinfmu.plan import compile_plan
 
-    references = interface(compile_plan(kinfmu.load("crank_rocker"))).value_references()
-    fmu = built_native("crank_rocker", 2, "time")
+    plan, forces = planned(kinfmu.load("fourbar_loaded"))
+    references = interface(plan, forces=forces).value_references()
+    fmu = built_native("fourbar_loaded", 2, "time")
     rows = _rows(OSP, fmu, tmp_path, *(str(references[name]) for name in NAMES))
     times = STEP * np.arange(1, COUNT + 1)
-    np.testing.assert_allclose(rows, _wanted("crank_rocker", times), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(rows, _wanted("fourbar_loaded", times), rtol=0, atol=1e-9)
 
 
 @pytest.mark.skipif(not _has("ecospy"), reason="ecospy is not installed, or lacks libtbb12")
 def test_ecospy_steps_it(built_native: Build, fmi: int, tmp_path: Path) -> None:
-    rows = _rows(ECOS, built_native("crank_rocker", fmi, "time"), tmp_path, *NAMES)
+    rows = _rows(ECOS, built_native("fourbar_loaded", fmi, "time"), tmp_path, *NAMES)
     times = STEP * np.arange(1, COUNT + 1)
-    np.testing.assert_allclose(rows, _wanted("crank_rocker", times), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(rows, _wanted("fourbar_loaded", times), rtol=0, atol=1e-9)
 
 
 def _table_of_ecos(fmu: Path, stop: float, step: float, folder: Path) -> tuple[list[str], list[list[str]]]:
@@ -153,11 +154,11 @@ def _ecos() -> Path | None:
 
 @pytest.mark.skipif(_ecos() is None, reason="ecospy is not installed: no ecos command")
 def test_the_ecos_command_steps_it(built_native: Build, fmi: int, tmp_path: Path) -> None:
-    header, lines = _table_of_ecos(built_native("crank_rocker", fmi, "time"), STEP * COUNT, STEP, tmp_path)
+    header, lines = _table_of_ecos(built_native("fourbar_loaded", fmi, "time"), STEP * COUNT, STEP, tmp_path)
     columns = [next(k for k, cell in enumerate(header) if f"::{name}[" in cell.replace(" ", "")) for name in NAMES]
     rows = np.array([[float(line[k]) for k in (1, *columns)] for line in lines])
     np.testing.assert_allclose(
-        rows[:, 1:], _wanted("crank_rocker", rows[:, 0]), rtol=0, atol=2e-5
+        rows[:, 1:], _wanted("fourbar_loaded", rows[:, 0]), rtol=0, atol=2e-5
     )  # the command writes 6 digits
 
 
