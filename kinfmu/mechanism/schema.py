@@ -20,6 +20,7 @@ from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
 from kinfmu.mechanism.expression import LONGEST
 from kinfmu.mechanism.number import EXAMPLES
+from kinfmu.mechanism.repeats import LARGEST_COUNT, REPEATED
 from kinfmu.mechanism.toml_tables import table_keys
 from kinfmu.readings import READINGS
 from kinfmu.units import METRES, Quantity
@@ -27,7 +28,12 @@ from kinfmu.units import METRES, Quantity
 Schema = dict[str, Any]
 DIALECT = "http://json-schema.org/draft-07/schema#"  # the newest that editors of TOML agree on
 NAME = "^[A-Za-z_][A-Za-z0-9_]{0,99}$"
-_REFERRED = {"point": "point", "body": "name", "coordinate": "point"}  # definitions by what a reference refers to
+_BRACED = r"(?:[A-Za-z_]|\{[A-Za-z0-9_+\- ]+\})(?:[A-Za-z0-9_]|\{[A-Za-z0-9_+\- ]+\})*"  # with numbers of repeats
+_REFERRED = {
+    "point": "point",
+    "body": "braced_name",
+    "coordinate": "point",
+}  # definitions by what a reference refers to
 
 
 def schema_text() -> str:
@@ -82,6 +88,18 @@ def schema() -> Schema:
             }
         ),
     }
+    tables["counts"] = {
+        "type": "object",
+        "description": "Whole numbers that braces and repeats refer to by name",
+        "additionalProperties": {"type": "integer", "minimum": 0, "maximum": LARGEST_COUNT},
+        **names,
+    }
+    tables["repeat"] = {
+        "type": "object",
+        "description": "Tables that are read once for each number of a range",
+        "additionalProperties": _repeat(tables),
+        **names,
+    }
     return {
         "$schema": DIALECT,
         "title": "kinfmu mechanism",
@@ -90,15 +108,30 @@ def schema() -> Schema:
     }
 
 
+def _repeat(named: Schema) -> Schema:
+    """Describe the table of a repeat; named: the tables of named members."""
+    whole = {"anyOf": [{"type": "integer", "minimum": 0, "maximum": LARGEST_COUNT}, {"type": "string"}]}
+    names = {"propertyNames": _ref("braced_name")}
+    return _table(
+        {
+            "from": {"description": "First number; default: 1", **whole},
+            "to": {"description": "Last number, or a count such as 'stages - 1'", **whole},
+            **{key: {**named[key], **names} for key in REPEATED},
+        },
+        required=("to",),
+    )
+
+
 def _definitions() -> Schema:
     laws_of_joints = [law for law in LAWS if law is not External]
     return {
         "name": {"type": "string", "pattern": NAME},
-        "point": {"type": "string", "pattern": r"^[A-Za-z_][A-Za-z0-9_]*\.[A-Za-z_][A-Za-z0-9_]*$"},
+        "braced_name": {"type": "string", "pattern": f"^{_BRACED}$"},
+        "point": {"type": "string", "pattern": rf"^{_BRACED}\.{_BRACED}$"},
         "number": {
             "anyOf": [
                 {"type": "number"},
-                {"type": "string", "pattern": r"^[A-Za-z0-9_.,+\-*/() \t]+$", "maxLength": LONGEST},
+                {"type": "string", "pattern": r"^[A-Za-z0-9_.,+\-*/() \t{}]+$", "maxLength": LONGEST},
             ]
         },
         "parameter": {
@@ -126,7 +159,7 @@ def _body() -> Schema:
             "points": {
                 "type": "object",
                 "description": "Points [x, y] in the body's own frame",
-                "propertyNames": _ref("name"),
+                "propertyNames": _ref("braced_name"),
                 "additionalProperties": _ref("xy"),
             },
             "start": {

@@ -18,6 +18,7 @@ from kinfmu.mechanism.body import MASS_KEYS, Body, Gravity, RunSettings, Start
 from kinfmu.mechanism.declared import REQUIRED, Takes, keys_of
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.mechanism.parameters import Parameter
+from kinfmu.mechanism.repeats import COUNTS, REPEAT, expanded
 from kinfmu.mechanism.table_file import read_table
 from kinfmu.mechanism.toml_tables import (
     check_keys,
@@ -61,6 +62,8 @@ _TABLES = (
     "points",
     "outputs",
     "measures",
+    COUNTS,
+    REPEAT,
 )
 
 
@@ -131,6 +134,7 @@ def _deep_key(text: str) -> int | None:
 
 def _mechanism(document: dict[str, Any], folder: Path | None) -> Mechanism:
     check_keys("", document, _TABLES)
+    document = expanded(document)
     units = table_of(document, "units")
     check_keys("[units]", units, ("length",))
     outputs = table_of(document, "outputs")

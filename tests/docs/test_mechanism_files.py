@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import kinfmu
@@ -44,11 +45,14 @@ def test_the_blocks_are_one_mechanism_that_solves() -> None:
     assert run.good.all()
     assert run.outputs[:3] == ("crank.phi", "slide.x", "rocker.phi")
     assert "tip.x" in run.outputs
+    apart = np.hypot(run["mark_2.x"] - run["mark_1.x"], run["mark_2.y"] - run["mark_1.y"])
+    np.testing.assert_allclose(apart, 50.0, rtol=1e-12)
 
 
 def test_every_table_of_the_format_is_on_the_page() -> None:
     named = ("bodies.NAME", "joints.NAME", "drivers.NAME")
     tables = ("units", "parameters", *named, "gravity", "loads.NAME", "points", "outputs", "run", "measures.NAME")
+    tables += ("repeat.NAME",)
     assert [re.sub(r"[`\[\]]", "", line[3:]) for line in PAGE.splitlines() if line.startswith("## `[")] == list(tables)
 
 
