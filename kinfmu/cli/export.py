@@ -97,6 +97,12 @@ def _between(run: Run, start: str | None, stop: str | None) -> Run:
 )
 @click.option("--overlay", is_flag=True, help="Plot columns of one unit in one panel: --columns left.phi,right.phi.")
 @click.option("--polar", is_flag=True, help="Plot over the polar angle: the driver's, or that of --x.")
+@click.option(
+    "--svaj",
+    metavar="NAME",
+    help="Plot displacement, velocity, acceleration and jerk over the driver, of a coordinate such as slider.x or of a "
+    "cam joint's lift.",
+)
 @click.option("--degrees", is_flag=True, help="Plot angles in deg. Driver values and angles of --x always are.")
 @click.option(
     "--start", metavar="VALUE", help="First sample: time [s], or driver value of solve --angle, such as 30deg."
@@ -111,6 +117,7 @@ def export(
     across: str | None,
     overlay: bool,
     polar: bool,
+    svaj: str | None,
     degrees: bool,
     start: str | None,
     stop: str | None,
@@ -130,10 +137,20 @@ def export(
     if units and suffix != ".csv":
         where = "Parquet and npz always hold the units" if suffix in TABLES else "plots show the units at their axes"
         raise click.UsageError(f"--units: only for .csv, not {suffix}; {where}")
-    plot_only = {"--x": across, "--overlay": overlay, "--polar": polar, "--degrees": degrees, "a second run": other}
+    plot_only = {
+        "--x": across,
+        "--overlay": overlay,
+        "--polar": polar,
+        "a second run": other,
+        "--svaj": svaj,
+        "--degrees": degrees,
+    }
     given = [name for name, value in plot_only.items() if value]
     if given and suffix not in PLOTS:
         raise click.UsageError(f"{listed(given)}: only for plots, {listed(PLOTS)}, not {suffix}")
+    excluded = [name for name in given if name not in ("--svaj", "--degrees")] + ["--columns"] * (columns is not None)
+    if svaj and excluded:
+        raise click.UsageError(f"--svaj excludes {listed(excluded)}")
     if columns is not None and suffix in ANIMATIONS:
         valid = listed((*TABLES, *PLOTS))
         raise click.UsageError(f"--columns {columns}: only for tables and plots, {valid}, not {suffix}")
@@ -141,6 +158,12 @@ def export(
     if output == STANDARD_OUTPUT:
         for line in csv_lines(part, names_in(columns), units=units):
             click.echo(line, nl=False)
+        return
+    if svaj:
+        from kinfmu.draw import svaj as drawn
+
+        drawn(part, output, svaj, degrees=degrees)
+        click.echo(f"written: {output}")
         return
     how: dict[str, Any] = {"x": names_in(across) or (), "overlaid": overlay, "polar": polar, "degrees": degrees}
     if other is not None:

@@ -1,4 +1,4 @@
-"""Figures for reports and web pages: of a mechanism, of a run's coordinates, of a moving run.
+"""Figures for reports and web pages: of a mechanism, of a run's coordinates and their jerk, of a moving run.
 
 matplotlib and Pillow draw them; they are loaded when first used.
 """
@@ -8,5 +8,6 @@ from __future__ import annotations
 from kinfmu.draw.animation import animate
 from kinfmu.draw.drawing import figure
 from kinfmu.draw.plots import plot
+from kinfmu.draw.svaj import svaj
 
-__all__ = ["animate", "figure", "plot"]
+__all__ = ["animate", "figure", "plot", "svaj"]

@@ -230,7 +230,7 @@ def _scales(axes: Any, shown: Shown, panel: Sequence[str], values: FloatArray, u
     if is_logarithmic(panel[0]):
         powers_of_ten(axes, values)
     elif not _is_map(shown, panel):
-        shown_values = _range(values)
+        shown_values = range_of(values)
         if shown_values:
             axes.set_ylim(*shown_values)
         axes.yaxis.set_major_formatter(lambda value, _: f"{value:.4g}".replace("-", "\N{MINUS SIGN}"))
@@ -245,7 +245,7 @@ def _scales(axes: Any, shown: Shown, panel: Sequence[str], values: FloatArray, u
                 axes.axvspan(first, last, color=ink(LOST), linewidth=0.0, zorder=0.0)
 
 
-def _range(values: FloatArray) -> tuple[float, float] | None:
+def range_of(values: FloatArray) -> tuple[float, float] | None:
     """Return a range in which noise about a constant is a straight line; None for matplotlib's default."""
     known = values[np.isfinite(values)]
     if not len(known):

@@ -153,3 +153,12 @@ def test_a_column_is_plotted_over_another(record: Path, command: Command, refuse
     assert message == "--x, --polar: only for plots, .svg, .png, .pdf, not .csv"
     message = refuses("export", record, record, "-o", "run.gif")
     assert message == "a second run: only for plots, .svg, .png, .pdf, not .gif"
+
+
+def test_displacement_velocity_acceleration_and_jerk_are_plotted(command: Command, refuses: Callable[..., str]) -> None:
+    assert command("solve", "crank_rocker", "-o", "run.mcap", "--angle", "0deg:360deg:37").exit_code == 0
+    assert command("export", "run.mcap", "-o", "run.svg", "--svaj", "rocker.phi", "--degrees").exit_code == 0
+    assert ">j [rad/rad³]<" in Path("run.svg").read_text(encoding="utf-8")
+    message = refuses("export", "run.mcap", "-o", "run.svg", "--svaj", "rocker.phi", "--polar", "--columns", "q")
+    assert message == "--svaj excludes --polar, --columns"
+    assert "--svaj: only for plots" in refuses("export", "run.mcap", "-o", "run.csv", "--svaj", "rocker.phi")

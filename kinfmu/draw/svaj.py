@@ -1,0 +1,102 @@
+"""svaj(): displacement, velocity, acceleration and jerk of a follower or a slider over its driver."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kinfmu.draw.abscissa import TICK_STEPS, Abscissa, abscissa, degrees_of, labelled
+from kinfmu.draw.chart import SMALL, dress
+from kinfmu.draw.curves import rows_of
+from kinfmu.draw.overlay import range_of, sheet_title
+from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
+from kinfmu.draw.writing import check_suffix, write
+from kinfmu.errors import FigureError, RequestError
+from kinfmu.motion.jerk import motion_of
+from kinfmu.run import FloatArray, Run
+from kinfmu.run.axis import rates_per
+from kinfmu.scene import palette
+from kinfmu.units import Quantity, unit_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LETTERS = ("s", "v", "a", "j")
+_COLOURS = (5, 2, 4, 3)  # of the palette
+_WIDTH, _HEIGHT = 420.0, 104.0  # [pt] of a panel
+_LEFT, _RIGHT, _TOP, _BOTTOM, _GAP, _EDGE = 70.0, 24.0, 34.0, 34.0, 12.0, 8.0  # [pt]
+
+
+def svaj(run: Run, path: str | Path, name: str, *, degrees: bool = False) -> None:
+    """Draw displacement s, velocity v, acceleration a and jerk j of a coordinate or a cam's follower over its driver.
+
+    The jerk is exact: it solves the constraint equations, differentiated three times, at every sample. It has gaps at
+    samples that are bridged or near a singular point. v, a and j are derivatives by time or by the driver, as the rates
+    of the run are; their units state it.
+
+    Args:
+        run: The run.
+        path: The .svg, .png or .pdf file.
+        name: A coordinate such as 'slider.x' or 'foot.y', or the name of a cam joint for its lift.
+        degrees: True: angles in deg.
+
+    Raises:
+        RequestError: The name is unknown, or the jerk is not known, with the reason.
+        FigureError: The run has no samples, the suffix is unknown, or the file cannot be written.
+        MissingPackageError: matplotlib is not installed.
+
+    """
+    path = Path(str(path))
+    check_suffix(path)
+    if not len(run):
+        raise FigureError("the run has no samples to plot")
+    table, kind = motion_of(run, name)
+    per = rates_per(run)
+    units = [unit_of(Quantity(kind, order, per), run.length_unit) for order in range(4)]
+    across = driver_axis(run)
+    write(path, lambda: _sheet(run, across, name, table, units, degrees=degrees))
+
+
+def driver_axis(run: Run) -> Abscissa:
+    """Return the values of the only driver that moves, or the axis of the run."""
+    moving = [name for name in run.input_names[::3] if np.ptp(run.inputs[:, run.input_names.index(name)]) > 0.0]
+    try:
+        return abscissa(run, moving[0]) if len(moving) == 1 else abscissa(run)
+    except RequestError:
+        return abscissa(run)
+
+
+def _sheet(run: Run, across: Abscissa, name: str, table: FloatArray, units: list[str], *, degrees: bool) -> Figure:
+    from matplotlib.figure import Figure
+
+    width = _LEFT + _WIDTH + _RIGHT
+    title = sheet_title((run,), ("", ""))
+    lines = title_lines(f"{title}: {name}" if title else name, width - 2.0 * _EDGE)
+    above = _TOP + max(len(lines) - 1, 0) * TITLE_LINE
+    height = above + 4.0 * _HEIGHT + 3.0 * _GAP + _BOTTOM
+    made = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
+    look: dict[str, Any] = {"fontsize": TITLE_FONT, "va": "top", "color": ink(INK), "parse_math": False}
+    made.text(_EDGE / width, 1.0 - _EDGE / height, "\n".join(lines), **look)
+    for order, letter in enumerate(LETTERS):
+        bottom = height - above - (order + 1) * _HEIGHT - order * _GAP
+        axes = made.add_axes((_LEFT / width, bottom / height, _WIDTH / width, _HEIGHT / height))
+        unit, factor = degrees_of(units[order]) if degrees else (units[order], 1.0)
+        values = table[:, order] * factor
+        rows = rows_of(values)
+        axes.plot(across.values[rows], values[rows], linewidth=1.2, color=ink(palette.BODIES[_COLOURS[order]]))
+        dress(axes, "")
+        limits = range_of(values)
+        if limits:
+            axes.set_ylim(*limits)
+        axes.margins(x=0.01)
+        axes.locator_params(axis="y", nbins=4)
+        axes.yaxis.set_major_formatter(lambda value, _: f"{value:.4g}".replace("-", "\N{MINUS SIGN}"))
+        if across.is_angle:
+            axes.locator_params(axis="x", nbins=9, steps=TICK_STEPS)
+        axes.set_ylabel(labelled(letter, unit), fontsize=SMALL, color=ink(GREY))
+        axes.yaxis.set_label_coords(-50.0 / _WIDTH, 0.5)
+        axes.tick_params(labelbottom=order == len(LETTERS) - 1)
+    axes.set_xlabel(across.label, fontsize=SMALL, color=ink(GREY), labelpad=1.0, parse_math=False)
+    return made

@@ -1,0 +1,134 @@
+"""Jerk: third derivatives of a run's motion, from the constraint equations differentiated once more than for gamma."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kinfmu.equations.system import System, placement
+from kinfmu.errors import RequestError, listed, suggestion
+from kinfmu.joints.cam import Cam
+from kinfmu.laws import External
+from kinfmu.measures.placement import Placement
+from kinfmu.mechanism import Mechanism
+from kinfmu.motion.jets import Jet
+from kinfmu.run import FloatArray, Run
+from kinfmu.run.axis import TIME
+from kinfmu.solver.python.status import Status
+
+SAME = 1e-9  # of the largest value; by how much inputs may differ from the law of their driver
+LEAST_MARGIN = 1e-6  # 1 / condition of the scaled Jacobian; below it a third derivative has no digits
+
+
+def motion_of(run: Run, name: str) -> tuple[FloatArray, str]:
+    """Return a coordinate with its first three derivatives, and its kind: 'length' or 'angle'.
+
+        Phi_q qddd = delta,   delta = -Phi''' along q + qd t + qdd t^2 / 2, u(t)
+
+    Derivatives are by what the rates of the run are derivatives by. They are exact to round-off times the condition
+    number; rows of samples that are bridged, near a singular point or without numbers hold NaN.
+
+    Args:
+        run: A run that holds its mechanism and the positions, velocities and accelerations of all coordinates.
+        name: A coordinate such as 'slider.x', a point of interest's, or a cam joint for its follower's lift.
+
+    Returns:
+        (n, 4) values, rates, accelerations and jerks; the kind.
+
+    Raises:
+        RequestError: The name is unknown, or the third derivative of a driver's input is not known.
+        KinfmuError: The run does not hold a column.
+        MechanismError: The run's mechanism cannot be read.
+
+    """
+    mechanism = run.mechanism
+    if mechanism is None:
+        raise RequestError("the run does not hold its mechanism, from whose equations the jerk is computed")
+    places = [place for place in mechanism.coordinate_names if place in {*run.outputs, *run.fixed}]
+    missing = [place for place in mechanism.coordinate_names if place not in places]
+    if missing:
+        raise RequestError(f"the jerk needs all coordinates, and the run does not hold {listed(missing)}")
+    columns = [tuple(np.asarray(run[place.derivative(k)], dtype=float) for k in range(3)) for place in places]
+    system, targets = System(mechanism), _targets(run, mechanism)
+    along = [Jet.of(*_whole(run, one)) for one in columns]
+    phi = system.evaluate(along, targets)
+    at_rest = [Jet.of(target.c[0]) for target in targets]
+    jacobian = np.stack(
+        [
+            np.stack([_column(row, 1, run) for row in system.evaluate(_unit(along, k), at_rest)], -1)
+            for k in range(len(along))
+        ],
+        -1,
+    )  # (n, rows, coordinates)
+    delta = -np.stack([_column(row, 3, run) for row in phi], -1)  # (n, rows)
+    scaled = jacobian / system.scales[:, None] * system.column_scales / system.size
+    u, sizes, v = np.linalg.svd(scaled, full_matrices=False)
+    solved = np.einsum("nij,ni->nj", u, delta / system.scales / system.size)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        jerks = np.einsum("nij,ni->nj", v, solved / sizes) * system.column_scales
+    is_known = run.good & (run.status != Status.BRIDGED) & (sizes[:, -1] > LEAST_MARGIN * sizes[:, 0])
+    full = [Jet((*jet.c[:3], jerks[:, k] / 6.0)) for k, jet in enumerate(along)]
+    value, kind = _quantity(mechanism, name, placement(mechanism, full))
+    table = np.stack([_column(value, order, run) for order in range(4)], -1)
+    table[~run.good] = np.nan
+    table[~is_known, 3] = np.nan
+    return table, kind
+
+
+def _quantity(mechanism: Mechanism, name: str, at: Placement) -> tuple[Any, str]:
+    """Return a coordinate or the lift of a cam as a jet, and its kind."""
+    owner, _, axis = name.rpartition(".")
+    cams = {joint.name: joint for joint in mechanism.joints if isinstance(joint, Cam)}
+    if name in cams:
+        return cams[name].follower().value(at) - cams[name].offset, cams[name].led
+    bodies = [body.name for body in mechanism.moving_bodies]
+    if axis == "phi" and owner in bodies:
+        return at.angle(owner), "angle"
+    if axis in ("x", "y") and (owner in bodies or owner in mechanism.points):
+        pose = at.poses.get(owner)
+        xy = (pose.x, pose.y) if pose is not None else at.point(mechanism.points[owner])
+        return xy["xy".index(axis)], "length"
+    known = [*cams, *mechanism.coordinate_names, *(f"{point}.{axis}" for point in mechanism.points for axis in "xy")]
+    raise RequestError(f"'{name}' is neither a coordinate nor a cam{suggestion(name, known)}; known: {listed(known)}")
+
+
+def _whole(run: Run, columns: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
+    """Return columns with 0 where a sample has no numbers."""
+    return tuple(np.where(run.good, column, 0.0) for column in columns)
+
+
+def _column(value: Any, order: int, run: Run) -> FloatArray:
+    """Return a derivative at all samples."""
+    derivative = value.derivative(order) if isinstance(value, Jet) else (0.0 if order else value)
+    return np.broadcast_to(np.asarray(derivative, dtype=float), (len(run),)).copy()
+
+
+def _unit(along: list[Jet], number: int) -> list[Jet]:
+    """Return the coordinates at rest but one, which has speed 1."""
+    return [Jet.of(jet.c[0], 1.0 if k == number else 0.0) for k, jet in enumerate(along)]
+
+
+def _targets(run: Run, mechanism: Mechanism) -> list[Jet]:
+    """Return the values of all drivers with three derivatives; RequestError if the third one is not known."""
+    found = []
+    for driver in mechanism.drivers:
+        given = [np.asarray(run[name], dtype=float) for name in driver.inputs()]
+        given = [np.where(np.isfinite(column), column, 0.0) for column in given]
+        if not given[2].any():
+            found.append(Jet.of(*given))
+            continue
+        of_law = None
+        if run.axis == TIME and not isinstance(driver.law, External):
+            of_law = driver.law.at(Jet.of(run.t, 1.0))
+        if not isinstance(of_law, Jet) or not all(map(_agrees, given, map(of_law.derivative, range(3)))):
+            raise RequestError(
+                f"the jerk is not known: driver '{driver.name}' has accelerations that are not those of the law in the "
+                "mechanism file, so their rate of change is unknown; run it by its law, or at constant speed"
+            )
+        found.append(of_law)
+    return found
+
+
+def _agrees(given: FloatArray, of_law: Any) -> bool:
+    return bool(np.all(np.abs(given - of_law) <= SAME * max(float(np.abs(given).max()), 1e-300)))
