@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     from kinfmu.run import Run
 
 
-TABLES, PLOTS, ANIMATIONS = (".csv", ".parquet", ".npz"), (".svg", ".png", ".pdf"), (".gif",)
-FORMATS = (*TABLES, *PLOTS, *ANIMATIONS)
+TABLES, PLOTS, ANIMATIONS = (".csv", ".parquet", ".npz"), (".svg", ".png", ".pdf"), (".gif", ".mp4")
+DRAWING = ".dxf"
+FORMATS = (*TABLES, *PLOTS, *ANIMATIONS, DRAWING)
 
 
 def _write(run: Run, path: Path, columns: Sequence[str], *, units: bool, **how: Any) -> None:
@@ -73,6 +74,14 @@ def _between(run: Run, start: str | None, stop: str | None) -> Run:
     return run.part(rows, events=tuple(event for event in run.events if low <= event.t <= high))
 
 
+def _on_axis_of(run: Run, text: str) -> float:
+    """Return a value of --at, in the unit of the axis of the run."""
+    from kinfmu.run.axis import axis_of
+
+    axis = axis_of(run)
+    return on_axis("--at", text, axis.label, axis.unit, f", {axis.range()}") / axis.factor
+
+
 @main.command(epilog="Example: kinfmu export logs/fourbar.mcap -o fourbar.svg --columns coupler.x,rocker.phi")
 @click.argument("run", type=InputFile(".mcap"))
 @click.argument("other", required=False, type=InputFile(".mcap"))
@@ -108,6 +117,9 @@ def _between(run: Run, start: str | None, stop: str | None) -> Run:
     "--start", metavar="VALUE", help="First sample: time [s], or driver value of solve --angle, such as 30deg."
 )
 @click.option("--stop", metavar="VALUE", help="Last sample: time [s], or driver value of solve --angle, such as 90deg.")
+@click.option(
+    "--at", metavar="VALUE", help="Time or driver value of a .dxf drawing, such as 45deg. Default: the first."
+)
 @click.option("--units", is_flag=True, help="Write units into the first line of a CSV file: coupler.x [m].")
 def export(
     run: Path,
@@ -121,14 +133,15 @@ def export(
     degrees: bool,
     start: str | None,
     stop: str | None,
+    at: str | None,
     units: bool,
 ) -> None:
     """Write a run as a table, as plots or as an animation.
 
     RUN is a record (.mcap) of simulate or solve. Tables in Parquet and npz contain the units. Plots (.svg, .png, .pdf)
     show coordinates, velocities and accelerations against time, or against the driver of a solve --angle. With --x,
-    --overlay or --polar, exactly the named columns are curves. OTHER is a second run for the same plot. A .gif shows
-    the moving linkage.
+    --overlay or --polar, exactly the named columns are curves. OTHER is a second run for the same plot. A .gif or
+    .mp4 shows the moving linkage, a .dxf the pose at a value as a CAD drawing.
     """
     from kinfmu.log import read
     from kinfmu.log.table import csv_lines
@@ -151,13 +164,21 @@ def export(
     excluded = [name for name in given if name not in ("--svaj", "--degrees")] + ["--columns"] * (columns is not None)
     if svaj and excluded:
         raise click.UsageError(f"--svaj excludes {listed(excluded)}")
-    if columns is not None and suffix in ANIMATIONS:
+    if at is not None and suffix != DRAWING:
+        raise click.UsageError(f"--at {at}: only for {DRAWING}, not {suffix}")
+    if columns is not None and suffix in (*ANIMATIONS, DRAWING):
         valid = listed((*TABLES, *PLOTS))
         raise click.UsageError(f"--columns {columns}: only for tables and plots, {valid}, not {suffix}")
     part = _between(read(run), start, stop)
     if output == STANDARD_OUTPUT:
         for line in csv_lines(part, names_in(columns), units=units):
             click.echo(line, nl=False)
+        return
+    if suffix == DRAWING:
+        from kinfmu.draw import dxf
+
+        dxf(part, output, None if at is None else _on_axis_of(part, at))
+        click.echo(f"written: {output}")
         return
     if svaj:
         from kinfmu.draw import svaj as drawn

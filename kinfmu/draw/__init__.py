@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from kinfmu.draw.animation import animate
 from kinfmu.draw.drawing import figure
+from kinfmu.draw.dxf import dxf
 from kinfmu.draw.plots import plot
 from kinfmu.draw.svaj import svaj
 
-__all__ = ["animate", "figure", "plot", "svaj"]
+__all__ = ["animate", "dxf", "figure", "plot", "svaj"]

@@ -1,4 +1,4 @@
-"""animate(): the linkage of a run as a GIF animation."""
+"""animate(): the linkage of a run as a GIF animation or an MP4 video."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from kinfmu.draw.drawing import draw
 from kinfmu.draw.painting import extent, placed, shortest
 from kinfmu.draw.pins import paths, pins
 from kinfmu.draw.sheet import GREY, PAPER, Sheet, ink
+from kinfmu.draw.video import encoder, mp4
 from kinfmu.draw.writing import figure_style, write_bytes
 from kinfmu.errors import FigureError, MechanismError, listed
 from kinfmu.files.whole_file import suffix_of
@@ -31,6 +32,7 @@ from kinfmu.scene.shapes import shapes
 if TYPE_CHECKING:
     from PIL.Image import Image
 
+SUFFIXES = (".gif", ".mp4")
 DOTS_PER_INCH = 80  # about 600 pixels across
 SHORTEST, LONGEST = 3.0, 8.0  # [s], limits of the duration; between them it is the run's own time
 PER_SECOND, MOST = 20.0, 100  # pictures; viewers of GIF round times to hundredths of a second
@@ -54,7 +56,7 @@ class _Film(NamedTuple):
 
 
 def animate(run: Run, path: str | Path) -> None:
-    """Draw the moving linkage of `run` into a .gif file: bodies, joints, cams, wheels, cylinders, paths and trails.
+    """Draw the moving linkage of `run` into a .gif or .mp4 file: bodies, joints, cams, wheels, paths, trails.
 
     The animation takes the run's own time, but at least SHORTEST and at most LONGEST; LONGEST if the run has no time. A
     motion that ends where it began repeats without a pause. Samples without numbers show the last pose that closed,
@@ -62,25 +64,28 @@ def animate(run: Run, path: str | Path) -> None:
 
     Args:
         run: The run.
-        path: The .gif file.
+        path: The .gif or .mp4 file.
 
     Raises:
         FigureError: The run has no mechanism, not all its coordinates, fewer than two samples with numbers, or too many
             turns for the number of pictures; or the file cannot be written.
-        MissingPackageError: matplotlib is not installed.
+        MissingPackageError: matplotlib is not installed or, for .mp4, ffmpeg is not.
 
     """
     path = Path(path)
-    if suffix_of(path) != ".gif":
-        raise FigureError(f"{path}: '{path.suffix}' is not a known format of animations; known: .gif")
-    mechanism, poses = _placed(run, path)
+    if suffix_of(path) not in SUFFIXES:
+        raise FigureError(f"{path}: '{path.suffix}' is not a known format of animations; known: {listed(SUFFIXES)}")
+    is_video = suffix_of(path) == ".mp4"
+    if is_video:
+        encoder(path)  # reports a missing program before the pictures are drawn
+    mechanism, poses = placed_run(run, path)
     film = _film(run, poses, path)
     with figure_style(path):
         images = list(_images(run, mechanism, poses, film))
-    write_bytes(path, _gif(images, film))
+    write_bytes(path, mp4(images, film.seconds, path) if is_video else _gif(images, film))
 
 
-def _placed(run: Run, path: Path) -> tuple[Mechanism, dict[str, FloatArray]]:
+def placed_run(run: Run, path: Path) -> tuple[Mechanism, dict[str, FloatArray]]:
     """Return the run's mechanism, and poses (n, 3) by body and for the ground; gaps hold the pose before them."""
     try:
         mechanism = run.mechanism

@@ -162,3 +162,11 @@ def test_displacement_velocity_acceleration_and_jerk_are_plotted(command: Comman
     message = refuses("export", "run.mcap", "-o", "run.svg", "--svaj", "rocker.phi", "--polar", "--columns", "q")
     assert message == "--svaj excludes --polar, --columns"
     assert "--svaj: only for plots" in refuses("export", "run.mcap", "-o", "run.csv", "--svaj", "rocker.phi")
+
+
+def test_a_pose_is_drawn_for_cad(record: Path, command: Command, refuses: Callable[..., str]) -> None:
+    pytest.importorskip("ezdxf")
+    assert command("export", record, "-o", "run.dxf", "--at", "45").stdout == "written: run.dxf\n"
+    message = refuses("export", record, "-o", "run.csv", "--at", "45")
+    assert message == "--at 45: only for .dxf, not .csv"
+    assert "'noon' is not a number" in refuses("export", record, "-o", "run.dxf", "--at", "noon")

@@ -11,7 +11,7 @@ import pytest
 
 import kinfmu
 from kinfmu.draw import animate, animation
-from kinfmu.draw.animation import _film, _placed
+from kinfmu.draw.animation import _film, placed_run
 from kinfmu.errors import FigureError
 from kinfmu.run import Run
 from kinfmu.scene import palette
@@ -67,7 +67,7 @@ def test_a_motion_that_does_not_return_pauses_at_its_end(tmp_path: Path) -> None
     found, times = pages(tmp_path / "run.gif")
     assert len(found) == 7
     assert times[-1] == times[0] + 1000
-    film = _film(run, _placed(run, tmp_path)[1], tmp_path)
+    film = _film(run, placed_run(run, tmp_path)[1], tmp_path)
     assert (film.rows[0], film.rows[-1]) == (0, 180)
     assert not film.repeats
 
@@ -85,10 +85,10 @@ def test_more_turns_than_the_pictures_can_show_are_refused_with_the_limit(
 
 def test_a_gap_holds_the_last_pose_that_closed(tmp_path: Path) -> None:
     run = with_gap(fourbar(np.arange(181.0)), 100, 120)
-    _, poses = _placed(run, tmp_path)
+    _, poses = placed_run(run, tmp_path)
     np.testing.assert_array_equal(poses["crank"][100:121], np.tile(poses["crank"][99], (21, 1)))
     late = with_gap(fourbar(np.arange(181.0)), 0, 30)
-    film = _film(late, _placed(late, tmp_path)[1], tmp_path)
+    film = _film(late, placed_run(late, tmp_path)[1], tmp_path)
     assert film.rows[0] == 31
     animate(run, tmp_path / "run.gif")
     reddish = [
@@ -100,7 +100,7 @@ def test_a_gap_holds_the_last_pose_that_closed(tmp_path: Path) -> None:
 
 def test_shapes_of_one_instant_serve_all_pictures(tmp_path: Path) -> None:
     run = solved("excavator")
-    mechanism, poses = _placed(run, tmp_path)
+    mechanism, poses = placed_run(run, tmp_path)
     directions = {driver.name: 1.0 for driver in mechanism.drivers}
     found = [
         shapes(Instant(mechanism, {body: np.vstack([pose[row], pose]) for body, pose in poses.items()}, directions))
@@ -132,8 +132,10 @@ def test_what_cannot_be_drawn_is_reported(tmp_path: Path) -> None:
         animate(run.without(["coupler.x", "coupler.y"]), path)
     with pytest.raises(FigureError, match=r"needs two samples with numbers; the run has 1$"):
         animate(fourbar(np.array([60.0])), path)
-    with pytest.raises(FigureError, match=r"run\.mp4: '\.mp4' is not a known format of animations; known: \.gif"):
-        animate(run, tmp_path / "run.mp4")
+    with pytest.raises(
+        FigureError, match=r"run\.avi: '\.avi' is not a known format of animations; known: \.gif, \.mp4"
+    ):
+        animate(run, tmp_path / "run.avi")
     with pytest.raises(FigureError, match=r"run\.gif: cannot be written"):
         animate(fourbar(np.arange(0.0, 181.0, 60.0)), tmp_path / "nowhere" / "run.gif")
     assert not list(tmp_path.iterdir())

@@ -1,0 +1,101 @@
+"""dxf(): the pose of a run at one sample as a DXF drawing, for CAD."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kinfmu.draw.animation import placed_run
+from kinfmu.draw.painting import placed
+from kinfmu.draw.writing import write_bytes
+from kinfmu.errors import FigureError, MissingPackageError
+from kinfmu.files.whole_file import suffix_of
+from kinfmu.joints import CamRoller
+from kinfmu.measures.placement import body_of
+from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.run import Run
+from kinfmu.run.axis import axis_of
+from kinfmu.scene.instant import Instant
+from kinfmu.scene.shapes import shapes
+
+_UNITS = {"in": 1, "ft": 2, "mm": 4, "cm": 5, "m": 6, "km": 7, "um": 13}  # $INSUNITS
+_DRAWN = ("link", "rod", "bar", "slot", "rail", "rack", "wheel", "barrel", "shaft")  # what has true dimensions
+_POINT_STYLE = 34  # $PDMODE: a cross in a circle
+
+
+def dxf(run: Run, path: str | Path, at: float | None = None) -> None:
+    """Write the pose of `run` at one sample into a .dxf file, in the mechanism's unit of length.
+
+    Each body has a layer of its name and colour, with its lines and circles and its points as POINT. The pitch curve of
+    a `cam_roller` is a closed polyline on the layer of its cam, one corner a degree. What has no true dimensions, such
+    as supports, blocks, rollers and names, is left out. The same run gives the same bytes with the same ezdxf.
+
+    Args:
+        run: The run.
+        path: The .dxf file.
+        at: Value on the axis of the run, in the unit of `axis_of`: the nearest sample with numbers is drawn. Default:
+            the first sample with numbers.
+
+    Raises:
+        FigureError: The run has no mechanism, not all its coordinates, or no sample with numbers; or the file cannot be
+            written.
+        MissingPackageError: ezdxf is not installed.
+
+    """
+    path = Path(str(path))
+    if suffix_of(path) != ".dxf":
+        raise FigureError(f"{path}: '{path.suffix}' is not a known format of CAD drawings; known: .dxf")
+    good = np.flatnonzero(run.good)
+    if not len(good):
+        raise FigureError(f"{path}: the run has no sample with numbers to draw")
+    try:
+        ezdxf: Any = import_module("ezdxf")
+    except ImportError:
+        raise MissingPackageError(f"{path}: a DXF file needs ezdxf: pip install 'kinfmu[dxf]'") from None
+    row = good[0] if at is None else good[np.argmin(np.abs(axis_of(run).values[good] - at))]
+    mechanism, poses = placed_run(run, path)
+    shown = Instant(mechanism, {body: pose[row : row + 1] for body, pose in poses.items()}, {})
+    with _without_date(ezdxf):
+        text = _drawing(ezdxf, shown, mechanism.length_unit)
+    write_bytes(path, text.encode())
+
+
+def _drawing(ezdxf: Any, shown: Instant, length_unit: str) -> str:
+    """Return the text of the drawing."""
+    drawing = ezdxf.new("R2010", units=_UNITS.get(length_unit, 0))
+    drawing.header["$PDMODE"] = _POINT_STYLE
+    space = drawing.modelspace()
+    rollers = {joint.name for joint in shown.joints if isinstance(joint, CamRoller)}
+    for body in (GROUND_NAME, *(body.name for body in shown.mechanism.moving_bodies)):
+        drawing.layers.add(body, true_color=ezdxf.rgb2int(shown.colour(body)))
+    for shape in placed(shown, shapes(shown)):
+        is_pitch = shape.kind == "pitch" and shape.name in rollers
+        if not is_pitch and shape.kind not in _DRAWN:
+            continue
+        look = {"layer": shape.frame if drawing.layers.has_entry(shape.frame) else GROUND_NAME}
+        if shape.radius:
+            space.add_circle(tuple(map(float, shape.points[0])), shape.radius, dxfattribs=look)
+        elif len(shape.points) > 1:
+            space.add_lwpolyline(shape.points.tolist(), close=shape.is_closed or is_pitch, dxfattribs=look)
+    for name in shown.body_points:
+        space.add_point(tuple(map(float, shown.point(name))), dxfattribs={"layer": body_of(name)})
+    text = io.StringIO()
+    drawing.write(text)
+    return text.getvalue()
+
+
+@contextmanager
+def _without_date(ezdxf: Any) -> Iterator[None]:
+    """Let ezdxf write no dates and no random identifiers in this block."""
+    before = ezdxf.options.write_fixed_meta_data_for_testing
+    ezdxf.options.write_fixed_meta_data_for_testing = True
+    try:
+        yield
+    finally:
+        ezdxf.options.write_fixed_meta_data_for_testing = before

@@ -1,0 +1,47 @@
+"""Pictures as an MP4 video, by the program ffmpeg."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kinfmu.errors import FigureError, MissingPackageError
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+
+def encoder(path: Path) -> str:
+    """Return the path of ffmpeg; MissingPackageError about `path` if it is not installed."""
+    found = shutil.which("ffmpeg")
+    if found is None:
+        raise MissingPackageError(
+            f"{path}: an MP4 needs the program ffmpeg, which is not found; install it, or write a .gif"
+        )
+    return found
+
+
+def mp4(images: Sequence[Image], seconds: float, path: Path) -> bytes:
+    """Return pictures of one size as an MP4 (H.264) that lasts `seconds`; FigureError if ffmpeg fails.
+
+    The size is rounded up to even numbers of pixels, which the format needs. Equal pictures give equal bytes with the
+    same version of ffmpeg.
+    """
+    width, height = images[0].size
+    with tempfile.TemporaryDirectory() as folder:
+        made = Path(folder) / "video.mp4"
+        command = [
+            encoder(path), "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
+            "-r", f"{len(images) / seconds:.6f}", "-i", "-", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white",
+            "-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-fflags", "+bitexact", str(made),
+        ]  # fmt: skip
+        frames = b"".join(image.tobytes() for image in images)
+        done = subprocess.run(command, input=frames, capture_output=True, check=False)  # noqa: S603  ffmpeg of the PATH
+        if done.returncode or not made.exists():
+            *_, why = ["no reason given", *done.stderr.decode(errors="replace").split("\n")[:1]]
+            raise FigureError(f"{path}: ffmpeg failed: {why or 'no reason given'}")
+        return made.read_bytes()

@@ -1,0 +1,73 @@
+"""DXF drawings and MP4 videos: what they hold, and what is refused."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu.draw import animate, animation, dxf
+from kinfmu.draw.video import encoder
+from kinfmu.errors import FigureError, MissingPackageError
+from tests.log.runs import fourbar
+
+
+def test_a_pose_is_drawn_in_layers_with_its_true_dimensions(tmp_path: Path) -> None:
+    ezdxf = pytest.importorskip("ezdxf")
+    mechanism = kinfmu.load("cam_roller")
+    run = kinfmu.solve(mechanism, cam_angle=np.radians(np.arange(0.0, 361.0)))
+    for name in ("a.dxf", "b.dxf"):
+        dxf(run, tmp_path / name, at=100.2)
+    assert (tmp_path / "a.dxf").read_bytes() == (tmp_path / "b.dxf").read_bytes()
+    drawing = ezdxf.readfile(tmp_path / "a.dxf")
+    assert not drawing.audit().errors
+    assert drawing.units == ezdxf.units.MM
+    space = drawing.modelspace()
+    (pitch,) = [line for line in space.query("LWPOLYLINE") if line.dxf.layer == "cam"]
+    corners = np.array(pitch.get_points("xy"))
+    (law,) = [joint.law for joint in mechanism.joints if joint.name == "pitch"]
+    angle = np.radians(np.arange(360.0))
+    radii = np.array([law.at(one) for one in angle])
+    turned = angle + np.radians(100.0)
+    np.testing.assert_allclose(corners, radii[:, None] * np.column_stack([np.cos(turned), np.sin(turned)]), atol=1e-9)
+    assert pitch.closed
+    points = {tuple(np.round([*one.dxf.location.vec2], 9)) for one in space.query("POINT") if one.dxf.layer == "lever"}
+    assert points == {(90.0, 0.0), tuple(np.round([run["roller.x"][100], run["roller.y"][100]], 9))}
+    assert not space.query("CIRCLE")  # the radius of the roller is not known
+
+
+def test_drawings_and_videos_that_cannot_be_made_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = fourbar(np.arange(5.0))
+    with pytest.raises(FigureError, match=r"a\.dwg: '\.dwg' is not a known format of CAD drawings; known: \.dxf"):
+        dxf(run, tmp_path / "a.dwg")
+    with pytest.raises(FigureError, match=r"a\.dxf: the run has no sample with numbers to draw"):
+        dxf(run.part(slice(0, 0)), tmp_path / "a.dxf")
+    monkeypatch.setitem(sys.modules, "ezdxf", None)
+    with pytest.raises(MissingPackageError, match=r"a\.dxf: a DXF file needs ezdxf: pip install 'kinfmu\[dxf\]'"):
+        dxf(run, tmp_path / "a.dxf")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(
+        MissingPackageError, match=r"a\.mp4: an MP4 needs the program ffmpeg, which is not found; install"
+    ):
+        animate(run, tmp_path / "a.mp4")
+    broken = tmp_path / "ffmpeg"
+    broken.write_text("#!/bin/sh\necho no encoder >&2\nexit 1\n", encoding="utf-8")
+    broken.chmod(0o755)
+    monkeypatch.setattr(animation, "MOST", 2)
+    with pytest.raises(FigureError, match=r"a\.mp4: ffmpeg failed: no encoder$"):
+        animate(run, tmp_path / "a.mp4")
+
+
+def test_a_video_holds_every_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    try:
+        encoder(tmp_path)
+    except MissingPackageError:
+        pytest.skip("ffmpeg is not installed")
+    monkeypatch.setattr(animation, "MOST", 6)
+    animate(fourbar(np.arange(0.0, 91.0)), tmp_path / "a.mp4")
+    data = (tmp_path / "a.mp4").read_bytes()
+    assert data[4:8] == b"ftyp"
+    assert b"avc1" in data
