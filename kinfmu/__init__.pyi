@@ -14,6 +14,7 @@ from kinfmu.drivers import SlideDriver as SlideDriver
 from kinfmu.errors import KinfmuError as KinfmuError
 from kinfmu.fmu import build as build
 from kinfmu.fmu import simulate as simulate
+from kinfmu.fmu import verify as verify
 from kinfmu.gallery import load as load
 from kinfmu.gallery import save as save
 from kinfmu.joints import Angle as Angle

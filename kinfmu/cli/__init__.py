@@ -17,6 +17,7 @@ from kinfmu.cli import (  # noqa: F401  for the commands that they add
     simulate,
     solve,
     study,
+    verify,
 )
 from kinfmu.cli.group import main
 

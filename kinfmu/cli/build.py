@@ -52,6 +52,13 @@ from kinfmu.errors import listed
     "are inputs, and the FMU integrates the motion.",
 )
 @outputs_option
+@click.option("--author", help="Author, stated in the FMU.")
+@click.option("--model-version", "version", help="Version of the model, stated in the FMU.")
+@click.option("--license", "license_", help="Licence of the model, stated in the FMU.")
+@click.option("--copyright", "copyright_", help="Copyright, stated in the FMU.")
+@click.option(
+    "--date", help="Date, such as 2026-05-01, stated in the FMU. Default: none, so that two builds are equal."
+)
 @set_option
 def build(
     mechanism: str,
@@ -61,6 +68,11 @@ def build(
     platforms: str,
     drive: Any,
     outputs: str | None,
+    author: str | None,
+    version: str | None,
+    license_: str | None,
+    copyright_: str | None,
+    date: str | None,
     settings: tuple[tuple[str, str], ...],
 ) -> None:
     """Build the FMU of a mechanism.
@@ -75,6 +87,7 @@ def build(
             raise click.UsageError(f"{option} {value} needs --flavour native; the python flavour has {option} {plain}")
     mech = checked_settings(gallery.load(mechanism), settings).mechanism()
     drive = drive or default_drive(mech)
+    stated = {"author": author, "version": version, "license": license_, "copyright": copyright_, "date": date}
     chosen = flavour or default_flavour(int(fmi), platforms)
     with errors_of(mechanism), Progress("compiling for all platforms", least=2) as progress:
         path = built(
@@ -85,6 +98,7 @@ def build(
             outputs=names_in(outputs),
             fmi=int(fmi),
             platforms=platforms,
+            metadata={name: text for name, text in stated.items() if text is not None},
             progress=progress,
         )
     is_native = chosen == "native"

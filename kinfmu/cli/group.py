@@ -23,6 +23,7 @@ ORDER = (
     "study",
     "build",
     "simulate",
+    "verify",
     "review",
     "export",
     "recover",

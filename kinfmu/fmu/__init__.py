@@ -4,5 +4,6 @@ from __future__ import annotations
 
 from kinfmu.fmu.build import build
 from kinfmu.fmu.simulate import simulate
+from kinfmu.fmu.verify import verify
 
-__all__ = ["build", "simulate"]
+__all__ = ["build", "simulate", "verify"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -30,6 +30,7 @@ def build(
     outputs: Sequence[str] | None = None,
     fmi: int = 2,
     platforms: str = "host",
+    metadata: Mapping[str, str] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Write the FMU of a mechanism and return its path.
@@ -50,6 +51,8 @@ def build(
             redundant joints leave undetermined. What no output needs is not solved.
         fmi: Version of FMI, 2 or 3. The python flavour is FMI 2.0 only.
         platforms: Platforms of the native flavour: 'host' (compiled by the system's compiler) or 'all' (by zig).
+        metadata: Texts of the model description by name: author, version, license, copyright, date. Default: none,
+            also no date, so that two builds are equal.
         progress: Called with (platforms done, number of platforms) during compilation.
 
     Returns:
@@ -67,29 +70,35 @@ def build(
     drive = default_drive(mechanism) if drive is None else drive
     flavour = default_flavour(fmi, platforms) if flavour is None else flavour
     _check(flavour, drive, fmi, platforms)
+    from kinfmu.fmu.documents import documents
     from kinfmu.fmu.force_variables import chosen_outputs, force_stages
+    from kinfmu.fmu.metadata import attributes
     from kinfmu.plan import compile_plan
     from kinfmu.plan.forces import loaded_coordinates
 
+    stated = attributes(metadata or {})
     path = _file(path, mechanism.name)
     coordinates, names = chosen_outputs(mechanism, outputs)
     owned, forces = None, {}
     if drive == "torque":
         from kinfmu.fmu.owned_motion import owned_motion
 
-        plan, owned = owned_motion(compile_plan(mechanism, coordinates, solved=loaded_coordinates(mechanism)))
+        plan = compile_plan(mechanism, coordinates, solved=loaded_coordinates(mechanism))
+        papers = documents(plan, fmi, stated)
+        plan, owned = owned_motion(plan)
     else:
         plan = compile_plan(mechanism, coordinates, solved=loaded_coordinates(mechanism) if names else ())
+        papers = documents(plan, fmi, stated)
     if names:
         forces = force_stages(plan, names, are_default=outputs is None)
     if flavour == "python":
         from kinfmu.fmu import python_flavour
 
-        data = python_flavour.archive(plan, drive, VERSION, forces, owned)
+        data = python_flavour.archive(plan, drive, VERSION, forces, owned, papers)
     else:
         from kinfmu.fmu.native import archive
 
-        data = archive.archive(plan, drive, VERSION, FMI_VERSIONS[fmi], platforms, progress, forces, owned)
+        data = archive.archive(plan, drive, VERSION, FMI_VERSIONS[fmi], platforms, progress, forces, owned, papers)
     _write(path, data)
     return path
 

@@ -9,13 +9,24 @@ from typing import Literal
 
 from kinfmu.errors import FmuError
 from kinfmu.mechanism import RunSettings
-from kinfmu.units import display_units
+from kinfmu.units import METRES, display_units
 
 Drive = Literal["time", "inputs", "torque"]
 DRIVES: tuple[Drive, ...] = ("time", "inputs", "torque")
 STATUS_TYPE, RATES_TYPE = "Status", "Rates"  # names of the enumerations' types
 
 _ANGLES_SHOWN_IN_DEGREES = ("rad", "rad/s", "rad/s2")
+_QUANTITIES = {  # names of Modelica's SI units, by unit and the power of time in it
+    "rad": {"": "Angle", "s": "AngularVelocity", "s2": "AngularAcceleration"},
+    "m": {"": "Length", "s": "Velocity", "s2": "Acceleration"},
+    "s": {"": "Time"},
+    "kg": {"": "Mass"},
+    "kg m2": {"": "MomentOfInertia"},
+    "N": {"": "Force"},
+    "N m": {"": "Torque"},
+    "J": {"": "Energy"},
+    "W": {"": "Power"},
+}
 
 
 @dataclass(frozen=True)
@@ -33,6 +44,7 @@ class Variable:
         start: Start value.
         minimum: Smallest valid value.
         maximum: Largest valid value.
+        nominal: Usual magnitude; None if it is 1 or unknown.
         derivative_of: Variable of which this is the time derivative.
         declared_type: Name of the type of an Enumeration.
         dependencies: Inputs that an output depends on structurally; None if FMI lists none.
@@ -51,11 +63,19 @@ class Variable:
     start: float | bool | None = None
     minimum: float | None = None
     maximum: float | None = None
+    nominal: float | None = None
     derivative_of: str | None = None
     declared_type: str | None = None
     dependencies: tuple[str, ...] | None = None
     linear_in: tuple[str, ...] = ()
     initial_dependencies: tuple[str, ...] | None = None
+
+    @property
+    def quantity(self) -> str | None:
+        """FMI's name of the physical quantity, such as 'AngularVelocity'; None if the unit does not state it."""
+        base, _, per = (self.unit or "").partition("/")
+        by_rate = _QUANTITIES.get("m" if base in METRES else base)
+        return None if by_rate is None else by_rate.get(per)
 
     @property
     def display_unit(self) -> str | None:

@@ -30,9 +30,11 @@ from kinfmu.codegen.python import emit
 from kinfmu.codegen.python.forces import emit_forces, solves
 from kinfmu.codegen.python.jumps import emit_jumps
 from kinfmu.errors import FmuError
-from kinfmu.fmu import description, documentation
+from kinfmu.fmu import description
 from kinfmu.fmu.archive import digest, token, zipped
+from kinfmu.fmu.documents import Documents
 from kinfmu.fmu.interface import Drive, Interface
+from kinfmu.fmu.licence import licence
 from kinfmu.fmu.owned_motion import OwnedMotion, units_in_si
 from kinfmu.fmu.variables import interface
 from kinfmu.mechanism import toml_text
@@ -100,6 +102,7 @@ def archive(
     version: str,
     forces: Mapping[str, ForceSteps] = MappingProxyType({}),
     owned: OwnedMotion | None = None,
+    documents: Documents | None = None,
 ) -> bytes:
     """Return the FMU of a plan; the same plan gives the same bytes.
 
@@ -109,6 +112,7 @@ def archive(
         version: Version of kinfmu.
         forces: Stages of the forces that are outputs, by part. Default: none.
         owned: Motion of the drivers, if efforts drive. Default: inputs or laws give it.
+        documents: Makes documentation, icons and reference results. Default: none of these.
 
     Returns:
         Bytes of the zip archive.
@@ -117,7 +121,8 @@ def archive(
         FmuError: If pythonfmu is installed without its binaries.
 
     """
-    variables = interface(plan, drive, forces=forces, starts=owned.starts if owned else ())
+    starts, reach = owned.starts if owned else (), documents.reach if documents else None
+    variables = interface(plan, drive, forces=forces, starts=starts, reach=reach)
     in_si = units_in_si(plan) if owned else ()
     contents = _contents(plan, variables, version, in_si)
     stages = dict(forces) | ({"inertia": owned.inertia} if owned else {})
@@ -128,7 +133,9 @@ def archive(
         contents["kinfmu/solver/jumps.py"] = emit_jumps(plan).encode()
     added = (*(WITH_FORCES if stages else ()), *(WITH_EFFORTS if owned else ()))
     contents |= {f"kinfmu/fmu/{name}": files("kinfmu.fmu").joinpath(name).read_bytes() for name in added}
-    return zipped(_named(dict(sorted(contents.items())), variables, version, digest(contents), in_si))
+    metadata = documents.metadata if documents else {}
+    named = _named(dict(sorted(contents.items())), variables, version, digest(contents), in_si, metadata)
+    return zipped(named | (documents.files(variables) if documents else {}))
 
 
 def _contents(plan: SolvePlan, variables: Interface, version: str, in_si: Sequence[float]) -> dict[str, bytes]:
@@ -139,7 +146,6 @@ def _contents(plan: SolvePlan, variables: Interface, version: str, in_si: Sequen
     base = files(pythonfmu)
     contents = {
         "modelDescription.xml": _description(variables, version, guid=""),
-        "documentation/index.html": documentation.page(variables).encode(),
         "resources/mechanism.toml": toml_text.text(plan.mechanism).encode(),
         "kinfmu/__init__.py": b'"""The parts of kinfmu that this FMU needs."""\n',
         "kinfmu/fmu/__init__.py": b'"""The slave."""\n',
@@ -159,7 +165,7 @@ def _documents() -> dict[str, bytes]:
     """Return the documents: requirements of the FMU, and the licences of its contents."""
     return {
         "documentation/externalDependencies.txt": EXTERNAL_DEPENDENCIES.encode(),
-        "documentation/licenses/license.txt": documentation.licence("pythonfmu, in pythonfmu.txt").encode(),
+        "documentation/licenses/license.txt": licence("pythonfmu, in pythonfmu.txt").encode(),
         "documentation/licenses/pythonfmu.txt": (
             distribution("pythonfmu").read_text("licenses/LICENSE") or "MIT, https://github.com/NTNU-IHB/PythonFMU\n"
         ).encode(),
@@ -181,10 +187,11 @@ def _binaries(identifier: str) -> dict[str, bytes]:
     return found
 
 
-def _description(variables: Interface, version: str, guid: str) -> bytes:
-    return description.write(
-        description.Description(variables, guid, variables.name, f"kinfmu {version}"), {"CoSimulation": CAPABILITIES}
-    )
+def _description(
+    variables: Interface, version: str, guid: str, metadata: Mapping[str, str] = MappingProxyType({})
+) -> bytes:
+    about = description.Description(variables, guid, variables.name, f"kinfmu {version}", metadata=metadata)
+    return description.write(about, {"CoSimulation": CAPABILITIES})
 
 
 def _entry(variables: Interface, token: str, in_si: Sequence[float], package: str = "kinfmu") -> str:
@@ -218,12 +225,17 @@ def _entry(variables: Interface, token: str, in_si: Sequence[float], package: st
 
 
 def _named(
-    contents: Mapping[str, bytes], variables: Interface, version: str, digits: str, in_si: Sequence[float]
+    contents: Mapping[str, bytes],
+    variables: Interface,
+    version: str,
+    digits: str,
+    in_si: Sequence[float],
+    metadata: Mapping[str, str],
 ) -> dict[str, bytes]:
     """Return the files under their final names; check that modules import only each other and the standard library."""
     package = f"kinfmu_{variables.name}_{digits[:12]}"
     guid = token(digits)
-    named = {"modelDescription.xml": _description(variables, version, guid)}
+    named = {"modelDescription.xml": _description(variables, version, guid, metadata)}
     for path, data in contents.items():
         if path.startswith("kinfmu/"):
             module = _renamed(data.decode(), package)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Literal, NamedTuple
 
+from kinfmu.analysis.singular import DriverRange
 from kinfmu.equations.graph import Node, reachable
 from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.force_variables import force_parts
@@ -82,6 +84,7 @@ def interface(
     has_time: bool = False,
     forces: Mapping[str, ForceSteps] = MappingProxyType({}),
     starts: Sequence[float] = (),
+    reach: DriverRange | None = None,
 ) -> Interface:
     """Return the variables of the FMU of a plan.
 
@@ -93,6 +96,8 @@ def interface(
             parameters, which FMI 3.0 counts as known after initialization.
         forces: Stages of the forces that are outputs, by part. Default: none.
         starts: With 'torque': value and speed of each driver at the start.
+        reach: Range of the only driver. Its limits are minimum and maximum of the driver's input, unless parameters
+            change them. Default: unknown.
 
     Returns:
         The variables, part by part.
@@ -104,7 +109,7 @@ def interface(
     mechanism = plan.mechanism
     linear = linear_inputs(plan)
     lists: dict[str, Iterable[Variable]] = {
-        "inputs": _inputs(plan),
+        "inputs": _inputs(plan, reach),
         "values": [_output(plan, name, 0, linear[name]) for name in plan.outputs],
         "rates": [_output(plan, name, 1, linear[name]) for name in plan.outputs],
         "accelerations": [_output(plan, name, 2, linear[name]) for name in plan.outputs],
@@ -167,12 +172,14 @@ def _in_fmi3(variable: Variable, tunable: Collection[str], *, has_time: bool) ->
     )
 
 
-def _inputs(plan: SolvePlan) -> Iterator[Variable]:
+def _inputs(plan: SolvePlan, reach: DriverRange | None) -> Iterator[Variable]:
     """Yield the inputs. Values start as the law does, so a fresh FMU has a pose; a rate that stays 0 is not wired."""
     mechanism = plan.mechanism
+    nominal = _nominal(plan)
     starts = {driver.name: float(driver.law.at(mechanism.run.start)) for driver in mechanism.drivers}
     for driver in plan.drivers:
         for order, name in enumerate(driver.inputs):
+            least, most = _limits(plan, reach, starts[driver.name]) if not order else (None, None)
             wiring = " (the input or an estimate: see parameter rates)" if order else ""
             yield Variable(
                 name,
@@ -182,7 +189,26 @@ def _inputs(plan: SolvePlan) -> Iterator[Variable]:
                 f"Driver {driver.name}: {_ORDER_WORDS[order]}{driver.quantity.kind}{wiring}",
                 unit=unit_of(Quantity(driver.quantity.kind, order), mechanism.length_unit),
                 start=0.0 if order else starts[driver.name],
+                minimum=least,
+                maximum=most,
+                nominal=nominal if driver.quantity.kind == "length" and not order else None,
             )
+
+
+def _limits(plan: SolvePlan, reach: DriverRange | None, start: float) -> tuple[float | None, float | None]:
+    """Return smallest and largest value of the only driver; None where there is no limit, or it is not certain."""
+    if reach is None or plan.parameters:
+        return None, None
+    low, high = reach.low, reach.high
+    if not (low is None or low <= start) or not (high is None or start <= high):
+        return None, None
+    return low, high
+
+
+def _nominal(plan: SolvePlan) -> float | None:
+    """Return the usual magnitude of lengths, a power of ten."""
+    magnitude = 10.0 ** round(math.log10(plan.size))
+    return None if magnitude == 1.0 else magnitude
 
 
 def _output(plan: SolvePlan, name: CoordinateName, order: int, linear_in: tuple[str, ...]) -> Variable:
@@ -196,6 +222,7 @@ def _output(plan: SolvePlan, name: CoordinateName, order: int, linear_in: tuple[
         f"{_COORDINATE_WORDS[name.axis][order]} of {kind} {name.owner} in the world",
         initial="calculated",
         unit=unit_of(name.quantity(order), plan.mechanism.length_unit),
+        nominal=None if name.is_angle or order else _nominal(plan),
         derivative_of=name.derivative(order - 1) if order else None,
         dependencies=_input_names(plan, drivers, order, linear_in),
         linear_in=() if order else linear_in,

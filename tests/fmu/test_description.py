@@ -13,6 +13,7 @@ from fmpy.validation import validate_fmu
 
 from kinfmu.errors import FmuError
 from kinfmu.fmu import description
+from kinfmu.fmu.documents import documents
 from kinfmu.fmu.variables import interface
 from kinfmu.plan import compile_plan
 from tests.fmu.conftest import mechanism
@@ -46,7 +47,8 @@ def test_fmpy_validates_the_fmu_without_problems(fmu: Path) -> None:
 
 def test_description_reads_back_as_the_interface_it_was_written_from(fmu: Path) -> None:
     read = description.read(_xml(fmu), str(fmu)).interface
-    assert read == interface(compile_plan(mechanism(read.name)), "time")
+    plan = compile_plan(mechanism(read.name))
+    assert read == interface(plan, "time", reach=documents(plan, 2).reach)
 
 
 def test_every_output_is_in_outputs_and_initial_unknowns(root: ET.Element) -> None:

@@ -146,10 +146,14 @@ def typed(variable: Variable) -> dict[str, str]:
     found: dict[str, str] = {}
     if variable.declared_type:
         found["declaredType"] = variable.declared_type
+    if variable.quantity:
+        found["quantity"] = variable.quantity
     if variable.unit:
         found["unit"] = variable.unit
     if variable.display_unit:
         found["displayUnit"] = variable.display_unit
+    if variable.nominal is not None:
+        found["nominal"] = text(variable.nominal)
     return found | limits(variable)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, cast
 from xml.etree import ElementTree as ET
 from xml.etree.ElementTree import Element
@@ -39,6 +39,7 @@ class Description:
         generation_tool: Program that built the FMU, such as "kinfmu 1.0".
         version: Version of FMI.
         sources: Names of the C files inside, if any.
+        metadata: Further attributes, such as `author`.
 
     """
 
@@ -48,12 +49,13 @@ class Description:
     generation_tool: str
     version: FmiVersion = "2.0"
     sources: tuple[str, ...] = ()
+    metadata: Mapping[str, str] = field(default_factory=dict)
 
 
 def write(description: Description, kinds: Mapping[str, Mapping[str, float | bool]]) -> bytes:
     """Return modelDescription.xml.
 
-    It has no date: the same content gives the same bytes.
+    It has no date unless the metadata state one: the same content gives the same bytes.
 
     Args:
         description: Model description.
@@ -66,6 +68,7 @@ def write(description: Description, kinds: Mapping[str, Mapping[str, float | boo
         "fmiModelDescription",
         {"fmiVersion": description.version, "modelName": interface.name, version.TOKEN: description.token}
         | {"description": interface.title or interface.name, "generationTool": description.generation_tool}
+        | dict(description.metadata)
         | version.ROOT,
     )
     attributes = {
@@ -159,6 +162,7 @@ def _variable(attributes: Mapping[str, str], **fields: Any) -> Variable:
         start=start == "true" if start in ("true", "false") else number(start),
         minimum=number(attributes.get("min")),
         maximum=number(attributes.get("max")),
+        nominal=number(attributes.get("nominal")),
         declared_type=attributes.get("declaredType"),
         **fields,
     )

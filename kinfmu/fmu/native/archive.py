@@ -18,10 +18,12 @@ from xml.etree import ElementTree as ET
 from xml.etree.ElementTree import Element, SubElement
 
 from kinfmu.codegen.c import compiler
-from kinfmu.fmu import description, documentation
+from kinfmu.fmu import description
 from kinfmu.fmu.archive import digest, token, zipped
 from kinfmu.fmu.description import Description, FmiVersion
+from kinfmu.fmu.documents import Documents
 from kinfmu.fmu.interface import Drive, Interface
+from kinfmu.fmu.licence import licence
 from kinfmu.fmu.native.platforms import PLATFORMS, Platform, host
 from kinfmu.fmu.native.sources import headers, sources
 from kinfmu.fmu.owned_motion import OwnedMotion
@@ -67,6 +69,7 @@ def archive(
     progress: Callable[[int, int], None] | None = None,
     forces: Mapping[str, ForceSteps] = MappingProxyType({}),
     owned: OwnedMotion | None = None,
+    documents: Documents | None = None,
 ) -> bytes:
     """Return the FMU of a plan; the same plan and the same compiler give the same bytes.
 
@@ -79,6 +82,7 @@ def archive(
         progress: Called with (platforms done, number of platforms).
         forces: Stages of the forces that are outputs, by part. Default: none.
         owned: Motion of the drivers, if efforts drive. Default: inputs or laws give it.
+        documents: Makes documentation, icons and reference results. Default: none of these.
 
     Returns:
         Bytes of the zip archive.
@@ -87,10 +91,11 @@ def archive(
         CompilerError: If no compiler is found.
 
     """
-    starts = owned.starts if owned else ()
-    variables = interface(plan, drive, has_time=fmi == "3.0", forces=forces, starts=starts)
+    starts, reach = owned.starts if owned else (), documents.reach if documents else None
+    variables = interface(plan, drive, has_time=fmi == "3.0", forces=forces, starts=starts, reach=reach)
+    metadata = documents.metadata if documents else {}
     unnamed = _contents(plan, variables, version, fmi, "", forces, owned)
-    contents = _contents(plan, variables, version, fmi, token(digest(unnamed)), forces, owned)
+    contents = _contents(plan, variables, version, fmi, token(digest(unnamed)), forces, owned, metadata)
     wanted = [host()] if platforms == "host" else list(PLATFORMS)
     for done, platform in enumerate(wanted):
         if progress is not None:
@@ -99,7 +104,7 @@ def archive(
         contents[_binary(platform, variables, fmi)] = _compiled(contents, fmi, variables.name, platform, target)
     if progress is not None:
         progress(len(wanted), len(wanted))
-    return zipped(contents)
+    return zipped(contents | (documents.files(variables) if documents else {}))
 
 
 def _contents(
@@ -110,15 +115,17 @@ def _contents(
     guid: str,
     forces: Mapping[str, ForceSteps],
     owned: OwnedMotion | None = None,
+    metadata: Mapping[str, str] = MappingProxyType({}),
 ) -> dict[str, bytes]:
     """Return every file except the binaries, by path in the FMU."""
     code = sources(plan, variables, fmi, guid, forces, owned.inertia if owned else None)
     units = tuple(compiler.units(code))
-    about = Description(variables, guid, variables.name, f"kinfmu {version}", fmi, units if fmi == "2.0" else ())
+    about = Description(
+        variables, guid, variables.name, f"kinfmu {version}", fmi, units if fmi == "2.0" else (), metadata
+    )
     contents = {
         "modelDescription.xml": description.write(about, CAPABILITIES[fmi] if owned is None else _OWNING[fmi]),
-        "documentation/index.html": documentation.page(variables).encode(),
-        "documentation/licenses/license.txt": documentation.licence().encode(),
+        "documentation/licenses/license.txt": licence().encode(),
         "resources/mechanism.toml": toml_text.text(plan.mechanism).encode(),
     }
     if fmi == "3.0":

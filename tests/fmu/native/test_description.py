@@ -13,6 +13,7 @@ from fmpy.validation import validate_fmu
 
 import kinfmu
 from kinfmu.fmu import description
+from kinfmu.fmu.documents import documents
 from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.variables import interface
 from kinfmu.plan import compile_plan
@@ -45,7 +46,8 @@ def test_fmpy_validates_the_fmu_without_problems(fmu: Path) -> None:
 def test_description_reads_back_as_the_interface_it_was_written_from(data: bytes, fmi: int) -> None:
     read = description.read(data, "it")
     mechanism = linkage() if read.interface.name == "settable" else kinfmu.load(read.interface.name)
-    written = interface(compile_plan(mechanism), "time", has_time=fmi == 3)
+    plan = compile_plan(mechanism)
+    written = interface(plan, "time", has_time=fmi == 3, reach=documents(plan, fmi).reach)
     place = written.value_references()
     assert list(read.interface) == [
         replace(

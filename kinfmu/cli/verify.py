@@ -1,0 +1,37 @@
+"""kinfmu verify: check a host by the reference results in an FMU."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from kinfmu.cli.arguments import InputFile
+from kinfmu.cli.group import main
+from kinfmu.errors import KinfmuError
+
+
+@main.command(epilog="Example: kinfmu verify fourbar.fmu --results host.csv")
+@click.argument("fmu", type=InputFile(".fmu"), metavar="FMU")
+@click.option(
+    "--results",
+    type=InputFile(),
+    help="Results of a host, as CSV: a column time, and outputs by name. Default: step the FMU with fmpy.",
+)
+@click.option(
+    "--tolerance",
+    type=click.FloatRange(min=0.0, min_open=True, max=1.0, max_open=True),
+    help="Largest valid difference, relative to the largest number with the same unit; 1e-5 for hosts that write six "
+    "digits. Default: that in the FMU, 1e-9 but near singular points.",
+)
+def verify(fmu: Path, results: Path | None, tolerance: float | None) -> None:
+    """Check a host by the reference results in an FMU.
+
+    Each FMU of kinfmu holds the outputs at about 20 samples, in extra/org.kinfmu, with the step that belongs to them.
+    """
+    from kinfmu.fmu import verify as verified
+
+    found = verified(fmu, results, tolerance=tolerance)
+    click.echo(str(found))
+    if not found.ok:
+        raise KinfmuError(f"{results or fmu}: the results are not those of the reference")

@@ -1,0 +1,237 @@
+"""Compare a host's results, or those of fmpy, with the reference results in an FMU."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from kinfmu.errors import FmuError, RequestError, listed
+from kinfmu.fmu import description, reference
+from kinfmu.fmu.reference import FOLDER, Reference
+from kinfmu.fmu.simulate import simulate
+from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, text_in, unpacked
+from kinfmu.mechanism.valid import quoted
+from kinfmu.run import FloatArray
+from kinfmu.units import every_unit
+
+_SAME_TIME = 1e-6  # of a step: hosts sum up time
+_UNIT = re.compile(r"\s*\[([^]]*)\]\s*$")
+_LARGEST_TABLE = 2**28  # [bytes] of a host's results
+
+
+@dataclass(frozen=True)
+class Verification:
+    """How far results are from the reference results in an FMU.
+
+    Attributes:
+        tolerance: Largest valid difference, relative to the size of the numbers with the same unit.
+        samples: Number of reference samples.
+        missing: Times [s] of reference samples that the results do not have.
+        names: Outputs that were compared.
+        left_out: Outputs with reference results that the results do not have.
+        name: Output with the largest relative difference.
+        time: Its time [s].
+        value: The result there.
+        wanted: The reference result there.
+        difference: The difference, relative.
+        is_a_step_late: True if the results equal those of the sample before, within the tolerance.
+
+    """
+
+    tolerance: float
+    samples: int
+    missing: tuple[float, ...]
+    names: tuple[str, ...]
+    left_out: tuple[str, ...]
+    name: str
+    time: float
+    value: float
+    wanted: float
+    difference: float
+    is_a_step_late: bool
+
+    @property
+    def ok(self) -> bool:
+        """True if no sample is missing and every difference is within the tolerance."""
+        return not self.missing and self.difference <= self.tolerance
+
+    def __str__(self) -> str:
+        """Return the result in a few lines."""
+        compared = f"{len(self.names)} outputs at {self.samples - len(self.missing)} of {self.samples} samples"
+        largest = (
+            f"largest difference {self.difference:.2g} (relative), limit {self.tolerance:.2g}: "
+            f"{self.name} at t = {self.time:g} s is {self.value:.10g}, reference {self.wanted:.10g}"
+        )
+        lines = [f"{compared} compared", largest]
+        if self.left_out:
+            lines.append(f"not in the results: {listed(self.left_out)}")
+        if self.missing:
+            lines.append(f"no results at t = {listed(f'{t:g}' for t in self.missing)} [s]")
+        if self.is_a_step_late:
+            lines.append("the results equal the reference of the sample before: this host records outputs a step late")
+        return "\n".join(lines)
+
+
+def verify(fmu: str | Path, results: str | Path | None = None, *, tolerance: float | None = None) -> Verification:
+    """Compare results with the reference results in an FMU of kinfmu.
+
+    Args:
+        fmu: File of the FMU.
+        results: CSV file of a host, with a column time and outputs by name, alone, or behind the name of an instance as
+            in fourbar::coupler.x and model.fourbar.coupler.x; with units as in "coupler.phi [deg]". Rows at other times
+            than those of the reference are left out. Default: the FMU is stepped with fmpy.
+        tolerance: Largest valid difference, relative to the largest number with the same unit. Default: that in the
+            FMU, which is 1e-9 but near singular points. A host that writes six digits needs 1e-5.
+
+    Returns:
+        The verification.
+
+    Raises:
+        FmuError: The FMU has no reference results, or is not of kinfmu; the results are damaged, or have no output.
+        RequestError: The tolerance is not valid.
+
+    """
+    path = Path(fmu)
+    if tolerance is not None and not 0.0 < tolerance < 1.0:
+        raise RequestError(f"tolerance = {tolerance:g} must be above 0 and below 1")
+    with unpacked(path) as folder:
+        about = description.read(text_in(path, folder, DESCRIPTION, LARGEST_DESCRIPTION).encode(), str(path))
+        name = about.interface.name
+        if not (folder / FOLDER).is_dir():
+            raise FmuError(f"{path}: holds no reference results ({FOLDER}/{name}_ref.csv); build it again")
+        texts = {file.name: text_in(path, folder, f"{FOLDER}/{file.name}") for file in (folder / FOLDER).iterdir()}
+    try:
+        wanted = reference.read(name, texts)
+    except ValueError as error:
+        raise FmuError(f"{path}: the reference results in {FOLDER} are damaged: {error}") from None
+    units = {variable.name: variable.unit or "1" for variable in about.interface}
+    unknown = [one for one in wanted.names if one not in units]
+    if unknown:
+        raise FmuError(f"{path}: the reference results in {FOLDER} are damaged: {quoted(unknown[0])} is no variable")
+    if results is None:
+        found = _stepped(path, wanted)
+    else:
+        found = _table_of_host(Path(results), wanted, units, about.interface.length_unit)
+    return _compared(wanted, units, *found, wanted.tolerance if tolerance is None else tolerance)
+
+
+def _stepped(path: Path, wanted: Reference) -> tuple[tuple[str, ...], FloatArray]:
+    """Return outputs and their values (n, k) of the FMU, stepped through fmpy's low-level calls."""
+    t, step = wanted.t, wanted.step
+    inputs = None
+    if wanted.input_names:
+        inputs = {"time": t} | dict(zip(wanted.input_names, wanted.inputs.T, strict=True))
+    parameters = None if inputs else {"driven_by_time": True}
+    run = simulate(path, start=float(t[0]), stop=float(t[-1]), step=step, inputs=inputs, parameters=parameters)
+    rows = np.full((len(t), len(wanted.names)), np.nan)
+    count = int(run.good.sum())
+    rows[:count] = np.column_stack([run[name][:count] for name in wanted.names])
+    return wanted.names, rows
+
+
+def _table_of_host(
+    path: Path, wanted: Reference, units: dict[str, str], length_unit: str
+) -> tuple[tuple[str, ...], FloatArray]:
+    """Return outputs and their values (n, k) at the times of the reference, NaN where a host's table has none."""
+    try:
+        if path.stat().st_size > _LARGEST_TABLE:
+            raise FmuError(f"{path}: is too large (largest: {_LARGEST_TABLE} bytes)")
+        text = path.read_text("utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise FmuError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
+    lines = text.splitlines()
+    delimiter = max(",;\t", key=lines[0].count) if lines else ","
+    header, *rows = [row for row in csv.reader(io.StringIO(text), delimiter=delimiter) if row] or [[]]
+    titles = [_UNIT.sub("", one.strip()) for one in header]
+    times = [k for k, one in enumerate(titles) if one.lower() in ("time", "t")]
+    if not times:
+        raise FmuError(f"{path}: has no column time; columns: {listed(titles)}")
+    places = {name: k for name in wanted.names if (k := _place(name, titles)) is not None}
+    if not places:
+        raise FmuError(f"{path}: has no output of the FMU, such as {listed(wanted.names[:3])}")
+    columns = [times[0], *places.values()]
+    try:
+        table = np.array([[_number(row[k]) for k in columns] for row in rows], float).reshape(-1, len(columns))
+    except (ValueError, IndexError) as error:
+        raise FmuError(f"{path}: is no table of numbers ({error})") from None
+    for column, (name, place) in enumerate(places.items(), start=1):
+        table[:, column] *= _factor(path, header[place], units[name], length_unit)
+    found = np.full((len(wanted.t), len(places)), np.nan)
+    for k, time in enumerate(wanted.t.tolist()):
+        near = np.flatnonzero(np.abs(table[:, 0] - time) <= _SAME_TIME * wanted.step)
+        if len(near):
+            found[k] = table[near[-1], 1:]  # of rows at one time the last is after events
+    return tuple(places), found
+
+
+def _place(name: str, titles: list[str]) -> int | None:
+    """Return the place of an output among the titles of columns, by its name alone or behind that of an instance."""
+    if name in titles:
+        return titles.index(name)
+    behind = [k for k, title in enumerate(titles) if title.endswith((f"::{name}", f".{name}", f"/{name}"))]
+    return behind[0] if len(behind) == 1 else None
+
+
+def _number(text: str) -> float:
+    return float({"true": "1", "false": "0"}.get(text.strip().lower(), text))
+
+
+def _factor(path: Path, title: str, unit: str, length_unit: str) -> float:
+    """Return the factor from the unit in the title of a column, if there is one, to that of the variable."""
+    stated = _UNIT.search(title)
+    known = every_unit(length_unit)
+    if stated is None or stated[1] == unit or stated[1] not in known or unit not in known:
+        return 1.0  # hosts also write types in brackets
+    if known[stated[1]][0] != known[unit][0]:
+        raise FmuError(f"{path}: column {quoted(title)}: unit '{stated[1]}' does not fit '{unit}'")
+    return known[stated[1]][1] / known[unit][1]
+
+
+def _compared(
+    wanted: Reference, units: dict[str, str], names: tuple[str, ...], found: FloatArray, tolerance: float
+) -> Verification:
+    values = wanted.values[:, [wanted.names.index(name) for name in names]]
+    sizes = _sizes(wanted, units)
+    scale = np.array([sizes[units[name]] or 1.0 for name in names])
+    is_missing = np.asarray(np.isnan(found).all(axis=1))
+    relative = np.abs(found - values) / scale
+    relative[np.isnan(relative) & ~is_missing[:, None]] = np.inf
+    relative[is_missing] = -1.0
+    row, column = (int(one) for one in np.unravel_index(int(np.argmax(relative)), relative.shape))
+    difference = float(relative[row, column])
+    late = np.abs(found[1:] - values[:-1]) / scale
+    return Verification(
+        tolerance=tolerance,
+        samples=len(wanted.t),
+        missing=tuple(wanted.t[is_missing].tolist()),
+        names=names,
+        left_out=tuple(name for name in wanted.names if name not in names),
+        name=names[column],
+        time=float(wanted.t[row]),
+        value=float(found[row, column]),
+        wanted=float(values[row, column]),
+        difference=difference if difference >= 0.0 else float("nan"),
+        is_a_step_late=difference > tolerance and bool((late <= tolerance).all()),
+    )
+
+
+def _sizes(wanted: Reference, units: dict[str, str]) -> dict[str, float]:
+    """Return the largest numbers by unit; rates count at least as their values over the time of the reference.
+
+    A mechanism at constant speed has accelerations of 0, which co-simulation estimates with rounding errors.
+    """
+    largest: dict[str, float] = {}
+    for name, size in zip(wanted.names, np.abs(wanted.values).max(axis=0).tolist(), strict=True):
+        largest[units[name]] = max(largest.get(units[name], 0.0), size)
+    span = float(wanted.t[-1] - wanted.t[0])
+    found = dict(largest)
+    for unit in largest:
+        base, _, per = unit.partition("/")
+        if per in ("s", "s2") and base in largest:
+            found[unit] = max(found[unit], largest[base] / span ** (1 if per == "s" else 2))
+    return found

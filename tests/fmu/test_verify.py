@@ -1,0 +1,149 @@
+"""Reference results in FMUs, and hosts that are compared with them."""
+
+from __future__ import annotations
+
+import csv
+import re
+import zipfile
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import kinfmu
+from kinfmu.cli import main
+from kinfmu.errors import FmuError, RequestError
+from kinfmu.fmu.interface import Drive
+from kinfmu.fmu.reference import FOLDER
+from tests.fmu.conftest import Build
+
+Built = Callable[[str, Drive], Path]
+
+
+def texts(fmu: Path) -> dict[str, str]:
+    with zipfile.ZipFile(fmu) as zipped:
+        return {Path(name).name: zipped.read(name).decode() for name in zipped.namelist() if name.startswith(FOLDER)}
+
+
+def rows_of(text: str) -> list[list[str]]:
+    return list(csv.reader(text.splitlines()))
+
+
+def write(path: Path, rows: list[list[str]], delimiter: str = ",") -> Path:
+    with path.open("w", newline="") as file:
+        csv.writer(file, delimiter=delimiter).writerows(rows)
+    return path
+
+
+@pytest.mark.parametrize(("name", "drive"), [("fourbar", "inputs"), ("toggle_press", "time")])
+def test_an_fmu_has_the_results_of_the_solver(built: Built, name: str, drive: Drive) -> None:
+    fmu = built(name, drive)
+    found = kinfmu.verify(fmu)
+    assert found.ok, str(found)
+    assert found.samples == 21
+    assert found.difference < 1e-10
+    header, *rows = rows_of(texts(fmu)[f"{name}_ref.csv"])
+    table = np.array(rows, float)
+    run = kinfmu.solve(kinfmu.load(name), table[:, 0])
+    for column, title in enumerate(header[1:], start=1):
+        np.testing.assert_allclose(table[:, column], run[title], rtol=1e-12, atol=1e-12)
+    assert ("crank.torque" in header) == (name == "toggle_press")
+    inputs = texts(fmu).get(f"{name}_in.csv")
+    assert (inputs is not None) == (drive == "inputs")
+    if inputs is not None:
+        assert rows_of(inputs)[0] == ["time", "crank_angle", "crank_speed", "crank_acceleration"]
+
+
+def test_results_of_hosts_in_their_formats(built: Built, tmp_path: Path) -> None:
+    fmu = built("fourbar", "time")
+    header, *rows = rows_of(texts(fmu)["fourbar_ref.csv"])
+    ecos = [["iterations", "time", *(f"it::{name}[REAL]" for name in header[1:])]]
+    ecos += [[str(k), *(f"{float(value):.6g}" for value in row)] for k, row in enumerate(rows)]
+    path = write(tmp_path / "ecos.csv", ecos)
+    assert not kinfmu.verify(fmu, path).ok
+    assert kinfmu.verify(fmu, path, tolerance=1e-5).ok
+    place = header.index("rocker.phi")
+    degrees = [["Time", "model.root.fourbar.rocker.phi [deg]"]]
+    degrees += [[row[0], repr(float(np.degrees(float(row[place]))))] for row in rows]
+    found = kinfmu.verify(fmu, write(tmp_path / "degrees.csv", degrees, ";"))
+    assert found.ok, str(found)
+    assert found.names == ("rocker.phi",)
+    late = [header, rows[0], *([row[0], *before[1:]] for before, row in pairwise(rows))]
+    found = kinfmu.verify(fmu, write(tmp_path / "late.csv", late))
+    assert found.is_a_step_late
+    assert not found.ok
+    assert "a step late" in str(found)
+
+
+def test_one_wrong_number_is_named(built: Built, tmp_path: Path) -> None:
+    fmu = built("fourbar", "time")
+    table = rows_of(texts(fmu)["fourbar_ref.csv"])
+    place = table[0].index("coupler.x")
+    table[8][place] = repr(float(table[8][place]) + 1e-6)
+    path = write(tmp_path / "host.csv", table)
+    done = CliRunner().invoke(main, ["verify", str(fmu), "--results", str(path)])
+    assert done.exit_code == 1
+    assert "coupler.x at t = 63 s" in done.output
+    assert f"kinfmu: {path}: the results are not those of the reference" in done.output
+    found = kinfmu.verify(fmu, write(tmp_path / "short.csv", [table[0], *table[3:8]]))
+    assert found.missing[:2] == (0.0, 9.0)
+    assert not found.ok
+    assert "5 of 21 samples" in str(found)
+    done = CliRunner().invoke(main, ["verify", str(fmu)])
+    assert done.exit_code == 0
+    assert "21 outputs at 21 of 21 samples compared" in done.output
+
+
+def test_drivers_whose_law_is_external_swing(tmp_path: Path) -> None:
+    mechanism = kinfmu.load("crank_rocker")
+    mechanism = replace(mechanism, drivers=(replace(mechanism.drivers[0], law=kinfmu.External()),))
+    fmu = kinfmu.build(mechanism, tmp_path, flavour="python")
+    assert kinfmu.verify(fmu).ok
+    inputs = np.array(rows_of(texts(fmu)[f"{mechanism.name}_in.csv"])[1:], float)
+    assert np.ptp(inputs[:, 1]) > 0.1
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("a,b\n1,2\n", "has no column time; columns: a, b"),
+        ("time,b\n1,2\n", "has no output of the FMU, such as crank.phi, coupler.x, coupler.y"),
+        ("time,coupler.x\n0,two\n", "is no table of numbers (could not convert string to float: 'two')"),
+        ("time,coupler.x [deg]\n0,2\n", "column 'coupler.x [deg]': unit 'deg' does not fit 'm'"),
+        ("", "has no column time; columns: none"),
+    ],
+)
+def test_faulty_results_have_one_line(built: Built, tmp_path: Path, content: str, message: str) -> None:
+    path = tmp_path / "host.csv"
+    path.write_text(content)
+    with pytest.raises(FmuError, match=re.escape(f"{path}: {message}")):
+        kinfmu.verify(built("fourbar", "time"), path)
+
+
+def test_damaged_reference_results_and_settings(built: Built, tmp_path: Path) -> None:
+    fmu = built("fourbar", "time")
+    with pytest.raises(RequestError, match="tolerance = 2 must be above 0 and below 1"):
+        kinfmu.verify(fmu, tolerance=2.0)
+    for name, new, message in (
+        ("fourbar_ref.csv", b"time,coupler.z\n0,1\n1,2\n", "'coupler.z' is no variable"),
+        ("fourbar_ref.csv", b"time,coupler.x\n0,1\n", "needs two or more samples at increasing times"),
+        ("fourbar_ref.opt", b"StepSize, 1\n", "RelTol is missing"),
+    ):
+        path = tmp_path / "damaged.fmu"
+        with zipfile.ZipFile(fmu) as before, zipfile.ZipFile(path, "w") as after:
+            for entry in before.namelist():
+                after.writestr(entry, new if entry == f"{FOLDER}/{name}" else before.read(entry))
+        with pytest.raises(FmuError, match=re.escape(message)):
+            kinfmu.verify(path)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_native_fmus_agree_with_the_python_engine(built_native: Build, fmi: int) -> None:
+    found = kinfmu.verify(built_native("fourbar", fmi, "inputs"))
+    assert found.ok, str(found)
+    assert len(found.names) == 21
+    assert found.difference < 1e-10
