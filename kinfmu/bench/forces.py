@@ -25,7 +25,7 @@ PER_SAMPLE = 1e9  # [ns/s]
 
 
 def run(rounds: int = ROUNDS) -> str:
-    """Return a table: nanoseconds a sample over a turn, with and without masses, efforts and reactions."""
+    """Return a table: nanoseconds a sample over a turn, with and without masses, efforts, shaking force, reactions."""
     rows = []
     for name in MECHANISMS:
         plain = load(name)
@@ -35,7 +35,9 @@ def run(rounds: int = ROUNDS) -> str:
             repeats = max(1, LEAST // count)
             ways = [
                 partial(_repeated, partial(_solved, model, angles, read), repeats)
-                for model, read in zip((models[0], *3 * models[1:]), (None, None, _efforts, _reactions), strict=True)
+                for model, read in zip(
+                    (models[0], *4 * models[1:]), (None, None, _efforts, _shaking, _reactions), strict=True
+                )
             ]
             costs = [
                 spread([s / repeats / count * PER_SAMPLE for s in seconds]).low
@@ -44,7 +46,7 @@ def run(rounds: int = ROUNDS) -> str:
             what = f"{name}, {count} samples"
             ratios = [f"{cost / costs[0]:.2f}" for cost in costs[1:]]
             rows.append([what, f"{costs[0]:.1f}", *ratios])
-    head = ("", "no masses [ns]", "masses", "and efforts", "and reactions")
+    head = ("", "no masses [ns]", "masses", "and efforts", "and shaking", "and reactions")
     return "\n".join(
         [f"Model.solve, native engine; the best of {rounds} rounds in turn, processor time; ratios", *table(head, rows)]
     )
@@ -79,6 +81,10 @@ def _solved(model: Model, angles: np.ndarray, read: Callable[[Run], object] | No
 
 def _efforts(run: Run) -> object:
     return run.forces
+
+
+def _shaking(run: Run) -> object:
+    return run["shaking_force_x"]
 
 
 def _reactions(run: Run) -> object:

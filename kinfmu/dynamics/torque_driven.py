@@ -156,6 +156,7 @@ def _run(model: Model, samples: list[Sample], efforts: Efforts, events: tuple[Ev
         events=events,
         forces=lambda: forces.forces(loaded()),
         reactions=lambda: forces.reactions(loaded()),
+        shaking=lambda: forces.shaking(loaded()),
     )
 
 

@@ -25,7 +25,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 MOST_SAMPLES = 10_000_000  # a table of them fills the memory of a large machine
-
+_SHAKING = 3  # columns of shaking force and moment, the last reactions
 
 T = TypeVar("T")
 
@@ -100,6 +100,8 @@ class Run(Displayed):
         forces: (n, f) in SI units; None without any.
         reaction_names: Names of the r reactions of joints, such as 'pin.force_x'.
         reactions: (n, r) in N and N m; None without any. NaN where redundant rows share a load in an unknown way.
+        shaking: (n, 3) the last columns of `reactions`, shaking force and moment, which need none of the others; None
+            where they are not computed by themselves.
         signal_names: Names of the s outputs of FMUs that are not kinfmu's, with their units, such as 'motor.current'.
         signals: (n, s) their values; None without any.
         fixed: Coordinates that a joint holds at a constant, by name.
@@ -143,6 +145,7 @@ class Run(Displayed):
     forces: Lazy[FloatArray | None] = Lazy(None)
     reaction_names: tuple[ForceName, ...] = ()
     reactions: Lazy[FloatArray | None] = Lazy(None)
+    shaking: Lazy[FloatArray | None] = Lazy(None)
     signal_names: tuple[SignalName, ...] = ()
     signals: Lazy[FloatArray | None] = Lazy(None)
     length_unit: str = "m"
@@ -311,6 +314,10 @@ class Run(Displayed):
             yield ColumnPlace(f"watch.{watch}", "1", "watch", k)
 
     def _column(self, place: ColumnPlace) -> NDArray[Any]:
+        if place.table == "reactions" and place.column is not None and callable(self.__dict__["reactions"]):
+            of_shaking = place.column - len(self.reaction_names) + _SHAKING
+            if of_shaking >= 0 and self.shaking is not None:
+                return self.shaking[:, of_shaking]
         table: NDArray[Any] = getattr(self, place.table)
         return table if place.column is None else table[:, place.column]
 
@@ -370,7 +377,7 @@ class Run(Displayed):
 
 _LAZY = tuple(name for name, value in vars(Run).items() if isinstance(value, Lazy))
 _TABLES = ("t", "values", "rates", "accelerations", "inputs", "status", "iterations", "residual", "margin", "error",
-           "watch", "forces", "reactions", "signals")  # fmt: skip
+           "watch", "forces", "reactions", "shaking", "signals")  # fmt: skip
 
 
 def arrow_table(columns: Iterable[Column]) -> Any:

@@ -104,6 +104,13 @@ class ForceModel:
             reactions[bridged, len(names) - shaking.shape[1] :] = shaking
         return reactions
 
+    def shaking(self, run: LoadedRun) -> FloatArray:
+        """Return shaking force and moment at all samples, (n, 3); NaN where the run has no numbers."""
+        status = run.poses.status
+        shaking = self._evaluated(self._shaking_stage, run, slice(None), len(status))
+        shaking[status > Status.BRIDGED] = np.nan
+        return shaking
+
     def _at_regular_samples(self, stage: CompiledStage, run: LoadedRun) -> tuple[FloatArray, IntArray]:
         """Return the results of a stage, (n, results), and the numbers of all other samples, where they are NaN.
 

@@ -212,6 +212,7 @@ class Model:
             forces=(lambda: self._force_model.forces(loaded())) if self._force_names else None,
             reaction_names=self._reaction_names,
             reactions=(lambda: self._force_model.reactions(loaded())) if self._force_names else None,
+            shaking=(lambda: self._force_model.shaking(loaded())) if self._force_names else None,
             length_unit=plan.mechanism.length_unit,
             mechanism_source=self.arguments.mechanism_with(setting),
             info=lambda: self.arguments.info(setting, engine.name),

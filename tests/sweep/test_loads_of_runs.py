@@ -17,6 +17,7 @@ from kinfmu.mechanism.toml_file import parse
 from kinfmu.readings import Peak
 from tests.fmu.test_forces import press
 from tests.mechanisms import reference_fourbar
+from tests.sweep.test_forces import loaded
 
 PENDULUM = """
 name = "pendulum"
@@ -207,3 +208,20 @@ def test_nothing_is_left_over_a_turn_at_constant_speed() -> None:
     torque = run["crank.torque"]
     assert np.abs(torque).max() > 0.1
     assert abs(torque.mean()) < 1e-12 * np.abs(torque).max()
+
+
+def test_the_shaking_force_is_computed_without_the_reactions() -> None:
+    """Over bridges, limits and parts of a run, for a column and for a whole table."""
+    mechanism = loaded("double_pendulum")
+    run, again = (kinfmu.solve(mechanism, crank_angle=np.linspace(3.0, 7.0, 81), crank_speed=2.0) for _ in range(2))
+    part = run.part(slice(10, 60))
+    names = ("shaking_force_x", "shaking_force_y", "shaking_moment")
+    alone = np.stack([run[name] for name in names], axis=1)
+    assert callable(vars(run)["reactions"])
+    assert again.reactions is not None
+    assert np.isfinite(alone).any(axis=0).all()
+    assert np.isnan(alone).any()
+    assert callable(vars(again)["shaking"])
+    np.testing.assert_allclose(alone, again.reactions[:, -3:], rtol=1e-13, atol=1e-12)
+    np.testing.assert_array_equal(np.stack([part[name] for name in names], axis=1), alone[10:60])
+    assert callable(vars(part)["reactions"])
