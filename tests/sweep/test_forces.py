@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import Mechanism, Run, gallery
+from kinfmu import Body, Mechanism, Run, gallery
 from kinfmu.joints import Distance, Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism import toml_file
 from kinfmu.readings import Peak
@@ -34,10 +34,11 @@ def loaded(name: str) -> Mechanism:
     bodies = [
         body
         if body.is_ground
-        else replace(
-            body,
+        else Body(
+            body.name,
+            body.points,
+            body.start,
             mass=1.0 + 0.37 * k,
-            rod=None,
             center_of_mass=(size * (0.3 + 0.01 * k), size * (0.11 - 0.02 * k)),
             inertia=(0.4 + 0.1 * k) * (size * metre) ** 2,
         )
