@@ -33,7 +33,7 @@ def compile_files(
     cc: Sequence[str], files: Mapping[str, str], flags: Sequence[str], output: Path, rare: Sequence[str] = ()
 ) -> None:
     """Compile a library as `kinfmu.codegen.c.compiler` does, from fewer units; take objects that are there already."""
-    if "-O0" not in flags or "-shared" not in flags:
+    if "-O0" not in flags:
         FILE_BY_FILE(cc, files, flags, output, rare)
         return
     files = {name: text for name, text in files.items() if name not in rare}  # they join files

@@ -34,6 +34,7 @@ GRID = 240  # angles of the crank to a turn
 EDGE = 4  # angles at either end of a stretch that are left out: between two a limit may be near
 SAMPLES = 12  # to a stretch
 TURN = 2.0 * math.pi
+EXAMPLES = settings().max_examples  # of the profile
 PHASES = (Phase.explicit, Phase.generate)  # what fails prints its mechanism; shrinking would take minutes
 
 
@@ -321,7 +322,7 @@ def stephensons(draw: st.DrawFn) -> Linkage:
 
 @pytest.mark.parametrize("kind", KINDS)
 @given(data=st.data(), start=ANGLES, rates=RATES)
-@settings(max_examples=12, phases=PHASES)
+@settings(max_examples=EXAMPLES // 3, phases=PHASES)
 def test_four_bars_of_every_kind_move_as_the_closed_form_says(
     kind: str, data: st.DataObject, start: float, rates: tuple[float, float]
 ) -> None:
@@ -340,7 +341,7 @@ def test_four_bars_of_every_kind_move_as_the_closed_form_says(
     start=ANGLES,
     rates=RATES,
 )
-@settings(max_examples=30, phases=PHASES)
+@settings(max_examples=EXAMPLES, phases=PHASES)
 def test_slider_cranks_move_as_the_closed_form_says(
     crank: float,
     rod: float,
@@ -357,7 +358,7 @@ def test_slider_cranks_move_as_the_closed_form_says(
 
 
 @given(data=st.data(), start=ANGLES, rates=RATES)
-@settings(max_examples=20, phases=PHASES)
+@settings(max_examples=2 * EXAMPLES // 3, phases=PHASES)
 def test_watt_six_bars_move_as_the_closed_form_says(
     data: st.DataObject, start: float, rates: tuple[float, float]
 ) -> None:
@@ -366,7 +367,7 @@ def test_watt_six_bars_move_as_the_closed_form_says(
 
 
 @given(data=st.data(), start=ANGLES, rates=RATES)
-@settings(max_examples=20, phases=PHASES)
+@settings(max_examples=2 * EXAMPLES // 3, phases=PHASES)
 def test_stephenson_six_bars_move_as_the_closed_form_says(
     data: st.DataObject, start: float, rates: tuple[float, float]
 ) -> None:

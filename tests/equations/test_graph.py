@@ -18,6 +18,7 @@ from tests.power_series import Series
 
 Expression = Callable[[dict[str, Any]], Any]  # from the values of x, y, z: numbers or nodes
 
+EXAMPLES = settings().max_examples  # of the profile
 BINARY = (operator.add, operator.sub, operator.mul, operator.truediv)
 STEPS = (
     (-1.0, 2.0),
@@ -73,7 +74,7 @@ def direct(expression: Expression, values: dict[str, Any]) -> Any:
     return value
 
 
-@settings(max_examples=400)
+@settings(max_examples=10 * EXAMPLES)
 @given(expression=expressions(), x=uneven, y=uneven, z=numbers)
 def test_traced_and_evaluated_has_the_bits_of_direct_evaluation(
     expression: Expression, x: float, y: float, z: float
@@ -85,7 +86,7 @@ def test_traced_and_evaluated_has_the_bits_of_direct_evaluation(
     assert evaluate([node], values) == [expected]
 
 
-@settings(max_examples=200)
+@settings(max_examples=5 * EXAMPLES)
 @given(expression=expressions(), x=st.floats(0.5, 2.0), y=st.floats(-2.0, -0.5), z=st.floats(2.5, 4.0))
 def test_derivatives_on_the_graph_are_those_of_power_series(
     expression: Expression, x: float, y: float, z: float

@@ -24,6 +24,7 @@ from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text
 from kinfmu.units import METRES
 
+EXAMPLES = settings().max_examples  # of the profile
 FOURBAR = (gallery.folder() / "fourbar" / "mechanism.toml").read_text(encoding="utf-8")
 
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_"
@@ -100,7 +101,7 @@ def mechanisms(draw: st.DrawFn) -> Mechanism:
     )
 
 
-@settings(max_examples=150)
+@settings(max_examples=4 * EXAMPLES)
 @given(mechanism=mechanisms())
 def test_a_mechanism_that_is_written_and_read_is_the_same(mechanism: Mechanism) -> None:
     again = parse(text(mechanism))
@@ -258,13 +259,13 @@ def all_paths(tree: Any, prefix: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
 PATHS = all_paths(tomllib.loads(FOURBAR))
 
 
-@settings(max_examples=300)
+@settings(max_examples=8 * EXAMPLES)
 @given(document=st.dictionaries(keys, junk, max_size=5))
 def test_any_tree_of_values_gives_a_mechanism_or_a_message_of_one_line(document: dict[str, Any]) -> None:
     parsed_or_told("\n".join(f"{written(key)} = {written(value)}" for key, value in document.items()))
 
 
-@settings(max_examples=400)
+@settings(max_examples=10 * EXAMPLES)
 @given(path=st.sampled_from(PATHS), deeper=st.lists(keys, max_size=2), value=junk)
 def test_the_fourbar_with_anything_in_place_of_one_value_gives_a_mechanism_or_one_line(
     path: tuple[str, ...], deeper: list[str], value: Any
@@ -274,7 +275,7 @@ def test_the_fourbar_with_anything_in_place_of_one_value_gives_a_mechanism_or_on
     parsed_or_told("\n".join(f"{written(key)} = {written(inner)}" for key, inner in document.items()))
 
 
-@settings(max_examples=200)
+@settings(max_examples=5 * EXAMPLES)
 @given(data=st.data())
 def test_the_fourbars_text_with_a_piece_cut_out_or_put_in_gives_a_mechanism_or_one_line(data: st.DataObject) -> None:
     start = data.draw(st.integers(0, len(FOURBAR)))
@@ -285,7 +286,7 @@ def test_the_fourbars_text_with_a_piece_cut_out_or_put_in_gives_a_mechanism_or_o
     parsed_or_told(FOURBAR[:start] + inserted + FOURBAR[end:])
 
 
-@settings(max_examples=200)
+@settings(max_examples=5 * EXAMPLES)
 @given(junk=st.text())
 def test_any_text_gives_one_line(junk: str) -> None:
     parsed_or_told(junk)

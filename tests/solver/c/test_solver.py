@@ -125,7 +125,7 @@ def test_c_and_python_are_the_same_over_the_run_of_a_gallery_mechanism(name: str
     model = load_model(plan)
     constants = tuple(value for _, value in model.LAW_CONSTANTS)
     times = run_times(mechanism.run)
-    assert_same(plan, [tuple(model.drive(t, constants)[0]) for t in times[:: max(1, len(times) // 60)].tolist()])
+    assert_same(plan, [tuple(model.drive(t, constants)[0]) for t in times[:: max(1, len(times) // 30)].tolist()])
 
 
 def wander(middle: float, reach: float, special: Sequence[float], seed: int) -> Samples:
