@@ -31,7 +31,7 @@ def test_the_architecture_lists_every_module_outside_packages() -> None:
 def test_the_paths_of_the_architecture_exist() -> None:
     paths = re.findall(r"`((?:kinfmu|scripts|fmus|tests|docs)/[\w/.]*)[ `]", ARCHITECTURE)
     assert len(paths) > 30
-    for path in paths:
+    for path in set(paths) - {"docs/_build"}:  # there once scripts/docs has run
         assert (ROOT / path).exists(), path
 
 
