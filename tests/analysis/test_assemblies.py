@@ -181,10 +181,10 @@ def test_a_mechanism_at_fault_has_no_assemblies() -> None:
 
 
 def all_starts_or_one(plan: SolvePlan) -> list[list[str]]:
-    """Bodies whose start poses are left out: each alone, where that takes no seconds, and all together."""
+    """Bodies whose start poses are left out: all together, and, where that takes no seconds, some alone."""
     bodies = [body.name for body in plan.mechanism.moving_bodies]
     is_slow = len(plan.drivers) > 2 or plan.watches
-    return [bodies] if is_slow else [*([name] for name in bodies), bodies]
+    return [bodies] if is_slow else [*([name] for name in bodies[:: 1 + len(bodies) // 5]), bodies]
 
 
 @pytest.mark.parametrize(

@@ -212,7 +212,7 @@ def test_samples_past_a_limit_are_reported_and_the_branch_comes_back() -> None:
 
 
 def test_after_thousands_of_turns_samples_are_as_good_as_at_first() -> None:
-    u = 2.0 * np.pi * 15_000 + np.linspace(0.0, 7.0, 700)  # the last ones fill no lanes
+    u = 2.0 * np.pi * 3_000 + np.linspace(0.0, 7.0, 700)  # the last ones fill no lanes
     native, python = (kinfmu.solve(kinfmu.load("jansen_leg"), engine=engine, crank_angle=u) for engine in ENGINES)
     assert (native.status == 0).all()
     assert native.residual.max() <= 1e-14
