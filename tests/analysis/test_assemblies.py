@@ -190,8 +190,8 @@ def all_starts_or_one(plan: SolvePlan) -> list[list[str]]:
 @pytest.mark.parametrize(
     "mechanism",
     [
-        # Peaucellier's rhombus may fold flat, where it has another mobility.
-        *(kinfmu.load(name) for name in gallery.names() if name != "peaucellier"),
+        # Peaucellier's rhombus may fold flat, where it has another mobility. Loads change no pose.
+        *(kinfmu.load(name) for name in gallery.names() if name != "peaucellier" and not name.endswith("_loaded")),
         bar_linkage(),
         five_bar_arm(),
         six_bar(),
