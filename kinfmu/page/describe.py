@@ -17,7 +17,7 @@ from kinfmu.analysis import Report
 from kinfmu.analysis.loops import FourBar, Place
 from kinfmu.draw.instant import instant
 from kinfmu.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
-from kinfmu.joints import Coordinate, Distance, PointOnLine, Revolute, Translational
+from kinfmu.joints import CamRoller, Coordinate, Distance, PointOnLine, Revolute, Translational
 from kinfmu.joints.joint import Joint
 from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism
@@ -34,10 +34,13 @@ from kinfmu.scene import palette
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.shape import Shape
 from kinfmu.scene.shapes import shapes
+from kinfmu.scene.slides import Slide, slides
 from kinfmu.units import Quantity, unit_of
 from kinfmu.version import VERSION
 
 _DIGITS = 7  # of numbers that are only drawn
+_NOT_DRAWN = ("rib", "pitch", "contact")  # the page finds corners and ribs of a link from its points
+_ON_LINES = ("rail", "bed", "slot", "rod", "block", "die")
 
 
 def describe(mechanism: Mechanism, report: Report) -> dict[str, Any]:
@@ -50,7 +53,13 @@ def describe(mechanism: Mechanism, report: Report) -> dict[str, Any]:
     """
     shown = instant(mechanism)
     numbers = {name: k for k, name in enumerate(mechanism.body_points)}
-    found = [_shape(shown, shape, numbers) for shape in shapes(shown) if shape.kind != "pitch"]
+    sliding = slides(shown)
+    along = {body: iter([slide for slide in sliding if slide.holder == body]) for body in shown.poses}  # of rods
+    lines = {slide.name: slide for slide in sliding}
+    found = []
+    for shape in shapes(shown):
+        slide = next(along[shape.frame]) if shape.kind == "rod" else lines.get(shape.name)
+        found.append(_shape(shown, shape, numbers) | _line(shape, slide, numbers))
     bodies = [GROUND_NAME, *(body.name for body in mechanism.moving_bodies)]
     return {
         "name": mechanism.name,
@@ -63,14 +72,14 @@ def describe(mechanism: Mechanism, report: Report) -> dict[str, Any]:
             {"body": body_of(name), "name": name.partition(".")[2], "x": float(x), "y": float(y)}
             for name, (x, y) in mechanism.body_points.items()
         ],
-        "joints": [_joint(joint, numbers) for joint in mechanism.joints],
+        "joints": [_joint(joint, numbers) | _numbers(mechanism, joint) for joint in mechanism.joints],
         "drivers": [_driver(driver, shown, report, numbers) for driver in mechanism.drivers],
         "interest": [
             {"name": name, "point": numbers[point], "colour": list(palette.body(len(bodies) - 1 + k))}
             for k, (name, point) in enumerate(mechanism.points.items())
         ],
         "loads": [_load(load, numbers) for load in mechanism.loads],
-        "shapes": [shape for shape in found if shape is not None],
+        "shapes": [shape for shape in found if shape["kind"] not in _NOT_DRAWN],
         "loops": list(_loops(report, numbers)),
         "notes": list(report.notes),
         "mobility": report.mobility,
@@ -145,18 +154,37 @@ def _users(mechanism: Mechanism) -> dict[str, list[str]]:
     for place, expression in mechanism.expressions.items():
         if place[0] != "bodies" or place[2] != "points":
             continue
-        names, seen = list(expression.names), set()
-        while names:
-            name = names.pop()
-            if name not in seen:
-                seen.add(name)
-                other = mechanism.parameters[name].expression
-                names += other.names if other else ()
-        for name in seen:
+        for name in _behind(mechanism, expression):
             point = f"{place[1]}.{place[3]}"
             if point not in found.setdefault(name, []):
                 found[name].append(point)
     return found
+
+
+def _behind(mechanism: Mechanism, expression: Expression) -> set[str]:
+    """Return the parameters on which an expression depends."""
+    names, seen = list(expression.names), set()
+    while names:
+        name = names.pop()
+        if name not in seen:
+            seen.add(name)
+            other = mechanism.parameters[name].expression
+            names += other.names if other else ()
+    return seen
+
+
+def _numbers(mechanism: Mechanism, joint: Joint) -> dict[str, Any]:
+    """Return the parameters on which numbers of a joint depend; nothing if there are none."""
+    of_joint = [one for place, one in mechanism.expressions.items() if place[:2] == ("joints", joint.name)]
+    names = sorted({name for expression in of_joint for name in _behind(mechanism, expression)})
+    return {"numbers": names} if names else {}
+
+
+def _line(shape: Shape, slide: Slide | None, numbers: Mapping[str, int]) -> dict[str, Any]:
+    """Return for a shape of a slide its holder, its sliding point, and a point of its line if that has a name."""
+    if slide is None or shape.kind not in _ON_LINES or (shape.kind == "rail" and slide.holder != GROUND_NAME):
+        return {}
+    return {"line": {"holder": slide.holder, "point": numbers[slide.point], "origin": numbers.get(slide.origin)}}
 
 
 def label_of(place: NumberPath) -> str:
@@ -264,11 +292,9 @@ def _load(load: Any, numbers: Mapping[str, int]) -> dict[str, Any]:
     return {"name": load.name, "type": load.type, "points": [numbers[p] for p in points if p in numbers]}
 
 
-def _shape(shown: Instant, shape: Shape, numbers: Mapping[str, int]) -> dict[str, Any] | None:
+def _shape(shown: Instant, shape: Shape, numbers: Mapping[str, int]) -> dict[str, Any]:
     """Return a shape whose points are numbers of points of its body, or coordinates in its frame."""
     found: dict[str, Any] = {"kind": shape.kind, "name": shape.name, "frame": shape.frame, "colour": list(shape.colour)}
-    if shape.kind == "rib":
-        return None  # the page finds corners and ribs of a link from its points
     if shape.kind == "link":
         found["at"] = [number for name, number in numbers.items() if body_of(name) == shape.frame]
     elif shape.kind in ("bar", "barrel", "shaft"):
@@ -279,6 +305,13 @@ def _shape(shown: Instant, shape: Shape, numbers: Mapping[str, int]) -> dict[str
         anchor = _nearest(shown, shape, numbers)
         if anchor is not None:
             found["anchor"] = anchor
+    if shape.kind == "cam":
+        pole = next(
+            (joint.between[0] for joint in shown.joints if isinstance(joint, CamRoller) and joint.name == shape.name),
+            None,
+        )
+        if pole is not None:  # the file has the pitch curve itself, not what the roller does
+            found |= {"anchor": numbers[pole], "hasCurve": True}
     if shape.kind.startswith("die") or shape.frame.startswith("die."):
         (joint,) = (one for one in shown.joints if f"die.{one.name}" == shape.frame)
         point = joint.of if isinstance(joint, Coordinate) else joint.between[1]  # type: ignore[attr-defined]

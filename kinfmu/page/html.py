@@ -23,6 +23,7 @@ _SCRIPTS = (
     "pen",
     "view",
     "engine",
+    "forms",
     "linkage",
     "marks",
     "drawing",

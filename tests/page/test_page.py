@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from tests.page.browser import PHONE, Browser, browser, needs_browser, text_of
 
 pytestmark = needs_browser
 LARGEST = 300_000  # [bytes] of a page
+CONTRASTS = Path(__file__).with_name("contrasts.js").read_text("utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -165,6 +167,37 @@ def test_pin_dragged_too_far_stays_where_the_lengths_close(chromium: Browser) ->
         pins = [page.at("coupler.Q"), page.at("rocker.Q")]
         assert pins[0] == pytest.approx(pins[1], abs=1e-6)
         assert page.errors == []
+
+
+def test_slides_and_wheels_follow_new_lengths(chromium: Browser) -> None:
+    with chromium.open(text_of("scotch_yoke")) as page:
+        page.get("k.design.set({'bodies.crank.points.P.x': 52}) && k.reshape()")
+        shapes = {one["kind"]: one["points"] for one in page.get("k.linkage.shapes")}
+        assert np.abs(shapes["rail"]) == pytest.approx(np.array([[52, 0], [52, 0]]), abs=1e-6)
+        assert np.abs(shapes["slot"]) == pytest.approx(np.array([[0, 52], [0, 52]]), abs=1e-6)
+        page.settle()
+        assert page.errors == []
+    with chromium.open(text_of("geared_five_bar")) as page:
+        page.get("k.design.set({'bodies.ground.points.C.x': 66}) && k.reshape()")
+        assert sorted(page.get("k.linkage.shapes.flatMap(one => one.radius || [])")) == pytest.approx([22, 44])
+        page.get("k.design.set({'joints.mesh.offset': 0.1}) && k.reshape()")
+        assert page.get("k.linkage.shapes.every(one => one.kind !== 'wheel')")
+        page.settle()
+        assert page.errors == []
+
+
+def test_text_has_the_contrast_of_wcag_aa_in_both_themes(chromium: Browser) -> None:
+    with chromium.open(text_of("crank_rocker")) as page:
+        page.get("document.querySelectorAll('details').forEach(one => { one.open = true; })")
+        for _ in range(2):
+            for tab in ("values", "plots", "show", "files"):
+                page.tab.click(f"#tab-{tab}")
+                page.settle()
+                page.tab.wait_for_timeout(150)  # colours of buttons fade
+                found = page.tab.evaluate(CONTRASTS)
+                assert len(found) > 20
+                assert [one for one in found if one["ratio"] < one["least"]] == []
+            page.tab.click("#theme")
 
 
 def test_forces_in_joints_are_drawn_to_one_scale_and_only_computed_when_shown(chromium: Browser) -> None:

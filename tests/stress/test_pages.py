@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -65,4 +66,36 @@ def test_page_of_the_gallery_opens_and_moves(chromium: Browser, name: str) -> No
 
 
 def test_page_of_a_long_chain_opens_and_moves(chromium: Browser) -> None:
-    opens_and_moves(chromium, fourbar_chain(100), 2_000_000)
+    opens_and_moves(chromium, fourbar_chain(100), LARGEST)
+
+
+def test_page_of_a_leg_paints_soon_and_draws_frames_in_less_than_10_ms(chromium: Browser) -> None:
+    with chromium.open(page(kinfmu.load("jansen_leg"))) as shown:
+        paint = shown.tab.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime")
+        assert paint < 1000.0
+        assert len(shown.get("k.curves[0]")) == 721
+        for change in ("k.move(0, {angle!r})", "(k.design.set({{ m: {length!r} }}), k.reshape())"):
+            shown.get("k.frames.times.splice(0)")
+            for step in np.linspace(0.0, 1.0, 120):
+                work = change.format(angle=float(2.0 * np.pi * step), length=float(14.0 + 2.0 * step))
+                shown.get(f"k.refresh(() => {work})")
+                shown.settle()
+            assert np.median(shown.get("k.frames.times")) < 10.0, change
+        assert shown.errors == []
+
+
+def test_file_with_the_values_of_a_page_gives_an_fmu_with_its_numbers(chromium: Browser, tmp_path: Path) -> None:
+    with chromium.open(page(kinfmu.load("crank_rocker")), "#bodies.rocker.points.Q.x=52.5&crank.speed=2") as shown:
+        shown.tab.click("#tab-files")
+        with shown.tab.expect_download() as waiting:
+            shown.tab.click("#save-file")
+        path = tmp_path / "changed.toml"
+        path.write_bytes(waiting.value.path().read_bytes())
+        names = shown.get("[...k.linkage.index.keys()]")
+        poses = [shown.get(f"k.linkage.goToTime({t!r}) && Array.from(k.linkage.pose.q)") for t in (0.0, 0.5, 1.0)]
+        assert shown.errors == []
+    fmu = kinfmu.build(kinfmu.load(path), tmp_path / "changed.fmu", flavour="native", fmi=3)
+    run = kinfmu.simulate(fmu, step=0.5, stop=1.0)
+    columns = dict(zip(names, np.array(poses).T, strict=True))
+    for name in ("tracer.x", "tracer.y", "rocker.phi", "coupler.x"):
+        assert np.abs(columns[name] - run[name]).max() < 1e-9, name

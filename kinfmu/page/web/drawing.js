@@ -4,6 +4,7 @@ import { edgeOf, fillOf, GREY, paleOf } from "./colours.js";
 import { distance, outline, placed } from "./geometry.js";
 import { marks } from "./marks.js";
 import { niceStep, number } from "./numbers.js";
+import { BUTTONS } from "./view.js";
 
 // Draw a pose; show: what is switched on; view: from the plane to pixels.
 export function draw(pen, linkage, view, theme, show, extra) {
@@ -47,7 +48,7 @@ class Painter {
     }
 
     all(...kinds) {
-        return this.linkage.data.shapes.filter((shape) => kinds.includes(shape.kind));
+        return this.linkage.shapes.filter((shape) => kinds.includes(shape.kind));
     }
 
     // Return the points of a shape in the plane; they move with the point next to which the file has the shape.
@@ -94,7 +95,7 @@ class Painter {
         for (let k = Math.ceil(low[1] / step); k * step <= high[1]; k++) {
             const [, y] = this.dot([0, k * step]);
             pen.line([[0, y], [view.width, y]], { width: 1, colour: theme.grid });
-            pen.text(4, y - 7, number(k * step), { colour: theme.quiet, size: 10, halo: theme.paper });
+            if (y > BUTTONS + 20) pen.text(4, y - 7, number(k * step), { colour: theme.quiet, size: 10, halo: theme.paper });
         }
         pen.text(view.width - 6, view.height - 8, this.linkage.data.unit, { colour: theme.quiet, size: 11, align: "right", halo: theme.paper });
     }
@@ -306,7 +307,7 @@ class Painter {
                     const cx = x + dx * off + (Math.sign(dx) * width) / 2;
                     const cy = y + dy * off;
                     const box = [cx - width / 2, cy - 8, cx + width / 2, cy + 8];
-                    if (box[0] < 2 || box[2] > this.view.width - 2 || box[1] < 2 || box[3] > this.view.height - 2) continue;
+                    if (box[0] < 2 || box[2] > this.view.width - 2 || box[1] < BUTTONS + 10 || box[3] > this.view.height - 2) continue;
                     if (this.boxes.some((b) => b[0] < box[2] && b[2] > box[0] && b[1] < box[3] && b[3] > box[1])) continue;
                     this.boxes.push(box);
                     pen.text(cx, cy, text, { colour, size: 12, align: "center", halo: theme.paper });

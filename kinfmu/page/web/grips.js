@@ -26,7 +26,7 @@ export function gripAt(linkage, p, reach) {
         }
     }
     if (best) return best;
-    for (const shape of linkage.data.shapes) {
+    for (const shape of linkage.shapes) {
         const body = linkage.bodies.indexOf(shape.frame);
         if (body < 0 || linkage.triples[body][0] < 0 || !(shape.radius || shape.kind === "cam")) continue;
         const local = seen(linkage.bodyPose(body), ...p);

@@ -1,11 +1,15 @@
 // The mechanism that moves: engines, the pose that is shown, curves and ranges, quantities of the pose.
 
+import { axlesOf, formsOf } from "./forms.js";
 import { TURN, placed, remainder } from "./geometry.js";
 
 const CURVE = 720; // points of a coupler curve
 const BOX = 73; // poses that decide what fits into the view
 const FORCES = 90; // poses of a run that decide the scale of forces
 const USUAL = 0.99; // part of the forces that are not outliers
+const TURNED = 360; // poses of a turn among which change points are looked for
+const NEAR = 0.05; // margin of such a pose that is next to a change point
+const SINGULAR = 1e-5; // margin at a change point
 const LAW = 400; // times at which the laws are tabled
 
 export class Linkage {
@@ -27,7 +31,13 @@ export class Linkage {
         this.#tableLaws();
         this.goTo(this.u);
         if (!this.pose) throw new Error(this.failure);
+        this.axles = axlesOf(this);
         this.findRanges();
+    }
+
+    // Return whether lengths or other numbers of the mechanism, apart from its laws, are not those of the file.
+    get isChanged() {
+        return this.parameters.some((one) => !one.isLaw && this.bound.get(one.name) !== one.value);
     }
 
     #use(which) {
@@ -217,7 +227,8 @@ export class Linkage {
         return this.probe.sweep(us, columns);
     }
 
-    // Find the range of each driver, the others at the start of their laws.
+    // Find what the lengths decide: ranges of the drivers, each with the others at the start of their laws, change points,
+    // shapes.
     findRanges() {
         const start = Array.from(this.law[0].u);
         this.limits = [];
@@ -232,6 +243,42 @@ export class Linkage {
             }
             return [ends[0].at, ends[1].at];
         });
+        this.changePoints = this.data.drivers.flatMap((driver, k) => {
+            const found = this.isChanged ? this.#changePoints(driver, k) : driver.changePoints;
+            return found.map((at) => ({ driver: k, at }));
+        });
+        this.shapes = formsOf(this);
+    }
+
+    // Return where a turning driver passes change points: the margin from singular poses is zero there.
+    #changePoints(driver, k) {
+        if (driver.kind !== "angle") return [];
+        const { probe } = this;
+        const [low, high] = this.ranges[k];
+        const u = Float64Array.from(this.law[0].u);
+        const [ud, udd] = [new Float64Array(u.length).fill(1), new Float64Array(u.length)];
+        const margin = (at) => {
+            u[k] = at;
+            return isGood(probe.at(u, ud, udd)) ? probe.margin : Infinity;
+        };
+        probe.restart();
+        const step = (high - low) / TURNED;
+        const margins = Array.from({ length: TURNED + 1 }, (_, i) => margin(low + i * step));
+        const found = [];
+        margins.forEach((value, i) => {
+            const [before, after] = [margins[i - 1] ?? Infinity, margins[i + 1] ?? Infinity];
+            if (value > NEAR || value > before || value >= after) return;
+            let [a, b] = [low + Math.max(i - 1, 0) * step, low + Math.min(i + 1, TURNED) * step];
+            while (b - a > 1e-9) {
+                const [c, d] = [a + 0.382 * (b - a), a + 0.618 * (b - a)];
+                if (margin(c) <= margin(d)) b = d;
+                else a = c;
+            }
+            const at = 0.5 * (a + b);
+            const isLimit = this.limits.some((limit) => limit.driver === k && Math.abs(limit.at - at) < step);
+            if (!isLimit && margin(at) < SINGULAR) found.push(at);
+        });
+        return found;
     }
 
     #reach(driver, k, start) {
@@ -251,16 +298,16 @@ export class Linkage {
     // Return how far one driver goes from its start towards an end, to 1e-9 of the way.
     #end(start, k, end) {
         const steps = 120;
+        const [ones, zeros] = [new Float64Array(start.length).fill(1), new Float64Array(start.length)];
         const at = (part) => start[k] + (end - start[k]) * part;
         if (end === start[k]) return { at: end, isLimit: false };
         const goes = (from, to, count) => {
-            const us = Array.from({ length: count }, (_, i) => {
-                const u = Float64Array.from(start);
+            const u = Float64Array.from(start);
+            this.probe.restart();
+            for (let i = 0; i < count; i++) {
                 u[k] = at(from + ((to - from) * (i + 1)) / count);
-                return u;
-            });
-            const { status } = this.#swept([Float64Array.from(start), ...us], [0]);
-            for (let i = 1; i <= count; i++) if (!isGood(status[i])) return i - 1;
+                if (!isGood(this.probe.at(u, ones, zeros))) return i;
+            }
             return count;
         };
         const reached = goes(0, 1, steps);
@@ -320,7 +367,7 @@ export class Linkage {
         };
         for (const line of this.curves(all, BOX)) line.forEach(add);
         all.forEach((k) => add(this.point(k)));
-        for (const shape of this.data.shapes) {
+        for (const shape of this.shapes) {
             if (!shape.radius && shape.kind !== "cam") continue;
             const body = this.bodies.indexOf(shape.frame);
             if (body < 0) continue;

@@ -100,7 +100,7 @@ function driverMarks(painter) {
             painter.name(label, [on(u, radius + 8)], colour, 14, -1);
         };
         for (const limit of linkage.limits) if (limit.driver === k) mark(limit.at, theme.bad, `limit ${degrees(limit.at, 1)}`);
-        if (linkage.which === "written") for (const at of driver.changePoints) mark(at, theme.accent, `change point ${degrees(at, 1)}`);
+        for (const point of linkage.changePoints) if (point.driver === k) mark(point.at, theme.accent, `change point ${degrees(point.at, 1)}`);
         const p = on(linkage.u[k], radius);
         pen.circle(...p, 4, { colour: theme.accent, fill: theme.accent });
     });

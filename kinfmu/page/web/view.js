@@ -1,5 +1,7 @@
 // The view: which part of the plane is on the canvas, y up.
 
+export const BUTTONS = 40; // [px] of the height, above the drawing
+
 export class View {
     constructor() {
         Object.assign(this, { width: 1, height: 1, scale: 1, x: 0, y: 0, isFitted: true });
@@ -16,9 +18,9 @@ export class View {
     fit([x0, y0, x1, y1]) {
         const margin = Math.min(64, 0.13 * Math.min(this.width, this.height) + 12);
         const [w, h] = [Math.max(x1 - x0, 1e-12), Math.max(y1 - y0, 1e-12)];
-        const [aw, ah] = [Math.max(this.width - 2 * margin, 20), Math.max(this.height - 2 * margin, 20)];
+        const [aw, ah] = [Math.max(this.width - 2 * margin, 20), Math.max(this.height - 2 * margin - BUTTONS, 20)];
         this.scale = Math.min(aw / w, ah / h);
-        [this.x, this.y] = [(x0 + x1) / 2, (y0 + y1) / 2];
+        [this.x, this.y] = [(x0 + x1) / 2, (y0 + y1 + BUTTONS / this.scale) / 2];
         this.isFitted = true;
     }
 
