@@ -186,6 +186,15 @@ def test_slides_and_wheels_follow_new_lengths(chromium: Browser) -> None:
         assert page.errors == []
 
 
+def test_change_points_are_found_again_with_new_lengths(chromium: Browser) -> None:
+    with chromium.open(text_of("fourbar")) as page:  # its third bar moves along the coupler and stays parallel
+        page.get("k.design.set({'bodies.coupler.points.A.x': 0.8, 'bodies.ground.points.B.x': 1.8}) && k.reshape()")
+        assert page.get("k.linkage.isChanged && k.design.isOk")
+        assert [one["at"] for one in page.get("k.linkage.changePoints")] == pytest.approx([0.0, math.pi], abs=1e-6)
+        page.settle()
+        assert page.errors == []
+
+
 def test_text_has_the_contrast_of_wcag_aa_in_both_themes(chromium: Browser) -> None:
     with chromium.open(text_of("crank_rocker")) as page:
         page.get("document.querySelectorAll('details').forEach(one => { one.open = true; })")

@@ -276,7 +276,8 @@ export class Linkage {
             }
             const at = 0.5 * (a + b);
             const isLimit = this.limits.some((limit) => limit.driver === k && Math.abs(limit.at - at) < step);
-            if (!isLimit && margin(at) < SINGULAR) found.push(at);
+            const isKnown = found.some((other) => Math.abs(remainder(other - at)) < step); // the range may end where it starts
+            if (!isLimit && !isKnown && margin(at) < SINGULAR) found.push(at);
         });
         return found;
     }
