@@ -24,6 +24,7 @@ _SCRIPTS = (
     "view",
     "engine",
     "forms",
+    "ranges",
     "linkage",
     "marks",
     "drawing",

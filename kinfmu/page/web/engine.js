@@ -12,6 +12,11 @@ export async function unpacked(text) {
   return new Response(stream).arrayBuffer();
 }
 
+// Return whether a status is that of a pose with numbers.
+export function isGood(status) {
+  return status <= BRIDGED;
+}
+
 export class Engine {
   // Return the engine of a module: text as PageModule.text gives it.
   static async load(text) {
@@ -147,7 +152,7 @@ export class Engine {
         if (udds) udd[driver] = udds[number];
       }
       status[sample] = this.#code.kf_page_sample(orders, ts ? ts[sample] : NaN);
-      const good = status[sample] <= BRIDGED;
+      const good = isGood(status[sample]);
       for (const [numbers, column] of sources) {
         values[place] = good ? numbers[column] : NaN;
         place += 1;

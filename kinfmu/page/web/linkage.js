@@ -1,15 +1,14 @@
 // The mechanism that moves: engines, the pose that is shown, curves and ranges, quantities of the pose.
 
+import { isGood } from "./engine.js";
 import { axlesOf, formsOf } from "./forms.js";
 import { TURN, placed, remainder } from "./geometry.js";
+import { changePointsOf, rangesOf } from "./ranges.js";
 
 const CURVE = 720; // points of a coupler curve
 const BOX = 73; // poses that decide what fits into the view
 const FORCES = 90; // poses of a run that decide the scale of forces
 const USUAL = 0.99; // part of the forces that are not outliers
-const TURNED = 360; // poses of a turn among which change points are looked for
-const NEAR = 0.05; // margin of such a pose that is next to a change point
-const SINGULAR = 1e-5; // margin at a change point
 const LAW = 400; // times at which the laws are tabled
 
 export class Linkage {
@@ -227,98 +226,12 @@ export class Linkage {
         return this.probe.sweep(us, columns);
     }
 
-    // Find what the lengths decide: ranges of the drivers, each with the others at the start of their laws, change points,
-    // shapes.
+    // Find what the lengths decide: ranges of the drivers, each with the others at the start of their laws, limits, change
+    // points, shapes.
     findRanges() {
-        const start = Array.from(this.law[0].u);
-        this.limits = [];
-        this.ranges = this.data.drivers.map((driver, k) => {
-            const reach = this.#reach(driver, k, start[k]);
-            const ends = reach.map((end) => this.#end(start, k, end));
-            ends.forEach((end) => {
-                if (end.isLimit) this.limits.push({ driver: k, at: end.at });
-            });
-            if (driver.kind === "angle" && !ends[0].isLimit && !ends[1].isLimit) {
-                return [start[k], start[k] + TURN * (driver.turns || 1)];
-            }
-            return [ends[0].at, ends[1].at];
-        });
-        this.changePoints = this.data.drivers.flatMap((driver, k) => {
-            const found = this.isChanged ? this.#changePoints(driver, k) : driver.changePoints;
-            return found.map((at) => ({ driver: k, at }));
-        });
+        Object.assign(this, rangesOf(this));
+        this.changePoints = changePointsOf(this);
         this.shapes = formsOf(this);
-    }
-
-    // Return where a turning driver passes change points: the margin from singular poses is zero there.
-    #changePoints(driver, k) {
-        if (driver.kind !== "angle") return [];
-        const { probe } = this;
-        const [low, high] = this.ranges[k];
-        const u = Float64Array.from(this.law[0].u);
-        const [ud, udd] = [new Float64Array(u.length).fill(1), new Float64Array(u.length)];
-        const margin = (at) => {
-            u[k] = at;
-            return isGood(probe.at(u, ud, udd)) ? probe.margin : Infinity;
-        };
-        probe.restart();
-        const step = (high - low) / TURNED;
-        const margins = Array.from({ length: TURNED + 1 }, (_, i) => margin(low + i * step));
-        const found = [];
-        margins.forEach((value, i) => {
-            const [before, after] = [margins[i - 1] ?? Infinity, margins[i + 1] ?? Infinity];
-            if (value > NEAR || value > before || value >= after) return;
-            let [a, b] = [low + Math.max(i - 1, 0) * step, low + Math.min(i + 1, TURNED) * step];
-            while (b - a > 1e-9) {
-                const [c, d] = [a + 0.382 * (b - a), a + 0.618 * (b - a)];
-                if (margin(c) <= margin(d)) b = d;
-                else a = c;
-            }
-            const at = 0.5 * (a + b);
-            const isLimit = this.limits.some((limit) => limit.driver === k && Math.abs(limit.at - at) < step);
-            const isKnown = found.some((other) => Math.abs(remainder(other - at)) < step); // the range may end where it starts
-            if (!isLimit && !isKnown && margin(at) < SINGULAR) found.push(at);
-        });
-        return found;
-    }
-
-    #reach(driver, k, start) {
-        if (driver.kind === "angle") return [start - TURN, start + TURN];
-        const law = this.law.map((one) => one.u[k]);
-        const [low, high] = [Math.min(...law), Math.max(...law)];
-        const known = [...(driver.reach || []), ...driver.limits.map((limit) => limit.at), low, high];
-        const [least, most] = [Math.min(...known), Math.max(...known)];
-        const spare = Math.max(0.5 * (high - low), 0.02 * this.data.size);
-        const limits = driver.limits.map((limit) => limit.at);
-        return [
-            limits.some((at) => at < low) ? least - 0.1 * (high - least) : Math.max(low - spare, least),
-            limits.some((at) => at > high) ? most + 0.1 * (most - low) : Math.min(high + spare, most),
-        ];
-    }
-
-    // Return how far one driver goes from its start towards an end, to 1e-9 of the way.
-    #end(start, k, end) {
-        const steps = 120;
-        const [ones, zeros] = [new Float64Array(start.length).fill(1), new Float64Array(start.length)];
-        const at = (part) => start[k] + (end - start[k]) * part;
-        if (end === start[k]) return { at: end, isLimit: false };
-        const goes = (from, to, count) => {
-            const u = Float64Array.from(start);
-            this.probe.restart();
-            for (let i = 0; i < count; i++) {
-                u[k] = at(from + ((to - from) * (i + 1)) / count);
-                if (!isGood(this.probe.at(u, ones, zeros))) return i;
-            }
-            return count;
-        };
-        const reached = goes(0, 1, steps);
-        if (reached === steps) return { at: end, isLimit: false };
-        let [low, high] = [reached / steps, (reached + 1) / steps];
-        for (let i = 0; i < 6; i++) {
-            const inner = goes(low, high, 16);
-            [low, high] = [low + ((high - low) * inner) / 16, low + ((high - low) * (inner + 1)) / 16];
-        }
-        return { at: at(low), isLimit: true };
     }
 
     // Return the value of a driver within its range, if it turns without end.
@@ -467,9 +380,4 @@ export class Linkage {
         }
         return found;
     }
-}
-
-// Return whether a status is that of a pose with numbers.
-export function isGood(status) {
-    return status <= 2;
 }

@@ -1,0 +1,100 @@
+// How far drivers go: their ranges and limits, and the change points that they pass.
+
+import { isGood } from "./engine.js";
+import { remainder, TURN } from "./geometry.js";
+
+const TURNED = 360; // poses of a turn among which change points are looked for
+const NEAR = 0.05; // margin of such a pose that is next to a change point
+const SINGULAR = 1e-5; // margin at a change point
+
+// Return { ranges, limits }: of each driver, the others at the start of their laws.
+export function rangesOf(linkage) {
+    const start = Array.from(linkage.law[0].u);
+    const limits = [];
+    const ranges = linkage.data.drivers.map((driver, k) => {
+        const ends = reachOf(linkage, driver, k, start[k]).map((end) => endOf(linkage, start, k, end));
+        for (const { at, isLimit } of ends) if (isLimit) limits.push({ driver: k, at });
+        if (driver.kind === "angle" && !ends[0].isLimit && !ends[1].isLimit) return [start[k], start[k] + TURN * (driver.turns || 1)];
+        return [ends[0].at, ends[1].at];
+    });
+    return { ranges, limits };
+}
+
+// Return the change points { driver, at }: those that check states, or those found with other lengths.
+export function changePointsOf(linkage) {
+    return linkage.data.drivers.flatMap((driver, k) => {
+        const found = linkage.isChanged ? changePoints(linkage, driver, k) : driver.changePoints;
+        return found.map((at) => ({ driver: k, at }));
+    });
+}
+
+// Return where a turning driver passes change points: the margin from singular poses is zero there.
+function changePoints(linkage, driver, k) {
+    if (driver.kind !== "angle") return [];
+    const { probe } = linkage;
+    const [low, high] = linkage.ranges[k];
+    const u = Float64Array.from(linkage.law[0].u);
+    const [ud, udd] = [new Float64Array(u.length).fill(1), new Float64Array(u.length)];
+    const margin = (at) => {
+        u[k] = at;
+        return isGood(probe.at(u, ud, udd)) ? probe.margin : Infinity;
+    };
+    probe.restart();
+    const step = (high - low) / TURNED;
+    const margins = Array.from({ length: TURNED + 1 }, (_, i) => margin(low + i * step));
+    const found = [];
+    margins.forEach((value, i) => {
+        const [before, after] = [margins[i - 1] ?? Infinity, margins[i + 1] ?? Infinity];
+        if (value > NEAR || value > before || value >= after) return;
+        let [a, b] = [low + Math.max(i - 1, 0) * step, low + Math.min(i + 1, TURNED) * step];
+        while (b - a > 1e-9) {
+            const [c, d] = [a + 0.382 * (b - a), a + 0.618 * (b - a)];
+            if (margin(c) <= margin(d)) b = d;
+            else a = c;
+        }
+        const at = 0.5 * (a + b);
+        const isLimit = linkage.limits.some((limit) => limit.driver === k && Math.abs(limit.at - at) < step);
+        const isKnown = found.some((other) => Math.abs(remainder(other - at)) < step); // the range may end where it starts
+        if (!isLimit && !isKnown && margin(at) < SINGULAR) found.push(at);
+    });
+    return found;
+}
+
+function reachOf(linkage, driver, k, start) {
+    if (driver.kind === "angle") return [start - TURN, start + TURN];
+    const law = linkage.law.map((one) => one.u[k]);
+    const [low, high] = [Math.min(...law), Math.max(...law)];
+    const known = [...(driver.reach || []), ...driver.limits.map((limit) => limit.at), low, high];
+    const [least, most] = [Math.min(...known), Math.max(...known)];
+    const spare = Math.max(0.5 * (high - low), 0.02 * linkage.data.size);
+    const limits = driver.limits.map((limit) => limit.at);
+    return [
+        limits.some((at) => at < low) ? least - 0.1 * (high - least) : Math.max(low - spare, least),
+        limits.some((at) => at > high) ? most + 0.1 * (most - low) : Math.min(high + spare, most),
+    ];
+}
+
+// Return how far one driver goes from its start towards an end, to 1e-9 of the way.
+function endOf(linkage, start, k, end) {
+    const steps = 120;
+    const [ones, zeros] = [new Float64Array(start.length).fill(1), new Float64Array(start.length)];
+    const at = (part) => start[k] + (end - start[k]) * part;
+    if (end === start[k]) return { at: end, isLimit: false };
+    const goes = (from, to, count) => {
+        const u = Float64Array.from(start);
+        linkage.probe.restart();
+        for (let i = 0; i < count; i++) {
+            u[k] = at(from + ((to - from) * (i + 1)) / count);
+            if (!isGood(linkage.probe.at(u, ones, zeros))) return i;
+        }
+        return count;
+    };
+    const reached = goes(0, 1, steps);
+    if (reached === steps) return { at: end, isLimit: false };
+    let [low, high] = [reached / steps, (reached + 1) / steps];
+    for (let i = 0; i < 6; i++) {
+        const inner = goes(low, high, 16);
+        [low, high] = [low + ((high - low) * inner) / 16, low + ((high - low) * (inner + 1)) / 16];
+    }
+    return { at: at(low), isLimit: true };
+}
