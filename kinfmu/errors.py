@@ -91,8 +91,10 @@ class MissingPackageError(KinfmuError):
 
 MOST_LISTED = 100  # names in a message
 OTHER_WORDS = {  # words of other programs and of drawings, with the words of kinfmu
-    **dict.fromkeys(("pin", "hinge", "pivot", "rotational", "rotary"), "revolute"),
-    **dict.fromkeys(("prismatic", "slider", "slide", "sliding", "linear"), "translational"),
+    **dict.fromkeys(
+        ("pin", "pinned", "hinge", "pivot", "rotational", "rotary", "pin joint", "hinge joint"), "revolute"
+    ),
+    **dict.fromkeys(("prismatic", "slider", "slide", "sliding", "linear", "slider joint"), "translational"),
     **dict.fromkeys(("weld", "welded", "rigid"), "fixed"),
     **dict.fromkeys(("inch", "inches", '"'), "in"),
     **dict.fromkeys(("foot", "feet"), "ft"),

@@ -1,7 +1,7 @@
 # Sourced by the scripts of this folder: the checkout's own Python environment, .venv.
 # shellcheck shell=bash
 #
-#   set_up run    kinfmu and what it needs to run
+#   set_up run    kinfmu and what it needs to run and to draw
 #   set_up dev    that, and the tools for tests and checks
 #
 # Both do nothing (in well under half a second) when the environment is there and pyproject.toml is as it was installed.
@@ -60,7 +60,7 @@ must_be_made() {
 }
 
 install() {
-    local kind="$1" python what="."
+    local kind="$1" python what=".[figures]"
     if [[ "$kind" == dev ]]; then what=".[dev]"; fi
     if must_be_made; then
         python="$(find_python)"

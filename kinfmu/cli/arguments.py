@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from kinfmu import gallery
 from kinfmu.cli.messages import note
@@ -37,6 +38,10 @@ class _File(ArgumentType):
 
     def __init__(self, *suffixes: str) -> None:
         self.suffixes = suffixes
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
+        """Let the shell complete names of files."""
+        return [CompletionItem(incomplete, type="file")]
 
 
 class InputFile(_File):
@@ -75,6 +80,11 @@ class MechanismName(ArgumentType):
 
     name = "MECH"
     suffixes: tuple[str, ...] = (".toml",)
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
+        """Return the names of the gallery that begin so; the shell completes names of files."""
+        names = [CompletionItem(name) for name in gallery.names() if incomplete and name.startswith(incomplete)]
+        return names or [CompletionItem(incomplete, type="file")]
 
     def read(self, text: str) -> str:
         if suffix_of(text) in self.suffixes:

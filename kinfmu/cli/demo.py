@@ -1,14 +1,18 @@
-"""The demonstration on the reference four-bar: check, FMU, simulation, comparison with the report, logs."""
+"""The demonstration on the reference four-bar: check, FMU, simulation, comparison with the report, logs, picture."""
 
 from __future__ import annotations
 
+import shutil
 import sys
 from pathlib import Path
+from shlex import quote
 
 import numpy as np
 
 from kinfmu.analysis import check
 from kinfmu.bench.singular_points import parallelogram
+from kinfmu.draw import animate
+from kinfmu.errors import MissingPackageError
 from kinfmu.fmu import build, simulate
 from kinfmu.gallery import load
 from kinfmu.log import write_mcap, write_rrd
@@ -75,11 +79,18 @@ def main() -> int:
     logs.mkdir(exist_ok=True)
     write_mcap(run, logs / "fourbar.mcap")
     write_rrd(run, logs / "fourbar.rrd")
+    command = "kinfmu" if shutil.which("kinfmu") else quote(str(Path(sys.executable).with_name("kinfmu")))
     print(
         "\nwrote logs/fourbar.mcap and logs/fourbar.rrd; to review them:\n"
-        "  .venv/bin/kinfmu review logs/fourbar.mcap\n"
-        "  .venv/bin/kinfmu review logs/fourbar.mcap --screenshot fourbar.png    (after scripts/graphics; no screen)"
+        f"  {command} review logs/fourbar.mcap\n"
+        f"  {command} review logs/fourbar.mcap --screenshot fourbar.png    # needs no screen; after scripts/graphics"
     )
+    moving = logs / "fourbar.gif"
+    try:
+        animate(run, moving)
+        print(f"\nthe moving linkage, which every browser opens: {moving.resolve().as_uri()}")
+    except MissingPackageError as missing:
+        print(f"\nno picture: {missing}")
     return 0 if agrees and exact and bool(run.good.all()) else 1
 
 

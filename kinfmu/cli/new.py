@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 
 import click
 
@@ -31,4 +32,4 @@ def new(mechanism: str, file: Path) -> None:
             write_whole(file, source.read_bytes())
     except OSError as error:
         raise KinfmuError(f"{file}: cannot be written ({error.strerror})") from None
-    click.echo(f"{file}: written; next: kinfmu check {file}")
+    click.echo(f"{file}: written; next: kinfmu check {quote(str(file))}")

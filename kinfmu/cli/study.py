@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from pathlib import Path
+from shlex import quote
 
 import click
 
@@ -62,7 +63,7 @@ def study(
         raise click.UsageError("--workers is for this machine; the Dask cluster has its own")
     defined = read_study(file, engine=engine)
     target = output or Path(f"{file.stem}.parquet")
-    shown = _Shown(f"kinfmu study {file}")
+    shown = _Shown(f"kinfmu study {quote(str(file))}")
     try:
         result = run_study(defined, target, workers=workers, dask=dask, restart=restart, progress=shown)
     except KeyboardInterrupt:

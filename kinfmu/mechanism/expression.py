@@ -378,7 +378,8 @@ class _Parser:
     def _wrong(self, valid: str) -> MechanismError:
         token = self._token
         found = {"end": "the end", "character": quoted(token.text)}.get(token.kind, f"'{token.text}'")
-        return _error(self._text, token.at, f"expected {valid}, found {found}")
+        near = suggestion(token.text, self._units) if token.kind == "character" else ""  # a degree or inch sign
+        return _error(self._text, token.at, f"expected {valid}, found {found}{near}")
 
 
 class Computed(float):

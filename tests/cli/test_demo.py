@@ -28,6 +28,9 @@ def test_the_demo_does_the_main_job(
     kept = kinfmu.log.read(tmp_path / "logs" / "fourbar.mcap")
     assert (kept.t[0], kept.t[-1], len(kept)) == (0.0, 180.0, 181)
     assert (tmp_path / "logs" / "fourbar.rrd").is_file()
+    shown = tmp_path / "logs" / "fourbar.gif"
+    assert shown.resolve().as_uri() in message
+    assert shown.read_bytes().startswith(b"GIF89a")
 
 
 def test_the_demos_closed_form_is_that_of_the_oracle() -> None:

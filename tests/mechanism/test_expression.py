@@ -267,3 +267,9 @@ def test_incompatible_quantities_are_reported(text: str, what: str) -> None:
     with pytest.raises(MechanismError) as caught:
         Expression(text).dimension(DIMENSIONS)
     assert str(caught.value) == f"'{text}', {what}"
+
+
+def test_degree_and_inch_signs_within_expressions_suggest_a_unit() -> None:
+    for text, unit in (("30 deg + 60\N{DEGREE SIGN}", "deg"), ('2" + 1 mm', "in")):
+        with pytest.raises(MechanismError, match=f"; did you mean '{unit}'\\?$"):
+            Expression(text)

@@ -22,7 +22,7 @@ def test_a_first_call_makes_the_environment_installs_and_runs(miniature: Miniatu
     assert status == 0, said
     assert miniature.asked == [
         f"python3 -m venv {miniature.root}/.venv",
-        f"{INSTALL}.",
+        f"{INSTALL}.[figures]",
         "python -m kinfmu.cli.demo",
     ]
 
@@ -61,16 +61,24 @@ def test_a_failed_installation_is_reported_and_started_again(miniature: Miniatur
     status, said = miniature.run("demo", PIP_FAILS="1")
     assert status == 1
     assert said.splitlines()[-1] == "kinfmu: installing into .venv failed, see above"
-    assert miniature.asked[-1] == f"{INSTALL}."
+    assert miniature.asked[-1] == f"{INSTALL}.[figures]"
     assert miniature.run("demo")[0] == 0
-    assert miniature.asked == [f"python3 -m venv {miniature.root}/.venv", f"{INSTALL}.", "python -m kinfmu.cli.demo"]
+    assert miniature.asked == [
+        f"python3 -m venv {miniature.root}/.venv",
+        f"{INSTALL}.[figures]",
+        "python -m kinfmu.cli.demo",
+    ]
 
 
 def test_an_interrupted_update_is_begun_again(miniature: Miniature) -> None:
     miniature.run("demo")
     assert miniature.run("test", PIP_FAILS="1")[0] == 1
     miniature.run("demo")
-    assert miniature.asked == [f"python3 -m venv {miniature.root}/.venv", f"{INSTALL}.", "python -m kinfmu.cli.demo"]
+    assert miniature.asked == [
+        f"python3 -m venv {miniature.root}/.venv",
+        f"{INSTALL}.[figures]",
+        "python -m kinfmu.cli.demo",
+    ]
 
 
 def test_a_broken_environment_is_made_again(miniature: Miniature) -> None:
@@ -86,7 +94,7 @@ def test_an_environment_that_somebody_made_by_hand_is_kept(miniature: Miniature)
     shutil.copy(miniature.python, tools / "python")
     (tools / "theirs").touch()
     miniature.run("demo")
-    assert miniature.asked == [f"{INSTALL}.", "python -m kinfmu.cli.demo"]
+    assert miniature.asked == [f"{INSTALL}.[figures]", "python -m kinfmu.cli.demo"]
     assert (tools / "theirs").exists()
 
 

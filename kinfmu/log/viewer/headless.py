@@ -23,8 +23,8 @@ Cursor = dict[str, Any]  # {"duration": seconds}, or {"sequence": number} of rec
 CursorOn = Callable[["Timeline"], Cursor]  # a function that returns the cursor on the recording's timeline
 START_TIME, SETTLE_TIME, END_TIME = 30.0, 25.0, 5.0  # [s], at most
 NO_DRIVER = (
-    "no graphics driver for a picture without a display: scripts/graphics of the source tree installs one; on Debian: "
-    "apt-get install mesa-vulkan-drivers libvulkan1"
+    "no graphics driver for a picture without a display; on Debian and Ubuntu this installs one: scripts/graphics (in "
+    "the source tree) or apt-get install mesa-vulkan-drivers libvulkan1"
 )
 _SIGNS_OF_NO_DRIVER = ("No graphics adapter", "render context")  # no driver; a driver that is too old
 _COLOUR = re.compile("\x1b\\[[0-9;]*m")  # of terminals
