@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from shlex import quote
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -26,6 +26,9 @@ from kinfmu.cli.settings import (
 )
 from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.files.whole_file import suffix_of
+
+if TYPE_CHECKING:
+    from kinfmu.run import Run, Sink
 
 LOGS = Path("logs")
 
@@ -68,6 +71,7 @@ LOGS = Path("logs")
     help="How an SSP passes values: ordered, an output after the inputs that it depends on; jacobi, all at once, a "
     "step late, as many hosts do. Default: ordered.",
 )
+@click.option("--live", is_flag=True, help="Show the run in the Rerun viewer while it is computed.")
 @click.option("--rate", type=click.FloatRange(min=0.0, min_open=True), help="Samples to log per second of the run.")
 @on_interrupt("stopped before the first sample: nothing was kept")
 def simulate(
@@ -83,6 +87,7 @@ def simulate(
     rrd: Path | None,
     channels: str | None,
     exchange: str,
+    live: bool,
     rate: float | None,
 ) -> None:
     """Step an FMU or an SSP and write logs; build an FMU first from a MECH.
@@ -93,7 +98,7 @@ def simulate(
     from tempfile import TemporaryDirectory
 
     from kinfmu.fmu import simulate as simulated
-    from kinfmu.log import McapLog, write_rrd
+    from kinfmu.log import LiveView, McapLog, write_rrd
     from kinfmu.run.channels import is_drawn
 
     if wrap and inputs is None:
@@ -108,6 +113,9 @@ def simulate(
         record, recording = _logs(model, mcap, rrd) if is_logged else (None, None)
         is_replaced = record is not None and record.exists()
         needs_folder = is_logged and mcap is None
+        sinks: list[Sink] = [McapLog(record, drawn=is_drawn(names))] if record else []
+        if live:
+            sinks.append(LiveView())
         with _logs_folder() if needs_folder else nullcontext(), Progress() as progress, errors_as(str(fmu), model):
             run = simulated(
                 fmu,
@@ -120,7 +128,7 @@ def simulate(
                 wrap=wrap,
                 channels=names,
                 rate=rate,
-                sink=McapLog(record, drawn=is_drawn(names)) if record else None,
+                sink=_Sinks(*sinks) if sinks else None,
                 progress=progress,
                 exchange=exchange,
             )
@@ -130,6 +138,25 @@ def simulate(
     replaced = " (an older run of that name was replaced)" if is_replaced else ""
     written = [f"written to {record} and {recording}{replaced}", f"to review it: kinfmu review {quote(str(record))}"]
     report(run, *(written if record else ()))
+
+
+class _Sinks:
+    """Several sinks as one."""
+
+    def __init__(self, *sinks: Sink) -> None:
+        self._sinks = sinks
+
+    def begin(self, run: Run) -> None:
+        for sink in self._sinks:
+            sink.begin(run)
+
+    def add(self, run: Run) -> None:
+        for sink in self._sinks:
+            sink.add(run)
+
+    def end(self, run: Run, reason: str) -> None:
+        for sink in self._sinks:
+            sink.end(run, reason)
 
 
 def _fmu(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -135,11 +135,19 @@ class Linkage:
                 seen[entity] += 1
         for frame, path in entities.items():
             self._points(path, frame)
-        for index, (name, points) in enumerate(self.scene.paths.items()):
-            own = self.colour or palette.body(len(self.scene.bodies) + index)
-            self._path(f"{self.root}/paths/{name}", points, own)
-            self._trail(trail_path(self.root, name), points, own)
+        for name, points in self.scene.paths.items():
+            self._trail(trail_path(self.root, name), points, self._colour_of(name))
+        self.log_paths(self.scene.paths)
         self._notice()
+
+    def log_paths(self, paths: Mapping[str, FloatArray]) -> None:
+        """Log paths (n, 2) of points of interest, which replace those logged before."""
+        for name, points in paths.items():
+            self._path(f"{self.root}/paths/{name}", points, self._colour_of(name))
+
+    def _colour_of(self, point: str) -> palette.Colour:
+        """Return the colour of a point of interest."""
+        return self.colour or palette.body(len(self.scene.bodies) + list(self.scene.paths).index(point))
 
     def _entity(self, frame: str) -> str:
         """Return the entity of a frame, such as 'bodies/crank' or 'cylinders/boom/rod'."""

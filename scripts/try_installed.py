@@ -1,0 +1,39 @@
+"""Try the installed kinfmu: check, FMU, simulation, record and table, by its command and in Python."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import kinfmu
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+COMMAND = Path(sys.executable).with_name("kinfmu")
+CALLS = (
+    ("check", "fourbar"),
+    ("new", "crank_rocker", "mine.toml"),
+    ("build", "mine.toml", "--flavour", "python", "-o", "mine.fmu"),
+    ("simulate", "mine.fmu"),
+    ("export", "logs/mine.mcap", "-o", "mine.csv"),
+)
+
+
+def main() -> int:
+    """Return 0 if all works; an AssertionError or the failing command says what does not."""
+    assert CHECKOUT not in Path(kinfmu.__file__).resolve().parents, "this is the checkout, not an installation"
+    for call in CALLS:
+        subprocess.run([COMMAND, *call], check=True)
+    run = kinfmu.solve(kinfmu.load("fourbar"), crank_angle=np.radians(np.arange(361)))
+    assert np.abs(run["rocker.phi"] - run["crank.phi"]).max() < 1e-12
+    table = np.genfromtxt("mine.csv", delimiter=",", names=True)
+    record = kinfmu.log.read("logs/mine.mcap")
+    np.testing.assert_array_equal(table["time"], record.t)
+    assert record.good.all()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
