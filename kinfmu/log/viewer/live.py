@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     import rerun.blueprint as rrb
 
 PORT = 9876  # that of the viewer
+ANSWER_TIME = 5.0  # [s], at most, until the viewer has received a piece
 START_TIME = 30.0  # [s], at most, until a new viewer answers
 _POLL = 0.05  # [s]
 _VIEWERS: list[subprocess.Popen[bytes]] = []  # kept, because Python warns of running processes without a reference
@@ -43,6 +44,8 @@ _VIEWERS: list[subprocess.Popen[bytes]] = []  # kept, because Python warns of ru
 
 class LiveView:
     """A sink for `simulate` that shows the run in the Rerun viewer while it is computed.
+
+    A viewer that is closed meanwhile ends the live view, but not the run.
 
     Args:
         stream: The recording stream to send to, such as one that is connected to a viewer of another machine. Default:
@@ -57,6 +60,7 @@ class LiveView:
         self._stream = _stream_to_viewer() if stream is None else stream
         self._paths: dict[str, list[FloatArray]] = {}
         self._has_layout = False
+        self._is_connected = True
 
     def begin(self, run: Run) -> None:
         """Begin a run.
@@ -78,7 +82,7 @@ class LiveView:
             LogError: A time is outside the range of a log.
 
         """
-        if not len(run):
+        if not len(run) or not self._is_connected:
             return
         nanoseconds(run.t)  # reports invalid times
         timeline = timeline_of([run])
@@ -99,7 +103,7 @@ class LiveView:
         for group in (*curves, *diagnostics):
             log_group(self._stream, "", timeline, shown, group)
         log_status(self._stream, "", timeline, timeline.placed(run))
-        self._stream.flush()
+        self._flush()
 
     def end(self, run: Run, reason: str) -> None:  # noqa: ARG002  the card has the events and the verdict
         """Show the layout of the whole run and its card.
@@ -109,6 +113,8 @@ class LiveView:
             reason: Why it ended early, if none of its events states that; else empty.
 
         """
+        if not self._is_connected:
+            return
         timeline = timeline_of([run])
         shown = timeline.placed(decimated(run))
         scene, note = drawable(shown) if shown.outputs or shown.mechanism_text else (None, "")
@@ -120,7 +126,14 @@ class LiveView:
             Linkage(self._stream, "/linkage", timeline, shown, scene).log_paths(scene.paths)
         log_card(self._stream, card(run, " ".join([*left_out(run, shown), note]).strip()))
         self._stream.send_blueprint(single(timeline, shown, scene, groups(shown), forces, solver))
-        self._stream.flush()
+        self._flush()
+
+    def _flush(self) -> None:
+        """Wait until the viewer has what was sent; one that was closed ends the live view, but not the run."""
+        try:
+            self._stream.flush(timeout_sec=ANSWER_TIME)
+        except RuntimeError:
+            self._is_connected = False
 
 
 def _groups(run: Run) -> tuple[list[Group], list[Group]]:

@@ -36,6 +36,25 @@ def test_pieces_of_a_run_are_in_the_stream_once_with_layout_and_card(tmp_path: P
     assert documents(path, "/card")[0].startswith("#")
 
 
+def test_a_viewer_that_is_closed_does_not_end_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(live, "ANSWER_TIME", 0.2)
+    stream = rr.RecordingStream("kinfmu_test", recording_id="closed")
+    flushed: list[float] = []
+
+    def lost(*, timeout_sec: float) -> None:
+        flushed.append(timeout_sec)
+        raise RuntimeError("no viewer")
+
+    monkeypatch.setattr(stream, "flush", lost)
+    run = kinfmu.solve(kinfmu.load("crank_rocker"), np.linspace(0.0, 1.0, 5))
+    view = LiveView(stream)
+    view.begin(run.part(slice(0, 0)))
+    view.add(run)
+    view.add(run)
+    view.end(run, "")
+    assert flushed == [0.2]  # nothing is sent after that
+
+
 def test_without_display_and_viewer_the_message_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(live, "PORT", 1)  # nothing listens there
     monkeypatch.setattr(live.sys, "platform", "linux")
