@@ -64,7 +64,7 @@ def test_the_title_of_a_figure_is_in_the_picture(title: str, unit: str | None) -
 
 @pytest.mark.parametrize("title", ["Four-bar", LONG, "W" * 200])
 def test_the_title_of_plots_is_in_the_picture_and_above_the_names(title: str) -> None:
-    figure = _sheet(titled(title), stacks_of(fourbar(np.arange(10.0)), ["coupler.x"]))
+    figure = _sheet([titled(title)], stacks_of(fourbar(np.arange(10.0)), ["coupler.x"]))
     figure.canvas.draw()
     (box,) = (text.get_window_extent() for text in figure.texts)
     assert box.x1 <= figure.bbox.x1
@@ -76,7 +76,7 @@ def test_the_title_of_plots_is_in_the_picture_and_above_the_names(title: str) ->
 def test_the_number_of_the_last_tick_is_in_the_picture(stop: float) -> None:
     run = fourbar(np.arange(10.0))
     figure = _sheet(
-        dataclasses.replace(run, t=np.linspace(0.0, stop, 10)),
+        [dataclasses.replace(run, t=np.linspace(0.0, stop, 10))],
         stacks_of(run, ["coupler.x", "coupler.y"]),
     )
     figure.canvas.draw()

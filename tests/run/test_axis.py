@@ -110,7 +110,7 @@ def test_a_part_of_a_sweep_keeps_its_axis(sweep: Run) -> None:
 
 
 def test_pictures_and_reports_say_the_axis(sweep: Run, tmp_path: Path) -> None:
-    panels = _sheet(sweep, stacks_of(sweep, ["coupler.x"])).axes
+    panels = _sheet([sweep], stacks_of(sweep, ["coupler.x"])).axes
     assert [panel.get_ylabel() for panel in panels] == ["x [mm]", "vx [mm/rad]", "ax [mm/rad²]"]
     assert panels[2].get_xlabel() == "crank [deg]"
     np.testing.assert_array_equal(panels[0].lines[0].get_xdata(), np.arange(361.0))
