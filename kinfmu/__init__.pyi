@@ -71,6 +71,7 @@ from kinfmu.motion import MeasuredValue as MeasuredValue
 from kinfmu.motion import MeasuredValues as MeasuredValues
 from kinfmu.motion import measure as measure
 from kinfmu.motion import measure_designs as measure_designs
+from kinfmu.player import play as play
 from kinfmu.run import Run as Run
 from kinfmu.run import Sink as Sink
 from kinfmu.solver.python.status import Status as Status

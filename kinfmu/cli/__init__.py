@@ -11,6 +11,7 @@ from kinfmu.cli import (  # noqa: F401  for the commands that they add
     fit,
     listing,
     new,
+    play,
     recover,
     review,
     schema,

@@ -109,6 +109,13 @@ class ModelName(MechanismName):
     suffixes = (".toml", ".fmu", ".ssp")
 
 
+class RecordOrMechanism(MechanismName):
+    """A record (.mcap), or a mechanism."""
+
+    name = "RUN|MECH"
+    suffixes = (".toml", ".mcap")
+
+
 mechanism_argument = click.argument("mechanism", type=MechanismName(), metavar="MECH")
 outputs_option = click.option(
     "--outputs",

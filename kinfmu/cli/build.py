@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import click
 from kinfmu import gallery
 from kinfmu.cli.arguments import mechanism_argument, names_in, outputs_option
 from kinfmu.cli.group import errors_of, main
-from kinfmu.cli.messages import Progress
+from kinfmu.cli.messages import Progress, patience
 from kinfmu.cli.settings import checked_settings, set_option
 from kinfmu.errors import listed
 
@@ -51,6 +52,11 @@ from kinfmu.errors import listed
     "inputs if a law is external. The FMU's parameter driven_by_time changes it. torque: efforts such as crank_torque "
     "are inputs, and the FMU integrates the motion.",
 )
+@click.option(
+    "--page/--no-page",
+    default=None,
+    help="Put the page of kinfmu play into the FMU's documentation. Default: if ziglang is installed.",
+)
 @outputs_option
 @click.option("--author", help="Author, stated in the FMU.")
 @click.option("--model-version", "version", help="Version of the model, stated in the FMU.")
@@ -67,6 +73,7 @@ def build(
     fmi: str,
     platforms: str,
     drive: Any,
+    page: bool | None,
     outputs: str | None,
     author: str | None,
     version: str | None,
@@ -81,6 +88,7 @@ def build(
     """
     from kinfmu.fmu import build as built
     from kinfmu.fmu.build import default_drive, default_flavour, native_obstacle, platforms_of
+    from kinfmu.fmu.played import add_page
 
     for option, value, plain in (("--fmi", fmi, "2"), ("--platforms", platforms, "host")):
         if flavour == "python" and value != plain:
@@ -89,7 +97,8 @@ def build(
     drive = drive or default_drive(mech)
     stated = {"author": author, "version": version, "license": license_, "copyright": copyright_, "date": date}
     chosen = flavour or default_flavour(int(fmi), platforms)
-    with errors_of(mechanism), Progress("compiling for all platforms", least=2) as progress:
+    has_page = find_spec("ziglang") is not None if page is None else page
+    with errors_of(mechanism), patience(), Progress("compiling for all platforms", least=2) as progress:
         path = built(
             mech,
             output or _place(mechanism, mech.name),
@@ -101,6 +110,8 @@ def build(
             metadata={name: text for name, text in stated.items() if text is not None},
             progress=progress,
         )
+        if has_page:
+            add_page(path, mech)
     is_native = chosen == "native"
     kinds = "co-simulation and model exchange" if is_native else "co-simulation"
     where = listed(platforms_of(path)) + ("" if is_native else " in hosts that contain Python")

@@ -1,4 +1,4 @@
-"""kinfmu export: write a run as a table, plot or animation; the file's ending chooses which."""
+"""kinfmu export: write a run as a table, plot, animation or page; the file's ending chooses which."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kinfmu.cli.arguments import STANDARD_OUTPUT, InputFile, OutputFile, names_in
-from kinfmu.cli.group import main
+from kinfmu import gallery
+from kinfmu.cli.arguments import STANDARD_OUTPUT, InputFile, OutputFile, RecordOrMechanism, names_in
+from kinfmu.cli.group import errors_of, main
+from kinfmu.cli.pages import PAGES, mechanism_of, write_page
 from kinfmu.cli.quantities import on_axis
 from kinfmu.errors import RequestError, listed
 from kinfmu.files.whole_file import suffix_of
@@ -83,14 +85,14 @@ def _on_axis_of(run: Run, text: str) -> float:
 
 
 @main.command(epilog="Example: kinfmu export logs/fourbar.mcap -o fourbar.svg --columns coupler.x,rocker.phi")
-@click.argument("run", type=InputFile(".mcap"))
+@click.argument("run", type=RecordOrMechanism(), metavar="RUN|MECH")
 @click.argument("other", required=False, type=InputFile(".mcap"))
 @click.option(
     "-o",
     "output",
-    type=OutputFile(*FORMATS, or_standard_output=True),
+    type=OutputFile(*FORMATS, *PAGES, or_standard_output=True),
     required=True,
-    help=f"The file to write: {listed(FORMATS)}; - prints a table as CSV.",
+    help=f"The file to write: {listed((*FORMATS, *PAGES))}; - prints a table as CSV.",
 )
 @click.option(
     "--columns",
@@ -122,7 +124,7 @@ def _on_axis_of(run: Run, text: str) -> float:
 )
 @click.option("--units", is_flag=True, help="Write units into the first line of a CSV file: coupler.x [m].")
 def export(
-    run: Path,
+    run: str,
     other: Path | None,
     output: Path,
     columns: str | None,
@@ -136,13 +138,19 @@ def export(
     at: str | None,
     units: bool,
 ) -> None:
-    """Write a run as a table, as plots or as an animation.
+    """Write a run as a table, as plots, as an animation or as a page; or a mechanism as a page.
+
+    A page (.html) is the mechanism, to be dragged in a browser, with the parameters and the time of the run; it is one
+    file, needs no net, and computes with the compiled code of the FMU.
 
     RUN is a record (.mcap) of simulate or solve. Tables in Parquet and npz contain the units. Plots (.svg, .png, .pdf)
     show coordinates, velocities and accelerations against time, or against the driver of a solve --angle. With --x,
     --overlay or --polar, exactly the named columns are curves. OTHER is a second run for the same plot. A .gif or
     .mp4 shows the moving linkage, a .dxf the pose at a value as a CAD drawing.
     """
+    if suffix_of(output) in PAGES or suffix_of(run) != ".mcap":
+        _export_page(run, output, start, stop)
+        return
     from kinfmu.log import read
     from kinfmu.log.table import csv_lines
 
@@ -169,7 +177,7 @@ def export(
     if columns is not None and suffix in (*ANIMATIONS, DRAWING):
         valid = listed((*TABLES, *PLOTS))
         raise click.UsageError(f"--columns {columns}: only for tables and plots, {valid}, not {suffix}")
-    part = _between(read(run), start, stop)
+    part = _between(read(Path(run)), start, stop)
     if output == STANDARD_OUTPUT:
         for line in csv_lines(part, names_in(columns), units=units):
             click.echo(line, nl=False)
@@ -188,6 +196,28 @@ def export(
         return
     how: dict[str, Any] = {"x": names_in(across) or (), "overlaid": overlay, "polar": polar, "degrees": degrees}
     if other is not None:
-        how |= {"other": _between(read(other), start, stop), "names": (run.stem, other.stem)}
+        how |= {"other": _between(read(other), start, stop), "names": (Path(run).stem, other.stem)}
     _write(part, output, names_in(columns) or (), units=units, **how)
+    click.echo(f"written: {output}")
+
+
+def _export_page(given: str, output: Path, start: str | None, stop: str | None) -> None:
+    """Write the page of a record, from start to stop, or of a mechanism."""
+    is_record = suffix_of(given) == ".mcap"
+    valid = {"run", "output", *(("start", "stop") if is_record else ())}
+    others = [name for name, value in click.get_current_context().params.items() if value and name not in valid]
+    if others or suffix_of(output) not in PAGES:
+        options = "no other options than --start and --stop" if is_record else "no other options"
+        raise click.UsageError(
+            f"{given}: of a mechanism only a page (.html) is written; a page has {options}; a table, plot or animation "
+            f"needs a record (.mcap)"
+        )
+    if is_record:
+        from kinfmu.log import read
+
+        write_page(mechanism_of(_between(read(Path(given)), start, stop)), output)
+    else:
+        mechanism = gallery.load(given)
+        with errors_of(given):
+            write_page(mechanism, output)
     click.echo(f"written: {output}")

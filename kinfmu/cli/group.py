@@ -18,6 +18,7 @@ ORDER = (
     "list",
     "new",
     "check",
+    "play",
     "solve",
     "fit",
     "study",

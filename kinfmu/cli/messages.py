@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
+import threading
 import unicodedata
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -32,6 +34,20 @@ def note(text: str) -> None:
 def warn(text: str) -> None:
     """Print a warning of a probable mistake."""
     click.echo(f"kinfmu: warning: {printable(text)}", err=True)
+
+
+@contextmanager
+def patience(seconds: float = 6.0) -> Iterator[None]:
+    """Print a note if this block, which makes a page, lasts longer: zig compiles its C library once, for a minute."""
+    timer = threading.Timer(
+        seconds, note, ["compiling the page; the first page on this machine takes a minute, others seconds"]
+    )
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def report(run: Run, *after: str, by_samples: bool = False) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from functools import singledispatch
 from importlib import import_module
+from typing import Any
 
 from kinfmu.display.html import escaped
 
@@ -20,6 +22,13 @@ def html_of(value: object) -> str | None:
 @singledispatch
 def svg_of(value: object) -> str | None:
     """Return the picture of a value as SVG, registered like `html_of`. None: there is no picture."""
+    del value
+    return None
+
+
+@singledispatch
+def widget_of(value: object) -> Any:
+    """Return a value as a widget of notebooks, registered like `html_of`. None: there is none."""
     del value
     return None
 
@@ -45,6 +54,31 @@ class Displayed:
             return svg_of(self)
         except Exception:
             return None  # the HTML states the reason
+
+
+class Live(Displayed):
+    """A value that notebooks show as a widget; where none can be made, as its picture and table."""
+
+    __slots__ = ()
+
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
+        """Return the widget for Jupyter; None in a terminal, which asks as well."""
+        shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+        widget = _widget(self) if getattr(shell, "kernel", None) is not None else None
+        return None if widget is None else widget._repr_mimebundle_(include=include, exclude=exclude)
+
+    def _display_(self) -> Any:
+        """Return what marimo shows."""
+        widget = _widget(self)
+        return sys.modules["marimo"].Html(self._repr_html_() or "") if widget is None else widget
+
+
+def _widget(value: object) -> Any:
+    try:
+        import_module(_MAKERS)
+        return widget_of(value)
+    except Exception:
+        return None  # the HTML states what is wrong with the value
 
 
 def _reason(error: Exception) -> str:

@@ -8,7 +8,7 @@ from pathlib import PurePath
 from types import MappingProxyType
 from typing import Any
 
-from kinfmu.display import Displayed
+from kinfmu.display import Live
 from kinfmu.drivers import Driver
 from kinfmu.errors import RequestError
 from kinfmu.joints import Joint
@@ -33,7 +33,7 @@ from kinfmu.units import CoordinateName, Quantity
 
 
 @dataclass(frozen=True)
-class Mechanism(Displayed):
+class Mechanism(Live):
     """A planar mechanism: bodies, the joints between them, and the drivers that move it.
 
     Every number can also be given as text with a unit or as an expression of parameters ("60 deg", "a/2 + 5 mm"). The

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
+from importlib.util import find_spec
+from typing import Any
 
-from kinfmu.display import html_of, page, svg_of, table
+from kinfmu.display import html_of, page, svg_of, table, widget_of
 from kinfmu.draw.drawing import sheet_of
 from kinfmu.draw.instant import instant
 from kinfmu.draw.writing import svg_text
@@ -37,6 +39,16 @@ def drawing(mechanism: Mechanism) -> str:
 
     """
     return _drawing(mechanism)
+
+
+@widget_of.register
+def live(mechanism: Mechanism) -> Any:
+    """Return the live mechanism; None without anywidget and ziglang, and for large ones, whose page takes long."""
+    if len(mechanism.coordinate_names) > _LARGEST or not (find_spec("anywidget") and find_spec("ziglang")):
+        return None
+    from kinfmu.player import play
+
+    return play(mechanism)
 
 
 @lru_cache(maxsize=_KEPT)

@@ -44,12 +44,12 @@ _SCRIPTS = (
     "keyboard",
     "main",
 )
-_MOST_NUMBERS = 400  # of a file that its page can change: the C code of more is too long for a small page
+MOST_NUMBERS = 400  # of a file that its page can change: the C code of more is too long for a small page
 _IMPORT = re.compile(r"^import .*\n", re.MULTILINE)
 _EXPORT = re.compile(r"^export ", re.MULTILINE)
 
 
-def page(mechanism: Mechanism, *, report: Report | None = None) -> str:
+def page(mechanism: Mechanism, *, report: Report | None = None, script: str = "") -> str:
     """Return a page in which a mechanism is dragged: one HTML file that works offline, without any request.
 
     It computes with the C code of the FMU, compiled to WebAssembly: as long as no number of the file but a parameter is
@@ -59,6 +59,7 @@ def page(mechanism: Mechanism, *, report: Report | None = None) -> str:
     Args:
         mechanism: The mechanism.
         report: Its report, if `check` was called already. Default: `check` is called.
+        script: JavaScript after that of the page, which `started.then((page) => ...)` calls. Default: none.
 
     Returns:
         The HTML text.
@@ -74,7 +75,7 @@ def page(mechanism: Mechanism, *, report: Report | None = None) -> str:
         raise report.problem
     as_written = page_module(mechanism)
     change = opened(mechanism)
-    is_large = len(change.places) > _MOST_NUMBERS
+    is_large = len(change.places) > MOST_NUMBERS
     places = {} if is_large else change.places
     modules = {
         "written": module_data(as_written, {}),
@@ -92,7 +93,7 @@ def page(mechanism: Mechanism, *, report: Report | None = None) -> str:
             "title": html.escape(mechanism.name),
             "style": (_WEB / "style.css").read_text("utf-8"),
             "data": packed(json.dumps(data, separators=(",", ":"), allow_nan=False).encode()),
-            "script": "\n".join(_script(name) for name in _SCRIPTS),
+            "script": "\n".join([*(_script(name) for name in _SCRIPTS), f"{{\n{script}\n}}"]),  # names of its own
         },
     )
 

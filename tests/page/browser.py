@@ -86,17 +86,28 @@ class Browser:
         path = self._folder / f"{abs(hash(text))}.html"
         if not path.exists():
             path.write_text(text, "utf-8")
+        with self.open_at(path.as_uri(), fragment, **options) as opened:
+            yield opened
+
+    @contextmanager
+    def open_at(self, url: str, fragment: str = "", **options: Any) -> Iterator[Opened]:
+        """Yield the page at an address."""
+        with self.tab(**options) as opened:
+            opened.tab.goto(f"{url}{fragment}")
+            opened.tab.wait_for_function("window.kinfmu")
+            opened.settle()
+            opened.requests = [one for one in opened.requests if not one.startswith((url, "data:", "blob:"))]
+            yield opened
+
+    @contextmanager
+    def tab(self, **options: Any) -> Iterator[Opened]:
+        """Yield an empty page."""
         context = self._chromium.new_context(viewport=DESKTOP, accept_downloads=True, **options)
         try:
             opened = Opened(context.new_page())
-            tab = opened.tab
-            tab.on("console", lambda message: opened.errors.append(message.text))
-            tab.on("pageerror", lambda error: opened.errors.append(str(error)))
-            tab.on("request", lambda request: opened.requests.append(request.url))
-            tab.goto(f"{path.as_uri()}{fragment}")
-            tab.wait_for_function("window.kinfmu")
-            opened.settle()
-            opened.requests = [url for url in opened.requests if not url.startswith((path.as_uri(), "data:", "blob:"))]
+            opened.tab.on("console", lambda message: opened.errors.append(message.text))
+            opened.tab.on("pageerror", lambda error: opened.errors.append(str(error)))
+            opened.tab.on("request", lambda request: opened.requests.append(request.url))
             yield opened
         finally:
             context.close()

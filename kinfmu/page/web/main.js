@@ -310,6 +310,7 @@ async function start() {
             engines[which] = part && [await Engine.load(part.text, part), await Engine.load(part.text, part)];
         }
         window.kinfmu = new Page(new Linkage(data, engines));
+        return window.kinfmu;
     } catch (error) {
         $("banner").hidden = false;
         $("banner").textContent = `The mechanism cannot be shown: ${error.message}`;
@@ -317,4 +318,4 @@ async function start() {
     }
 }
 
-start();
+const started = start(); // scripts that are added to the page wait for it

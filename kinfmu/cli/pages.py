@@ -1,0 +1,46 @@
+"""Pages that commands write: of a mechanism, or of a run with its parameters and its time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kinfmu.cli.messages import patience
+from kinfmu.errors import KinfmuError
+from kinfmu.files.whole_file import write_whole
+
+if TYPE_CHECKING:
+    from kinfmu.mechanism import Mechanism
+    from kinfmu.run import Run
+
+PAGES = (".html",)
+
+
+def write_page(mechanism: Mechanism, path: Path) -> None:
+    """Write the page of a mechanism.
+
+    Raises:
+        KinfmuError: There is no page, or it cannot be written.
+
+    """
+    from kinfmu.page import page
+
+    with patience():
+        text = page(mechanism)
+    try:
+        write_whole(path, text.encode())
+    except OSError as error:
+        raise KinfmuError(f"{path}: cannot be written ({error.strerror})") from None
+
+
+def mechanism_of(run: Run) -> Mechanism:
+    """Return the mechanism of a run: with its parameters, and the time from its first to its last sample."""
+    from kinfmu.run.axis import axis_of
+
+    mechanism = run.mechanism
+    if mechanism is None:
+        raise KinfmuError("the run does not hold its mechanism; give the mechanism file in its place")
+    if not axis_of(run).is_time or len(run) < 2:
+        return mechanism
+    return replace(mechanism, run=replace(mechanism.run, start=float(run.t[0]), stop=float(run.t[-1])))

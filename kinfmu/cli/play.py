@@ -1,0 +1,36 @@
+"""kinfmu play: drag a mechanism in the browser."""
+
+from __future__ import annotations
+
+import threading
+import webbrowser
+
+import click
+
+from kinfmu.cli.arguments import mechanism_argument
+from kinfmu.cli.group import main
+from kinfmu.cli.messages import note, patience
+
+
+@main.command(epilog="Example: kinfmu play mine.toml")
+@mechanism_argument
+@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port on this machine. Default: a free one.")
+@click.option("--no-browser", is_flag=True, help="Print the address only.")
+def play(mechanism: str, port: int, no_browser: bool) -> None:
+    """Drag a mechanism in the browser, with the compiled code of its FMU.
+
+    The page follows the file while you edit it; errors in the file are shown in the page. The page saves FMUs, tables,
+    drawings and mechanism files with the lengths as set. Only this machine can open the address. Ctrl-C ends it.
+    """
+    from kinfmu.player import PlayServer, Source
+
+    with patience():
+        source = Source(mechanism)
+    with PlayServer(source, port) as server:
+        click.echo(server.url)
+        if not no_browser and not webbrowser.open(server.url):
+            note("no browser was found; open the address in one of this machine")
+        try:
+            threading.Event().wait()
+        except KeyboardInterrupt:
+            click.echo("", err=True)

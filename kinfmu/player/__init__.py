@@ -1,0 +1,9 @@
+"""Pages in which a mechanism is dragged, with what a page alone cannot do: a server, a widget."""
+
+from __future__ import annotations
+
+from kinfmu.player.server import PlayServer
+from kinfmu.player.source import Source
+from kinfmu.player.widget import play
+
+__all__ = ["PlayServer", "Source", "play"]

@@ -1,0 +1,109 @@
+// The page of `kinfmu play`: it follows the file, and asks the server for FMUs and for a copy of the file.
+
+const SERVED = Number("{{served version}}"); // of the page
+const KEPT = "kinfmu-kept"; // what is shown, across a reload
+
+started.then((page) => {
+    if (page) serve(page);
+});
+
+function serve(page) {
+    takeBack(page);
+    const line = element("div", { id: "file-problem", role: "alert", hidden: true });
+    line.style = "padding: 10px 14px; border-bottom: 1px solid var(--bad); background: var(--bad-back); color: var(--ink); overflow-wrap: anywhere; font-size: 14px";
+    document.querySelector("header").after(line);
+    const tell = (text) => {
+        line.textContent = text;
+        line.hidden = !text;
+    };
+    const buttons = serverButtons(page);
+    const states = new EventSource("changes");
+    states.addEventListener("state", (event) => {
+        const { version, problem } = JSON.parse(event.data);
+        buttons.forEach((button) => (button.disabled = false));
+        if (version !== SERVED) {
+            keep(page);
+            location.reload();
+        } else tell(problem && `The file cannot be used as it is: ${problem}`);
+    });
+    states.addEventListener("error", () => {
+        buttons.forEach((button) => (button.disabled = true));
+        tell("kinfmu play has ended. This page goes on working; it no longer follows the file.");
+    });
+    window.addEventListener("pagehide", () => states.close());
+}
+
+// ---- FMU and file
+
+function serverButtons(page) {
+    const { linkage, design } = page;
+    const part = document.querySelector("#files .buttons");
+    const post = async (path) => {
+        const answer = await fetch(path, { method: "POST", body: mechanismFile(linkage, design) });
+        if (!answer.ok) throw new Error(await answer.text());
+        return answer;
+    };
+    const note = element("p", { className: "quiet", role: "status", id: "served" });
+    const add = (label, id, busy, act) => {
+        const button = element("button", { textContent: label, id });
+        button.addEventListener("click", async () => {
+            button.disabled = true;
+            note.textContent = busy;
+            try {
+                note.textContent = await act();
+            } catch (error) {
+                note.textContent = `Not done: ${error.message}`;
+            }
+            button.disabled = false;
+        });
+        part.append(button);
+        return button;
+    };
+    const build = (fmi) => async () => {
+        const answer = await post(`fmu${fmi}`);
+        download(`${linkage.data.name}.fmu`, await answer.blob(), "application/zip");
+        return `Built: ${linkage.data.name}.fmu, FMI ${fmi}.0.`;
+    };
+    const buttons = [
+        add("FMU with the values as set (FMI 3.0)", "save-fmu3", "Building the FMU\u2026", build(3)),
+        add("FMU with the values as set (FMI 2.0)", "save-fmu2", "Building the FMU\u2026", build(2)),
+        add("Mechanism file, into the folder of the file", "keep-file", "Saving\u2026", async () => `Saved: ${await (await post("file")).text()}`),
+    ];
+    part.after(note);
+    return buttons;
+}
+
+// ---- what stays across a reload, apart from the address
+
+function keep(page) {
+    page.address.write();
+    const { scale, x, y, isFitted } = page.view;
+    const tab = document.querySelector("#tabs [aria-selected=true]")?.id;
+    const kept = { show: page.show, locked: [...page.design.locked], tab, isPlaying: page.isPlaying, view: isFitted ? null : { scale, x, y, isFitted } };
+    try {
+        sessionStorage.setItem(KEPT, JSON.stringify(kept));
+    } catch {
+        // Without storage the address alone stays.
+    }
+}
+
+function takeBack(page) {
+    let kept = null;
+    try {
+        kept = JSON.parse(sessionStorage.getItem(KEPT));
+        sessionStorage.removeItem(KEPT);
+    } catch {
+        // Without storage there is nothing to take back.
+    }
+    if (!kept) return;
+    for (const [name, value] of Object.entries(kept.show)) {
+        const box = $(`show-${name}`);
+        if (box && box.checked !== value) box.click();
+    }
+    kept.locked.filter((name) => page.design.byName.has(name)).forEach((name) => page.design.locked.add(name));
+    if (kept.view) Object.assign(page.view, kept.view);
+    $(kept.tab)?.click();
+    page.values.update();
+    if (kept.isPlaying) page.motion.play(true);
+    page.refresh();
+}

@@ -1,0 +1,36 @@
+"""kinfmu play: the address it prints, and how it ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import urllib.request
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("ziglang", reason="pages are compiled by zig")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends Ctrl-C as a signal")
+def test_play_prints_the_address_of_the_page_and_ends_with_ctrl_c(tmp_path: Path) -> None:
+    arguments = [sys.executable, "-m", "kinfmu", "play", "crank_rocker", "--no-browser"]
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as play:
+        assert play.stdout is not None
+        address = play.stdout.readline().strip()
+        with urllib.request.urlopen(address, timeout=30) as answer:  # noqa: S310  its own server
+            assert b"<title>crank_rocker</title>" in answer.read()
+        play.send_signal(signal.SIGINT)
+        assert play.wait(30) == 0
+        assert "Traceback" not in play.communicate()[1]
+
+
+def test_play_reports_a_mechanism_that_cannot_be_played(
+    refuses: Callable[..., str], fails: Callable[..., str], tmp_path: Path
+) -> None:
+    assert "there is no such file" in refuses("play", "none.toml")
+    (tmp_path / "bad.toml").write_text("name = ", "utf-8")
+    assert fails("play", "bad.toml", "--no-browser").startswith("bad.toml: not valid TOML")
