@@ -409,3 +409,21 @@ def test_an_fmu_goes_into_a_folder_of_the_gallery_only_for_a_name_of_the_gallery
     assert (tmp_path / "crank_rocker.fmu").is_file()
     assert (own / "crank_rocker.fmu").stat().st_mtime_ns == before
     assert command("build", "fourbar").stdout.startswith("fourbar.fmu: ")
+
+
+def test_a_mechanism_driven_by_torques_is_built_and_simulated(command: Command, tmp_path: Path) -> None:
+    """A flywheel of 2 kg m2 under 3 N m, from 60 rpm: the angle after 2 s, by an FMU and by its mechanism."""
+    (tmp_path / "flywheel.toml").write_text(
+        'name = "flywheel"\n'
+        "bodies.ground.points = { O = [0, 0] }\n"
+        'bodies.wheel = { points = { O = [0, 0] }, mass = "1 kg", inertia = "2 kg m2" }\n'
+        'joints.O = { type = "revolute", between = ["ground.O", "wheel.O"] }\n'
+        'drivers.crank = { type = "angle", of = "wheel", law = "constant_speed", speed = "30 rpm" }\n'
+    )
+    (tmp_path / "torque.csv").write_text("time,crank_torque\n0,3\n2,3\n")
+    command("build", "flywheel.toml", "--drive", "torque", "-o", "torque.fmu")
+    for source in ("torque.fmu", "flywheel.toml"):
+        drive = ["--drive", "torque"] if source.endswith("toml") else []
+        command("simulate", source, *drive, "--set", "crank_speed=60rpm", "--input", "torque.csv", "--step", "0.5")
+        run = log.read(tmp_path / "logs" / f"{Path(source).stem}.mcap")
+        assert run["crank_angle"][-1] == pytest.approx(2.0 * 2.0 * math.pi + 3.0, rel=1e-9)

@@ -340,3 +340,38 @@ def test_settings_of_a_torque_driven_fmu_are_for_these_alone(fmu_of: Callable[..
         kinfmu.simulate(path, tolerance=0.1)
     with pytest.raises(RequestError, match="there is no parameter 'crank_sped'; did you mean 'crank_speed'"):
         kinfmu.simulate(path, state={"crank_sped": 1.0})
+
+
+@of_each_flavour
+def test_a_mass_on_a_crank_turns_in_closed_form(flavour: str, fmi: int, tmp_path: Path) -> None:
+    """theta = T t^2 / (2 m r^2), with a parameter as mass, without forces among the outputs."""
+    mechanism = replace(
+        pendulum(gravity=(0.0, 0.0)),
+        name="flywheel",
+        parameters={"rim": "2 kg"},
+        bodies=tuple(body if body.is_ground else replace(body, mass="rim") for body in pendulum().bodies),
+    )
+    path = kinfmu.build(mechanism, tmp_path / "a.fmu", flavour=flavour, fmi=fmi, drive="torque", outputs=["rod.phi"])
+    host = Host(path, tmp_path / "a")
+    assert not {"crank.torque", "kinetic_energy"} & set(host.references)
+    host.set({"rim": 8.0, "crank_torque": 3.0})
+    host.initialize(0.0)
+    inertia = 8.0 * 0.5**2
+    for k in range(5):
+        assert host.step(0.4 * k, 0.4) == OK
+    found = host.get("crank_angle", "crank_speed", "crank_acceleration", "rod.phi")
+    host.free()
+    assert found == pytest.approx([3.0 * 2.0 / inertia, 3.0 * 2.0 / inertia, 3.0 / inertia, 3.0], rel=1e-12)
+
+
+@pytest.mark.parametrize("flavour", ["native", "python"])
+def test_the_tolerance_of_the_host_is_that_of_the_integrator(
+    flavour: str, fmu_of: Callable[..., Path], tmp_path: Path
+) -> None:
+    host = Host(fmu_of("motor", flavour, 2), tmp_path / "host")
+    taken = []
+    for tolerance in (1e-6, 1e-20, 1.0):
+        host.fmu.setupExperiment(startTime=0.0, tolerance=tolerance)
+        taken += host.get("integrator.tolerance")
+    host.free()
+    assert taken == [1e-6, 1e-13, 1e-4]

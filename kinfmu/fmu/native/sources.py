@@ -89,7 +89,7 @@ def sources(
             [emit_forces(plan, inertia, "inertia"), *array("double kf_in_si", units_in_si(plan)), ""]
         )
         instance["dormand_prince.h"] = dormand_prince(pair.C, pair.A, b=pair.B, e3=pair.E3, e5=pair.E5)
-    if not forces:
+    if not (forces or owns):
         del instance["forces_at.c"], instance["solutions.c"]
         instance = {name: _OF_FORCES.sub("", text) for name, text in instance.items()}
     else:
@@ -213,7 +213,7 @@ def _tables(variables: Interface) -> str:
     drives = [variable.start for variable in variables.part("drive")] or [False]
     rates = [variable.start for variable in variables.part("rate_source")] or [Rates.WIRED]
     place = _numbers(len(part.variables) for part in parts)
-    has_forces = any(variables.part(stage) for stage in STAGES)
+    has_forces = any(variables.part(stage) for stage in (*STAGES, "states"))
     bits, not_real = ("unsigned", "0x80000000u") if has_forces else ("unsigned short", 1 << 15)
     positive = [v.causality == "parameter" and v.minimum is not None and v.minimum >= 0.0 for v in real]
     lines = [

@@ -10,6 +10,10 @@ static void evaluate(unsigned parts, double t, const double *const drive[3], con
                      const double *zdd, const double *slopes, const double *efforts, const double *parameters,
                      bool is_bridged, double *row)
 {
+#if KF_STAGE_FORCES + KF_STAGE_REACTIONS + KF_STAGE_SHAKING == 0 /* efforts drive, and no force is an output */
+    (void)parts, (void)t, (void)drive, (void)z, (void)zd, (void)zdd, (void)slopes, (void)efforts, (void)parameters;
+    (void)row;
+#endif
 #if KF_STAGE_FORCES
     if (parts & KF_BIT(KF_PART_FORCES)) {
         kf_forces(t, drive[0], drive[1], drive[2], z, zd, zdd, slopes, efforts, parameters,
