@@ -40,6 +40,8 @@ foreign = [m for m in sys.modules if m.partition(".")[0] in ("kinfmu", "pythonfm
 assert not foreign, foreign
 assert set(sys.modules) == before, set(sys.modules) - before
 print(repr(x))
+slave.terminate()
+slave.freeInstance()  # as hosts do; pythonfmu's library may abort at exit where an instance is left
 """
 
 
