@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from _site import api, command_line, docstrings, formulas, gallery, variables
+from _site import api, command_line, docstrings, formulas, gallery, live, variables
 from _site.pages import Pages
 
 
@@ -13,6 +13,7 @@ def setup(app: Any) -> dict[str, bool]:
     formulas.connect(app)
     app.connect("builder-inited", _write_pages)
     app.connect("source-read", gallery.linked)
+    app.connect("build-finished", live.write)
     app.connect("autodoc-process-docstring", docstrings.prepared, priority=400)  # before napoleon, at 500
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 

@@ -25,6 +25,7 @@ GROUPS = {  # the package of a public name, as the stub imports it: title of its
     "run": ("Runs", "The motion of a mechanism at many samples, and where it is sent while it is computed."),
     "solver": ("Status of a sample", "The quality of a sample."),
     "motion": ("Measuring", "Measures of one motion and of designs."),
+    "player": ("The page", "A mechanism that is dragged in a notebook."),
     "studies": ("Studies", "Many designs by grids, samples and tolerances."),
     "synthesis": ("Fitting", "Parameters for a task."),
     "fmu": ("FMUs", "Building and stepping them."),

@@ -7,6 +7,7 @@ import re
 from typing import Any
 
 import kinfmu
+from _site.live import FRAME
 from _site.pages import Pages, table
 from kinfmu import gallery
 
@@ -45,6 +46,9 @@ def _page(name: str) -> str:
 
 {text.strip(NEWLINE)}
 
+## Drag it
+
+{FRAME.format(name=name)}
 ## What `check` reports
 
     kinfmu check {name}

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from kinfmu import gallery
 from kinfmu.cli.arguments import mechanism_argument, names_in, outputs_option
 from kinfmu.cli.group import errors_of, main
-from kinfmu.cli.messages import Progress, patience
+from kinfmu.cli.messages import Progress, note, patience
 from kinfmu.cli.settings import checked_settings, set_option
-from kinfmu.errors import listed
+from kinfmu.errors import CompilerError, listed
+
+if TYPE_CHECKING:
+    from kinfmu.mechanism import Mechanism
 
 
 @main.command(epilog="Example: kinfmu build fourbar --fmi 3 -o fourbar.fmu")
@@ -97,8 +100,8 @@ def build(
     drive = drive or default_drive(mech)
     stated = {"author": author, "version": version, "license": license_, "copyright": copyright_, "date": date}
     chosen = flavour or default_flavour(int(fmi), platforms)
-    has_page = find_spec("ziglang") is not None if page is None else page
     with errors_of(mechanism), patience(), Progress("compiling for all platforms", least=2) as progress:
+        html = _page(mech, page)
         path = built(
             mech,
             output or _place(mechanism, mech.name),
@@ -110,8 +113,8 @@ def build(
             metadata={name: text for name, text in stated.items() if text is not None},
             progress=progress,
         )
-        if has_page:
-            add_page(path, mech)
+        if html:
+            add_page(path, html)
     is_native = chosen == "native"
     kinds = "co-simulation and model exchange" if is_native else "co-simulation"
     where = listed(platforms_of(path)) + ("" if is_native else " in hosts that contain Python")
@@ -120,6 +123,21 @@ def build(
     obstacle = native_obstacle() if flavour is None and not is_native else ""
     if obstacle:
         click.echo(f"a native FMU, which every host can load, is not possible here: {obstacle}", err=True)
+
+
+def _page(mechanism: Mechanism, wanted: bool | None) -> str:
+    """Return the page of a mechanism, '' if it is not wanted, or if nobody asked for it and it cannot be made."""
+    from kinfmu.page import page
+
+    if wanted is False or (wanted is None and find_spec("ziglang") is None):
+        return ""
+    try:
+        return page(mechanism)
+    except CompilerError as error:
+        if wanted:
+            raise
+        note(f"the FMU is built without the page of kinfmu play: {error}")
+        return ""
 
 
 def _place(given: str, name: str) -> Path:

@@ -8,8 +8,6 @@ from pathlib import Path
 from kinfmu.errors import FmuError
 from kinfmu.files.whole_file import write_whole
 from kinfmu.fmu.archive import zipped
-from kinfmu.mechanism import Mechanism
-from kinfmu.page import page
 
 PLACE = "documentation/play.html"
 _INDEX = "documentation/index.html"
@@ -18,23 +16,20 @@ _LINK = (
 )
 
 
-def add_page(path: Path, mechanism: Mechanism) -> None:
-    """Put the page of a mechanism into its FMU; the same mechanism gives the same bytes.
+def add_page(path: Path, page: str) -> None:
+    """Put the page of a mechanism into its FMU; the same page gives the same bytes.
 
     The token of the FMU stays: it identifies what is computed.
 
     Raises:
-        KinfmuError: The mechanism cannot be solved.
-        CompilerError: ziglang is not installed, or it fails.
         FmuError: The file cannot be read or written.
 
     """
-    html = page(mechanism).encode()
     try:
         with zipfile.ZipFile(path) as given:
             contents = {name: given.read(name) for name in given.namelist()}
         before, end, after = contents[_INDEX].rpartition(b"</body>")
         contents[_INDEX] = before + _LINK + end + after
-        write_whole(path, zipped(contents | {PLACE: html}))
+        write_whole(path, zipped(contents | {PLACE: page.encode()}))
     except OSError as error:
         raise FmuError(f"{path}: cannot be written ({error.strerror})") from None

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu.errors import CompilerError
 from kinfmu.log import write_mcap
 from tests.cli.conftest import Command, command, fails, refuses
 
@@ -63,3 +64,20 @@ def test_the_documentation_of_an_fmu_has_the_page(command: Command, tmp_path: Pa
     assert b'<a href="play.html">' in contents["one"].pop("documentation/index.html")
     assert b"play.html" not in contents["none"].pop("documentation/index.html")
     assert contents["one"] == contents["none"]
+
+
+def test_an_fmu_whose_page_cannot_be_compiled(command: Command, fails: Callable[..., str], tmp_path: Path) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("kinfmu.codegen.c.compiler.wasm_module", _refused)
+        assert "zig fails" in fails("build", "slider_crank", "--flavour", "python", "--page", "-o", "one.fmu")
+        assert not (tmp_path / "one.fmu").exists()
+        patch.setattr("kinfmu.cli.build.find_spec", lambda _name: True)
+        built = command("build", "slider_crank", "--flavour", "python", "-o", "one.fmu")
+    assert built.exit_code == 0
+    assert built.stderr == "kinfmu: note: the FMU is built without the page of kinfmu play: zig fails\n"
+    with zipfile.ZipFile(tmp_path / "one.fmu") as archive:
+        assert "documentation/play.html" not in archive.namelist()
+
+
+def _refused(*_arguments: object) -> bytes:
+    raise CompilerError("zig fails")
