@@ -96,6 +96,8 @@ class MechanismName(ArgumentType):
             if exists(Path(files[0])):
                 note(f"{text} is the gallery's; the file in this folder is {files[0]}")
             return text
+        if exists(Path(text)):
+            raise ValueError(f"{text}: its name must end in {' or '.join(self.suffixes)}; or name one of the gallery")
         near = next((f"; did you mean '{file}'?" for file in files if exists(Path(file))), "")
         near = near or suggestion(text, [*_neighbours(Path(text), ".toml"), *known])
         endings = " or ".join(self.suffixes)

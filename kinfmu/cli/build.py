@@ -126,7 +126,7 @@ def build(
 
 
 def _page(mechanism: Mechanism, wanted: bool | None) -> str:
-    """Return the page of a mechanism, '' if it is not wanted, or if nobody asked for it and it cannot be made."""
+    """Return the page of a mechanism, '' if it is not wanted, or if it was not asked for and cannot be made."""
     from kinfmu.page import page
 
     if wanted is False or (wanted is None and find_spec("ziglang") is None):

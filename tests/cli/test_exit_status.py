@@ -84,7 +84,7 @@ WRONG_USAGE = [
     ("review damaged.mcap --save run.txt", "run.txt: its name must end in .rrd"),
     ("review damaged.mcap --screenshot run.jpg", "run.jpg: its name must end in .png"),
     ("export none.mcap -o run.csv", "none.mcap: there is no such file"),
-    ("export short.csv -o run.csv", "short.csv: its name must end in .mcap"),
+    ("export short.csv -o run.csv", "short.csv: its name must end in .toml or .mcap"),
     ("export damaged.mcap", "Missing option '-o'"),
     ("export damaged.mcap -o run.xls", "run.xls: its name must end in one of .csv"),
     ("export damaged.mcap -o none/run.csv", "there is no folder 'none'"),
@@ -96,6 +96,9 @@ WRONG_USAGE = [
     ("study short.csv", "short.csv"),
     ("fit none.toml", "none.toml: there is no such file"),
     ("fit short.csv", "short.csv"),
+    ("play forbar", "did you mean 'fourbar'?"),
+    ("verify none.fmu", "none.fmu: there is no such file"),
+    ("verify short.csv", "short.csv: its name must end in .fmu"),
     ("bench speed", "'speed' is not a measurement"),
     ("bench --mechanism forbar", "did you mean 'fourbar'?"),
 ]
@@ -117,6 +120,8 @@ AT_FAULT = [
     ("export damaged.mcap -o run.csv", "damaged.mcap"),
     ("recover damaged.mcap", "nothing can be recovered"),
     ("study broken.toml", "broken.toml: "),
+    ("play broken.toml --no-browser", "broken.toml: [bodies.crank] ponts: unknown key"),
+    ("verify text.fmu", "text.fmu: is no FMU"),
     ("fit broken.toml", "broken.toml: "),
 ]
 

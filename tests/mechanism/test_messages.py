@@ -49,13 +49,15 @@ CHANGES = {
         "[joints.O]",
         "[joint.O]",
         "[joint]: unknown key; did you mean 'joints'?; "
-        "keys: name, title, units, parameters, run, bodies, joints, drivers, gravity, loads, points, outputs, measures",
+        "keys: name, title, units, parameters, run, bodies, joints, drivers, gravity, loads, points, outputs, "
+        "measures, counts, repeat",
     ),
     "a key of the file that is not known": (
         "title =",
         "tittle =",
         "tittle: unknown key; did you mean 'title'?; "
-        "keys: name, title, units, parameters, run, bodies, joints, drivers, gravity, loads, points, outputs, measures",
+        "keys: name, title, units, parameters, run, bodies, joints, drivers, gravity, loads, points, outputs, "
+        "measures, counts, repeat",
     ),
     "a key of a joint that is not known": (
         "length = 1\n",
@@ -314,7 +316,8 @@ CHANGES = {
         "title =",
         r'"tit\nle" =',
         r"'tit\nle': unknown key; did you mean 'title'?; "
-        "keys: name, title, units, parameters, run, bodies, joints, drivers, gravity, loads, points, outputs, measures",
+        "keys: name, title, units, parameters, run, bodies, joints, drivers, gravity, loads, points, outputs, "
+        "measures, counts, repeat",
     ),
     "a title with a line break": (
         'title = "Four-bar',

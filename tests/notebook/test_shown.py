@@ -214,9 +214,10 @@ def test_measures_show_their_values_or_reasons() -> None:
 
 
 def test_every_class_that_shows_itself_has_html() -> None:
-    from kinfmu.display import Displayed, html_of
+    from kinfmu.display import Displayed, Live, html_of
 
-    classes = {cls for cls in Displayed.__subclasses__() if cls.__module__.startswith("kinfmu.")}
+    found = {*Displayed.__subclasses__(), *Live.__subclasses__()} - {Live}
+    classes = {cls for cls in found if cls.__module__.startswith("kinfmu.")}
     assert {cls.__name__ for cls in classes} >= {
         "Mechanism", "Run", "Report", "Designs", "Sensitivities", "MeasuredValues",
     }  # fmt: skip
