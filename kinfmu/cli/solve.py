@@ -117,7 +117,7 @@ def _check_one_driver(name: str, given: Settings) -> None:
     if len(drivers) != 1:
         names = listed(driver.name for driver in drivers)
         raise click.UsageError(f"--angle drives one driver, {name} has {names}; simulate --input drives them")
-    for constant in given.constants:
+    for constant in given.constants.keys() & {one.name for one in given.written.law_constants}:
         raise click.UsageError(f"--set {constant} changes the law, which --angle does not use")
 
 

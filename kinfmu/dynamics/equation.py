@@ -74,8 +74,9 @@ class EquationOfMotion:
         given = [name.derivative(n) for n in range(3) for name in plan.outputs]
         given += [derivative_name(name, k) for k in range(d) for name in plan.outputs]
         given += [driver.inputs[n] for n in range(3) for driver in plan.drivers]
-        given += [*list(efforts.by_name)[d:], "time", *(law_symbol(constant.name) for constant in plan.law_constants)]
-        self._constants: Vector = tuple(constant.value for constant in plan.law_constants)
+        constants = (*plan.law_constants, *plan.load_constants)
+        given += [*list(efforts.by_name)[d:], "time", *(law_symbol(constant.name) for constant in constants)]
+        self._constants: Vector = tuple(constant.value for constant in constants)
         places = {name: place for place, name in enumerate(given)}
         self._chosen = itemgetter(*(places[name] for name in stage.given), 0, 0)  # two more: it returns a tuple
 

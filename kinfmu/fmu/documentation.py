@@ -158,7 +158,7 @@ def _law(plan: SolvePlan, driver: Driver) -> str:
     constants = ", ".join(
         f"{constant.key} = {_value(constant.value, constant.quantity, plan.mechanism.length_unit)}"
         for constant in plan.law_constants
-        if constant.driver == driver.name
+        if constant.owner == driver.name
     )
     return f"{driver.law.type}{': ' if constants else ''}{constants}"
 

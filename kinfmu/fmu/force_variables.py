@@ -8,13 +8,13 @@ from kinfmu.codegen.forces import STAGES
 from kinfmu.equations.graph import Node, symbols
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.fmu.interface import Variable
-from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism import LawConstant, Mechanism
 from kinfmu.mechanism.force_names import external_names
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import ForceSteps, force_names, force_steps
 from kinfmu.plan.reactions import reaction_names_of, reaction_steps, undetermined_reactions
 from kinfmu.plan.shaking import shaking_steps
-from kinfmu.plan.steps import Assignment, derivative_name
+from kinfmu.plan.steps import Assignment, derivative_name, law_symbol
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.units import ForceName, InputName, Quantity, unit_of
 
@@ -87,7 +87,7 @@ def force_stages(plan: SolvePlan, names: Sequence[str], *, are_default: bool) ->
 
 
 def load_variables(mechanism: Mechanism) -> Iterator[Variable]:
-    """Yield the inputs for the efforts of external loads."""
+    """Yield the inputs for the efforts of external loads, then the constants of the laws of loads."""
     for load in mechanism.loads:
         for name, kind in zip(load.inputs(), load.kinds(), strict=False):
             effort = "torque" if kind == "angle" else "force"
@@ -100,6 +100,23 @@ def load_variables(mechanism: Mechanism) -> Iterator[Variable]:
                 unit=unit_of(Quantity(effort), mechanism.length_unit),
                 start=0.0,
             )
+    for constant in mechanism.load_constants:
+        yield law_constant(constant, "Load", mechanism.length_unit)
+
+
+def law_constant(constant: LawConstant, what: str, length_unit: str) -> Variable:
+    """Return the parameter for a constant of a law; what: owns it, 'Driver' or 'Load'."""
+    return Variable(
+        constant.name,
+        "Real",
+        "parameter",
+        "tunable",
+        f"{what} {constant.owner}: {constant.key} of its law",
+        initial="exact",
+        unit=unit_of(constant.quantity, length_unit),
+        start=constant.value,
+        minimum=0.0 if constant.is_positive else None,
+    )
 
 
 def force_parts(plan: SolvePlan, stages: Mapping[str, ForceSteps]) -> dict[str, Iterable[Variable]]:
@@ -123,7 +140,8 @@ def force_variables(plan: SolvePlan, steps: ForceSteps) -> Iterator[Variable]:
             found -= {driver.inputs[2] for driver in plan.drivers}
         inputs = tuple(one for one in order if one in found)
         drivers = {driver.name for driver in plan.drivers if driver.inputs[0] in found}
-        constants = tuple(constant.name for constant in plan.law_constants if constant.driver in drivers)
+        constants = tuple(constant.name for constant in plan.law_constants if constant.owner in drivers)
+        constants += tuple(constant.name for constant in plan.load_constants if law_symbol(constant.name) in found)
         has_rates = any(found & set(driver.inputs[1:]) for driver in plan.drivers)
         parameters = tuple(one.name for one in plan.parameters if parameter_symbol(one.name) in found)
         yield Variable(

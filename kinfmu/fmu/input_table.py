@@ -96,7 +96,7 @@ def input_table(
     quantities = {
         variable.name: quantity_in(variable.unit or "1", interface.length_unit)
         for part in ("inputs", "efforts", "loads")
-        for variable in interface.part(part)
+        for variable in interface.inputs(part)
     }
     units = {name: factors(quantity, interface.length_unit) for name, quantity in quantities.items()}
     table = table_of(inputs, units)

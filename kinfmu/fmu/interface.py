@@ -134,6 +134,10 @@ class Interface:
         """Return the variables of a part, none if the FMU does not have that part."""
         return next((part.variables for part in self.parts if part.name == name), ())
 
+    def inputs(self, name: str) -> tuple[Variable, ...]:
+        """Return the inputs of a part: the part `loads` also holds parameters, the constants of the laws of loads."""
+        return tuple(variable for variable in self.part(name) if variable.causality == "input")
+
     @property
     def motion(self) -> tuple[Variable, ...]:
         """Value, speed and acceleration of each driver: inputs, or, if the FMU owns the motion, states."""

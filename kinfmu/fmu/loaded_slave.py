@@ -21,14 +21,19 @@ from kinfmu.solver.python.tracks import sample_rates
 
 
 class LoadedSlave(MechanismSlave):
-    """A mechanism with forces as an FMI 2.0 co-simulation slave; a subclass defines `stages`, emitted, by part."""
+    """A mechanism with forces as an FMI 2.0 co-simulation slave.
+
+    A subclass defines `stages` (emitted, by part) and `positive` (names of the constants of loads' laws that must be
+    positive).
+    """
 
     stages: ClassVar[dict[str, Callable[..., Numbers]]]
+    positive: ClassVar[tuple[str, ...]]
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         parts = {part.name: part for part in self.layout.parts}
-        self._loads: Numbers = parts["loads"].starts  # efforts of external loads
+        self._loads: Numbers = parts["loads"].starts  # efforts of external loads, then constants of the laws of loads
         self._committed_loads = self._loads
         self._forces_of: Shown | None = None  # the sample of `_forces`
         self._forces: dict[str, Numbers] = {}  # by part, as far as they were read
@@ -43,6 +48,9 @@ class LoadedSlave(MechanismSlave):
         if not -LARGEST <= value <= LARGEST:
             why = f"is too large: at most {LARGEST:g} is taken" if math.isfinite(value) else "is not a finite number"
             self._refuse(name, f"= {value!r} {why}; {self._loads[place]!r} stays")
+            return
+        if name in self.positive and not value > 0.0:
+            self._refuse(name, f"= {value!r} must be positive; {self._loads[place]!r} stays")
             return
         self._refused.pop(name, None)
         if value != self._loads[place]:

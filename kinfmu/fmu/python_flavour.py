@@ -204,6 +204,8 @@ def _entry(variables: Interface, token: str, in_si: Sequence[float], package: st
     stages = [stage for stage in STAGES if variables.part(stage)]
     modules, attributes = [*stages, "model"], []
     if stages or in_si:
+        positive = (one.name for one in variables.part("loads") if one.causality == "parameter" and one.minimum == 0.0)
+        attributes.append(f"positive = {tuple(positive)!r}")
         attributes.append(f"stages = {{{', '.join(f'{one!r}: {one}.forces' for one in stages)}}}")
     if in_si:
         modules += ["inertia", "jumps"]

@@ -36,7 +36,7 @@ _ESTIMATES = 2  # number of parts at the end that follow from the others
 def _force_names(interface: Interface, mechanism: Mechanism, parts: Sequence[str]) -> tuple[ForceName, ...]:
     """Return the names of the forces in some parts of an FMU."""
     names = {str(name): name for name in (*force_names(mechanism), *reaction_names_of(mechanism))}
-    return tuple(names[variable.name] for part in parts for variable in interface.part(part))
+    return tuple(names[variable.name] for part in parts for variable in interface.part(part) if variable.name in names)
 
 
 class Samples:
@@ -87,6 +87,8 @@ class Samples:
 
     def _variables(self, part: str) -> tuple[Variable, ...]:
         """Return the variables of a part; the driver values in effect are states if the FMU owns the motion."""
+        if part == "loads":
+            return self._interface.inputs(part)
         return self._interface.part(part) or (self._interface.part("states") if part == "driven" else ())
 
     def log(self, status: int, text: str) -> None:

@@ -36,7 +36,7 @@ class TorqueSlave(LoadedSlave):
     """
 
     inertia: ClassVar[Callable[..., Numbers]]
-    jumps: ClassVar[Callable[[Numbers], Sequence[tuple[float, float]]]]
+    jumps: ClassVar[Callable[[Numbers, Numbers], Sequence[tuple[float, float]]]]
     in_si: ClassVar[Numbers]
     _udd: Numbers | None  # accelerations of the drivers at the requested pose
     _ended: Ended | None  # why the last step was discarded
@@ -115,7 +115,7 @@ class TorqueSlave(LoadedSlave):
             size=self._step_size,
         )
         ud = tuple(self._inputs[1::3])
-        at = steps.run(pose, ud, t, t + h, type(self).jumps(self._parameters))
+        at = steps.run(pose, ud, t, t + h, type(self).jumps(self._loads, self._parameters))
         if steps.ended is not None:
             self._forget()
             self._set_ended(steps.ended)
@@ -201,6 +201,9 @@ class TorqueSlave(LoadedSlave):
         if not -LARGEST <= value <= LARGEST:
             why = f"is too large: at most {LARGEST:g} is taken" if math.isfinite(value) else "is not a finite number"
             self._refuse(name, f"= {value!r} {why}; {self.get_real([vr])[0]!r} stays")
+            return
+        if name in self.positive and not value > 0.0:
+            self._refuse(name, f"= {value!r} must be positive; {self.get_real([vr])[0]!r} stays")
             return
         if kind == "states":
             if self._initialized:

@@ -69,31 +69,35 @@ def with_states(
         at = list(by_name).index("fixed") + 1
         items = list(by_name.items())
         by_name = dict([*items[:at], *((name, InterfacePart(name, one)) for name, one in added.items()), *items[at:]])
-    loads = [variable.name for variable in by_name["loads"].variables]
+    loads = [variable.name for variable in by_name["loads"].variables if variable.causality == "input"]
     moving = [name for driver in plan.drivers for name in driver.inputs[:2]]
     time = ["time"] if has_time and depends_on_time(mechanism) else []
     moved_by = (*moving, *effort_names(plan), *loads, *time)
     behind: dict[str, Sequence[str]] = {driver.inputs[2]: moved_by for driver in plan.drivers}
+    constants = tuple(constant.name for constant in plan.load_constants)
     result = []
     for name, part in by_name.items():
         if name in _LEFT_OUT:
             continue
         if name == INPUTS:
-            result.append(InterfacePart(STATES, tuple(_states(plan, starts, behind))))
+            result.append(InterfacePart(STATES, tuple(_states(plan, starts, behind, constants))))
         elif name == "constants":  # the laws of drivers have no effect
             result.append(InterfacePart(name, ()))
         elif name == "tolerance":
             result.append(InterfacePart(name, (*part.variables, INTEGRATOR_TOLERANCE)))
         else:
             dropped = {constant.name for constant in plan.law_constants} | set(_GONE)
-            result.append(InterfacePart(name, tuple(_behind(one, behind, dropped) for one in part.variables)))
+            found = (_behind(one, behind, constants, dropped) for one in part.variables)
+            result.append(InterfacePart(name, tuple(found)))
         if name == "fixed":
             result.append(InterfacePart(EFFORTS, tuple(_efforts(plan))))
     return result
 
 
-def _states(plan: SolvePlan, starts: Sequence[float], behind: Mapping[str, Sequence[str]]) -> Iterator[Variable]:
-    parameters = tuple(parameter.name for parameter in plan.parameters)
+def _states(
+    plan: SolvePlan, starts: Sequence[float], behind: Mapping[str, Sequence[str]], constants: tuple[str, ...]
+) -> Iterator[Variable]:
+    parameters = (*constants, *(parameter.name for parameter in plan.parameters))
     for k, driver in enumerate(plan.drivers):
         for order, (name, (words, origin)) in enumerate(zip(driver.inputs, _WORDS, strict=True)):
             is_state = order < 2
@@ -127,17 +131,22 @@ def _efforts(plan: SolvePlan) -> Iterator[Variable]:
         )
 
 
-def _behind(variable: Variable, behind: Mapping[str, Sequence[str]], dropped: set[str]) -> Variable:
-    """Return a variable with states and efforts among its dependencies, in place of accelerations."""
+def _behind(
+    variable: Variable, behind: Mapping[str, Sequence[str]], constants: tuple[str, ...], dropped: set[str]
+) -> Variable:
+    """Return a variable with states and efforts among its dependencies, in place of accelerations.
 
-    def exact(names: tuple[str, ...] | None) -> tuple[str, ...] | None:
+    Constants of the laws of loads act on accelerations too, and count during initialization.
+    """
+
+    def exact(names: tuple[str, ...] | None, more: tuple[str, ...] = ()) -> tuple[str, ...] | None:
         if names is None:
             return None
         found = [one for name in names for one in behind.get(name, (name,)) if one not in dropped]
-        return tuple(dict.fromkeys(found))
+        return tuple(dict.fromkeys((*found, *more) if any(name in behind for name in names) else found))
 
     return replace(
         variable,
         dependencies=exact(variable.dependencies),
-        initial_dependencies=exact(variable.initial_dependencies),
+        initial_dependencies=exact(variable.initial_dependencies, constants),
     )

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 from kinfmu.analysis.singular import DriverRange
 from kinfmu.equations.graph import Node, reachable
 from kinfmu.fmu.estimated_rates import Rates
-from kinfmu.fmu.force_variables import force_parts
+from kinfmu.fmu.force_variables import force_parts, law_constant
 from kinfmu.fmu.interface import RATES_TYPE, STATUS_TYPE, Drive, Interface, InterfacePart, Variable
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.fmu.torque_variables import with_states
@@ -253,7 +253,7 @@ def _initial_names(
     if not drivers:
         return ()
     behind = {plan.drivers[k].name for k in drivers}
-    constants = tuple(constant.name for constant in plan.law_constants if constant.driver in behind)
+    constants = tuple(constant.name for constant in plan.law_constants if constant.owner in behind)
     extra = (_TOLERANCE.name,) if tolerance else ()
     rates = (_RATES.name,) if order else ()
     return (*_input_names(plan, drivers, order, linear_in), *constants, *extra, "driven_by_time", *rates)
@@ -316,17 +316,7 @@ def _driven(plan: SolvePlan) -> Iterator[Variable]:
 
 def _law_constants(plan: SolvePlan) -> Iterator[Variable]:
     for constant in plan.law_constants:
-        yield Variable(
-            constant.name,
-            "Real",
-            "parameter",
-            "tunable",
-            f"Driver {constant.driver}: {constant.key} of its law",
-            initial="exact",
-            unit=unit_of(constant.quantity, plan.mechanism.length_unit),
-            start=constant.value,
-            minimum=0.0 if constant.is_positive else None,
-        )
+        yield law_constant(constant, "Driver", plan.mechanism.length_unit)
 
 
 def _parameters(plan: SolvePlan) -> Iterator[Variable]:

@@ -181,9 +181,15 @@ class Mechanism(Live):
         return tuple(law_constants(self.drivers, self.expressions))
 
     @property
+    def load_constants(self) -> tuple[LawConstant, ...]:
+        """Settable constants of the loads' laws, on which forces depend, and the motion where efforts drive."""
+        return tuple(law_constants(self.loads, self.expressions))
+
+    @property
     def settable(self) -> Settable:
         """What can be set by name, with the checks of names and values."""
-        return Settable(self.parameters, self.law_constants, self.expressions, self.length_unit)
+        constants = (*self.law_constants, *self.load_constants)
+        return Settable(self.parameters, constants, self.expressions, self.length_unit)
 
     def with_parameters(self, values: Mapping[str, float | str]) -> Mechanism:
         """Return the mechanism with other values of some parameters.
@@ -205,8 +211,9 @@ class Mechanism(Live):
                 constants[name] = settable.number(name, value)
             else:
                 parameters[name] = settable.parameter(name, value)
-        drivers = with_law_constants(self.drivers, settable.constants.values(), constants)
-        return replace(self, parameters=parameters, drivers=drivers)
+        drivers = with_law_constants(self.drivers, self.law_constants, constants)
+        loads = with_law_constants(self.loads, self.load_constants, constants)
+        return replace(self, parameters=parameters, drivers=drivers, loads=loads)
 
 
 def require_masses(mechanism: Mechanism) -> None:

@@ -6,10 +6,13 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from kinfmu.drivers import Driver
 from kinfmu.errors import MechanismError, RequestError, listed, suggestion
+from kinfmu.loads import Load
+from kinfmu.loads.following import Following
+from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.members import NumberPath
 from kinfmu.mechanism.number import read_constant, read_number
@@ -19,9 +22,9 @@ from kinfmu.units import Quantity
 
 
 class LawConstant(NamedTuple):
-    """A constant of a driver's law of motion, settable under its name `<driver>.<key>`."""
+    """A constant of the law of a driver or a load, its owner, settable under its name `<owner>.<key>`."""
 
-    driver: str
+    owner: str
     key: str
     value: float
     quantity: Quantity
@@ -29,28 +32,39 @@ class LawConstant(NamedTuple):
 
     @property
     def name(self) -> str:
-        return f"{self.driver}.{self.key}"
+        return f"{self.owner}.{self.key}"
 
 
-def law_constants(drivers: Sequence[Driver], computed: Collection[NumberPath]) -> Iterator[LawConstant]:
-    """Yield the constants of all drivers' laws in file order, without those given by an expression (`computed`)."""
-    for driver in drivers:
-        for key, (value, said) in driver.law.constants().items():
-            if ("drivers", driver.name, "law", key) not in computed:
-                yield LawConstant(driver.name, key, float(value), said.quantity(*driver.law_kinds), said.is_positive)
+def law_constants(owners: Sequence[Driver | Load], computed: Collection[NumberPath]) -> Iterator[LawConstant]:
+    """Yield the constants of the laws of drivers or loads in file order, without those given by an expression.
+
+    Args:
+        owners: Drivers or loads. Most loads have no law, and the effort of external ones is an input.
+        computed: Places of the numbers that are given by expressions.
+
+    """
+    for owner in owners:
+        if isinstance(owner, Driver) or (isinstance(owner, Following) and not owner.inputs()):
+            table = "drivers" if isinstance(owner, Driver) else "loads"
+            for key, (value, said) in owner.law.constants().items():
+                if (table, owner.name, "law", key) not in computed:
+                    yield LawConstant(owner.name, key, float(value), said.quantity(*owner.law_kinds), said.is_positive)
+
+
+Owner = TypeVar("Owner", bound=Driver | Load)
 
 
 def with_law_constants(
-    drivers: Sequence[Driver], constants: Iterable[LawConstant], values: Mapping[str, float]
-) -> tuple[Driver, ...]:
-    """Return the drivers with other values, by name, of some of their law constants."""
-    numbers: dict[str, dict[tuple[str | int, ...], float]] = {}
+    owners: Sequence[Owner], constants: Iterable[LawConstant], values: Mapping[str, Value]
+) -> tuple[Owner, ...]:
+    """Return drivers or loads with other values, by name and in any arithmetic, of some of their law constants."""
+    numbers: dict[str, dict[tuple[str | int, ...], Value]] = {}
     for constant in constants:
         if constant.name in values:
-            numbers.setdefault(constant.driver, {})[constant.key,] = values[constant.name]
+            numbers.setdefault(constant.owner, {})[constant.key,] = values[constant.name]
     return tuple(
-        replace(driver, law=driver.law.with_numbers(numbers[driver.name])) if driver.name in numbers else driver  # type: ignore[type-var]
-        for driver in drivers
+        replace(owner, law=owner.law.with_numbers(numbers[owner.name])) if owner.name in numbers else owner  # type: ignore[type-var,union-attr]
+        for owner in owners
     )
 
 
@@ -122,7 +136,11 @@ class Settable:
         """Return the expression of a parameter or a law constant, if it has one."""
         if name in self.parameters:
             return self.parameters[name].expression
-        paths = {f"{path[1]}.{path[3]}": path for path in self._expressions if path[0] == "drivers" and len(path) == 4}
+        paths = {
+            f"{path[1]}.{path[3]}": path
+            for path in self._expressions
+            if path[0] in ("drivers", "loads") and len(path) == 4 and path[2] == "law"
+        }
         return self._expressions[paths[name]] if name in paths else None
 
 

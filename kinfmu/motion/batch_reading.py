@@ -378,7 +378,7 @@ class BatchReading:
     def _units_of_parameters(self) -> dict[str, str]:
         """Return the units of the parameters and law constants that are given."""
         plan = self._model.plan
-        known: list[PlanParameter | LawConstant] = [*plan.parameters, *plan.law_constants]
+        known: list[PlanParameter | LawConstant] = [*plan.parameters, *plan.law_constants, *plan.load_constants]
         quantities = {one.name: one.quantity for one in known}
         unit = plan.mechanism.length_unit
         return {name: unit_of(quantities[name] or Quantity("number"), unit) for name in self.parameters}

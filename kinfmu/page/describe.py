@@ -101,8 +101,8 @@ def module_data(module: PageModule, places: Mapping[str, NumberPath]) -> dict[st
     parameters += [
         _parameter(one.name, one.value, one.quantity, unit)
         | {
-            "label": f"{one.driver} {one.key}",
-            "short": f"{one.driver} {one.key}",
+            "label": f"{one.owner} {one.key}",
+            "short": f"{one.owner} {one.key}",
             "inFile": "",
             "points": [],
             "isLaw": True,
@@ -203,7 +203,7 @@ def written_file(mechanism: Mechanism, module: PageModule, places: Mapping[str, 
     Start poses are "{{start crank.phi}}", so that the file assembles on the branch that the page shows.
     """
     paths = {path: place_text(path) for path in places.values()}
-    paths |= {("drivers", one.driver, "law", one.key): one.name for one in module.plan.law_constants}
+    paths |= {("drivers", one.owner, "law", one.key): one.name for one in module.plan.law_constants}
     known = {*module.plan.outputs, *module.plan.fixed}
 
     def slot(name: str, value: float) -> Any:

@@ -117,7 +117,7 @@ def page_sources(plan: SolvePlan, points: Sequence[str], labels: Mapping[str, st
     names = force_names(plan.mechanism)
     stages = {"forces": force_steps(plan, names, given_coefficients=True)} if names else {}
     stages |= _reaction_stages(plan)
-    files |= {f"{stage}.c": emit_forces(plan, steps, stage) for stage, steps in stages.items()}
+    files |= {f"{stage}.c": emit_forces(plan, steps, stage, are_loads_open=False) for stage, steps in stages.items()}
     return files | {"page.c": "\n".join(lines) + "\n"}
 
 

@@ -6,16 +6,18 @@ All is in SI units, whatever the mechanism's unit of length is.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 from kinfmu.equations.graph import Node
 from kinfmu.loads import Load
 from kinfmu.measures.placement import GROUND, BodyFrame, Placement
 from kinfmu.mechanism.body import GROUND_NAME, Body
+from kinfmu.mechanism.settings import with_law_constants
 from kinfmu.plan.block import TimeDerivatives
 from kinfmu.plan.origin import localized
 from kinfmu.plan.plan import SolvePlan
-from kinfmu.plan.steps import Tracing, derivative_name
+from kinfmu.plan.steps import Tracing, derivative_name, law_symbol
 from kinfmu.plan.trace import Tracer
 from kinfmu.units import METRES
 
@@ -55,7 +57,11 @@ class Mechanics(Tracing):
         graph, one = self.tracer.graph, self.tracer.graph.constant(1.0)
         changes = [{graph.symbol(driver.inputs[0]): one} for driver in plan.drivers]
         super().__init__(graph, changes, frozenset(constant.name for constant in plan.law_constants))
-        self.members = self.tracer.members
+        members, settable = self.tracer.members, plan.load_constants
+        loads = with_law_constants(
+            members.loads, settable, {one.name: graph.symbol(law_symbol(one.name)) for one in settable}
+        )
+        self.members = replace(members, loads=loads)
         self.metre = METRES[plan.mechanism.length_unit]
         self.known = dict(zip(plan.known, self.copied(list(plan.known.values())), strict=True))
         self.rates = TimeDerivatives(self.tracer, self.known)

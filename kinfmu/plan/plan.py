@@ -92,6 +92,11 @@ class SolvePlan:
     anchor: Assembled
 
     @cached_property
+    def load_constants(self) -> tuple[LawConstant, ...]:
+        """Constants of the laws of loads, settable at run time: forces depend on them, poses do not."""
+        return self.mechanism.load_constants
+
+    @cached_property
     def parameter_values(self) -> dict[str, float]:
         """Parameters as written, by the names of their symbols."""
         return {parameter_symbol(parameter.name): parameter.value for parameter in self.parameters}

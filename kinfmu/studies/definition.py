@@ -200,10 +200,11 @@ def define(
     mechanism = replace(mechanism, measures=readings)
     _refuse_equal_names([one.name for one in variations], [reading.name for reading in mechanism.measures])
     motion = _motion(mechanism, t, inputs or {}, over)
-    constants = [one.name for one in variations if one.name in mechanism.settable.constants]
+    of_drivers = {constant.name for constant in mechanism.law_constants}
+    constants = [one.name for one in variations if one.name in of_drivers]
     if constants and motion.t is None:
         raise RequestError(
-            f"{constants[0]} is a constant of a law, which acts over time: give times "
+            f"{constants[0]} is a constant of a driver's law, which acts over time: give times "
             f"([run] start, stop and step in a study file) in place of driver values"
         )
     if engine == "auto":

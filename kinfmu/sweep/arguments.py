@@ -24,12 +24,14 @@ class Setting(NamedTuple):
     """Parameters and law constants of one call.
 
     given: As the caller wrote them. values: Of all parameters of the plan; empty: those of the plan, none was given.
-    constants: Of all laws. starts_elsewhere: The laws may start at another pose than the anchor's.
+    constants: Of the laws of all drivers. load_constants: Of the laws of all loads.
+    starts_elsewhere: The laws of drivers may start at another pose than the anchor's.
     """
 
     given: Settings
     values: Vector
     constants: Vector
+    load_constants: Vector
     starts_elsewhere: bool
 
 
@@ -45,11 +47,12 @@ class Arguments:
         self.plan = plan
         self.mechanism = plan.mechanism
         self.written = tuple(parameter.value for parameter in plan.parameters)
-        self._constants_written = tuple(constant.value for constant in plan.law_constants)
+        self._constants = constants = (*plan.law_constants, *plan.load_constants)
+        self._constants_written = tuple(constant.value for constant in constants)
         self._places = {parameter.name: k for k, parameter in enumerate(plan.parameters)}
-        self._constant_places = {constant.name: k for k, constant in enumerate(plan.law_constants)}
+        self._constant_places = {constant.name: k for k, constant in enumerate(constants)}
         self.opens_expressions = any(plan.mechanism.parameters[name].expression for name in self._places)
-        self._positive = {k for k, constant in enumerate(plan.law_constants) if constant.is_positive}
+        self._positive = {k for k, constant in enumerate(constants) if constant.is_positive}
 
     def setting(self, given: Settings) -> Setting:
         """Return parameters and law constants as numbers.
@@ -60,7 +63,7 @@ class Arguments:
 
         """
         if not given:
-            return Setting(given, (), self._constants_written, starts_elsewhere=False)
+            return Setting(given, (), *self._split(self._constants_written), starts_elsewhere=False)
         values, constants = list(self.written), list(self._constants_written)
         own = False
         for name, value in given.items():
@@ -81,8 +84,15 @@ class Arguments:
             known = {name: float(value) for name, value in given.items() if name in self._places}
             found = parameter_values(self.mechanism.parameters, known)
             values = [float(found[name]) for name in self._places]
-        elsewhere = own or self._law_starts(tuple(constants)) != self._law_starts(self._constants_written)
-        return Setting(given, tuple(values) if own else (), tuple(constants), elsewhere)
+        of_drivers, of_loads = self._split(tuple(constants))
+        written = self._split(self._constants_written)[0]
+        elsewhere = own or self._law_starts(of_drivers) != self._law_starts(written)
+        return Setting(given, tuple(values) if own else (), of_drivers, of_loads, elsewhere)
+
+    def _split(self, constants: Vector) -> tuple[Vector, Vector]:
+        """Return the constants of the laws of drivers, and those of loads."""
+        count = len(self.plan.law_constants)
+        return constants[:count], constants[count:]
 
     def number(self, name: str, value: float | str) -> float:
         """Return the value of a parameter or law constant as a number.
@@ -95,7 +105,7 @@ class Arguments:
         setting = self.setting({name: value})
         if name in self._places:
             return setting.values[self._places[name]]
-        return setting.constants[self._constant_places[name]]
+        return (*setting.constants, *setting.load_constants)[self._constant_places[name]]
 
     @cached_property
     def _derived(self) -> tuple[tuple[str, Expression], ...]:
@@ -143,8 +153,9 @@ class Arguments:
         return dict(zip(nodes, evaluate(list(nodes.values()), known), strict=True))
 
     def mechanism_with(self, setting: Setting) -> Mechanism | Callable[[], Mechanism]:
-        """Return the mechanism with the parameters set, or a function that makes it when it is first read."""
-        own = {name: value for name, value in setting.given.items() if name in self._places}
+        """Return the mechanism with parameters and loads as set, or a function that makes it when it is first read."""
+        drivers = {constant.name for constant in self.plan.law_constants}
+        own = {name: value for name, value in setting.given.items() if name not in drivers}
         mechanism = self.mechanism
         return (lambda: mechanism.with_parameters(own)) if own else mechanism
 
@@ -158,5 +169,8 @@ class Arguments:
             "title": mechanism.title,
             "engine": engine,
             **{name: repr(float(values.get(name, p.value))) for name, p in mechanism.parameters.items()},
-            **{name: repr(value) for name, value in zip(self._constant_places, setting.constants, strict=True)},
+            **{
+                constant.name: repr(value)
+                for constant, value in zip(self._constants, (*setting.constants, *setting.load_constants), strict=True)
+            },
         }

@@ -137,6 +137,7 @@ class Batch:
         if model.arguments.opens_expressions:
             self.values = np.array([self._followed(design) for design in range(self.count)])
         self.constants = self._rows(self.plan.law_constants)
+        self._of_loads = self._rows(self.plan.load_constants)
 
     def driven(self, inputs: Mapping[str, ArrayLike]) -> Driven | None:
         """Return driver values, speeds and accelerations as `Driving` has them; None without inputs.
@@ -161,7 +162,7 @@ class Batch:
         """Return a batch of some of the designs."""
         some = copy(self)
         some.parameters = {name: array[part] if len(array) > 1 else array for name, array in self.parameters.items()}
-        some.values, some.constants = self.values[part], self.constants[part]
+        some.values, some.constants, some._of_loads = self.values[part], self.constants[part], self._of_loads[part]
         some.count = len(some.values)
         return some
 
@@ -171,11 +172,12 @@ class Batch:
 
     def invalid(self) -> NDArray[np.bool_]:
         """(m,) True for designs with a number that is not finite or too large, or not positive where it must be."""
-        positive = [constant.is_positive for constant in self.plan.law_constants]
+        constants = np.hstack([self.constants, self._of_loads])
+        positive = [one.is_positive for one in (*self.plan.law_constants, *self.plan.load_constants)]
         found = ~np.logical_and.reduce(
-            [(np.abs(table) <= LARGEST_NUMBER).all(axis=1) for table in (self.values, self.constants)]
+            [(np.abs(table) <= LARGEST_NUMBER).all(axis=1) for table in (self.values, constants)]
         )
-        return np.asarray(found | ~(self.constants[:, positive] > 0.0).all(axis=1))
+        return np.asarray(found | ~(constants[:, positive] > 0.0).all(axis=1))
 
     def _rows(self, declared: Sequence[PlanParameter | LawConstant]) -> FloatArray:
         """Return the values of all designs, (m, number of those declared)."""

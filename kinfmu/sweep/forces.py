@@ -153,7 +153,8 @@ class ForceModel:
         written = [parameter.value for parameter in plan.parameters]
         for parameter, value in zip(plan.parameters, setting.values or written, strict=True):
             given[parameter_symbol(parameter.name)] = value
-        for constant, value in zip(plan.law_constants, setting.constants, strict=True):
+        constants = (*plan.law_constants, *plan.load_constants)
+        for constant, value in zip(constants, (*setting.constants, *setting.load_constants), strict=True):
             given[law_symbol(constant.name)] = value
         return given
 

@@ -147,6 +147,8 @@ class SensitivityModel:
         own = [parameter.name for parameter in plan.parameters]
         constants = [constant.name for constant in plan.law_constants]
         known = [*own, *constants] if by_law else own
+        if wrt is not None:  # on constants of the laws of loads no pose depends: derivatives are 0
+            known = [*known, *(constant.name for constant in plan.load_constants)]
         for name in wrt or ():
             if name in constants and not by_law:
                 raise RequestError(

@@ -146,7 +146,7 @@ class FitProblem:
         bounds = {}
         for name, value in self.unknowns.items():
             parameter, constant = self.mechanism.parameters.get(name), settable.constants.get(name)
-            if constant is not None and argument.input:
+            if constant in self.mechanism.law_constants and argument.input:
                 raise RequestError(f"[unknowns] {name} is a law constant, which acts over time: write over = 'time'")
             if constant is None and (parameter is None or parameter.expression is not None):
                 raise RequestError(f"[unknowns] {settable.unknown(name, settable.names)}")

@@ -306,7 +306,9 @@ def test_the_description_is_valid_and_declares_the_states(flavour: str, fmi: int
     assert places["crank_torque"].causality == places["wind_force"].causality == "input"
     assert "driven_by_time" not in places
     on = {one.variable.name: {two.name for two in one.dependencies} for one in about.outputs}
-    moved = {"crank_angle", "crank_speed", "crank_torque", "wind_force"} | ({"time"} if fmi == 3 else set())
+    moved = {"crank_angle", "crank_speed", "crank_torque", "wind_force"}
+    if fmi == 3:  # with time and tunable parameters
+        moved |= {"time", *(constant.name for constant in motor().load_constants)}
     assert on["crank_acceleration"] == on["coupler.ax"] == moved
     assert on["coupler.x"] == on["crank.reduced_inertia"] == {"crank_angle"}
     assert on["coupler.vx"] == on["kinetic_energy"] == {"crank_angle", "crank_speed"}

@@ -55,7 +55,7 @@ WRONG = {
     ),
     f"{CRANK}[run]\nend = 1": "[run] end: unknown key",
     'mechanism = "hoeken.toml"\n[parameters]\n"crank.speed" = { values = [1, 2] }': (
-        "crank.speed is a constant of a law, which acts over time: give times ([run] start, stop and step"
+        "crank.speed is a constant of a driver's law, which acts over time: give times ([run] start, stop and step"
     ),
 }
 WRONG_PARAMETERS = {

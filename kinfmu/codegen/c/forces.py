@@ -20,9 +20,17 @@ SIGNATURE = (
 )
 
 
-def emit_forces(plan: SolvePlan, steps: ForceSteps, stage: str = "forces") -> str:
-    """Return the text of a stage; linear systems of three and more unknowns are left to `kf_solutions`."""
-    places, given = places_of_symbols(plan), given_symbols(steps)
+def emit_forces(plan: SolvePlan, steps: ForceSteps, stage: str = "forces", *, are_loads_open: bool = True) -> str:
+    """Return the text of a stage; linear systems of three and more unknowns are left to `kf_solutions`.
+
+    Args:
+        plan: The plan.
+        steps: Of the stage.
+        stage: Its name.
+        are_loads_open: Constants of the laws of loads can be set: they follow the efforts of external loads.
+
+    """
+    places, given = places_of_symbols(plan, are_loads_open=are_loads_open), given_symbols(steps)
     curves = {data: f"&{name.lower()}" for data, name in stage_curves(steps).items()}
     buffers: list[str] = []
 

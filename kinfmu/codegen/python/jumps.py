@@ -9,7 +9,7 @@ from kinfmu.plan import SolvePlan
 
 
 def emit_jumps(plan: SolvePlan) -> str:
-    """Return the source text of `jumps(parameters)`: pairs of a time and the period after which it repeats, or 0."""
+    """Return the source text of `jumps(efforts, parameters)`: pairs of a time and its period, or 0."""
     writer = Writer(Names(), ())
     body = writer.statements([node for jump in plan.jumps for node in jump])
     pairs = [tupled([writer.expression(at), writer.expression(period)]) for at, period in plan.jumps]
@@ -22,7 +22,7 @@ def emit_jumps(plan: SolvePlan) -> str:
             "from math import atan2, cos, floor, sin, sqrt",
             "",
             "",
-            "def jumps(parameters):",
+            "def jumps(efforts, parameters):",
             '    """Times [s] at which laws of loads jump, each with its period, or 0."""',
             *indented([*given, *body]),
             f"    return {tupled(pairs)}",

@@ -73,21 +73,18 @@ def units(root: Element, interface: Interface) -> None:
 
 
 def _base_unit(name: str) -> dict[str, str]:
-    """Return exponents of SI base units and factor: `mm/s2` is m=1, s=-2, factor=0.001."""
-    for kind in KINDS.values():
-        if kind.unit == name:
-            powers = zip(("kg", "m", "s"), kind.powers, strict=True)
-            return {key: str(power) for key, power in powers if power}
-    base, _, per = name.partition("/")
-    exponents = {"s": -int(per[1:] or 1) if per else 0}
+    """Return exponents of SI base units and factor: `mm/s2` is m=1, s=-2, factor=0.001; `N/rad` has rad=-1."""
+    known = {kind.unit: kind.powers for kind in KINDS.values()}
+    base, _, per = (name, "", "") if name in known else name.partition("/")
+    powers = dict(zip(("kg", "m", "s"), known.get(base, (0, 0, 0)), strict=True))
     factor = 1.0
-    if base == "rad":
-        exponents = {"rad": 1, **exponents}
-    elif base in METRES:
-        exponents, factor = {"m": 1, **exponents}, METRES[base]
-    elif base == "s":
-        exponents["s"] += 1
-    attributes = {key: str(exponent) for key, exponent in exponents.items() if exponent}
+    for unit, sign in ((base, 1), (per.rstrip("23456789"), -1)):
+        power = sign * int(per[len(unit) :] or 1) if sign < 0 and per else sign
+        key = "m" if unit in METRES else unit
+        if key in ("rad", "m", "s"):
+            powers[key] = powers.get(key, 0) + power
+            factor *= METRES.get(unit, 1.0) ** power
+    attributes = {key: str(powers[key]) for key in ("kg", "m", "s", "rad") if powers.get(key)}
     return attributes if factor == 1.0 else {**attributes, "factor": text(factor)}
 
 

@@ -13,7 +13,7 @@ from kinfmu.codegen.c import compiler, emit
 from kinfmu.codegen.c.dormand_prince import dormand_prince
 from kinfmu.codegen.c.forces import emit_forces
 from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
-from kinfmu.codegen.forces import STAGES
+from kinfmu.codegen.forces import STAGES, places_of_symbols
 from kinfmu.codegen.python.forces import solves
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.errors import MissingPackageError
@@ -97,7 +97,7 @@ def sources(
             del instance["solutions.c"]
         instance |= {f"{stage}.c": emit_forces(plan, steps, stage) for stage, steps in forces.items()}
     tables = {"interface.h": _header(plan, variables, version, token), "interface.c": _tables(variables)}
-    tables |= {"step.c": _step(version, owns=owns), "events.c": _events(plan)}
+    tables |= {"step.c": _step(version, owns=owns), "events.c": _events(plan, owns=owns)}
     files = emit(plan) | compiler.sources(compiler.SOLVER) | instance | tables
     return dict(sorted(_prefixed(files, version).items()))
 
@@ -154,7 +154,9 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
     total = sum(counts.values()) or int(owns)
     forces = [f"#define KF_FORCES {total} /* of all stages */"]
     forces += [f"#define KF_STAGE_{stage.upper()} {count}" for stage, count in counts.items()]
-    forces += [f"#define KF_LOADS {len(variables.part('loads'))}"]
+    loads = len(variables.part("loads"))
+    forces += [f"#define KF_LOADS {loads} /* efforts of external loads, then constants of the laws of loads */"]
+    forces += [f"#define KF_LOAD_INPUTS {len(variables.inputs('loads'))}"]
     forces += ["#define KF_PART_INPUTS KF_PART_STATES"] if owns else []
     forces = [*forces, ""] if total else []
     bits, not_real = ("unsigned", 1 << 31) if forces else ("unsigned short", 1 << 15)
@@ -237,17 +239,21 @@ def _numbers(counts: Iterable[int]) -> list[int]:
     return [number for number, count in enumerate(counts) for _ in range(count)]
 
 
-def _events(plan: SolvePlan) -> str:
+def _events(plan: SolvePlan, *, owns: bool) -> str:
     """Return events.c: the times at which laws jump, which model exchange announces to its host.
 
-    They are a function of the constants of the laws and of the parameters.
+    They are a function of the constants of the laws and of the parameters; of the efforts and laws of loads if the FMU
+    owns the motion of its drivers.
     """
     signature = "void kf_jumps(const kf_model *model, const double *constants, double *jumps, double *periods)"
     writer = Writer(Names(functions=FUNCTIONS), ())
     body = [f"{line};" for line in writer.statements([node for jump in plan.jumps for node in jump])]
     for k, (at, period) in enumerate(plan.jumps):
         body += [f"jumps[{k}] = {writer.expression(at)};", f"periods[{k}] = {writer.expression(period)};"]
-    places = {constant.name: f"constants[{k}]" for k, constant in enumerate(plan.law_constants)}
+    if owns:
+        places = {name: place.replace("efforts", "constants") for name, place in places_of_symbols(plan).items()}
+    else:
+        places = {constant.name: f"constants[{k}]" for k, constant in enumerate(plan.law_constants)}
     places |= {parameter_symbol(one.name): f"model->parameters[{k}]" for k, one in enumerate(plan.parameters)}
     used = {node.name for node in writer.used if node.op == "symbol"}
     loads = [f"{identifier(name)} = {place};" for name, place in places.items() if name in used]

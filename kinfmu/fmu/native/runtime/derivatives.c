@@ -91,6 +91,7 @@ static kf_answer direction_of_states(kf_instance *instance, const double *seed, 
     if (time_seed != 0.0) {
         h = fmin(h, STEP / fabs(time_seed));
     }
+    h = kf_step_along_laws(KF_REAL(s, KF_PART_LOADS), seed + kf_part_first[KF_PART_LOADS], h);
     for (tries = 0; tries < TRIES && !done; ++tries, h *= 0.5) {
         memset(direction->da, 0, sizeof direction->da);
         done = true;

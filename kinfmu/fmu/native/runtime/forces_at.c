@@ -109,6 +109,21 @@ void kf_forces_of_trial(kf_state *s, const kf_solver *solver, kf_pose *pose, con
     kf_forces_at(solver, pose, t, drive, efforts, parts, row);
 }
 
+/* The step of differences along loads: at most `longest`, and short where constants of laws change, in which forces are
+ * not polynomials.
+ */
+double kf_step_along_laws(const double *loads, const double *seed, double longest)
+{
+    double h = longest;
+    int k;
+    for (k = KF_LOAD_INPUTS; k < KF_LOADS; ++k) {
+        if (seed[k] != 0.0) {
+            h = fmin(h, 2e-3 * (loads[k] != 0.0 ? fabs(loads[k]) : 1.0) / fabs(seed[k]));
+        }
+    }
+    return h;
+}
+
 /* Add the derivatives of the forces of the pose shown along speeds dv, accelerations da, loads and time, at a pose that stays.
  *
  * Forces are polynomials of at most the third degree in all but time: the differences are exact but for rounding.
@@ -119,7 +134,7 @@ void kf_add_force_slopes(kf_state *s, const double *dv, const double *da, const 
     static const double weights[3] = {45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0};
     double ud[KF_DRIVERS], udd[KF_DRIVERS], moved[KF_ROOM(KF_LOADS)], trial[KF_REALS];
     const double *drive[3], *efforts;
-    const double t = shown_at(s, &efforts), h = dt != 0.0 ? 2e-3 / fabs(dt) : 1.0;
+    const double t = shown_at(s, &efforts), h = kf_step_along_laws(efforts, loads, dt != 0.0 ? 2e-3 / fabs(dt) : 1.0);
     int j, k, part, sign;
     drive[0] = s->u;
     drive[1] = ud;

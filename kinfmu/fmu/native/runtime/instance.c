@@ -539,7 +539,11 @@ bool kf_next_event(const kf_instance *instance, double *time)
         return false;
     }
 #endif
+#if KF_TORQUE
+    kf_jumps(&s->solver.model, KF_REAL(s, KF_PART_LOADS), jumps, periods);
+#else
     kf_jumps(&s->solver.model, KF_REAL(s, KF_PART_CONSTANTS), jumps, periods);
+#endif
     for (k = 0; k < KF_JUMPS; ++k) {
         const double past = periods[k] > 0.0 ? floor((s->time - jumps[k]) / periods[k]) : 0.0;
         double event = just_after(jumps[k], periods[k], past);

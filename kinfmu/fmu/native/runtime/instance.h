@@ -72,7 +72,7 @@ typedef struct {
     double ended_step, ended_ud[KF_DRIVERS], ended_udd[KF_DRIVERS]; /* of the step that ended so: its size, the rates at its end */
     double committed_u[KF_DRIVERS], committed_inputs[3 * KF_DRIVERS];
 #if KF_FORCES
-    double committed_efforts[KF_ROOM(KF_LOADS)]; /* of external loads */
+    double committed_efforts[KF_ROOM(KF_LOADS)]; /* of external loads, and constants of the laws of loads */
 #endif
     int samples;
     kf_sample history[KF_SAMPLES]; /* the last commits, oldest first */
@@ -207,6 +207,7 @@ void kf_forces_at(const kf_solver *solver, kf_pose *pose, double t, const double
 void kf_read_forces(kf_state *state, unsigned parts);
 void kf_forces_of_trial(kf_state *state, const kf_solver *solver, kf_pose *pose, const double *const drive[3],
                         unsigned parts, double *row);
+double kf_step_along_laws(const double *loads, const double *seed, double longest);
 void kf_add_force_slopes(kf_state *state, const double *dv, const double *da, const double *loads, double dt,
                          unsigned parts, double *slope);
 #endif

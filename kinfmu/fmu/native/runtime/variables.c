@@ -250,7 +250,7 @@ static KF_RARE kf_answer set_other(kf_instance *instance, unsigned reference, do
     }
 #endif
 #if KF_FORCES
-    if (part == KF_PART_LOADS && fabs(value) <= KF_LARGEST) {
+    if (part == KF_PART_LOADS && fabs(value) <= KF_LARGEST && (value > 0.0 || !kf_real_is_positive[place])) {
         s->real[place] = value;
         kf_touch(s);
         if (s->ahead) {
