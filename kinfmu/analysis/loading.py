@@ -1,22 +1,25 @@
 """Efforts and reactions of a mechanism with masses or loads over the motion that measures are taken of.
 
-Peaks are those of the samples: 360 in a turn of the driver, or those of the file's run.
+Samples are 360 in a turn of the driver, or those of the file's run. Peaks lie between them where the polynomials that
+measures use place them, to 1e-9 where forces are smooth. Where samples have no numbers, peaks are those of the others.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from kinfmu.analysis.measuring import SAMPLES_PER_TURN, turns_of_cycle
 from kinfmu.analysis.singular import DriverRange
-from kinfmu.errors import KinfmuError
+from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.laws import ConstantSpeed, External
 from kinfmu.mechanism import Mechanism
+from kinfmu.motion.motion import Motion, force_of
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import effort_noun
 from kinfmu.plan.reactions import undetermined_reactions
@@ -24,6 +27,8 @@ from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import axis_of
 from kinfmu.sweep import solve
 from kinfmu.units import unit_of
+
+EQUAL = 1e-9  # relative: of two sizes that differ by less, the first is reported
 
 
 @dataclass(frozen=True)
@@ -110,9 +115,10 @@ def loading(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Loading | None:
         missing = int((~run.good).sum())
         if missing == len(run):
             return Loading(over, undetermined=shared, reason="no sample has numbers", missing=missing)
-        efforts = tuple(_peak(run, name, run[name]) for name in _efforts(mechanism))
-        inertias, shaking = tuple(_inertias(run)), tuple(_shaking(run))
-        return Loading(over, efforts, inertias, _largest_reaction(run), shaking, shared, missing=missing)
+        forces = _Forces(run)
+        efforts = tuple(map(forces.peak, _efforts(mechanism)))
+        inertias, shaking = tuple(forces.inertias()), tuple(map(forces.peak, ("shaking_force", "shaking_moment")))
+        return Loading(over, efforts, inertias, forces.largest_reaction(), shaking, shared, missing=missing)
     except KinfmuError as reason:
         return Loading("no motion", undetermined=shared, reason=str(reason))
 
@@ -139,44 +145,59 @@ def _efforts(mechanism: Mechanism) -> list[str]:
     return [f"{driver.name}.{effort_noun(driver.quantity.kind)}" for driver in mechanism.drivers]
 
 
-def _inertias(run: Run) -> Iterator[InertiaRange]:
-    """Yield the ranges of the reduced inertias."""
-    for name in run.force_names:
-        values = run[name][np.isfinite(run[name])]
-        if name.noun.startswith("reduced_inertia") and len(values):
-            unit = unit_of(name.quantity, run.length_unit)
-            yield InertiaRange(name, float(values.min()), float(values.max()), unit)
+class _Forces:
+    """Forces of a run: their extremes between the samples."""
 
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._motion: Motion | None = None  # without it extremes are those of samples
+        with suppress(RequestError):  # too few samples, or they are not in the order of one argument
+            self._motion = Motion.of_run(run, with_margin=False)
 
-def _largest_reaction(run: Run) -> Peak | None:
-    """Return the largest force that a joint transmits; None if there is none that is determined."""
-    found: dict[str, list[FloatArray]] = {}
-    for name in run.reaction_names:
-        if name.owner and name.quantity.kind == "force":
-            found.setdefault(name.owner, []).append(run[name])
-    peaks = [_peak(run, joint, np.hypot.reduce(parts)) for joint, parts in found.items()]
-    return max((peak for peak in peaks if np.isfinite(peak.value)), key=lambda peak: peak.value, default=None)
+    def peak(self, name: str) -> Peak:
+        """Return the largest size of a force, of those that measures read; NaN if it has no numbers."""
+        low, high = self._extremes(name)
+        value, at = low if -low[0] > high[0] + EQUAL * abs(high[0]) else high
+        if -low[0] >= high[0] - EQUAL * abs(high[0]) and low[1] < high[1]:  # of equal sizes the first
+            value, at = low
+        run = self._run
+        driver, at_unit = "time", "s"
+        if len(run.input_names) == 3:
+            driver, at_unit = run.input_names[0].driver, unit_of(run.input_names[0].quantity, run.length_unit)
+        unit = next((place.unit for place in run.places() if place.name == name), "N")
+        return Peak(name, value, unit, driver, at, at_unit, _rms(run, force_of(run, name)))
 
+    def inertias(self) -> Iterator[InertiaRange]:
+        """Yield the ranges of the reduced inertias."""
+        for name in self._run.force_names:
+            if name.noun.startswith("reduced_inertia") and np.isfinite(self._run[name]).any():
+                (low, _), (high, _) = self._extremes(name)
+                yield InertiaRange(name, low, high, unit_of(name.quantity, self._run.length_unit))
 
-def _shaking(run: Run) -> Iterator[Peak]:
-    """Yield the largest shaking force and moment."""
-    yield _peak(run, "shaking_force", np.hypot(run["shaking_force_x"], run["shaking_force_y"]))
-    yield _peak(run, "shaking_moment", run["shaking_moment"])
+    def largest_reaction(self) -> Peak | None:
+        """Return the largest force that a joint transmits; None if there is none that is determined."""
+        names = [name for name in self._run.reaction_names if name.owner and name.quantity.kind == "force"]
+        joints = dict.fromkeys(name.owner for name in names)
+        peaks = [replace(self.peak(f"{joint}.force"), name=joint) for joint in joints]
+        return max(
+            (peak for peak in peaks if math.isfinite(peak.value)), key=lambda peak: abs(peak.value), default=None
+        )
 
-
-def _peak(run: Run, name: str, values: FloatArray) -> Peak:
-    """Return the largest size of a column, NaN if it has no numbers."""
-    known = np.isfinite(values)
-    sizes = np.where(known, np.abs(values), -1.0)
-    k = int(np.argmax(sizes))
-    several = len(run.input_names) != 3
-    at = float(run.t[k] if several else run.inputs[k, 0])
-    driver, at_unit = "time", "s"
-    if not several:
-        driver, at_unit = run.input_names[0].driver, unit_of(run.input_names[0].quantity, run.length_unit)
-    unit = next((place.unit for place in run.places() if place.name == name), "N")
-    value = float(values[k]) if known[k] else math.nan
-    return Peak(name, value, unit, driver, at, at_unit, _rms(run, values))
+    def _extremes(self, name: str) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Return the smallest and the largest value of a force, each with the driver value or time at which it is."""
+        run, values = self._run, force_of(self._run, name)
+        if self._motion is not None and np.isfinite(values).all():
+            motion, track = self._motion, self._motion.track(name)
+            low, high = track.minimum(), track.maximum()
+            return (
+                (float(low.value), float(motion.driven_at(np.asarray(low.x)))),
+                (float(high.value), float(motion.driven_at(np.asarray(high.x)))),
+            )
+        if not np.isfinite(values).any():
+            return (math.nan, math.nan), (math.nan, math.nan)
+        at = run.inputs[:, 0] if len(run.input_names) == 3 else run.t
+        k, j = int(np.nanargmin(values)), int(np.nanargmax(values))
+        return (float(values[k]), float(at[k])), (float(values[j]), float(at[j]))
 
 
 def _rms(run: Run, values: FloatArray) -> float:

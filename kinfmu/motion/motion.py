@@ -105,7 +105,7 @@ class Motion:
             mechanism.body_points,
             driver,
             run.margin[order] if with_margin else None,
-            force=lambda name: _force(run, name)[order],
+            force=lambda name: force_of(run, name)[order],
         )
         outputs = [(motion.quantity_track(name), name.is_angle) for name in run.outputs]
         return motion.going_round(bool(outputs) and bool(goes_round(outputs)))
@@ -391,7 +391,7 @@ class Motion:
         return Track.of(like, value if isinstance(value, Taylor) else Taylor(float(value)))
 
 
-def _force(run: Run, name: str) -> FloatArray:
+def force_of(run: Run, name: str) -> FloatArray:
     """Return a force of a run, (n,); the size of a pin's force from its components."""
     if name in (*run.force_names, *run.reaction_names):
         return np.asarray(run[name], dtype=float)

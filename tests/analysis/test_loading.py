@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
+import mpmath
+import numpy as np
 import pytest
 
 import kinfmu
@@ -117,3 +121,59 @@ def test_the_cycle_of_a_four_stroke_engine_is_two_turns() -> None:
     found = kinfmu.check(kinfmu.load("engine")).loading
     assert found is not None
     assert found.over.startswith("2 turns of crank")
+
+
+def test_peaks_lie_between_the_samples() -> None:
+    """Slider-crank with all mass in the slider: torque, inertia and guide force by closed forms, their peaks by mpmath.
+
+    x = cos u + sqrt(n^2 - sin^2 u),  F = m x'' w^2,  torque = F x',  reduced inertia = m x'^2
+    """
+    n, m, w = mpmath.mpf("3.7"), mpmath.mpf("1.3"), mpmath.mpf("11.25")
+    text = """
+name = "ram"
+[bodies]
+ground.points = { O = [0, 0] }
+crank = { points = { O = [0, 0], P = [1, 0] } }
+rod = { points = { P = [0, 0], S = [3.7, 0] } }
+ram = { points = { S = [0, 0] }, start = { x = 4.7, y = 0, phi = 0 }, mass = "1.3 kg" }
+[joints]
+O = { type = "revolute", between = ["ground.O", "crank.O"] }
+P = { type = "revolute", between = ["crank.P", "rod.P"] }
+S = { type = "revolute", between = ["rod.S", "ram.S"] }
+guide = { type = "translational", between = ["ground.O", "ram.S"] }
+[drivers]
+crank = { type = "angle", of = "crank", law = "constant_speed", start = 0.123, speed = 11.25 }
+"""
+    found = kinfmu.check(parse(text, "ram.toml")).loading
+    assert found is not None
+
+    def x(u: Any) -> Any:
+        return mpmath.cos(u) + mpmath.sqrt(n * n - mpmath.sin(u) ** 2)
+
+    def slope(u: Any) -> Any:
+        return mpmath.diff(x, u)
+
+    def torque(u: Any) -> Any:
+        return m * w * w * mpmath.diff(x, u, 2) * slope(u)
+
+    def normal(u: Any) -> Any:  # the rod pushes the ram sideways
+        return m * w * w * mpmath.diff(x, u, 2) * mpmath.sin(u) / mpmath.sqrt(n * n - mpmath.sin(u) ** 2)
+
+    def peak(of: Callable[[Any], Any], near: float) -> tuple[float, float]:
+        at = mpmath.findroot(lambda u: mpmath.diff(of, u), near)
+        return float(abs(of(at))), float(at)
+
+    with mpmath.workdps(40):
+        (effort,) = found.efforts
+        value, at = peak(torque, effort.at)
+        assert abs(effort.value) == pytest.approx(value, rel=1e-9)
+        assert effort.at == pytest.approx(at, abs=1e-6)
+        (inertia,) = found.inertias
+        assert inertia.largest == pytest.approx(peak(lambda u: m * slope(u) ** 2, 1.3)[0], rel=1e-9)
+        assert inertia.smallest == pytest.approx(0.0, abs=1e-9)
+        assert found.reaction is not None
+        (u, *_) = [k * mpmath.pi for k in (2,)]
+        force = mpmath.sqrt((m * w * w * mpmath.diff(x, u, 2)) ** 2 + normal(u) ** 2)
+        assert found.reaction.value == pytest.approx(float(force), rel=1e-9)  # at the outer dead centre
+    samples = kinfmu.solve(parse(text, "ram.toml"), np.linspace(0, 2 * math.pi / 11.25, 361))["crank.torque"]
+    assert np.abs(samples).max() < value * (1.0 - 1e-7)  # the peak is between the samples
