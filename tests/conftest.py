@@ -67,8 +67,19 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--update", action="store_true", help="rewrite the golden files, so that a change is read as a diff"
     )
     parser.addoption(
+        "--long", action="store_true", help="also the tests marked `long`, which the default run leaves out"
+    )
+    parser.addoption(
         "--grids", type=int, metavar="N", help="so many random grids of tests that take fewer, and these in full"
     )
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what is long, unless it is asked for: with --long, with -m, or by its name."""
+    if config.getoption("--long") or config.option.markexpr or any("::" in argument for argument in config.args):
+        return
+    config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("long")])
+    items[:] = [item for item in items if not item.get_closest_marker("long")]
 
 
 @pytest.fixture

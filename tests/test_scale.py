@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import AngleDriver, Body, ConstantSpeed, Distance, Mechanism, Revolute, Run, Translational, gallery
+from kinfmu import AngleDriver, Body, ConstantSpeed, Distance, Mechanism, Revolute, Run, Translational
 from kinfmu.errors import InconsistentError
 from kinfmu.plan import compile_plan
 from kinfmu.solver.python import Status
 from tests import oracle
+from tests.gallery_members import every_member
 from tests.oracle import Motion, largest_error, mp
 from tests.scaled import scaled
 
@@ -79,7 +80,7 @@ def tips_off(run: Run, crank: float, at: tuple[float, float] = (0.0, 0.0)) -> li
 # --------------------------------------------------------------------------------------------------- all sizes
 
 
-@pytest.mark.parametrize("name", gallery.names())
+@every_member
 def test_a_mechanism_larger_by_a_power_of_two_moves_equally_to_the_bit(name: str) -> None:
     mechanism = kinfmu.load(name)
     times = np.linspace(mechanism.run.start, mechanism.run.stop, 9)

@@ -7,9 +7,9 @@ import math
 import pytest
 
 import kinfmu
-from kinfmu import gallery
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import parse
+from tests.gallery_members import every_member
 
 FOURBAR = """
 name = "fourbar"
@@ -61,7 +61,7 @@ def test_a_sound_mechanism_has_no_note() -> None:
     assert notes() == ()
 
 
-@pytest.mark.parametrize("name", gallery.names())
+@every_member
 def test_no_gallery_mechanism_has_a_note_but_for_the_toggle_position_of_the_pendulum(name: str) -> None:
     crossed = "the run crosses a toggle position: upper, lower fall in line at crank = 11 pi/6 (330 deg)"
     assert kinfmu.check(kinfmu.load(name)).notes == ((crossed,) if name == "double_pendulum" else ())

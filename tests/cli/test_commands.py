@@ -23,6 +23,7 @@ from kinfmu.cli.group import ORDER
 from kinfmu.fmu.native.platforms import host
 from kinfmu.units import CoordinateName
 from tests.cli.conftest import Command, read_csv
+from tests.gallery_members import every_member
 from tests.log.runs import fourbar
 
 ROOT = Path(__file__).parents[2]
@@ -48,7 +49,7 @@ def test_list_names_the_gallery_with_titles(command: Command) -> None:
     assert titles["fourbar"] == "Four-bar crank with a redundant constraint"
 
 
-@pytest.mark.parametrize("name", gallery.names())
+@every_member
 def test_new_writes_a_commented_file_that_checks(name: str, command: Command, tmp_path: Path) -> None:
     result = command("new", name, "mine.toml")
     assert result.exit_code == 0

@@ -49,6 +49,7 @@ def run(project: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.long
 def test_the_contract_tests_pick_the_new_joint_up_and_pass(project: Path) -> None:
     done = run(project, "-m", "pytest", "tests/joints/test_contract.py", "-q", "-k", "opposed")
     assert done.returncode == 0, done.stdout + done.stderr

@@ -36,6 +36,7 @@ def test_the_commands_of_the_page(folder: Path) -> None:
     assert CliRunner().invoke(main, ["check", "fitted.toml"]).exit_code == 0
 
 
+@pytest.mark.long
 def test_the_python_of_the_page(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:  # noqa: ARG001  its files
     code = "\n".join(re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL))
     exec(compile(code, "fitting.md", "exec"), {})  # noqa: S102  our own page

@@ -6,15 +6,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from kinfmu import gallery
 from kinfmu.draw import figure
 from tests.draw.picture import differences, picture
+from tests.gallery_members import every_member
 from tests.mechanisms import fourbar
 
 
-@pytest.mark.parametrize("name", gallery.names())
+@every_member
 def test_the_figure_in_the_gallery_is_current(name: str, gallery_figure: Callable[[str], Path]) -> None:
     there, now = picture(gallery.folder() / name / "figure.svg"), picture(gallery_figure(name))
     assert not differences(there, now), "scripts/pictures draws it anew"

@@ -18,6 +18,7 @@ from kinfmu.draw import figure
 from kinfmu.draw.instant import instant, pose_note
 from kinfmu.errors import AssemblyError, FigureError, MissingPackageError
 from kinfmu.mechanism import toml_file, toml_text
+from tests.gallery_members import every_member
 from tests.mechanisms import fourbar, reference_fourbar
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -28,7 +29,7 @@ def texts_in(path: Path) -> str:
     return "\n".join(element.text or "" for element in ET.parse(path).iter(f"{SVG}text"))  # noqa: S314  ours
 
 
-@pytest.mark.parametrize("name", gallery.names())
+@every_member
 def test_a_mechanism_of_the_gallery_is_drawn_with_all_its_names(
     name: str, gallery_figure: Callable[[str], Path]
 ) -> None:

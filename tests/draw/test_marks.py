@@ -21,7 +21,6 @@ from kinfmu import (
     RunSettings,
     SlideDriver,
     Translational,
-    gallery,
     load,
 )
 from kinfmu.draw.drawing import sheet_of
@@ -33,6 +32,7 @@ from kinfmu.scene.instant import Instant
 from kinfmu.scene.shape import Shape
 from kinfmu.scene.shapes import shapes
 from kinfmu.scene.slides import slides
+from tests.gallery_members import every_member
 from tests.joints.test_mechanisms import crank_and_slider
 from tests.mechanisms import fourbar
 
@@ -237,7 +237,7 @@ def test_a_place_is_named_once_by_its_joint_and_its_points_of_interest() -> None
     assert [mark.text for mark in pins(shown) if isinstance(mark, Pin)] == ["O", "hinge", "tip"]
 
 
-@pytest.mark.parametrize("name", gallery.names())
+@every_member
 def test_names_do_not_overlap_stay_on_the_sheet_and_leave_links_and_paths_free(name: str) -> None:
     pytest.importorskip("matplotlib")
     sheet = sheet_of(instant(load(name)))

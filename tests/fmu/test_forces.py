@@ -21,6 +21,7 @@ from kinfmu.fmu.interface import Variable
 from kinfmu.fmu.unpacked import text_in, unpacked
 from kinfmu.mechanism import toml_file
 from tests.fmu.host import DISCARD, OK, Host, answer
+from tests.gallery_members import mostly_long
 from tests.sweep.test_forces import loaded
 from tests.sweep.test_redundant_reactions import LOCOMOTIVE, coupled
 
@@ -146,7 +147,7 @@ def assert_forces_equal(run: kinfmu.Run, reference: kinfmu.Run) -> None:
 
 
 @of_each_flavour
-@pytest.mark.parametrize("name", ["fourbar", "five_bar", "excavator"])
+@pytest.mark.parametrize("name", mostly_long(["fourbar", "five_bar", "excavator"], few=("excavator",)))
 def test_forces_equal_those_of_a_run(fmu_of: Callable[..., Path], flavour: str, fmi: int, name: str) -> None:
     mechanism = loaded(name)
     run = kinfmu.simulate(fmu_of(mechanism, flavour, fmi))

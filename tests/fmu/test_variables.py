@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import gallery
 from kinfmu.fmu.variables import linear_inputs
 from kinfmu.plan import compile_plan
 from tests.fmu.test_parameters import geared
+from tests.gallery_members import every_member
 
 
 def _linear(mechanism: kinfmu.Mechanism) -> dict[str, tuple[str, ...]]:
@@ -33,7 +33,7 @@ def test_factor_may_hold_a_parameter() -> None:
     assert _linear(geared()) == {"crank.phi": ("crank_angle",), "wheel.phi": ("crank_angle",)}
 
 
-@pytest.mark.parametrize("name", gallery.names())
+@every_member
 def test_linear_outputs_are_straight_lines_over_the_run(name: str) -> None:
     run = kinfmu.solve(kinfmu.load(name))
     for output, inputs in _linear(kinfmu.load(name)).items():

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import gallery
 from kinfmu.codegen.python import emit
 from kinfmu.equations.redundancy import find_redundancy
 from kinfmu.equations.system import System
@@ -18,6 +17,7 @@ from kinfmu.gallery.chains import fourbar_chain, open_chain
 from kinfmu.joints import Distance
 from kinfmu.mechanism import Mechanism
 from kinfmu.plan import compile_plan
+from tests.gallery_members import every_member
 
 EMIT = import_module("kinfmu.codegen.python.emit")  # the package shows a function of that name
 
@@ -66,7 +66,7 @@ def test_loops_over_tables_and_unrolled_code_agree_to_the_bit(
         np.testing.assert_array_equal(getattr(looped, name), getattr(unrolled, name))
 
 
-@pytest.mark.parametrize("name", gallery.names())
+@every_member
 def test_loops_over_tables_serve_any_mechanism(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     """Units of their own, several drivers, parameters, triads, rows set aside, points of interest."""
     mechanism = kinfmu.load(name)

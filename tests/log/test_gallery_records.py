@@ -10,11 +10,11 @@ import pytest
 from mcap.reader import NonSeekingReader, make_reader
 
 import kinfmu
-from kinfmu import gallery
 from kinfmu.log import McapLog, read, write_mcap, write_rrd
 from kinfmu.log.viewer.headless import executable
 from kinfmu.run import Run
 from kinfmu.run.channels import select
+from tests.gallery_members import every_member
 from tests.log.runs import fourbar, without_samples
 from tests.log.test_mcap import assert_same
 
@@ -27,7 +27,7 @@ def solved(name: str) -> Run:
     return run.part(slice(None), events=run.events)
 
 
-@pytest.mark.parametrize("name", gallery.names())
+@every_member
 def test_a_mechanism_of_the_gallery_is_recorded_with_all_that_draws_it(name: str, tmp_path: Path) -> None:
     run, path = solved(name), tmp_path / "run.mcap"
     sink = McapLog(path)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import gallery
 from kinfmu.log.urdf import link_poses, robot_description
 from kinfmu.run import Run
 from kinfmu.scene.scene import scene
 from kinfmu.sweep import run_times
 from kinfmu.units import METRES
+from tests.gallery_members import every_member
 
 
 def solved(name: str) -> Run:
@@ -39,7 +39,7 @@ def described(name: str) -> dict[str, list[tuple[float, float, float, float]]]:
     return found
 
 
-@pytest.mark.parametrize("name", gallery.names())
+@every_member
 def test_every_link_of_the_description_has_a_frame_and_every_frame_a_link(name: str) -> None:
     moving = link_poses(solved(name), kinfmu.load(name))
     assert {*described(name)} == {"ground", *moving}

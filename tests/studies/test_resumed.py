@@ -39,6 +39,7 @@ def killed(folder: Path, parts: int) -> int:
 
 
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="counts processes in /proc")
+@pytest.mark.long
 def test_a_study_that_is_killed_has_the_same_rows(tmp_path: Path) -> None:
     path = write(tmp_path, STUDY)
     assert 3 <= killed(tmp_path, 3) < 15

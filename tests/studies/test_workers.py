@@ -67,6 +67,7 @@ def test_the_numbers_of_a_design_do_not_depend_on_those_measured_with_it(engine:
 
 @needs_dask
 @quiet
+@pytest.mark.long
 def test_a_local_cluster_gives_the_same_bytes(rows: bytes, tmp_path: Path) -> None:
     assert study(tmp_path, workers=2, dask="local") == rows
 
@@ -93,6 +94,7 @@ def scheduler() -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
 
 @needs_dask
 @quiet
+@pytest.mark.long
 def test_a_worker_of_a_cluster_that_is_killed_does_not_change_them(
     rows: bytes, tmp_path: Path, scheduler: tuple[str, list[subprocess.Popen[bytes]]]
 ) -> None:
@@ -111,12 +113,14 @@ def test_a_worker_of_a_cluster_that_is_killed_does_not_change_them(
 
 @needs_dask
 @quiet
-def test_a_cluster_that_is_lost_ends_the_study_with_its_parts_kept(tmp_path: Path) -> None:
+def test_a_cluster_gives_the_same_bytes_and_if_it_is_lost_the_parts_are_kept(rows: bytes, tmp_path: Path) -> None:
     import distributed
 
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, silence_logs=50
     ) as cluster:
+        (tmp_path / "whole").mkdir()
+        assert study(tmp_path / "whole", dask=cluster.scheduler_address) == rows
 
         def lose(done: int, _count: int) -> None:
             if done:
@@ -164,6 +168,7 @@ def test_a_worker_with_another_version_is_refused() -> None:
         run_chunk(b"", "9.9", {})
 
 
+@pytest.mark.long
 def test_a_script_without_a_guard_is_not_run_again_by_the_workers(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(

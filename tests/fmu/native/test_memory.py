@@ -52,7 +52,14 @@ def _program(mechanism: kinfmu.Mechanism, fmi: int, folder: Path, *flags: str) -
 
 
 @pytest.mark.skipif(CC is None, reason="neither gcc nor clang is there")
-@pytest.mark.parametrize(("name", "fmi"), [("fourbar", 2), ("fourbar_loaded", 3), ("settable", 3)])
+@pytest.mark.parametrize(
+    ("name", "fmi"),
+    [
+        pytest.param("fourbar", 2, marks=pytest.mark.long),
+        ("fourbar_loaded", 3),
+        pytest.param("settable", 3, marks=pytest.mark.long),
+    ],
+)
 def test_address_and_undefined_behaviour_sanitizers_report_no_errors(name: str, fmi: int, tmp_path: Path) -> None:
     check_under_sanitizers(name, fmi, tmp_path)
 
@@ -67,6 +74,7 @@ def check_under_sanitizers(name: str, fmi: int, tmp_path: Path, *more: str) -> N
 
 
 @pytest.mark.skipif(CC is None or shutil.which("valgrind") is None, reason="valgrind or a compiler is not there")
+@pytest.mark.long
 def test_valgrind_reports_no_errors(fmi: int, tmp_path: Path) -> None:
     command = ["valgrind", "--error-exitcode=9", "--leak-check=full", "-q", _program(linkage(), fmi, tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True)

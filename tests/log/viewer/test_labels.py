@@ -6,15 +6,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 import kinfmu
-from kinfmu import Mechanism, gallery
+from kinfmu import Mechanism
 from kinfmu.log import write_rrd
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.labels import dots, places_below, shown_names
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.scene.scene import Scene, drawable
+from tests.gallery_members import every_member
 from tests.log.viewer.test_rerun_file import statics
 
 SLIDER_FIRST = """
@@ -49,7 +49,7 @@ def scene_of(mechanism: Mechanism) -> Scene:
     return found
 
 
-@pytest.mark.parametrize("name", gallery.names())
+@every_member
 def test_names_of_supports_do_not_cover_each_other(name: str) -> None:
     scene = scene_of(kinfmu.load(name))
     places, names = places_below(scene) * dots(scene), list(scene.supports)

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import gallery
 from kinfmu.log import write_mcap, write_rrd
 from kinfmu.log.viewer import headless
 from kinfmu.log.viewer.comparison import write_comparison
 from kinfmu.run.channels import select
 from kinfmu.sweep import run_times
+from tests.gallery_members import every_member
 from tests.log.runs import KINDS, fourbar, with_gap
 from tests.log.viewer.test_rerun_file import verified
 from tests.sweep.test_forces import loaded
@@ -63,7 +63,7 @@ def test_no_view_reports_an_error(
     assert shot.png.startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize("name", gallery.names())
+@every_member
 def test_no_view_of_the_gallery_reports_an_error(name: str, tmp_path: Path, viewer: headless.Viewer) -> None:
     mechanism = kinfmu.load(name)
     times = run_times(mechanism.run)

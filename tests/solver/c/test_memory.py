@@ -16,6 +16,7 @@ from kinfmu import Mechanism
 from kinfmu.codegen.c import compiler, emit
 from kinfmu.plan import compile_plan
 from tests.fmu.test_parameters import linkage
+from tests.gallery_members import mostly_long
 from tests.mechanisms import six_bar
 from tests.solver.c.native import STRICT
 
@@ -46,7 +47,7 @@ def run(*command: str | Path) -> list[int]:
     return [int(count) for count in done.stdout.split()]
 
 
-@pytest.mark.parametrize("name", MECHANISMS)
+@pytest.mark.parametrize("name", mostly_long(MECHANISMS, few=("bridges",)))
 def test_sanitizers_find_nothing(name: str, tmp_path: Path) -> None:
     try:
         program = walker(name, tmp_path, compiler.command(), "-O0", *SANITIZERS)
@@ -61,6 +62,7 @@ def test_sanitizers_find_nothing(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind is not installed")
+@pytest.mark.long
 def test_valgrind_finds_nothing(tmp_path: Path) -> None:
     """With bridges; parameters are set under valgrind in tests/fmu/native/test_memory.py."""
     program = walker("bridges", tmp_path, compiler.command(), "-O1", "-g")
@@ -68,6 +70,7 @@ def test_valgrind_finds_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
+@pytest.mark.long
 def test_zig_compiles_without_a_warning_and_finds_the_same(tmp_path: Path) -> None:
     (tmp_path / "zig").mkdir()
     zig = walker("limits", tmp_path / "zig", (sys.executable, "-m", "ziglang", "cc"), "-O2")

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import Mechanism, gallery
+from kinfmu import Mechanism
 from kinfmu.codegen.c import compiler
 from kinfmu.codegen.python import load_model, load_module
 from kinfmu.plan import SolvePlan, compile_plan
@@ -29,6 +29,7 @@ from kinfmu.solver.python.pose import AT_REST, UNIT_SPEED
 from kinfmu.solver.python.span import PLACES
 from kinfmu.sweep import run_times
 from tests.fmu.test_parameters import geared, linkage
+from tests.gallery_members import every_member, mostly_long
 from tests.mechanisms import (
     bar_as_body,
     beside,
@@ -118,7 +119,7 @@ def defined(files: Sequence[str]) -> dict[str, float]:
     return {name: float(number) for name, number in re.findall(r"^#define (\w+) ([0-9][0-9.e+-]*)", text, re.M)}
 
 
-@pytest.mark.parametrize("name", gallery.names())
+@every_member
 def test_c_and_python_are_the_same_over_the_run_of_a_gallery_mechanism(name: str) -> None:
     mechanism = kinfmu.load(name)
     plan = compile_plan(mechanism)
@@ -168,7 +169,19 @@ SINGULAR: dict[str, tuple[Callable[[], Mechanism], Samples, set[Status]]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", SINGULAR)
+@pytest.mark.parametrize(
+    "name",
+    mostly_long(
+        SINGULAR,
+        few=(
+            "parallelogram with a redundant bar",
+            "antiparallelogram",
+            "two loops",
+            "double pendulum",
+            "tight gripper",
+        ),
+    ),
+)
 def test_c_and_python_are_the_same_near_singular_points_and_limits(name: str) -> None:
     mechanism, samples, expected = SINGULAR[name]
     statuses = assert_same(compile_plan(mechanism()), samples)
