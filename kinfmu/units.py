@@ -8,6 +8,7 @@ rates `.vx .vy .omega`, their accelerations `.ax .ay .alpha`; points likewise.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from functools import cache
 from typing import Annotated, NamedTuple
@@ -37,6 +38,7 @@ Acceleration = Annotated[float, Quantity("length", 2)]
 METRES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "km": 1e3, "in": 0.0254, "ft": 0.3048}
 ANGLES = {"rad": 1.0, "deg": math.pi / 180.0, "rev": 2.0 * math.pi}
 SECONDS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
+OTHER_SPELLINGS = {"\N{DEGREE SIGN}": "deg", "inch": "in"}  # also accepted, but not listed in messages
 HIGHEST_ORDER = 7  # of a derivative with a unit
 
 POUND = 0.45359237  # [kg]
@@ -111,6 +113,14 @@ def looks_like_degrees(angle: float) -> bool:
 def in_turns(angle: float) -> str:
     """Return an angle [rad] in turns, for messages: '57.3 turns' for 360 rad."""
     return f"{abs(angle) / ANGLES['rev']:.3g} turns"
+
+
+_OTHER_SPELLING = re.compile("|".join(rf"(?<![^\W\d]){one}(?!\w)" for one in OTHER_SPELLINGS))
+
+
+def spelled(unit: str) -> str:
+    """Return a unit in the spelling of kinfmu: 'deg/s' for '\N{DEGREE SIGN}/s', 'lbf/in' for 'lbf/inch'."""
+    return _OTHER_SPELLING.sub(lambda found: OTHER_SPELLINGS[found[0]], unit)
 
 
 def unit_of(quantity: Quantity, length_unit: str) -> str:

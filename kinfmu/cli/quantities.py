@@ -9,7 +9,7 @@ import click
 from kinfmu.cli.arguments import ArgumentType
 from kinfmu.cli.messages import note
 from kinfmu.errors import listed
-from kinfmu.units import ANGLES, Quantity, factors, in_turns, looks_like_degrees
+from kinfmu.units import ANGLES, Quantity, factors, in_turns, looks_like_degrees, spelled
 
 
 class Time(ArgumentType):
@@ -113,6 +113,7 @@ def is_bare(text: str) -> bool:
 def _number(text: str, quantity: Quantity, length_unit: str = "m") -> float:
     """Return '360deg' in radians, '1.5' unchanged, '3mm' in the unit of length; a ValueError lists the valid units."""
     known = factors(quantity, length_unit)
+    text = spelled(text)
     for unit in sorted(known, key=len, reverse=True):
         if text.endswith(unit) and text[: -len(unit)].strip():
             text, factor = text[: -len(unit)], known[unit]

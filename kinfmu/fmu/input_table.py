@@ -19,7 +19,7 @@ from kinfmu.mechanism.table_file import read_decimal
 from kinfmu.mechanism.valid import quoted
 from kinfmu.run import MOST_SAMPLES, Event
 from kinfmu.run.unwrap import is_long, unwrap
-from kinfmu.units import Quantity, factors, in_turns, looks_like_degrees, quantity_in
+from kinfmu.units import Quantity, factors, in_turns, looks_like_degrees, quantity_in, spelled
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -197,6 +197,7 @@ def _factor(where: str, name: str, unit: str, known: Mapping[str, float]) -> flo
     """Return the factor from the column's unit to the unit of the FMU."""
     if not unit:
         return 1.0
+    unit = spelled(unit)
     if unit not in known:
         raise FmuError(
             f"{where}: unit {quoted(unit)} of {name} must be one of {listed(known)}{suggestion(unit, known)}"

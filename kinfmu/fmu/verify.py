@@ -17,7 +17,7 @@ from kinfmu.fmu.simulate import simulate
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, text_in, unpacked
 from kinfmu.mechanism.valid import quoted
 from kinfmu.run import FloatArray
-from kinfmu.units import every_unit
+from kinfmu.units import every_unit, spelled
 
 _SAME_TIME = 1e-6  # of a step: hosts sum up time
 _UNIT = re.compile(r"\s*\[([^]]*)\]\s*$")
@@ -183,13 +183,13 @@ def _number(text: str) -> float:
 
 def _factor(path: Path, title: str, unit: str, length_unit: str) -> float:
     """Return the factor from the unit in the title of a column, if there is one, to that of the variable."""
-    stated = _UNIT.search(title)
-    known = every_unit(length_unit)
-    if stated is None or stated[1] == unit or stated[1] not in known or unit not in known:
+    found = _UNIT.search(title)
+    stated, known = spelled(found[1]) if found else unit, every_unit(length_unit)
+    if stated == unit or stated not in known or unit not in known:
         return 1.0  # hosts also write types in brackets
-    if known[stated[1]][0] != known[unit][0]:
-        raise FmuError(f"{path}: column {quoted(title)}: unit '{stated[1]}' does not fit '{unit}'")
-    return known[stated[1]][1] / known[unit][1]
+    if known[stated][0] != known[unit][0]:
+        raise FmuError(f"{path}: column {quoted(title)}: unit '{stated}' does not fit '{unit}'")
+    return known[stated][1] / known[unit][1]
 
 
 def _compared(

@@ -5,7 +5,7 @@
     power   = atom ["**" whole number]
     atom    = number [unit] | name | "pi" | function "(" sum { "," sum } ")" | "(" sum ")"
 
-A word directly after a number is its unit, or several words, such as "N m"; around the slash of a unit, such as "mm/s",
+A word or a degree sign directly after a number is its unit, or several words, such as "N m"; around the slash of a unit, such as "mm/s",
 are no blanks. This module parses the text; Python never evaluates it.
 """
 
@@ -24,7 +24,7 @@ from kinfmu.measures.arithmetic import Value, atan2, cos, sin, sqrt
 from kinfmu.mechanism import dimension
 from kinfmu.mechanism.dimension import Dimension, DimensionError
 from kinfmu.mechanism.valid import quoted
-from kinfmu.units import every_unit
+from kinfmu.units import every_unit, spelled
 
 T = TypeVar("T")
 LONGEST = 1000  # characters
@@ -233,7 +233,7 @@ _TOKEN = re.compile(
     r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
     r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<sign>\*\*|[-+*/(),])"
 )
-_WORD = "[A-Za-z_][A-Za-z0-9_]*"
+_WORD = r"(?:[A-Za-z_][A-Za-z0-9_]*|\N{DEGREE SIGN})"
 _UNIT = re.compile(rf"[ \t]*({_WORD}((?: {_WORD}){{0,2}}))(/{_WORD})?")  # the longest has three words, 'N m s/rad'
 
 
@@ -347,8 +347,8 @@ class _Parser:
         if match:
             begin, ends = match.start(1), [match.end(), match.end(1)]
             ends += [k for k in range(match.end(1) - 1, begin, -1) if self._text[k] == " "]
-            end = next((end for end in ends if self._text[begin:end] in self._units), ends[-1])
-            unit = self._text[begin:end]
+            end = next((end for end in ends if spelled(self._text[begin:end]) in self._units), ends[-1])
+            unit = spelled(self._text[begin:end])
             if unit not in self._units:
                 known = listed(u for u in self._units if not {"/", " "} & set(u))
                 more = "and such as mm/s, rad/s2, N m"

@@ -29,7 +29,7 @@ from kinfmu.mechanism.parameters import Parameter, parameter_values
 from kinfmu.mechanism.resolve import resolve
 from kinfmu.mechanism.settings import LawConstant, Settable, law_constants, with_law_constants
 from kinfmu.readings import Reading
-from kinfmu.units import CoordinateName, Quantity
+from kinfmu.units import OTHER_SPELLINGS, CoordinateName, Quantity
 
 
 @dataclass(frozen=True)
@@ -87,6 +87,7 @@ class Mechanism(Live):
             object.__setattr__(self, "bodies", (Body(GROUND_NAME), *self.bodies))
         object.__setattr__(self, "points", MappingProxyType(dict(self.points)))
         object.__setattr__(self, "gravity", read_gravity(self.gravity))
+        object.__setattr__(self, "length_unit", OTHER_SPELLINGS.get(self.length_unit, self.length_unit))
         check_header(self.name, self.title, self.length_unit)
         check_names(self.members, self.points)
         object.__setattr__(self, "loads", tuple(load.with_unit(self.length_unit) for load in self.loads))

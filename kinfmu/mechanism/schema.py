@@ -47,7 +47,7 @@ def schema() -> Schema:
     tables = {
         "name": _ref("name", description="The mechanism's name, and its FMU's"),
         "title": {"type": "string", "description": "One line for people"},
-        "units": _table({"length": {"enum": list(METRES), "description": "Unit of bare lengths; default: m"}}),
+        "units": _table({"length": {"enum": [*METRES, "inch"], "description": "Unit of bare lengths; default: m"}}),
         "parameters": {
             "type": "object",
             "description": "Numbers that expressions refer to by name",

@@ -13,7 +13,7 @@ from kinfmu.loads import LOADS
 from kinfmu.measures import POSE_QUANTITIES
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
 from kinfmu.readings import READINGS
-from kinfmu.units import ANGLES, KINDS, METRES, SECONDS, Quantity
+from kinfmu.units import ANGLES, KINDS, METRES, OTHER_SPELLINGS, SECONDS, Quantity
 
 SHAPES = {
     "truth": "`true` or `false`",
@@ -68,7 +68,7 @@ def _with(page: str, texts: dict[str, str]) -> str:
 def _units() -> str:
     rows = {"length": METRES, "angle": ANGLES, "time": SECONDS}
     lines = ["| what | units |", "|---|---|"]
-    lines += [f"| {kind} | {_listed(units)} |" for kind, units in rows.items()]
+    lines += [f"| {kind} | {_listed(_with_other_spellings(units))} |" for kind, units in rows.items()]
     lines += [
         "| speed | such as `mm/s`, `m/min` |",
         "| angular speed | such as `rad/s`, `deg/s`, `rev/min`; `rpm`; `Hz` (periods or turns per second) |",
@@ -81,6 +81,13 @@ def _units() -> str:
         "| number | none |",
     ]
     return "\n".join(lines)
+
+
+def _with_other_spellings(units: Iterable[str]) -> Iterable[str]:
+    """Yield units, each followed by its other spelling."""
+    others = {unit: other for other, unit in OTHER_SPELLINGS.items()}
+    for unit in units:
+        yield from (unit, others[unit]) if unit in others else (unit,)
 
 
 def _listed(units: Iterable[str]) -> str:

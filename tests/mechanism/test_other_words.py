@@ -16,15 +16,31 @@ from tests.analysis.test_design_notes import FOURBAR
         ('O = { type = "revolute"', 'O = { type = "hinge"', "revolute"),
         ('O = { type = "revolute"', 'O = { type = "prismatic"', "translational"),
         ('O = { type = "revolute"', 'O = { type = "slider"', "translational"),
-        ('"78 deg"', '"78°"', "deg"),
         ('"78 deg"', '"78 degrees"', "deg"),
-        ("x = 20,", 'x = "20 inch",', "in"),
-        ('length = "mm"', 'length = "inch"', "in"),
+        ("x = 20,", 'x = "20 inches",', "in"),
+        ('length = "mm"', 'length = "inches"', "in"),
     ],
 )
 def test_a_word_of_another_program_suggests_the_word_of_kinfmu(old: str, new: str, meant: str) -> None:
     with pytest.raises(MechanismError, match=rf"; did you mean '{meant}'\?"):
         parse(FOURBAR.replace(old, new), "fourbar.toml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "same"),
+    [
+        ('"78 deg"', '"78°"', '"78 deg"'),
+        ('"78 deg"', '"78 °"', '"78 deg"'),
+        ('"78 deg"', '"30° + 48°"', '"30 deg + 48 deg"'),
+        ("x = 20,", 'x = "20 inch",', 'x = "20 in",'),
+        ("x = 20,", 'x = "2*(4 inch + 0.5inch)",', 'x = "2*(4 in + 0.5in)",'),
+        ('length = "mm"', 'length = "inch"', 'length = "in"'),
+    ],
+)
+def test_degree_sign_and_inch_are_units(old: str, new: str, same: str) -> None:
+    assert old in FOURBAR
+    found, wanted = (parse(FOURBAR.replace(old, text), "fourbar.toml") for text in (new, same))
+    assert (found.bodies, found.length_unit) == (wanted.bodies, wanted.length_unit)
 
 
 def test_another_word_is_suggested_only_where_its_meaning_is_known() -> None:

@@ -70,8 +70,8 @@ CHANGES = {
     "a unit that is unknown": ('phi = "60 deg"', 'phi = "60 grad"', "unit 'grad' must be one of rad, deg, rev"),
     "a unit of length that is unknown": (
         "[parameters]",
-        'units = { length = "inch" }\n[parameters]',
-        "[units] length = 'inch' is not a unit of length; did you mean 'in'?; known: m, mm",
+        'units = { length = "inches" }\n[parameters]',
+        "[units] length = 'inches' is not a unit of length; did you mean 'in'?; known: m, mm",
     ),
     "a parameter of another kind": (
         "crank = 1.0",
