@@ -5,8 +5,8 @@
     power   = atom ["**" whole number]
     atom    = number [unit] | name | "pi" | function "(" sum { "," sum } ")" | "(" sum ")"
 
-A word or a degree sign directly after a number is its unit, or several words, such as "N m"; around the slash of a unit, such as "mm/s",
-are no blanks. This module parses the text; Python never evaluates it.
+A word or a degree sign directly after a number is its unit, or several words, such as "N m"; around the slash of a
+unit, such as "mm/s", are no blanks. This module parses the text; Python never evaluates it.
 """
 
 from __future__ import annotations
@@ -137,6 +137,12 @@ class Expression:
     def alone(self) -> str | None:
         """The name of the parameter if it is the whole expression, else None."""
         return self.steps[0].value if len(self.steps) == 1 and self.names else None
+
+    @property
+    def alone_or_negative(self) -> str | None:
+        """The name of the parameter if the expression is only it and its sign, else None."""
+        first, *signs = self.steps
+        return first.value if first.operation == "name" and all(one.operation == "sign" for one in signs) else None
 
     @property
     def literal(self) -> Step | None:

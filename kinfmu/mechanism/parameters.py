@@ -27,7 +27,8 @@ class Parameter:
     Args:
         value: The number in the units used inside; before a mechanism resolves it also text with a unit or an
             expression of other parameters ("40 mm", "2*a").
-        quantity: What it measures. Default: from its unit, else from the key whose value is its name, else a number.
+        quantity: What it measures. Default: from its unit, else from the key whose value is its name or its negative, else
+            a number.
         description: One line for people. Default: none.
 
     """
@@ -69,7 +70,7 @@ def resolve_parameters(parameters: Mapping[str, Parameter], alone: Mapping[str, 
 
     Args:
         parameters: As `read_parameter` returns them, by name.
-        alone: For a parameter the quantities of the places where its name is the whole expression.
+        alone: For a parameter the quantities of the places where its name, or its negative, is the whole expression.
 
     Returns:
         The parameters in the given order.
@@ -85,7 +86,7 @@ def resolve_parameters(parameters: Mapping[str, Parameter], alone: Mapping[str, 
     for name in reversed(order):
         if quantities[name] is None and name not in expressions and len(wanted[name]) == 1:
             (quantities[name],) = wanted[name]
-        other = expressions[name].alone if name in expressions else None
+        other = expressions[name].alone_or_negative if name in expressions else None
         if other is not None:
             wanted[other] |= wanted[name]
     done: dict[str, Parameter] = {}

@@ -54,8 +54,8 @@ def resolve(members: Members, given: Mapping[str, Parameter], unit: str) -> Reso
         number = read_number(path_text(place), value, quantity, unit)
         if isinstance(number, Expression):
             expressions[place] = number
-            if number.alone:
-                alone.setdefault(number.alone, set()).add(quantity)
+            if number.alone_or_negative:
+                alone.setdefault(number.alone_or_negative, set()).add(quantity)
         return number
 
     members = members.changed(as_written)
