@@ -170,13 +170,19 @@ def factors(quantity: Quantity, length_unit: str) -> dict[str, float]:
     return written
 
 
-def display_units(unit: str) -> dict[str, float]:
-    """Return the display units of a declared unit with their factors (display value = factor * value), for FMI."""
+def display_units(unit: str, length: str = "mm") -> dict[str, float]:
+    """Return the display units of a declared unit with their factors (display value = factor * value), for FMI.
+
+    Args:
+        unit: Unit that a variable declares.
+        length: Unit in which lengths in m are shown. Default: mm, which is always defined.
+
+    """
     base, slash, per = unit.partition("/")
     if base == "rad":
         return {f"deg{slash}{per}": 180.0 / math.pi}
     if base == "m":
-        return {f"mm{slash}{per}": 1e3}
+        return {f"{shown}{slash}{per}": 1.0 / METRES[shown] for shown in dict.fromkeys(("mm", length)) if shown != "m"}
     return {}
 
 

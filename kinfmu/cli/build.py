@@ -14,6 +14,7 @@ from kinfmu.cli.group import errors_of, main
 from kinfmu.cli.messages import Progress, note, patience
 from kinfmu.cli.settings import checked_settings, set_option
 from kinfmu.errors import CompilerError, listed
+from kinfmu.files.whole_file import suffix_of
 
 if TYPE_CHECKING:
     from kinfmu.mechanism import Mechanism
@@ -25,8 +26,8 @@ if TYPE_CHECKING:
     "-o",
     "output",
     type=click.Path(path_type=Path),
-    help="The .fmu to write, or its folder. Default: <name>.fmu in the current folder, or in its fmus/<name>/ for a "
-    "mechanism of the gallery.",
+    help="The .fmu (or .ssp) to write, or its folder. Default: <name>.fmu in the current folder, or in its "
+    "fmus/<name>/ for a mechanism of the gallery.",
 )
 @click.option(
     "--flavour",
@@ -60,6 +61,18 @@ if TYPE_CHECKING:
     default=None,
     help="Put the page of kinfmu play into the FMU's documentation. Default: if ziglang is installed.",
 )
+@click.option(
+    "--si",
+    is_flag=True,
+    help="Lengths of all variables in m, for hosts that convert no units; hosts that do show the file's unit. Angles, "
+    "masses and forces are in SI units in any case.",
+)
+@click.option("--ssp", is_flag=True, help="Write an .ssp (SSP 1.0): the FMU, its connectors, a set of all parameters.")
+@click.option(
+    "--osp",
+    is_flag=True,
+    help="Write also <name>_OspModelDescription.xml beside the FMU: groups of variables, for libcosim.",
+)
 @outputs_option
 @click.option("--author", help="Author, stated in the FMU.")
 @click.option("--model-version", "version", help="Version of the model, stated in the FMU.")
@@ -77,6 +90,9 @@ def build(
     platforms: str,
     drive: Any,
     page: bool | None,
+    si: bool,
+    ssp: bool,
+    osp: bool,
     outputs: str | None,
     author: str | None,
     version: str | None,
@@ -91,35 +107,40 @@ def build(
     """
     from kinfmu.fmu import build as built
     from kinfmu.fmu.build import default_drive, default_flavour, native_obstacle, platforms_of
-    from kinfmu.fmu.played import add_page
 
     for option, value, plain in (("--fmi", fmi, "2"), ("--platforms", platforms, "host")):
         if flavour == "python" and value != plain:
             raise click.UsageError(f"{option} {value} needs --flavour native; the python flavour has {option} {plain}")
+    if osp and (ssp or (output is not None and suffix_of(output) == ".ssp")):
+        raise click.UsageError("--osp describes an FMU for the folder that it is in; an .ssp holds none")
     mech = checked_settings(gallery.load(mechanism), settings).mechanism()
     drive = drive or default_drive(mech)
     stated = {"author": author, "version": version, "license": license_, "copyright": copyright_, "date": date}
     chosen = flavour or default_flavour(int(fmi), platforms)
-    with errors_of(mechanism), patience(), Progress("compiling for all platforms", least=2) as progress:
-        html = _page(mech, page)
+    with errors_of(mechanism), Progress("compiling for all platforms", least=2) as progress:
         path = built(
             mech,
-            output or _place(mechanism, mech.name),
+            output or _place(mechanism, mech.name, ".ssp" if ssp else ".fmu"),
             flavour=chosen,
             drive=drive,
             outputs=names_in(outputs),
             fmi=int(fmi),
             platforms=platforms,
             metadata={name: text for name, text in stated.items() if text is not None},
+            si=si,
+            ssp=ssp,
+            osp=osp,
+            page=lambda: _page(mech, page),
             progress=progress,
         )
-        if html:
-            add_page(path, html)
     is_native = chosen == "native"
     kinds = "co-simulation and model exchange" if is_native else "co-simulation"
     where = listed(platforms_of(path)) + ("" if is_native else " in hosts that contain Python")
     size = f"{path.stat().st_size / 1000.0:.0f} kB"
-    click.echo(f"{path}: {size}, {chosen} FMU for {where}, FMI {fmi}.0 {kinds}, driven by {drive}")
+    held = "SSP with a " if suffix_of(path) == ".ssp" else ""
+    click.echo(f"{path}: {size}, {held}{chosen} FMU for {where}, FMI {fmi}.0 {kinds}, driven by {drive}")
+    if osp:
+        click.echo(path.with_name(f"{mech.name}_OspModelDescription.xml"))
     obstacle = native_obstacle() if flavour is None and not is_native else ""
     if obstacle:
         click.echo(f"a native FMU, which every host can load, is not possible here: {obstacle}", err=True)
@@ -132,7 +153,8 @@ def _page(mechanism: Mechanism, wanted: bool | None) -> str:
     if wanted is False or (wanted is None and find_spec("ziglang") is None):
         return ""
     try:
-        return page(mechanism)
+        with patience():
+            return page(mechanism)
     except CompilerError as error:
         if wanted:
             raise
@@ -140,7 +162,7 @@ def _page(mechanism: Mechanism, wanted: bool | None) -> str:
         return ""
 
 
-def _place(given: str, name: str) -> Path:
+def _place(given: str, name: str, ending: str) -> Path:
     """Return <name>.fmu, in fmus/<name>/ of a checkout for a mechanism given by its name in the gallery."""
     own = Path("fmus") / name
-    return (own if given in gallery.names() and own.is_dir() else Path()) / f"{name}.fmu"
+    return (own if given in gallery.names() and own.is_dir() else Path()) / f"{name}{ending}"

@@ -28,19 +28,20 @@ def token(digits: str) -> str:
     return "{" + "-".join((digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:32])) + "}"
 
 
-def zipped(contents: Mapping[str, bytes]) -> bytes:
+def zipped(contents: Mapping[str, bytes], first: str = "modelDescription.xml") -> bytes:
     """Return a zip archive with fixed dates, permissions, system and order.
 
     Args:
         contents: Files by path.
+        first: The file that comes first in the archive. Default: that of an FMU.
 
     Returns:
-        Bytes of the archive, in which modelDescription.xml is first.
+        Bytes of the archive.
 
     """
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for path in ("modelDescription.xml", *sorted(contents.keys() - {"modelDescription.xml"})):
+        for path in (first, *sorted(contents.keys() - {first})):
             entry = zipfile.ZipInfo(path, EPOCH)
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.create_system = 3  # Unix: it holds the permissions that follow

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from kinfmu.errors import CompilerError, FmuError, RequestError, listed, suggestion
 from kinfmu.files.whole_file import suffix_of, write_whole
@@ -31,6 +34,10 @@ def build(
     fmi: int = 2,
     platforms: str = "host",
     metadata: Mapping[str, str] | None = None,
+    si: bool = False,
+    ssp: bool = False,
+    osp: bool = False,
+    page: Callable[[], str] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Write the FMU of a mechanism and return its path.
@@ -39,7 +46,7 @@ def build(
 
     Args:
         mechanism: Mechanism to build.
-        path: File that ends in .fmu, or a folder. Default: `<name>.fmu` in the current folder.
+        path: File that ends in .fmu (or .ssp), or a folder. Default: `<name>.fmu` in the current folder.
         flavour: 'native' (C, for all hosts) or 'python' (through pythonfmu, for hosts that are Python processes).
             Default: native where a C compiler is found, else python.
         drive: Default of the parameter `driven_by_time`: 'time' (the laws in the file drive) or 'inputs'. Default:
@@ -53,6 +60,13 @@ def build(
         platforms: Platforms of the native flavour: 'host' (compiled by the system's compiler) or 'all' (by zig).
         metadata: Texts of the model description by name: author, version, license, copyright, date. Default: none,
             also no date, so that two builds are equal.
+        si: True: lengths of all variables are in m, which hosts show in the mechanism's unit (`displayUnit`). Angles,
+            times, masses and forces are in SI units in every FMU. Default: lengths are in the mechanism's unit.
+        ssp: True: write an .ssp that holds the FMU, with its connectors and a set of all parameters. Default: true if
+            the path ends in .ssp.
+        osp: True: write also `<name>_OspModelDescription.xml`, beside the FMU, with groups of variables for libcosim.
+        page: Called after the FMU is compiled; returns a page, such as that of `kinfmu.page`, to put into its
+            documentation, '' for none. Default: none.
         progress: Called with (platforms done, number of platforms) during compilation.
 
     Returns:
@@ -77,18 +91,21 @@ def build(
     from kinfmu.plan.forces import loaded_coordinates
 
     stated = attributes(metadata or {})
-    path = _file(path, mechanism.name)
+    path = _file(path, mechanism.name, ssp=ssp)
+    if osp and suffix_of(path) == ".ssp":
+        raise RequestError("osp describes an FMU for the folder that it is in; an .ssp holds none")
+    shown, mechanism = mechanism.length_unit, mechanism.in_metres() if si else mechanism
     coordinates, names = chosen_outputs(mechanism, outputs)
     owned, forces = None, {}
     if drive == "torque":
         from kinfmu.fmu.owned_motion import owned_motion
 
         plan = compile_plan(mechanism, coordinates, solved=loaded_coordinates(mechanism))
-        papers = documents(plan, fmi, stated)
+        papers = documents(plan, fmi, stated, shown)
         plan, owned = owned_motion(plan)
     else:
         plan = compile_plan(mechanism, coordinates, solved=loaded_coordinates(mechanism) if names else ())
-        papers = documents(plan, fmi, stated)
+        papers = documents(plan, fmi, stated, shown)
     if names:
         forces = force_stages(plan, names, are_default=outputs is None)
     if flavour == "python":
@@ -99,7 +116,25 @@ def build(
         from kinfmu.fmu.native import archive
 
         data = archive.archive(plan, drive, VERSION, FMI_VERSIONS[fmi], platforms, progress, forces, owned, papers)
+    return _written(path, data, page() if page else "", osp=osp)
+
+
+def _written(path: Path, data: bytes, page: str, *, osp: bool) -> Path:
+    """Write an FMU, with its page, or the .ssp that holds it, and the description for OSP."""
+    if suffix_of(path) == ".ssp":
+        from kinfmu.fmu.ssp import write_ssp
+
+        with TemporaryDirectory(prefix="kinfmu_", ignore_cleanup_errors=True) as folder:
+            return write_ssp(_written(Path(folder) / "model.fmu", data, page, osp=False), path)
     _write(path, data)
+    if page:
+        from kinfmu.fmu.played import add_page
+
+        add_page(path, page)
+    if osp:
+        from kinfmu.fmu.osp import write_osp
+
+        write_osp(path)
     return path
 
 
@@ -155,20 +190,24 @@ def native_obstacle() -> str:
 
 
 def platforms_of(path: Path) -> tuple[str, ...]:
-    """Return the platforms that an FMU holds binaries for, such as 'x86_64-linux'."""
+    """Return the platforms that an FMU, or the one in an .ssp, holds binaries for, such as 'x86_64-linux'."""
     from kinfmu.fmu.native.platforms import PLATFORMS as NATIVE_PLATFORMS
 
     with zipfile.ZipFile(path) as zipped:
-        folders = {name.split("/")[1] for name in zipped.namelist() if name.startswith("binaries/")}
+        inside = next((name for name in zipped.namelist() if name.endswith(".fmu")), None)
+        with zipfile.ZipFile(io.BytesIO(zipped.read(inside))) if inside else nullcontext(zipped) as fmu:
+            folders = {name.split("/")[1] for name in fmu.namelist() if name.startswith("binaries/")}
     return tuple(one.name for one in NATIVE_PLATFORMS if folders & {one.name, one.fmi2})
 
 
-def _file(path: str | Path | None, name: str) -> Path:
-    path = Path(f"{name}.fmu" if path is None else path)
+def _file(path: str | Path | None, name: str, *, ssp: bool) -> Path:
+    ending = ".ssp" if ssp else ".fmu"
+    path = Path(f"{name}{ending}" if path is None else path)
     if path.is_dir():
-        return path / f"{name}.fmu"
-    if suffix_of(path) != ".fmu":
-        raise RequestError(f"{path}: is no folder, and the file of an FMU ends in .fmu")
+        return path / f"{name}{ending}"
+    if suffix_of(path) not in ((".ssp",) if ssp else (".fmu", ".ssp")):
+        what = "a system ends in .ssp" if ssp else "an FMU ends in .fmu"
+        raise RequestError(f"{path}: is no folder, and the file of {what}")
     return path
 
 

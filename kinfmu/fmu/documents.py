@@ -34,6 +34,7 @@ class Documents:
         fmi: Version of FMI, 2 or 3.
         metadata: Attributes of the model description, such as `author`.
         reach: Range of the only driver, as written; None with several drivers, whose ranges depend on each other.
+        display_length: Unit in which tools show lengths in m; None: m.
 
     """
 
@@ -41,6 +42,7 @@ class Documents:
     fmi: int
     metadata: Mapping[str, str]
     reach: DriverRange | None
+    display_length: str | None = None
 
     def files(self, variables: Interface) -> dict[str, bytes]:
         """Return the files by path in the FMU.
@@ -66,16 +68,19 @@ class Documents:
         return contents | {f"{folder}/icon.png": png(drawn), f"{folder}/icon.svg": image.encode()}
 
 
-def documents(plan: SolvePlan, fmi: int, metadata: Mapping[str, str] = MappingProxyType({})) -> Documents:
+def documents(
+    plan: SolvePlan, fmi: int, metadata: Mapping[str, str] = MappingProxyType({}), display_length: str | None = None
+) -> Documents:
     """Return the documents of the FMU of a plan.
 
     Args:
         plan: The plan.
         fmi: Version of FMI, 2 or 3.
         metadata: Attributes of the model description. Default: none.
+        display_length: Unit in which tools show lengths in m. Default: m.
 
     """
-    return Documents(plan, fmi, metadata, _only_range(plan))
+    return Documents(plan, fmi, metadata, _only_range(plan), display_length)
 
 
 def _only_range(plan: SolvePlan) -> DriverRange | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from kinfmu.errors import FmuError
@@ -47,6 +47,7 @@ class Variable:
         nominal: Usual magnitude; None if it is 1 or unknown.
         derivative_of: Variable of which this is the time derivative.
         declared_type: Name of the type of an Enumeration.
+        display_length: Unit of length in which tools show a variable in m, m/s, ... by default; None: m.
         dependencies: Inputs that an output depends on structurally; None if FMI lists none.
         linear_in: Those of them whose factor depends on fixed parameters alone.
         initial_dependencies: Inputs and parameters that it depends on during initialization.
@@ -66,6 +67,7 @@ class Variable:
     nominal: float | None = None
     derivative_of: str | None = None
     declared_type: str | None = None
+    display_length: str | None = None
     dependencies: tuple[str, ...] | None = None
     linear_in: tuple[str, ...] = ()
     initial_dependencies: tuple[str, ...] | None = None
@@ -79,10 +81,16 @@ class Variable:
 
     @property
     def display_unit(self) -> str | None:
-        """The unit in which tools show the value by default: degrees for angles, else None."""
+        """The unit in which tools show the value by default: degrees for angles, `display_length` for lengths."""
         if self.unit in _ANGLES_SHOWN_IN_DEGREES:
             return next(iter(display_units(self.unit)))
-        return None
+        base, slash, per = (self.unit or "").partition("/")
+        return f"{self.display_length}{slash}{per}" if self.display_length and base == "m" else None
+
+    @property
+    def display_units(self) -> dict[str, float]:
+        """The display units of its unit with their factors."""
+        return display_units(self.unit or "1", self.display_length or "mm")
 
 
 @dataclass(frozen=True)
@@ -129,6 +137,18 @@ class Interface:
     def __iter__(self) -> Iterator[Variable]:
         for part in self.parts:
             yield from part.variables
+
+    def displayed_in(self, length: str | None) -> Interface:
+        """Return the interface with a unit in which tools show its lengths in m; itself for None and its own unit."""
+        if length in (None, self.length_unit):
+            return self
+
+        def shown(variable: Variable) -> Variable:
+            is_length = (variable.unit or "").partition("/")[0] == "m"
+            return replace(variable, display_length=length) if is_length else variable
+
+        parts = tuple(replace(part, variables=tuple(map(shown, part.variables))) for part in self.parts)
+        return replace(self, parts=parts)
 
     def part(self, name: str) -> tuple[Variable, ...]:
         """Return the variables of a part, none if the FMU does not have that part."""

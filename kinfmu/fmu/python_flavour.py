@@ -123,6 +123,7 @@ def archive(
     """
     starts, reach = owned.starts if owned else (), documents.reach if documents else None
     variables = interface(plan, drive, forces=forces, starts=starts, reach=reach)
+    variables = variables.displayed_in(documents.display_length if documents else None)
     in_si = units_in_si(plan) if owned else ()
     contents = _contents(plan, variables, version, in_si)
     stages = dict(forces) | ({"inertia": owned.inertia} if owned else {})

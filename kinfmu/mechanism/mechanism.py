@@ -216,6 +216,12 @@ class Mechanism(Live):
         loads = with_law_constants(self.loads, self.load_constants, constants)
         return replace(self, parameters=parameters, drivers=drivers, loads=loads)
 
+    def in_metres(self) -> Mechanism:
+        """Return the mechanism with the metre as its unit of length; lengths and expressions stay the same lengths."""
+        from kinfmu.mechanism.metres import in_metres  # it needs every class of this package
+
+        return in_metres(self)
+
 
 def require_masses(mechanism: Mechanism) -> None:
     """Raise a RequestError if no body has a mass or an inertia, so that efforts determine no motion."""

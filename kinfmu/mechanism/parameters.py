@@ -27,8 +27,8 @@ class Parameter:
     Args:
         value: The number in the units used inside; before a mechanism resolves it also text with a unit or an
             expression of other parameters ("40 mm", "2*a").
-        quantity: What it measures. Default: from its unit, else from the key whose value is its name or its negative, else
-            a number.
+        quantity: What it measures. Default: from its unit, else from the key whose value is its name or its negative,
+            else a number.
         description: One line for people. Default: none.
 
     """

@@ -12,7 +12,7 @@ import kinfmu
 from kinfmu.equations.graph import evaluate
 from kinfmu.equations.system import placement
 from kinfmu.errors import KinfmuError, MechanismError, RequestError
-from kinfmu.fmu.description.common import _base_unit
+from kinfmu.fmu.description.common import base_unit
 from kinfmu.loads import ForceAt, Spring
 from kinfmu.mechanism import Body, Gravity, Mechanism
 from kinfmu.mechanism.toml_file import parse
@@ -216,7 +216,7 @@ def test_a_unit_with_a_mass_has_its_powers_and_one_quantity(kind: str) -> None:
     assert unit == KINDS[kind].unit
     assert every_unit("mm")[unit] == (quantity, 1.0)
     assert length_power(quantity) == KINDS[kind].powers[1]
-    exponents = {key: int(value) for key, value in _base_unit(unit).items()}
+    exponents = {key: int(value) for key, value in base_unit(unit).items()}
     assert tuple(exponents.get(key, 0) for key in ("kg", "m", "s")) == KINDS[kind].powers
 
 

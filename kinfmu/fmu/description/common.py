@@ -11,7 +11,7 @@ from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.interface import RATES_TYPE, STATUS_TYPE, Interface, Variable
 from kinfmu.mechanism import RunSettings
 from kinfmu.solver.python.status import Status
-from kinfmu.units import KINDS, METRES, display_units
+from kinfmu.units import KINDS, METRES
 
 TOOL = "kinfmu"  # name of the annotation that identifies FMUs of kinfmu
 LOG_CATEGORIES = {
@@ -65,14 +65,15 @@ def limits(variable: Variable) -> dict[str, str]:
 def units(root: Element, interface: Interface) -> None:
     """Write UnitDefinitions: every unit that a variable has."""
     definitions = SubElement(root, "UnitDefinitions")
-    for name in sorted({variable.unit for variable in interface if variable.unit}):
+    shown = {variable.unit: variable.display_units for variable in interface if variable.unit}
+    for name in sorted(shown):
         unit = SubElement(definitions, "Unit", name=name)
-        SubElement(unit, "BaseUnit", _base_unit(name))
-        for display, factor in display_units(name).items():
+        SubElement(unit, "BaseUnit", base_unit(name))
+        for display, factor in shown[name].items():
             SubElement(unit, "DisplayUnit", name=display, factor=text(factor))
 
 
-def _base_unit(name: str) -> dict[str, str]:
+def base_unit(name: str) -> dict[str, str]:
     """Return exponents of SI base units and factor: `mm/s2` is m=1, s=-2, factor=0.001; `N/rad` has rad=-1."""
     known = {kind.unit: kind.powers for kind in KINDS.values()}
     base, _, per = (name, "", "") if name in known else name.partition("/")

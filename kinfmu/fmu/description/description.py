@@ -164,8 +164,15 @@ def _variable(attributes: Mapping[str, str], **fields: Any) -> Variable:
         maximum=number(attributes.get("max")),
         nominal=number(attributes.get("nominal")),
         declared_type=attributes.get("declaredType"),
+        display_length=_display_length(attributes.get("unit", ""), attributes.get("displayUnit", "")),
         **fields,
     )
+
+
+def _display_length(unit: str, shown: str) -> str | None:
+    """Return 'mm' for the unit 'm/s' and the display unit 'mm/s'; None if they state no other unit of length."""
+    base, length = unit.partition("/")[0], shown.partition("/")[0]
+    return length if base == "m" and length in METRES else None
 
 
 def _check(interface: Interface) -> None:

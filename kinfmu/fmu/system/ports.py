@@ -9,7 +9,7 @@ from typing import Any
 
 from kinfmu.errors import FmuError, RequestError, listed, suggestion
 from kinfmu.mechanism.valid import quoted
-from kinfmu.units import factors, quantity_in
+from kinfmu.units import factors, quantity_in, spelled
 
 VERSIONS = ("2.0", "3.0")
 _REALS = ("Real", "Float64", "Float32")
@@ -73,6 +73,7 @@ class Port:
         except (ValueError, IndexError):
             valid = f"one of {listed(items)}" if items else f"a number, such as '1 {self.unit}'"
             raise RequestError(f"{name} = {quoted(value)} must be {valid}") from None
+        unit = spelled(unit) if unit not in self.units() else unit
         if unit not in self.units():
             known = self.units()
             raise RequestError(f"{name}: unit {quoted(unit)} must be one of {listed(known)}{suggestion(unit, known)}")
