@@ -25,6 +25,7 @@ COARSE = 600  # places of a stretch that does not go round
 DEPTHS = np.concatenate([[0.0], 10.0 ** np.arange(-13.0, -1.0, 0.2)])  # from a mark, near which values change quickly
 CLOSE = 10.0 ** np.arange(-13.0, -2.0, 0.5)  # the same, of several drivers
 DIP = 0.05  # what must stay positive is looked at closely where it falls below
+CLEAR = 1e-3  # nothing asks how much is left above
 FLAT = 1.001  # places that differ by less have nothing between them
 LIMIT = 1e-10  # [rad, sizes]; limits are promised to this
 REGULAR = 0.02  # magnitudes are taken where what must stay positive is above
@@ -273,7 +274,7 @@ class BranchPath:
         which decides at an edge.
         """
         here = np.array(self.drawn.start)
-        names = [name for name in self.drawn.positions(here[None]).columns if name.endswith(".phi")]
+        names = [name for name in self.drawn.places(here[None]).columns if name.endswith(".phi")]
         now = {name: self.drawn.starts[name] for name in names}
         side, tightest = np.full(len(u), INSIDE), np.empty(len(u))
         angles = {name: np.empty(len(u)) for name in names}
@@ -284,7 +285,7 @@ class BranchPath:
             for k, target in enumerate(u):
                 count = 2 + int(np.abs((target - here) / units).max() / SHORT)
                 parts = self._places(here, target, count)
-                exact = self.drawn.positions(here + (target - here) * parts[:, None])
+                exact = self.drawn.places(here + (target - here) * parts[:, None])
                 lowest = self._least(here, target, parts, _each(exact.closing.limits, len(parts)))
                 tightest[k] = lowest
                 if lowest < -LIMIT or np.isnan(lowest):
@@ -304,7 +305,7 @@ class BranchPath:
         part = np.linspace(0.0, FAR, FAR_PLACES)
         with np.errstate(all="ignore"):
             for _ in range(PASSES):
-                values = _lowest(self.drawn.positions(here + direction * part[:, None]).closing.limits, len(part))
+                values = _lowest(self.drawn.places(here + direction * part[:, None]).closing.limits, len(part))
                 bad = _first_bad(values)
                 if bad is None or bad == 0:
                     return None
@@ -332,10 +333,12 @@ class BranchPath:
                 left, right = parts[max(k - 1, 0)], parts[min(k + 1, last)]
                 for _ in range(PASSES):
                     part = left + (right - left) * np.arange(PIECES + 1) / PIECES
-                    exact = self.drawn.positions(here + (target - here) * part[:, None])
+                    exact = self.drawn.places(here + (target - here) * part[:, None])
                     found = _each(exact.closing.limits, len(part))[number]
                     best = int(np.argmin(found))
                     least = min(least, float(found[best]))
+                    if 0 < best < PIECES and 2 * found[best] - max(found[best - 1], found[best + 1]) > CLEAR:
+                        break  # convex there, so it falls by less than it rises to its neighbours
                     left, right = part[max(best - 1, 0)], part[min(best + 1, PIECES)]
         return least
 

@@ -13,7 +13,7 @@ import numpy as np
 from kinfmu import Body, Mechanism, Revolute
 from kinfmu.drivers import Driver
 from kinfmu.joints import Joint
-from tests.stress.jets import LONG, Array, Exact, Jet, Numbers, Vector, turned
+from tests.stress.jets import LONG, Array, Exact, Jet, Numbers, Value, Vector, turned
 from tests.stress.loops import Closing
 
 TURN = 2.0 * np.pi
@@ -91,12 +91,18 @@ class Drawn:
 
     def exactly(self, numbers: Numbers, u: Array, ud: Array, udd: Array) -> Exactly:
         """Every coordinate at driver values, speeds and accelerations (n, d); angles as principal values."""
+        tables = [[numbers.array(column) for column in table.T] for table in (u, ud, udd)]
+        return self._columns(numbers, [Jet(numbers, *given) for given in zip(*tables, strict=True)])
+
+    def places(self, u: Array) -> Exactly:
+        """Coordinates without their derivatives, in long doubles."""
+        return self._columns(LONG, [Value(LONG, LONG.array(column)) for column in u.T])
+
+    def _columns(self, numbers: Numbers, given: Sequence[Jet]) -> Exactly:
         value = numbers.number
         theta, scale = numbers.angle(self.frame.direction), value(self.frame.scale)
-        local = []
-        for k, kind in enumerate(self.sketch.kinds):
-            given = Jet(numbers, *(numbers.array(table[:, k]) for table in (u, ud, udd)))
-            local.append(given - theta if kind == "angle" else given / scale)
+        kinds = zip(given, self.sketch.kinds, strict=True)
+        local = [one - theta if kind == "angle" else one / scale for one, kind in kinds]
         closing = Closing()
         poses = self.sketch.poses(numbers, local, closing)
         c, s = (value(part) * scale for part in self.frame.direction)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,7 @@ class Numbers:
         return self.arctan2(y, x)[0]
 
 
+@lru_cache(maxsize=4096)
 def _long(value: Exact) -> Any:
     value = Fraction(value)
     return np.longdouble(value.numerator) / np.longdouble(value.denominator)
@@ -139,8 +141,42 @@ class Jet:
         )
 
 
+class Value(Jet):
+    """A jet without derivatives, for who looks at places alone."""
+
+    __slots__ = ()
+
+    def __init__(self, numbers: Numbers, d0: Array) -> None:
+        super().__init__(numbers, d0, None, None)
+
+    def __neg__(self) -> Value:
+        return Value(self.numbers, -self.d0)
+
+    def __add__(self, other: Any) -> Value:
+        return Value(self.numbers, self.d0 + (other.d0 if isinstance(other, Jet) else other))
+
+    def __mul__(self, other: Any) -> Value:
+        return Value(self.numbers, self.d0 * (other.d0 if isinstance(other, Jet) else other))
+
+    def __truediv__(self, other: Any) -> Value:
+        return Value(self.numbers, self.d0 / (other.d0 if isinstance(other, Jet) else other))
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+    def sqrt(self) -> Value:
+        """The positive root."""
+        return Value(self.numbers, self.numbers.sqrt(self.d0))
+
+    def sin_cos(self) -> tuple[Value, Value]:
+        """Sine and cosine."""
+        return Value(self.numbers, self.numbers.sin(self.d0)), Value(self.numbers, self.numbers.cos(self.d0))
+
+
 def arctan2(y: Jet, x: Jet) -> Jet:
     """The angle of (x, y), a principal value."""
+    if isinstance(x, Value):
+        return Value(x.numbers, x.numbers.arctan2(y.d0, x.d0))
     squared = x.d0 * x.d0 + y.d0 * y.d0
     rate = (x.d0 * y.d1 - y.d0 * x.d1) / squared
     squared_rate = 2 * (x.d0 * x.d1 + y.d0 * y.d1)
