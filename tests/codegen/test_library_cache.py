@@ -10,7 +10,7 @@ import stat
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 
@@ -18,8 +18,11 @@ import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu import gallery
 from kinfmu.codegen.c import compiler, library_cache
 from kinfmu.errors import CompilerError
+from kinfmu.plan import compile_plan
+from kinfmu.sweep.library import Library
 
 SEVEN = {"a.c": "int f(void);\nint f(void) { return 7; }\n"}
 EIGHT = {"a.c": "int f(void);\nint f(void) { return 8; }\n"}
@@ -61,6 +64,73 @@ def test_a_folder_that_others_may_enter_is_closed_to_them(cache: Path, given: in
     cache.chmod(given)
     compiler.shared_library(SEVEN)
     assert mode(cache) == 0o700
+
+
+def sum_of(length: int) -> dict[str, str]:
+    """Files of a library: a unit of the run time that reads sizes alone, and the unit of a model."""
+    return {
+        "sizes.h": "#define SIZE 3\n",
+        "sums.h": '#include "sizes.h"\ndouble sum(const double *values);\n',
+        "rare.c": '#include "sums.h"\ndouble sum(const double *v) { return v[0] + v[1] + v[SIZE - 1]; }\n',
+        "model.c": f'#include "sums.h"\ndouble f(void) {{ double v[] = {{1, 2, {length}}}; return sum(v); }}\n',
+    }
+
+
+def called(files: dict[str, str]) -> float:
+    function = compiler.load(files, rare=["rare.c"]).f
+    function.restype = ctypes.c_double
+    return float(function())
+
+
+@pytest.fixture
+def compiled(cache: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of the units as they are compiled, in an empty cache."""
+    assert not cache.exists()
+    units: list[str] = []
+    run = compiler._run
+
+    def noted(commands: Sequence[Sequence[str]], folder: str) -> None:
+        units.extend(command[-1] for command in commands if "-c" in command)
+        run(commands, folder)
+
+    monkeypatch.setattr(compiler, "_run", noted)
+    return units
+
+
+def test_the_run_time_is_compiled_once_for_mechanisms_of_the_same_sizes(compiled: list[str]) -> None:
+    assert [called(sum_of(4)), called(sum_of(5))] == [7.0, 8.0]
+    assert sorted(compiled) == ["model.c", "model.c", "rare.c"]
+    wider = {**sum_of(4), "sizes.h": "#define SIZE 2\n"}
+    assert called(wider) == 5.0  # 1 + 2 + 2
+    assert compiled[3:].count("rare.c") == 1
+
+
+def test_an_object_that_was_changed_on_disk_is_compiled_again(cache: Path, compiled: list[str]) -> None:
+    called(sum_of(4))
+    for kept in cache.glob("*.o"):
+        flipped(kept)
+    assert called(sum_of(6)) == 9.0
+    assert compiled.count("rare.c") == 2
+
+
+def test_a_mechanism_with_other_lengths_gets_the_library_it_gets_without_a_cache(
+    compiled: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    written = (gallery.folder() / "crank_rocker" / "mechanism.toml").read_text("utf-8")
+    longer = tmp_path / "longer.toml"
+    longer.write_text(written.replace("[40", "[41"), "utf-8")
+    assert longer.read_text("utf-8") != written
+    Library(compile_plan(kinfmu.load("crank_rocker")))
+    first = len(compiled)
+    Library(compile_plan(kinfmu.load(longer)))
+    again = compiled[first:]
+    assert {"model.c", "lanes.c"} <= set(again)
+    assert not {"advance.c", "diagnosis.c", "singular_points.c", "sweep.c"} & set(again)
+    linked = [path.read_bytes() for path in library_cache.cache_folder().glob("*.so")]
+    monkeypatch.setenv("KINFMU_CACHE", str(tmp_path / "another"))
+    Library(compile_plan(kinfmu.load(longer)))
+    (whole,) = library_cache.cache_folder().glob("*.so")
+    assert whole.read_bytes() in linked
 
 
 def truncated(library: Path) -> None:

@@ -1,6 +1,7 @@
 """A shared library from generated C: compiled once by the system's compiler (or zig's), then taken from the cache.
 
-A library is found again by its sources, the flags, the compiler and the processor: see library_cache.py.
+A library is found again by its sources, the flags, the compiler and the processor: see library_cache.py. So are the
+objects of the run time, for mechanisms of the same sizes.
 """
 
 from __future__ import annotations
@@ -160,9 +161,7 @@ class _Build:
         self._rare = rare
         self._compiler = command() if target is None else zig(target)
         self._flags = (*(FLAGS if common is None else common), *flags)
-        content = [platform.machine(), _processor(), *_version(tuple(self._compiler)), *self._flags, *rare]
-        content += [part for name in sorted(files) for part in (name, files[name])]
-        self.key = hashlib.sha256("\0".join(content).encode()).hexdigest()[:24]
+        self.key = _key(self._compiler, [*self._flags, *rare], files)
         self.suffix = _suffix(target)
 
     def found_or_compiled(self) -> bytes:
@@ -202,21 +201,65 @@ def compile_files(
         names = units(files)
         libraries = [] if os.name == "nt" else ["-lm"]
         if tuple(compiler[: len(_ZIG)]) != _ZIG:  # zig compiles in parallel itself
-            longest_first = sorted(names, key=lambda name: (-_length(files, name), name))
-            level = {name: [_LEVEL] for name in rare}
-            _run([[*compiler, *flags, *level.get(name, []), "-c", name] for name in longest_first], scratch)
-            names = [f"{name.removesuffix('.c')}.o" for name in names]
+            names = _objects(compiler, files, flags, rare, scratch)
         _run([[*compiler, *flags, *names, "-o", str(output.resolve()), *libraries]], scratch)
+
+
+def _objects(
+    compiler: Sequence[str], files: Mapping[str, str], flags: Sequence[str], rare: Sequence[str], folder: str
+) -> list[str]:
+    """Compile units in a folder that holds the files; return their objects.
+
+    Of a mechanism, the run time reads no more than the sizes: its objects are kept for the next mechanism of the same
+    sizes, such as the same one with other lengths.
+    """
+    objects, keys, commands = [], {}, []
+    for name in sorted(units(files), key=lambda name: (-_length(files, name), name)):  # the longest first
+        command = [*compiler, *flags, *([_LEVEL] if name in rare else []), "-c", name]
+        made = f"{name.removesuffix('.c')}.o"
+        if name in rare or (RUNTIME / name).is_file():
+            read = _read(files, name)
+            key = _key(compiler, command, {one: files[one] for one in sorted(read)})
+            with suppress(CompilerError):
+                found = library_cache.find(key, ".o")
+                if found is not None:
+                    objects.append(str(found))
+                    continue
+            keys[made] = key
+        objects.append(made)
+        commands.append(command)
+    _run(commands, folder)
+    for made, key in keys.items():
+        with suppress(CompilerError):  # the library is made without a cache too
+            library_cache.store(key, ".o", (Path(folder) / made).read_bytes())
+    return objects
+
+
+def _key(compiler: Sequence[str], flags: Sequence[str], files: Mapping[str, str]) -> str:
+    """Return what identifies the result of a compilation."""
+    content = [platform.machine(), _processor(), *_version(tuple(compiler)), *flags]
+    content += [part for name in sorted(files) for part in (name, files[name])]
+    return hashlib.sha256("\0".join(content).encode()).hexdigest()[:24]
 
 
 def _length(files: Mapping[str, str], name: str) -> int:
     """Return the length of a C file with the C files that it includes."""
-    return len(files[name]) + sum(_length(files, one) for one in _included(files[name]))
+    return sum(len(files[one]) for one in _read(files, name) if one.endswith(".c"))
 
 
-def _included(text: str) -> list[str]:
-    """Return the C files that a C file includes."""
-    return re.findall(r'^#include "(\w+\.c)"', text, re.MULTILINE)
+def _read(files: Mapping[str, str], name: str) -> set[str]:
+    """Return a C file and all files that it includes."""
+    read, left = set[str](), {name}
+    while left:
+        one = left.pop()
+        read.add(one)
+        left |= _included(files[one]) & files.keys() - read
+    return read
+
+
+def _included(text: str) -> set[str]:
+    """Return the files that a C file includes."""
+    return set(re.findall(r'^ *# *include "([\w.]+)"', text, re.MULTILINE))
 
 
 def _run(commands: Sequence[Sequence[str]], folder: str) -> None:
