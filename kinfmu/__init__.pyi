@@ -5,6 +5,7 @@ from kinfmu import log as log
 from kinfmu import readings as readings
 from kinfmu import synthesis as synthesis
 from kinfmu.analysis import Report as Report
+from kinfmu.analysis import cam_profile as cam_profile
 from kinfmu.analysis import check as check
 from kinfmu.drivers import AngleDriver as AngleDriver
 from kinfmu.drivers import CoordinateDriver as CoordinateDriver
@@ -18,6 +19,7 @@ from kinfmu.fmu import verify as verify
 from kinfmu.gallery import load as load
 from kinfmu.gallery import save as save
 from kinfmu.joints import Angle as Angle
+from kinfmu.joints import CamFlatFace as CamFlatFace
 from kinfmu.joints import CamOscillating as CamOscillating
 from kinfmu.joints import CamRoller as CamRoller
 from kinfmu.joints import CamTranslating as CamTranslating

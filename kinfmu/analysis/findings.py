@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from kinfmu.analysis.cams import CamFindings
 from kinfmu.analysis.drivers import DriverAdvice
 from kinfmu.analysis.loading import Loading
 from kinfmu.analysis.measuring import Measurements
@@ -27,11 +28,12 @@ class BlockReport:
 
 @dataclass(frozen=True)
 class Findings:
-    """What a check finds. `problem` is the error that prevents solving, None if there is none.
+    """What a check finds. `problem` is the error that prevents solving or making a cam, None if there is none.
 
     ranges: one per driver, in file order; loops: the four-bars and slider-cranks among the joints; advice: on drivers,
     None where drivers and degrees of freedom match; notes: further findings, one line each;
-    measured: values of the measures, None without measures; loading: efforts and reactions, None without masses, loads.
+    measured: values of the measures, None without measures; loading: efforts and reactions, None without masses, loads;
+    cams: one per cam joint.
     """
 
     mechanism: Mechanism
@@ -44,6 +46,7 @@ class Findings:
     notes: tuple[str, ...] = ()
     measured: Measurements | None = None
     loading: Loading | None = None
+    cams: tuple[CamFindings, ...] = ()
 
     @property
     def mobility(self) -> int:
@@ -112,6 +115,11 @@ class Findings:
         (driver value), at_unit, rms;
         reduced_inertias: name, smallest, largest, unit; undetermined: reactions, and rows that share their load;
         reason (why there are no numbers), samples_without_numbers.
+        cams, only of mechanisms with cams: joint, element ('roller', 'knife edge', 'flat face', 'unknown'), driver (in
+        whose values `at`, begin and end are), reason (why there are no values), cam, follower, swings (true or false),
+        roller_radius; value and at of smallest_pressure_angle, largest_pressure_angle, smallest_convex_radius and
+        smallest_concave_radius (of the profile), smallest_pitch_radius, gouge (depth); undercut: begin, end; face: low
+        and high (ends of the contact on a flat face); null where there is none.
         notes: text; problem: text or null. `kinfmu check --json` adds matrices and assemblies with their options.
         """
         plan, mechanism = self.plan, self.mechanism
@@ -144,6 +152,7 @@ class Findings:
             "advice": None if self.advice is None else self.advice.as_json(),
             "measures": None if self.measured is None else self.measured.as_json(),
             **({} if self.loading is None else {"forces": self.loading.as_json()}),
+            **({"cams": [cam.as_json() for cam in self.cams]} if self.cams else {}),
             "notes": list(self.notes),
             "problem": str(self.problem) if self.problem else None,
         }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from kinfmu.analysis.assemblies import Assemblies, find_assemblies
+from kinfmu.analysis.cams import cam_findings
 from kinfmu.analysis.design_notes import motion_notes, part_notes
 from kinfmu.analysis.driver_path import follow
 from kinfmu.analysis.drivers import clearer_problem, driver_advice
@@ -58,7 +59,7 @@ class Report(Findings, Displayed):
 
 
 def check(mechanism: Mechanism) -> Report:
-    """Check a mechanism: mobility, redundancy, plan, drivers, loops, singular points, ranges, measures, forces.
+    """Check a mechanism: mobility, redundancy, plan, drivers, loops, singular points, ranges, cams, measures, forces.
 
     Args:
         mechanism: The mechanism to check.
@@ -90,5 +91,9 @@ def check(mechanism: Mechanism) -> Report:
     notes += run_notes(plan, ranges)
     loops = find_named_loops(mechanism, redundancy, paths)
     notes += motion_notes(mechanism, paths, loops)
+    cams = cam_findings(plan, paths)
+    notes += [cam.note() for cam in cams if cam.note()]
+    cut = next((problem for problem in (cam.problem() for cam in cams) if problem is not None), None)
     measured = measurements(mechanism, ranges)
-    return Report(mechanism, redundancy, None, plan, ranges, loops, None, tuple(notes), measured, loading(plan, ranges))
+    forces = loading(plan, ranges)
+    return Report(mechanism, redundancy, cut, plan, ranges, loops, None, tuple(notes), measured, forces, cams)

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from functools import partial
 from typing import NamedTuple
 
+from kinfmu.analysis.cam_text import cam_lines
 from kinfmu.analysis.findings import Findings
 from kinfmu.analysis.loading import Peak
 from kinfmu.analysis.loops import FourBar, Link, SliderCrank
@@ -38,7 +39,7 @@ class ReportLine(NamedTuple):
 def findings(report: Findings) -> list[ReportLine]:
     """Return the findings in order."""
     found: list[ReportLine] = []
-    for parts in (_count, _rows, _plan, _advice, _loops, _motion, _measures, _forces, _notes):
+    for parts in (_count, _rows, _plan, _advice, _loops, _motion, _cams, _measures, _forces, _notes):
         found += parts(report)
     if report.problem is not None:
         found.append(ReportLine("problem", str(report.problem)))
@@ -220,6 +221,13 @@ def _motion(report: Findings) -> Iterator[ReportLine]:
         yield ReportLine("", "each with the other drivers at their start values")
     if report.ranges and not report.singular and not any(reach.stopped for reach in report.ranges):
         yield ReportLine("singular", "none in the range")
+
+
+def _cams(report: Findings) -> Iterator[ReportLine]:
+    for k, cam in enumerate(report.cams):
+        texts = cam_lines(cam)
+        for text in texts:
+            yield ReportLine("cam" if k == 0 and text is texts[0] else "", text)
 
 
 def _measures(report: Findings) -> Iterator[ReportLine]:

@@ -11,6 +11,7 @@ import click
 
 from kinfmu import gallery
 from kinfmu.cli.arguments import STANDARD_OUTPUT, InputFile, OutputFile, RecordOrMechanism, names_in
+from kinfmu.cli.cams import export_cam
 from kinfmu.cli.group import errors_of, main
 from kinfmu.cli.pages import PAGES, mechanism_of, write_page
 from kinfmu.cli.quantities import on_axis
@@ -122,6 +123,16 @@ def _on_axis_of(run: Run, text: str) -> float:
 @click.option(
     "--at", metavar="VALUE", help="Time or driver value of a .dxf drawing, such as 45deg. Default: the first."
 )
+@click.option(
+    "--cam",
+    metavar="JOINT",
+    help="Write the profile of a cam, by its joint: as a table, a figure with pressure angle and curvature, or .dxf.",
+)
+@click.option(
+    "--tolerance",
+    metavar="LENGTH",
+    help="Largest distance of the polygon of a cam's .dxf from the curve, such as 0.01mm. Default: 1e-5 of the cam.",
+)
 @click.option("--units", is_flag=True, help="Write units into the first line of a CSV file: coupler.x [m].")
 def export(
     run: str,
@@ -136,6 +147,8 @@ def export(
     start: str | None,
     stop: str | None,
     at: str | None,
+    cam: str | None,
+    tolerance: str | None,
     units: bool,
 ) -> None:
     """Write a run as a table, as plots, as an animation or as a page; or a mechanism as a page.
@@ -146,8 +159,14 @@ def export(
     RUN is a record (.mcap) of simulate or solve. Tables in Parquet and npz contain the units. Plots (.svg, .png, .pdf)
     show coordinates, velocities and accelerations against time, or against the driver of a solve --angle. With --x,
     --overlay or --polar, exactly the named columns are curves. OTHER is a second run for the same plot. A .gif or
-    .mp4 shows the moving linkage, a .dxf the pose at a value as a CAD drawing.
+    .mp4 shows the moving linkage, a .dxf the pose at a value as a CAD drawing. With --cam, a mechanism or a record
+    gives the profile of a cam as .csv, .dxf or a figure.
     """
+    if cam is not None:
+        export_cam(run, output, cam, tolerance, units=units)
+        return
+    if tolerance is not None:
+        raise click.UsageError(f"--tolerance {tolerance}: only for the .dxf of a cam, with --cam")
     if suffix_of(output) in PAGES or suffix_of(run) != ".mcap":
         _export_page(run, output, start, stop)
         return
@@ -209,8 +228,8 @@ def _export_page(given: str, output: Path, start: str | None, stop: str | None) 
     if others or suffix_of(output) not in PAGES:
         options = "no other options than --start and --stop" if is_record else "no other options"
         raise click.UsageError(
-            f"{given}: of a mechanism only a page (.html) is written; a page has {options}; a table, plot or animation "
-            f"needs a record (.mcap)"
+            f"{given}: of a mechanism only a page (.html) is written, or with --cam a cam; a page has {options}; a "
+            f"table, plot or animation needs a record (.mcap)"
         )
     if is_record:
         from kinfmu.log import read

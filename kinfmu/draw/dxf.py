@@ -24,9 +24,9 @@ from kinfmu.run.axis import axis_of
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.shapes import shapes
 
-_UNITS = {"in": 1, "ft": 2, "mm": 4, "cm": 5, "m": 6, "km": 7, "um": 13}  # $INSUNITS
+DXF_UNITS = {"in": 1, "ft": 2, "mm": 4, "cm": 5, "m": 6, "km": 7, "um": 13}  # $INSUNITS
 _DRAWN = ("link", "rod", "bar", "slot", "rail", "rack", "wheel", "barrel", "shaft")  # what has true dimensions
-_POINT_STYLE = 34  # $PDMODE: a cross in a circle
+POINT_STYLE = 34  # $PDMODE: a cross in a circle
 
 
 def dxf(run: Run, path: str | Path, at: float | None = None) -> None:
@@ -61,15 +61,15 @@ def dxf(run: Run, path: str | Path, at: float | None = None) -> None:
     row = good[0] if at is None else good[np.argmin(np.abs(axis_of(run).values[good] - at))]
     mechanism, poses = placed_run(run, path)
     shown = Instant(mechanism, {body: pose[row : row + 1] for body, pose in poses.items()}, {})
-    with _without_date(ezdxf):
+    with without_date(ezdxf):
         text = _drawing(ezdxf, shown, mechanism.length_unit)
     write_bytes(path, text.encode())
 
 
 def _drawing(ezdxf: Any, shown: Instant, length_unit: str) -> str:
     """Return the text of the drawing."""
-    drawing = ezdxf.new("R2010", units=_UNITS.get(length_unit, 0))
-    drawing.header["$PDMODE"] = _POINT_STYLE
+    drawing = ezdxf.new("R2010", units=DXF_UNITS.get(length_unit, 0))
+    drawing.header["$PDMODE"] = POINT_STYLE
     space = drawing.modelspace()
     rollers = {joint.name for joint in shown.joints if isinstance(joint, CamRoller)}
     for body in (GROUND_NAME, *(body.name for body in shown.mechanism.moving_bodies)):
@@ -91,7 +91,7 @@ def _drawing(ezdxf: Any, shown: Instant, length_unit: str) -> str:
 
 
 @contextmanager
-def _without_date(ezdxf: Any) -> Iterator[None]:
+def without_date(ezdxf: Any) -> Iterator[None]:
     """Let ezdxf write no dates and no random identifiers in this block."""
     before = ezdxf.options.write_fixed_meta_data_for_testing
     ezdxf.options.write_fixed_meta_data_for_testing = True

@@ -6,6 +6,7 @@ To add a joint, write a file and add a line here.
 from __future__ import annotations
 
 from kinfmu.joints.cam import CamOscillating, CamTranslating
+from kinfmu.joints.cam_flat_face import CamFlatFace
 from kinfmu.joints.cam_roller import CamRoller
 from kinfmu.joints.coupling import Coupling
 from kinfmu.joints.fixed import Fixed
@@ -30,12 +31,14 @@ JOINTS: tuple[type[Joint], ...] = (
     CamTranslating,
     CamOscillating,
     CamRoller,
+    CamFlatFace,
     Coupling,
 )
 
 __all__ = [
     "JOINTS",
     "Angle",
+    "CamFlatFace",
     "CamOscillating",
     "CamRoller",
     "CamTranslating",

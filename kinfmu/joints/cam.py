@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from kinfmu.errors import MechanismError
+from kinfmu.joints.follower_element import FaceNormal, RollerRadius, check_element, roller_conditions
 from kinfmu.joints.joint import Condition, Joint
 from kinfmu.laws import Law
 from kinfmu.laws.law import TURN
 from kinfmu.measures import AngleBetween, PoseQuantity, PositionAlong
 from kinfmu.measures.arithmetic import Value
-from kinfmu.measures.placement import BodyName, BodyPair, Placement, PointPair, body_of
+from kinfmu.measures.placement import BodyName, BodyPair, Placement, PointPair, Reference, body_of
 from kinfmu.units import Length, Radians
 
 _SAMPLES = 24  # angles in a turn at which the size of a lift is sampled
@@ -23,12 +24,15 @@ class Cam(Joint):
 
         Phi = quantity - offset - f(phi_k - phi_i)        (1 row, scale 1)
 
-    A leaf defines the bodies and the quantity of the follower.
+    A leaf defines the bodies and the quantity of the follower. A roller or a flat face of the follower determines the
+    cam's profile, not the motion.
     """
 
     cam: str
     law: Law
     offset: float
+    roller_radius: float | None
+    normal: float | None
     led: ClassVar[str]  # 'length' or 'angle': what the lift is
 
     def holder(self) -> str:
@@ -56,11 +60,12 @@ class Cam(Joint):
         return max(lifts) if self.led == "length" else 0.0
 
     def conditions(self) -> tuple[Condition, ...]:
-        return closing(self.law) if self.law.repeats else ()
+        return (*(closing(self.law) if self.law.repeats else ()), *roller_conditions(self.roller_radius))
 
     def check(self) -> None:
         where = f"[joints.{self.name}]"
         self.law.check(where)
+        check_element(self.name, self.roller_radius, self.normal)
         if self.cam in self.bodies()[:2]:
             raise MechanismError(
                 f"{where} cam = '{self.cam}' must be another body than the follower and what holds it", joint=self.name
@@ -83,7 +88,8 @@ class CamTranslating(Cam):
 
         Phi = e.d - offset - f(phi_k - phi_i),   d = r_j + A_j s_b - r_i - A_i s_a        (1 row, scale 1)
 
-    The guide is a separate joint. After Haug (1989), cam-followers, which are given there by profiles.
+    The guide is a separate joint. The point b is the centre of the roller, or a point of the flat face. After Haug
+    (1989), cam-followers, which are given there by profiles.
     """
 
     type: ClassVar[str] = "cam_translating"
@@ -96,6 +102,8 @@ class CamTranslating(Cam):
     law: Annotated[Law, "lift f over the cam's angle [length over rad]"]
     axis: Annotated[Radians, "direction e of the lift in i's frame [rad]"] = 0.0
     offset: Annotated[Length, "position of the follower where the lift is 0 [length]"] = 0.0
+    roller_radius: RollerRadius = None
+    normal: FaceNormal = None
 
     def bodies(self) -> tuple[str, ...]:
         return (*map(body_of, self.between), self.cam)
@@ -122,6 +130,24 @@ class CamOscillating(Cam):
     cam: Annotated[BodyName, "the cam, body k"]
     law: Annotated[Law, "lift f over the cam's angle [rad over rad]"]
     offset: Annotated[Radians, "angle of the follower where the lift is 0 [rad]"] = 0.0
+    contact: Annotated[
+        str | None, Reference("point"), "centre of the roller, or a point of the flat face, on the follower"
+    ] = None
+    roller_radius: RollerRadius = None
+    normal: FaceNormal = None
+
+    def check(self) -> None:
+        super().check()
+        if self.contact is not None and body_of(self.contact) != self.between[1]:
+            raise MechanismError(
+                f"[joints.{self.name}] contact = '{self.contact}' must be a point of the follower '{self.between[1]}'",
+                joint=self.name,
+            )
+        if self.contact is None and not (self.roller_radius is None and self.normal is None):
+            raise MechanismError(
+                f"[joints.{self.name}] needs the key 'contact': the centre of the roller, or a point of the flat face",
+                joint=self.name,
+            )
 
     def bodies(self) -> tuple[str, ...]:
         return (*self.between, self.cam)

@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar
 
 from kinfmu.errors import MechanismError
 from kinfmu.joints.cam import closing
+from kinfmu.joints.follower_element import RollerRadius, check_element, roller_conditions
 from kinfmu.joints.joint import Condition, Joint
 from kinfmu.laws import Law
 from kinfmu.laws.law import TURN
@@ -36,6 +37,7 @@ class CamRoller(Joint):
         Law,
         "radius f > 0 of the pitch curve over the polar angle in the cam's frame [length over rad], period: a turn",
     ]
+    roller_radius: RollerRadius = None
 
     @property
     def law_kinds(self) -> tuple[str, str]:
@@ -55,11 +57,12 @@ class CamRoller(Joint):
         return max(float(self.law.at(k * TURN / _SAMPLES)) for k in range(_SAMPLES))
 
     def conditions(self) -> tuple[Condition, ...]:
-        return closing(self.law)
+        return (*closing(self.law), *roller_conditions(self.roller_radius))
 
     def check(self) -> None:
         where = f"[joints.{self.name}]"
         self.law.check(where)
+        check_element(self.name, self.roller_radius)
         why = self.law.why_not_periodic()
         if why:
             raise MechanismError(f"{where} law: {why}; a pitch curve must close", joint=self.name)

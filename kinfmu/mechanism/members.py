@@ -134,7 +134,7 @@ def _member(member: Any, place: NumberPath, change: Change) -> Any:
     values = {}
     for key in keys_of(cls):
         part = getattr(member, key.name)
-        if isinstance(key.measures, Quantity):
+        if isinstance(key.measures, Quantity) and not (part is None and key.default is None):
             values[key.name] = change((*place, key.name), part, key.measures)
         elif isinstance(part, Law):
             values[key.name] = _law(part, member.law_kinds, (*place, key.name), change)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from kinfmu.drivers import Driver
 from kinfmu.equations.system import System, placement
-from kinfmu.joints import CamRoller, Coupling, Joint
+from kinfmu.joints import CamFlatFace, CamRoller, Coupling, Joint
 from kinfmu.laws import LAWS, RISES, Harmonic, Law, MotionSequence, Polynomial, Segment, Spline
 from kinfmu.laws.law import number_fields
 from kinfmu.laws.spline import ENDS, PERIODIC
@@ -49,10 +49,12 @@ def _values(cls: type[Any], key: Key) -> st.SearchStrategy[Any]:
     if key.takes == "law":
         if issubclass(cls, Driver | Load):
             return st.sampled_from(LAWS).flatmap(laws)
-        return pitch_curves() if cls is CamRoller else lifts()
+        return pitch_curves() if issubclass(cls, CamRoller | CamFlatFace) else lifts()
     if key.takes == "measure":
         drawn = st.sampled_from(POSE_QUANTITIES).flatmap(measures)
         return drawn if key.default is not None else st.none() | drawn
+    if key.default is None:  # what of the follower touches the cam does not change the motion
+        return st.none()
     if isinstance(key.measures, Quantity):
         return angles if key.measures.kind == "angle" else lengths
     assert key.refers is not None, f"{cls.__name__}.{key.name}: tests/joints/drawn.py does not know how to draw it"

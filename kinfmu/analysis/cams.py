@@ -1,0 +1,296 @@
+"""Cams of a mechanism: their profiles, and what a check says about them, with the driver's angle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kinfmu.analysis.driver_path import DriverPath, follow
+from kinfmu.analysis.values import degrees
+from kinfmu.cams import CAM_JOINTS, CamJoint, CamProfile, Critical, Extreme, PlacedCam, critical_values, placed_cam
+from kinfmu.cams.profile import TURN, angles_within, profile_at
+from kinfmu.drivers import Driver
+from kinfmu.errors import KinfmuError, MechanismError, RequestError, listed, suggestion
+from kinfmu.joints import CamFlatFace
+from kinfmu.measures import AngleBetween
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.mechanism import require_mechanism
+from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.plan.origin import in_world
+from kinfmu.run import FloatArray
+from kinfmu.solver.python import Pose
+
+SLIDING_LIMIT, SWINGING_LIMIT = math.radians(30.0), math.radians(45.0)  # [rad], usual for pressure angles
+_ANGLES = 361  # of a table by default, one a degree
+
+
+@dataclass(frozen=True)
+class CamFindings:
+    """What a check finds of one cam.
+
+    cam: placed, None where it cannot be; critical: its values over a turn; driver: in whose values `at` gives places;
+    reason: why there are no values.
+    """
+
+    joint: str
+    cam: PlacedCam | None
+    critical: Critical | None
+    driver: str
+    at: Callable[[float], float]
+    length_unit: str
+    reason: str = ""
+
+    @property
+    def element(self) -> str:
+        """What touches the cam: 'roller', 'knife edge', 'flat face' or 'unknown'."""
+        if self.cam is None or not self.cam.is_known:
+            return "unknown"
+        return "flat face" if self.cam.normal is not None else "roller" if self.cam.radius else "knife edge"
+
+    @property
+    def is_cut(self) -> bool:
+        """True if there is no profile that leads the follower as the law says."""
+        return self.problem() is not None
+
+    @property
+    def steepest(self) -> Extreme | None:
+        """The largest size of the pressure angle."""
+        return None if self.critical is None else max(self.critical.pressure, key=lambda one: abs(one.value))
+
+    @property
+    def limit(self) -> float:
+        """The usual limit of the pressure angle [rad]: 30 degrees, of swinging followers 45."""
+        return SLIDING_LIMIT if self.cam is None or self.cam.pivot is None else SWINGING_LIMIT
+
+    def place(self, angle: float) -> str:
+        """Return an angle of the cam as the value of the driver: 'cam at 40 deg'."""
+        return f"{self.driver} at {degrees(self.at(angle))}"
+
+    def length(self, value: float) -> str:
+        return f"{round(value, 9) + 0.0:.6g} {self.length_unit}"
+
+    def note(self) -> str:
+        """Return a line about a pressure angle above the usual limit, '' if there is none."""
+        worst = self.steepest
+        if worst is None or self.cam is None or abs(worst.value) <= self.limit + 1e-9:
+            return ""
+        kind = "translating" if self.cam.pivot is None else "swinging"
+        return (
+            f"cam '{self.joint}': pressure angle {degrees(worst.value)} ({self.place(worst.at)}) is above "
+            f"{degrees(self.limit)}, the usual limit of {kind} followers; a larger base circle lowers it"
+        )
+
+    def problem(self) -> MechanismError | None:
+        """Return the reason why there is no profile that leads the follower as the law says; None if there is one."""
+        cam, found = self.cam, self.critical
+        if cam is None or found is None or not cam.is_known:
+            return None
+        where, radius = f"[joints.{self.joint}]", self.length(cam.radius or 0.0)
+        if found.nearest.value <= (cam.radius or 0.0):
+            what = f"the roller of radius {radius} reaches the cam's axle: its centre is"
+            if cam.normal is not None:
+                what = "the flat face reaches the cam's axle: its distance is"
+            return MechanismError(
+                f"{where} {what} {self.length(found.nearest.value)} from it ({self.place(found.nearest.at)}); "
+                "the base circle must be larger",
+                joint=self.joint,
+            )
+        if found.undercut:
+            parts = [f"{self.place(cut.begin)} to {degrees(self.at(cut.end))}" for cut in found.undercut]
+            return MechanismError(f"{where} {self._undercut(cam, found)} from {listed(parts)}", joint=self.joint)
+        if found.gouge is not None:
+            depth = self.length(found.gouge.value)
+            return MechanismError(
+                f"{where} roller_radius = {radius}: the roller cuts {depth} into another part of the profile "
+                f"({self.place(found.gouge.at)}); it must be smaller",
+                joint=self.joint,
+            )
+        return None
+
+    def _undercut(self, cam: PlacedCam, found: Critical) -> str:
+        if cam.normal is None:
+            least = found.pitch or found.nearest
+            return (
+                f"roller_radius = {self.length(cam.radius or 0.0)} must be smaller than the smallest radius of "
+                f"curvature of the pitch curve, {self.length(least.value)} ({self.place(least.at)}), or the base "
+                "circle larger: the profile is undercut"
+            )
+        least = found.convex or found.nearest
+        remedy = "f + f'' of the law must be positive" if isinstance(cam.joint, CamFlatFace) else (
+            "the base circle must be larger" if cam.pivot is not None
+            else f"the base circle must be larger by more than {self.length(-least.value)}"
+        )  # fmt: skip
+        return (
+            f"a flat face cannot touch a concave profile, radius of curvature {self.length(least.value)} "
+            f"({self.place(least.at)}); {remedy}: the profile is undercut"
+        )
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the findings as plain data."""
+        found = self.critical
+
+        def one(extreme: Extreme | None) -> dict[str, float] | None:
+            return None if extreme is None else {"value": extreme.value, "at": self.at(extreme.at)}
+
+        values: dict[str, Any] = {"reason": self.reason or None}
+        if found is not None and self.cam is not None:
+            values |= {
+                "cam": self.cam.cam,
+                "follower": self.cam.follower,
+                "swings": self.cam.pivot is not None,
+                "roller_radius": self.cam.radius,
+                "smallest_pressure_angle": one(found.pressure[0]),
+                "largest_pressure_angle": one(found.pressure[1]),
+                "smallest_convex_radius": one(found.convex) if self.cam.is_known else None,
+                "smallest_concave_radius": one(found.concave) if self.cam.is_known else None,
+                "smallest_pitch_radius": one(found.pitch),
+                "undercut": [{"begin": self.at(cut.begin), "end": self.at(cut.end)} for cut in found.undercut],
+                "gouge": one(found.gouge),
+                "face": None if found.width is None else {"low": one(found.width[0]), "high": one(found.width[1])},
+            }
+        return {"joint": self.joint, "element": self.element, "driver": self.driver, **values}
+
+
+def cam_profile(
+    mechanism: Mechanism, joint: str, angles: ArrayLike | None = None, *, tolerance: float | None = None
+) -> CamProfile:
+    """Return the profile of a cam: the envelope of the roller, or of the flat face, that the law leads round it.
+
+    Args:
+        mechanism: The mechanism.
+        joint: Name of a joint `cam_translating`, `cam_oscillating`, `cam_roller` or `cam_flat_face`.
+        angles: Angles of the cam against the body that holds it (n,) [rad]. Default: a turn in steps of a degree.
+        tolerance: In place of angles: so many in a turn that a closed polygon through the points of profile and pitch
+            curve is nowhere further from them [length].
+
+    Returns:
+        The profile in the cam's frame, with pressure angle and radius of curvature.
+
+    Raises:
+        RequestError: There is no such joint, or the tolerance is invalid.
+        MechanismError: The joint states no roller or flat face, the guides of cam and follower give no profile, or
+            there is none that leads the follower as the law says: it would be undercut, or reach the axle.
+
+    """
+    require_mechanism(mechanism, "cam_profile")
+    found = _named(mechanism, joint)
+    plan = compile_plan(mechanism)
+    placed = placed_cam(mechanism, found, _poses(plan))
+    unit = mechanism.length_unit
+    name, at = _driver(plan, placed, None)
+    profile_at(placed, np.zeros(1), unit)  # an unknown roller is reported before its consequences
+    problem = CamFindings(joint, placed, critical_values(placed), name, at, unit).problem()
+    if problem is not None:
+        raise problem
+    if tolerance is not None:
+        asked = angles_within(placed, tolerance, unit)
+    else:
+        asked = np.linspace(0.0, TURN, _ANGLES) if angles is None else np.asarray(angles, dtype=float).reshape(-1)
+    profile = profile_at(placed, asked, unit)
+    if at is float:
+        return profile  # the driver's value is the cam's angle, or no single driver turns the cam
+    return replace(profile, driver=np.array([at(one) for one in asked.tolist()]), driver_name=name)
+
+
+def cam_findings(plan: SolvePlan, paths: Sequence[DriverPath]) -> tuple[CamFindings, ...]:
+    """Return what is found of each cam of a mechanism; paths: of its drivers."""
+    mechanism, poses = plan.mechanism, None
+    found = []
+    for joint in mechanism.joints:
+        if not isinstance(joint, CAM_JOINTS):
+            continue
+        poses = poses or _poses(plan)
+        try:
+            placed = placed_cam(mechanism, joint, poses)
+            name, at = _driver(plan, placed, paths)
+            found.append(CamFindings(joint.name, placed, critical_values(placed), name, at, mechanism.length_unit))
+        except KinfmuError as reason:
+            text = str(reason).removeprefix(f"cam '{joint.name}': ")
+            found.append(CamFindings(joint.name, None, None, "", float, mechanism.length_unit, text))
+    return tuple(found)
+
+
+def _named(mechanism: Mechanism, name: str) -> CamJoint:
+    cams = [joint for joint in mechanism.joints if isinstance(joint, CAM_JOINTS)]
+    for joint in cams:
+        if joint.name == name:
+            return joint
+    if not cams:
+        raise RequestError(f"{mechanism.name} has no cam; joints of cams: {listed(cls.type for cls in CAM_JOINTS)}")
+    names = [joint.name for joint in cams]
+    raise RequestError(
+        f"'{name}' is not a cam joint of {mechanism.name}{suggestion(name, names)}; known: {listed(names)}"
+    )
+
+
+def _poses(plan: SolvePlan) -> dict[str, tuple[float, float, float]]:
+    """Return the poses of all bodies at the plan's anchor."""
+    rows = in_world(plan.origin, plan.anchor.q).reshape(-1, 3).tolist()
+    bodies = [body.name for body in plan.mechanism.moving_bodies]
+    return {GROUND_NAME: (0.0, 0.0, 0.0), **{body: (x, y, phi) for body, (x, y, phi) in zip(bodies, rows, strict=True)}}
+
+
+def _turns(drivers: Sequence[Driver], placed: PlacedCam) -> Driver | None:
+    """Return the driver whose value is the angle of the cam against its holder."""
+    for driver in drivers:
+        quantity = driver.measured()
+        is_of_cam = isinstance(quantity, AngleBetween) and quantity.of == placed.cam
+        if is_of_cam and (getattr(quantity, "to", None) or GROUND_NAME) == placed.holder:
+            return driver
+    return None
+
+
+def _driver(
+    plan: SolvePlan, placed: PlacedCam, paths: Sequence[DriverPath] | None
+) -> tuple[str, Callable[[float], float]]:
+    """Return the name of the driver that turns a cam, and its value at an angle of the cam.
+
+    That of the cam itself where no single driver turns it all the way round.
+    """
+    drivers = plan.mechanism.drivers
+    direct = _turns(drivers, placed)
+    if direct is not None:
+        return direct.name, float
+    if len(drivers) == 1 and drivers[0].quantity.kind == "angle":
+        path = follow(plan, 0) if paths is None else next(iter(paths), None)
+        if path is not None and path.turns is not None:
+            way = _Turning(path, placed)
+            if way.is_whole:
+                return drivers[0].name, way.driver_at
+    return placed.cam, float
+
+
+class _Turning:
+    """The angle of a cam over the path of its driver."""
+
+    def __init__(self, path: DriverPath, placed: PlacedCam) -> None:
+        self.path, self.placed = path, placed
+        self.angles: FloatArray = np.array([self._angle(pose) for pose in path.poses])
+
+    @property
+    def is_whole(self) -> bool:
+        """True if the cam makes a turn, always in one direction."""
+        steps = np.diff(self.angles)
+        return bool((np.all(steps > 0.0) or np.all(steps < 0.0)) and abs(steps.sum()) > TURN - 1e-6)
+
+    def driver_at(self, angle: float) -> float:
+        """Return the first driver value at an angle of the cam, modulo turns of the driver."""
+        low = float(self.angles.min())
+        wanted = low + (angle - low) % TURN
+        for (before, after), (a, b) in zip(pairwise(self.path.poses), pairwise(self.angles.tolist()), strict=True):
+            if min(a, b) <= wanted <= max(a, b):
+                at = self.path.zero(lambda pose: self._angle(pose) - wanted, before, after).u[0]
+                return at % ((self.path.turns or 1) * TURN)
+        return math.nan
+
+    def _angle(self, pose: Pose) -> float:
+        q = self.path.coordinates(pose)
+        held = 0.0 if self.placed.holder == GROUND_NAME else q[f"{self.placed.holder}.phi"]
+        return float(q[f"{self.placed.cam}.phi"] - held)

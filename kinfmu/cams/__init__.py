@@ -1,0 +1,21 @@
+"""Cams: pitch curve, profile, pressure angle and curvature, from the joint that leads the follower."""
+
+from __future__ import annotations
+
+from kinfmu.cams.critical import Critical, Cut, Extreme, critical_values
+from kinfmu.cams.placed import CAM_JOINTS, CamJoint, PlacedCam, placed_cam
+from kinfmu.cams.profile import CamProfile, profile_at, turn_of
+
+__all__ = [
+    "CAM_JOINTS",
+    "CamJoint",
+    "CamProfile",
+    "Critical",
+    "Cut",
+    "Extreme",
+    "PlacedCam",
+    "critical_values",
+    "placed_cam",
+    "profile_at",
+    "turn_of",
+]

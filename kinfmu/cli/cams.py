@@ -1,0 +1,70 @@
+"""Profiles of cams, as export writes them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from kinfmu import gallery
+from kinfmu.cli.arguments import STANDARD_OUTPUT
+from kinfmu.cli.group import errors_of
+from kinfmu.cli.pages import mechanism_of
+from kinfmu.cli.quantities import driver_value
+from kinfmu.errors import RequestError, listed
+from kinfmu.files.whole_file import suffix_of
+from kinfmu.units import Quantity
+
+FORMATS = (".csv", ".dxf", ".svg", ".png", ".pdf")
+_FINE = 1e-5  # of the largest distance of the profile from the axle
+
+
+def export_cam(given: str, output: Path, joint: str, tolerance: str | None, *, units: bool) -> None:
+    """Write the profile of a cam of a mechanism, or of the mechanism of a record."""
+    valid = {"run", "output", "cam", "tolerance", "units"}
+    others = [name for name, value in click.get_current_context().params.items() if value and name not in valid]
+    if others:
+        options = listed(f"--{name}" for name in others).replace("--other", "a second run").replace("across", "x")
+        raise click.UsageError(f"--cam {joint} excludes {options}")
+    suffix = ".csv" if output == STANDARD_OUTPUT else suffix_of(output)
+    if suffix not in FORMATS:
+        raise click.UsageError(f"{output}: the profile of a cam is written as {listed(FORMATS)}")
+    if units and suffix != ".csv":
+        raise click.UsageError(f"--units: only for .csv, not {suffix}")
+    if tolerance is not None and suffix != ".dxf":
+        raise click.UsageError(f"--tolerance {tolerance}: only for .dxf, not {suffix}")
+    from kinfmu.analysis import cam_profile
+
+    if suffix_of(given) == ".mcap":
+        from kinfmu.log import read
+
+        mechanism = mechanism_of(read(Path(given)))
+    else:
+        mechanism = gallery.load(given)
+    unit = mechanism.length_unit
+    within = None if tolerance is None else driver_value("--tolerance", tolerance, Quantity("length"), unit)
+    if within is not None and not within > 0.0:
+        raise click.UsageError(f"--tolerance {tolerance}: must be a positive length, such as 0.01{unit}")
+    with errors_of(given):
+        try:
+            profile = cam_profile(mechanism, joint)
+        except RequestError as error:
+            raise RequestError(f"--cam: {error}") from None
+        about = ""
+        if suffix == ".dxf":
+            import numpy as np
+
+            within = within or _FINE * float(np.hypot(*(profile.profile - profile.axle).T).max())
+            profile = cam_profile(mechanism, joint, tolerance=within)
+            about = f" ({len(profile.angle)} corners, within {within:.3g} {unit} of the curve)"
+    if output == STANDARD_OUTPUT:
+        for line in profile.csv_lines(units=units):
+            click.echo(line, nl=False)
+        return
+    if suffix == ".csv":
+        profile.write_csv(output, units=units)
+    else:
+        from kinfmu.draw import cam
+
+        cam(profile, output)
+    click.echo(f"written: {output}{about}")

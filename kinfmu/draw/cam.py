@@ -1,0 +1,158 @@
+"""cam(): the profile of a cam as a figure or as a DXF drawing."""
+
+from __future__ import annotations
+
+import io
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kinfmu.cams import CamProfile
+from kinfmu.draw.abscissa import TICK_STEPS
+from kinfmu.draw.chart import SMALL, dress
+from kinfmu.draw.dxf import DXF_UNITS, POINT_STYLE, without_date
+from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, ink
+from kinfmu.draw.writing import SUFFIXES, write, write_bytes
+from kinfmu.errors import FigureError, MissingPackageError, listed
+from kinfmu.files.whole_file import suffix_of
+from kinfmu.run import FloatArray
+from kinfmu.scene import palette
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_DXF = ".dxf"
+_FIGURE, _PLOT = 300.0, (270.0, 124.0)  # [pt]
+_LEFT, _BOTTOM, _TOP, _GAP, _EDGE = 46.0, 36.0, 30.0, 62.0, 10.0  # [pt]
+_LIMITS = {False: 30.0, True: 45.0}  # [deg] of the pressure angle, for sliding and swinging followers
+_FLAT = 20.0  # of the largest distance from the axle; larger radii of curvature are not plotted
+
+
+def cam(profile: CamProfile, path: str | Path) -> None:
+    """Draw the profile of a cam into a figure (.svg, .png, .pdf) or a CAD drawing (.dxf).
+
+    A figure shows profile, pitch curve, base circle and the roller or face at the first angle, and next to them
+    pressure angle and radius of curvature over the cam's angle. A drawing has the closed polygons through the points of
+    profile and pitch curve, the base circle and the axle as a point, on the layers PROFILE, PITCH, BASE and AXLE.
+
+    Args:
+        profile: The profile, from `kinfmu.cam_profile`; for a drawing with its argument `tolerance`.
+        path: The file.
+
+    Raises:
+        FigureError: The suffix is unknown, or the file cannot be written.
+        MissingPackageError: matplotlib, or for a drawing ezdxf, is not installed.
+
+    """
+    path = Path(str(path))
+    if suffix_of(path) == _DXF:
+        write_bytes(path, _drawing(profile, path).encode())
+    elif suffix_of(path) in SUFFIXES:
+        write(path, lambda: _figure(profile))
+    else:
+        raise FigureError(
+            f"{path}: '{path.suffix}' is not a known format of cam profiles; known: {listed((*SUFFIXES, _DXF))}"
+        )
+
+
+def _base_radius(profile: CamProfile) -> float:
+    """Return the radius of the base circle: the smallest distance of the profile from the axle."""
+    return float(np.hypot(*(profile.profile - profile.axle).T).min())
+
+
+def _drawing(profile: CamProfile, path: Path) -> str:
+    try:
+        ezdxf: Any = import_module("ezdxf")
+    except ImportError:
+        raise MissingPackageError(f"{path}: a DXF file needs ezdxf: pip install 'kinfmu[dxf]'") from None
+    with without_date(ezdxf):
+        drawing = ezdxf.new("R2010", units=DXF_UNITS.get(profile.length_unit, 0))
+        drawing.header["$PDMODE"] = POINT_STYLE
+        space, axle = drawing.modelspace(), tuple(map(float, profile.axle))
+        for layer, curve in (("PROFILE", profile.profile), ("PITCH", profile.pitch)):
+            if curve is not None:
+                drawing.layers.add(layer)
+                space.add_lwpolyline(_open(curve).tolist(), close=True, dxfattribs={"layer": layer})
+        for layer in ("BASE", "AXLE"):
+            drawing.layers.add(layer)
+        space.add_circle(axle, _base_radius(profile), dxfattribs={"layer": "BASE"})
+        space.add_point(axle, dxfattribs={"layer": "AXLE"})
+        text = io.StringIO()
+        drawing.write(text)
+        return text.getvalue()
+
+
+def _open(curve: FloatArray) -> FloatArray:
+    """Return a closed curve without its last point if that is the first one."""
+    apart = float(np.hypot(*(curve[-1] - curve[0])))
+    return curve[:-1] if len(curve) > 1 and apart <= 1e-9 * float(np.abs(curve).max()) else curve
+
+
+def _figure(profile: CamProfile) -> Figure:
+    from matplotlib.figure import Figure
+
+    width = _LEFT + _FIGURE + _GAP + _PLOT[0] + _EDGE
+    height = _TOP + _FIGURE + _BOTTOM
+    made = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
+    look: dict[str, Any] = {"fontsize": TITLE_FONT, "va": "top", "color": ink(INK), "parse_math": False}
+    title = f"{profile.cam}, {'flat face' if profile.pitch is None else f'roller {profile.roller_radius:.4g} '}"
+    title += "" if profile.pitch is None else profile.length_unit
+    made.text(_EDGE / width, 1.0 - _EDGE / height, f"{title}: joint {profile.joint}", **look)
+    axes = made.add_axes((_LEFT / width, _BOTTOM / height, _FIGURE / width, _FIGURE / height))
+    _outline(axes, profile)
+    left = (_LEFT + _FIGURE + _GAP) / width
+    across = np.degrees(profile.angle)
+    for k in range(2):
+        bottom = _BOTTOM + (1 - k) * (_FIGURE - _PLOT[1])
+        plot = made.add_axes((left, bottom / height, _PLOT[0] / width, _PLOT[1] / height))
+        (_pressure if k == 0 else _curvature)(plot, profile, across)
+        plot.locator_params(axis="x", nbins=9, steps=TICK_STEPS)
+        plot.margins(x=0.01)
+        plot.set_xlabel("angle of the cam [deg]", fontsize=SMALL, color=ink(GREY), labelpad=1.0)
+    return made
+
+
+def _outline(axes: Axes, profile: CamProfile) -> None:
+    """Paint the cam in its own frame, with the roller or the face at the first angle."""
+    colour = palette.BODIES[0]
+    axes.fill(*profile.profile.T, facecolor=ink(palette.lighter(colour)), edgecolor=ink(palette.darker(colour)), lw=1.2)
+    around = np.linspace(0.0, 2.0 * np.pi, 181)
+    circle = np.column_stack([np.cos(around), np.sin(around)])
+    axes.plot(*(profile.axle + _base_radius(profile) * circle).T, color=ink(GREY), lw=0.7, ls=":")
+    axes.plot(*profile.axle, "+", color=ink(INK), ms=9.0)
+    if profile.pitch is not None:
+        axes.plot(*profile.pitch.T, color=ink(GREY), lw=0.8, ls="--")
+        if profile.roller_radius:
+            axes.plot(*(profile.pitch[0] + profile.roller_radius * circle).T, color=ink(INK), lw=1.0)
+    else:
+        along = profile.face[0]
+        ends = np.array([profile.offset.min(), profile.offset.max()]) - profile.offset[0]
+        axes.plot(*(profile.profile[0] + ends[:, None] * along).T, color=ink(INK), lw=1.6)
+    dress(axes, "")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.06)
+    unit = profile.length_unit
+    axes.set_xlabel(f"x of {profile.cam} [{unit}]", fontsize=SMALL, color=ink(GREY), labelpad=1.0, parse_math=False)
+    axes.set_ylabel(f"y of {profile.cam} [{unit}]", fontsize=SMALL, color=ink(GREY), labelpad=1.0, parse_math=False)
+
+
+def _pressure(axes: Axes, profile: CamProfile, across: FloatArray) -> None:
+    limit = _LIMITS[profile.is_swinging]
+    axes.plot(across, np.degrees(profile.pressure_angle), color=ink(palette.BODIES[5]), lw=1.2)
+    for value in (-limit, limit):
+        axes.axhline(value, color=ink(palette.RUNS[0]), lw=0.8, ls="--")
+    dress(axes, "")
+    axes.set_ylabel("pressure angle [deg]", fontsize=SMALL, color=ink(GREY))
+
+
+def _curvature(axes: Axes, profile: CamProfile, across: FloatArray) -> None:
+    """Plot the radius of curvature, with gaps where the profile is nearly straight."""
+    most = _FLAT * float(np.hypot(*(profile.profile - profile.axle).T).max())
+    shown = np.where(np.abs(profile.radius) <= most, profile.radius, np.nan)
+    axes.plot(across, shown, color=ink(palette.BODIES[4]), lw=1.2)
+    axes.axhline(0.0, color=ink(GREY), lw=0.7)
+    dress(axes, "")
+    axes.set_ylabel(f"radius of curvature [{profile.length_unit}]", fontsize=SMALL, color=ink(GREY))
