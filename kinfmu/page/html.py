@@ -26,6 +26,7 @@ _SCRIPTS = (
     "forms",
     "ranges",
     "linkage",
+    "instants",
     "marks",
     "drawing",
     "design",

@@ -15,6 +15,7 @@
 
 #define LARGEST_RATE 1e100   /* of drivers; squares of much larger numbers are infinite */
 #define LARGEST_NUMBER 1e30  /* of parameters: as mechanism files have them */
+#define CLOSED 1e-10         /* gap of rows that close, relative to the size */
 
 /* The pose shown, and another solver with the same parameters: for sweeps, and for parameters that may have no solution. */
 static kf_follower followers[2];
@@ -155,6 +156,54 @@ bool kf_page_bind(void)
     kf_restart(next);
     memcpy(settings, bound, sizeof bound);
     return false;
+}
+
+/* Append "row AB" or "rows C.x, C.y" and what they do, in the form of the verb for one or for several. */
+static void append_rows(int block, const char *of_one, const char *of_several)
+{
+    const bool is_one = kf_block_rows[block] == 1;
+    kf_append(refusal, "%s %s %s", is_one ? "row" : "rows", kf_block_row_names[block], is_one ? of_one : of_several);
+}
+
+/* Write which rows do not close with the settings at the driver values, near the last good pose, and their smallest gap.
+ *
+ * Returns whether there is a gap: otherwise rows are named that close at a pose of another branch, or, for settings that
+ * no mechanism has, nothing.
+ */
+bool kf_page_gap(void)
+{
+    kf_pose *const pose = pose_of(&followers[shown]);
+    kf_solver *const solver = &followers[1 - shown].solver;
+    kf_model *const model = &solver->scratch.ahead;
+    kf_found *const found = &solver->scratch.follow[0].found;
+    double z[KF_ROOM(KF_UNKNOWNS)];
+    char why[KF_MESSAGE];
+    bool has_gap = false;
+    int k, weakest = 0;
+    refusal[0] = '\0';
+    message = refusal;
+    memcpy(z, pose->found.x, KF_UNKNOWNS * sizeof(double));
+    if (kf_bind(model, settings, why, sizeof why)) {
+        for (k = 0; k < KF_BLOCKS && !has_gap; ++k) {
+            const double gap = kf_gap(solver, model, k, drive[0], z);
+            weakest = fabs(pose->found.determinants[k]) < fabs(pose->found.determinants[weakest]) ? k : weakest;
+            if (gap > CLOSED) {
+                has_gap = true;
+                append_rows(k, "does not close: gap ", "do not close: gap ");
+                kf_append_number(refusal, "%.4g", gap * KF_SIZE);
+                kf_append(refusal, " %s", kf_length_unit);
+            }
+        }
+        if (!has_gap && kf_evaluated_as_given(model, drive[0], z, found) && found->watch > solver->tolerance) {
+            has_gap = true;
+            kf_append_watch(refusal, model, found, "gap ", "%.4g");
+        } else if (!has_gap && KF_BLOCKS > 0) {
+            append_rows(weakest, "closes", "close");
+            kf_append(refusal, " on another branch only: gap 0 %s", kf_length_unit);
+        }
+    }
+    memcpy(settings, bound, sizeof bound);
+    return has_gap;
 }
 
 /* Compute the driver values at a time, by the laws. */

@@ -33,6 +33,7 @@ EXPORTS = (
     "kf_page_length",
     "kf_page_message",
     "kf_page_bind",
+    "kf_page_gap",
     "kf_page_drive",
     "kf_page_restart",
     "kf_page_at",

@@ -39,15 +39,15 @@ function connect(model, page) {
     const valuesNow = () => Object.fromEntries(design.values);
     const driversNow = () => Object.fromEntries(linkage.data.drivers.map(({ name }, k) => [name, linkage.u[k]]));
     let waiting = 0;
+    let filed = null; // values of the file that was last reported
     const report = () => {
         waiting = 0;
         const values = valuesNow();
-        const isOther = !same(values, model.get("values"));
-        if (isOther) model.set("values", values);
-        if (isOther || !model.get("file")) model.set("file", page.file());
+        if (!same(values, model.get("values"))) model.set("values", values);
+        if (!filed || !same(values, filed)) model.set("file", page.file());
+        filed = values;
         if (!same(driversNow(), model.get("drivers"))) model.set("drivers", driversNow());
-        const problem = design.isOk ? "" : linkage.failure || "the mechanism does not close with these values";
-        if (problem !== model.get("problem")) model.set("problem", problem);
+        if (design.failure !== model.get("problem")) model.set("problem", design.failure);
         model.save_changes();
     };
     const reportSoon = () => (waiting ||= setTimeout(report, PERIOD));
@@ -66,14 +66,14 @@ function connect(model, page) {
             design.set(values);
             design.commit();
             page.reshape();
-        });
+        }, "values");
     };
     const takeDrivers = () => {
         const drivers = model.get("drivers");
         if (same(drivers, driversNow())) return;
         page.refresh(() => linkage.data.drivers.forEach(({ name }, k) => {
             if (drivers[name] !== linkage.u[k]) page.move(k, drivers[name]);
-        }));
+        }), "drivers");
     };
     const changes = { "change:values": takeValues, "change:drivers": takeDrivers };
     for (const [name, take] of Object.entries(changes)) model.on(name, take);

@@ -11,6 +11,7 @@ import kinfmu
 from kinfmu import Status, gallery
 from kinfmu.page.module import page_module
 from kinfmu.page.opened import opened
+from tests.page import test_lengths
 from tests.page.engines import (
     StepByStep,
     answers,
@@ -24,6 +25,7 @@ from tests.page.engines import (
 )
 
 MEMBERS = (*gallery.names(), "fourbar_chain:100")
+UNBREAKABLE = ("scotch_yoke",)  # its slides are straight lines without ends
 CLOSE = 1e-11  # of the largest number of a table
 NARROW = 1e-8  # of the same, at poses interpolated across a singular point
 
@@ -75,3 +77,9 @@ def test_every_opened_mechanism_moves_as_it_is_written(tmp_path: Path) -> None:
             gap = np.abs(ours - values).max(axis=1) / np.nanmax(np.abs(values))
             assert np.max(gap[run.status == Status.OK], initial=0.0) < CLOSE, name
             assert np.max(gap[run.status == Status.BRIDGED], initial=0.0) < NARROW, name
+
+
+def test_every_length_of_the_gallery_that_does_not_close_keeps_the_pose(tmp_path: Path) -> None:
+    for name, found in test_lengths.broken(tmp_path, gallery.names()).items():
+        assert bool(found) == (name not in UNBREAKABLE), name
+        test_lengths.keeps_its_pose_and_recovers(name, found)

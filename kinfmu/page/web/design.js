@@ -8,20 +8,25 @@ export class Design {
         this.locked = new Set();
         this.past = [];
         this.future = [];
-        this.values = new Map(linkage.values);
+        this.values = new Map(linkage.bound);
         this.saved = new Map(this.values);
+        this.failure = ""; // why the mechanism does not close with the values; it shows those before
         this.byName = new Map(linkage.parameters.map((one) => [one.name, one]));
     }
 
     get isOk() {
-        return this.ok !== false;
+        return this.failure === "";
     }
 
     // Set values of some parameters; they are one step to undo after `commit`.
     set(changes) {
         for (const [name, value] of Object.entries(changes)) this.values.set(name, value);
-        this.ok = this.linkage.setValues(this.values);
-        return this.ok;
+        return this.#bind();
+    }
+
+    #bind() {
+        this.failure = this.linkage.setValues(this.values) ? "" : this.linkage.failure;
+        return this.isOk;
     }
 
     commit() {
@@ -46,13 +51,13 @@ export class Design {
         to.push(this.saved);
         this.saved = values;
         this.values = new Map(values);
-        this.ok = this.linkage.setValues(this.values);
+        this.#bind();
         return true;
     }
 
     reset() {
         for (const one of this.linkage.parameters) this.values.set(one.name, one.value);
-        this.ok = this.linkage.setValues(this.values);
+        this.#bind();
         this.commit();
     }
 
@@ -93,9 +98,10 @@ export class Design {
             else ignored.push(name);
         }
         this.values = values;
-        this.ok = same(values, this.linkage.values) || this.linkage.setValues(values);
+        if (same(values, this.linkage.bound)) this.failure = "";
+        else this.#bind();
         this.saved = new Map(values);
-        if (this.ok && !u.every((value, k) => value === this.linkage.u[k])) this.linkage.goTowards(u);
+        if (this.isOk && !u.every((value, k) => value === this.linkage.u[k])) this.linkage.goTowards(u);
         return ignored;
     }
 }

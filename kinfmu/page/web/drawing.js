@@ -3,8 +3,11 @@
 import { edgeOf, fillOf, GREY, paleOf } from "./colours.js";
 import { distance, outline, placed } from "./geometry.js";
 import { marks } from "./marks.js";
-import { niceStep, number } from "./numbers.js";
+import { grouped, niceStep, number } from "./numbers.js";
 import { BUTTONS } from "./view.js";
+
+const MOST_NAMES = 80; // at once, the most important ones; more are unreadable, and those in view come with zooming in
+const CELL = 48; // [px] of the grid that finds names in the way
 
 // Draw a pose; show: what is switched on; view: from the plane to pixels.
 export function draw(pen, linkage, view, theme, show, extra) {
@@ -28,7 +31,7 @@ class Painter {
     constructor(pen, linkage, view, theme, isGhost) {
         Object.assign(this, { pen, linkage, view, theme, isGhost });
         this.pose = linkage.pose;
-        this.boxes = [];
+        this.boxes = new Boxes();
         this.wanted = [];
         this.fine = linkage.fineness;
         this.width = Math.max(4, Math.min(15, 13 * this.fine));
@@ -48,7 +51,7 @@ class Painter {
     }
 
     all(...kinds) {
-        return this.linkage.shapes.filter((shape) => kinds.includes(shape.kind));
+        return kinds.flatMap((kind) => this.linkage.shapesOf.get(kind) || []);
     }
 
     // Return the points of a shape in the plane; they move with the point next to which the file has the shape.
@@ -59,7 +62,7 @@ class Painter {
             const [x, y] = linkage.point(shape.follows);
             return points.map((p) => [x + p[0], y + p[1]]);
         }
-        const frame = linkage.bodyPose(linkage.bodies.indexOf(shape.frame), pose);
+        const frame = linkage.bodyPose(linkage.body(shape.frame), pose);
         return points.map((p) => placed(frame, p[0] + dx, p[1] + dy));
     }
 
@@ -72,7 +75,7 @@ class Painter {
 
     // Return a direction of a shape in pixels, y down.
     direction(shape) {
-        const body = this.linkage.bodies.indexOf(shape.frame);
+        const body = this.linkage.body(shape.frame);
         const phi = body < 0 ? 0 : this.linkage.bodyPose(body)[2];
         const [x, y] = placed([0, 0, phi], ...shape.direction);
         return [x, -y];
@@ -183,16 +186,15 @@ class Painter {
 
     // Draw links: plates first, then those whose points are on a line, with their rods.
     links(areClosed) {
+        const rods = grouped(this.all("rod"), (rod) => rod.frame);
         for (const link of this.all("link")) {
-            const body = this.linkage.bodies.indexOf(link.frame);
+            const body = this.linkage.body(link.frame);
             const found = this.outlines[body];
             if (found.closed !== areClosed) continue;
             const pose = this.linkage.bodyPose(body);
             const place = (p) => this.dot(placed(pose, p[0], p[1]));
             const routes = found.corners.length > 1 ? [{ points: found.corners.map(place), closed: found.closed }] : [];
-            for (const rod of this.all("rod")) {
-                if (rod.frame === link.frame) routes.push({ points: this.at(rod).map((p) => this.dot(p)), closed: false });
-            }
+            for (const rod of rods.get(link.frame) || []) routes.push({ points: this.at(rod).map((p) => this.dot(p)), closed: false });
             const [edge, fill] = [this.edge(link.colour), this.fill(link.colour)];
             const width = this.width * (found.closed ? 0.8 : 1);
             if (found.closed) this.pen.line(routes[0].points, { width: 0, fill: paleOf(this.isGhost ? GREY : link.colour, this.theme), closed: true, alpha: 0.85 });
@@ -210,8 +212,9 @@ class Painter {
         const { linkage } = this;
         if (linkage.outlinesFor !== linkage.pose.locals) {
             linkage.outlinesFor = linkage.pose.locals;
+            const ofBodies = grouped(linkage.bodyOf.keys(), (k) => linkage.bodyOf[k]);
             linkage.outlineList = linkage.bodies.map((_, body) => {
-                const points = linkage.data.points.map((__, k) => k).filter((k) => linkage.bodyOf[k] === body);
+                const points = ofBodies.get(body) || [];
                 return outline(points.length ? points.map((k) => linkage.local(k)) : [[0, 0]]);
             });
         }
@@ -270,13 +273,15 @@ class Painter {
     pins(held) {
         const { linkage, pen, theme } = this;
         const radius = Math.max(2.4, 0.33 * this.width);
-        const done = [];
+        const done = new Set();
         const pin = (point, text) => {
             const p = this.dot(linkage.point(point));
-            if (done.some((other) => distance(other, p) < 1)) return;
-            done.push(p);
-            pen.circle(...p, radius, { width: 1.6, colour: theme.ink, fill: theme.pin });
-            this.boxes.push([p[0] - radius, p[1] - radius, p[0] + radius, p[1] + radius]);
+            const place = `${Math.round(p[0])} ${Math.round(p[1])}`;
+            if (!done.has(place)) {
+                done.add(place);
+                pen.circle(...p, radius, { width: 1.6, colour: theme.ink, fill: theme.pin });
+                this.boxes.add([p[0] - radius, p[1] - radius, p[0] + radius, p[1] + radius]);
+            }
             if (text) this.name(text, [p], theme.ink, radius + 8, 1);
         };
         for (const joint of linkage.data.joints) {
@@ -298,7 +303,9 @@ class Painter {
     names() {
         const { pen, theme } = this;
         this.wanted.sort((a, b) => a.rank - b.rank);
+        let left = MOST_NAMES;
         for (const { text, places, colour, off } of this.wanted) {
+            if (!left) break;
             const width = 6.6 * text.length + 4;
             let done = false;
             for (const [x, y] of places) {
@@ -308,8 +315,9 @@ class Painter {
                     const cy = y + dy * off;
                     const box = [cx - width / 2, cy - 8, cx + width / 2, cy + 8];
                     if (box[0] < 2 || box[2] > this.view.width - 2 || box[1] < BUTTONS + 10 || box[3] > this.view.height - 2) continue;
-                    if (this.boxes.some((b) => b[0] < box[2] && b[2] > box[0] && b[1] < box[3] && b[3] > box[1])) continue;
-                    this.boxes.push(box);
+                    if (!this.boxes.isFree(box)) continue;
+                    this.boxes.add(box);
+                    left -= 1;
                     pen.text(cx, cy, text, { colour, size: 12, align: "center", halo: theme.paper });
                     done = true;
                     break;
@@ -317,6 +325,33 @@ class Painter {
                 if (done) break;
             }
         }
+    }
+}
+
+// Rectangles [left, top, right, bottom] that are taken, listed by the cells of a grid that they touch.
+class Boxes {
+    constructor() {
+        this.cells = new Map();
+    }
+
+    *#touched([left, top, right, bottom]) {
+        for (let i = Math.floor(left / CELL); i <= Math.floor(right / CELL); i++) {
+            for (let j = Math.floor(top / CELL); j <= Math.floor(bottom / CELL); j++) yield i * 4096 + j;
+        }
+    }
+
+    add(box) {
+        for (const cell of this.#touched(box)) {
+            if (this.cells.has(cell)) this.cells.get(cell).push(box);
+            else this.cells.set(cell, [box]);
+        }
+    }
+
+    isFree(box) {
+        for (const cell of this.#touched(box)) {
+            if (this.cells.get(cell)?.some((b) => b[0] < box[2] && b[2] > box[0] && b[1] < box[3] && b[3] > box[1])) return false;
+        }
+        return true;
     }
 }
 

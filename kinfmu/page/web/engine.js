@@ -58,6 +58,18 @@ export class Engine {
     return { ok, message: this.message };
   }
 
+  // Why nothing closes with values at driver values u: { hasGap, text } names rows and their smallest gap near the last
+  // good pose. Without a gap they close at a pose of another branch, or, without text, the values are invalid. Neither what
+  // is bound nor the pose is changed.
+  gap(values, u) {
+    this.#expect("gap", "values", values, this.#arrays.settings.length);
+    this.#expect("gap", "u", u, this.#drive[0].length);
+    this.#arrays.settings.set(values);
+    this.#drive[0].set(u);
+    const hasGap = this.#code.kf_page_gap() !== 0;
+    return { hasGap, text: this.message };
+  }
+
   // Go where the laws start.
   restart() {
     this.#code.kf_page_restart();

@@ -41,7 +41,7 @@ function tracksOf(linkage, shapes) {
     linkage.visit(linkage.data.drivers.length === 1 ? "driver" : "time", POSES, (_, pose) => {
         if (!pose) return;
         for (const [shape, { point, holder }] of wanted) {
-            found.get(shape).push(seen(linkage.bodyPose(linkage.bodies.indexOf(holder), pose), ...linkage.point(point, pose)));
+            found.get(shape).push(seen(linkage.bodyPose(linkage.body(holder), pose), ...linkage.point(point, pose)));
         }
     });
     return found;
@@ -68,7 +68,7 @@ function ofSlide(linkage, shape, track) {
     if (shape.kind === "slot" || shape.kind === "rod") return { ...shape, points: ends, anchor: undefined };
     if (shape.kind === "die") return { ...shape, direction: along };
     if (shape.kind === "block") {
-        const turn = linkage.bodyPose(linkage.bodies.indexOf(holder))[2] - linkage.bodyPose(linkage.bodies.indexOf(shape.frame))[2];
+        const turn = linkage.bodyPose(linkage.body(holder))[2] - linkage.bodyPose(linkage.body(shape.frame))[2];
         return { ...shape, direction: placed([0, 0, turn], ...along) };
     }
     const side = -along[1] * shape.direction[0] + along[0] * shape.direction[1] < 0 ? -1 : 1;
@@ -114,7 +114,7 @@ function scaled(shape, factor) {
 // Return one of the two straight parts of a belt around two pulleys.
 function ofBelt(linkage, shape) {
     const both = linkage.data.shapes.filter((one) => one.kind === "belt" && one.name === shape.name);
-    const carrier = linkage.bodyPose(linkage.bodies.indexOf(shape.frame));
+    const carrier = linkage.bodyPose(linkage.body(shape.frame));
     const wheels = wheelsOf(linkage, shape.name);
     const [a, b] = wheels.map((wheel) => seen(carrier, ...linkage.point(wheel.anchor)));
     const [r, s] = wheels.map((wheel) => wheel.radius * growth(linkage, shape.name));

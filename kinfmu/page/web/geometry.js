@@ -17,7 +17,12 @@ export function seen(pose, x, y) {
 }
 
 export function distance(a, b) {
-    return Math.hypot(a[0] - b[0], a[1] - b[1]);
+    return length(a[0] - b[0], a[1] - b[1]);
+}
+
+// Return the length of a vector; Math.hypot is many times slower.
+export function length(x, y) {
+    return Math.sqrt(x * x + y * y);
 }
 
 export function remainder(angle) {

@@ -27,7 +27,7 @@ export function gripAt(linkage, p, reach) {
     }
     if (best) return best;
     for (const shape of linkage.shapes) {
-        const body = linkage.bodies.indexOf(shape.frame);
+        const body = linkage.body(shape.frame);
         if (body < 0 || linkage.triples[body][0] < 0 || !(shape.radius || shape.kind === "cam")) continue;
         const local = seen(linkage.bodyPose(body), ...p);
         const [cx, cy] = shape.points.reduce(([x, y], q) => [x + q[0] / shape.points.length, y + q[1] / shape.points.length], [0, 0]);

@@ -44,17 +44,19 @@ export class Hand {
             } else if (drag?.kind === "pan") {
                 view.pan(p[0] - before[0], p[1] - before[1]);
                 page.refresh();
-            } else if (drag) page.refresh(() => this.#drag(drag, view.plane(p)));
+            } else if (drag) {
+                const dragged = drag;
+                page.refresh(() => this.#drag(dragged, view.plane(p)), "hand");
+            }
             held.set(event.pointerId, p);
         });
         const release = (event) => {
             held.delete(event.pointerId);
             if (drag?.kind === "pin") page.commit();
-            if (drag?.kind === "grip") page.address.write();
+            if (drag?.kind === "grip") page.refresh(() => page.address.write());
             drag = null;
-            this.held = null;
             canvas.classList.remove("dragging");
-            page.refresh();
+            page.refresh(() => (this.held = null)); // after the last place
         };
         canvas.addEventListener("pointerup", release);
         canvas.addEventListener("pointercancel", release);
@@ -79,8 +81,7 @@ export class Hand {
         const { page } = this;
         const { linkage, design, motion } = page;
         if (drag.kind === "grip") {
-            const isReached = pull(linkage, drag.grip, target);
-            motion.blocked = isReached ? "" : linkage.failure;
+            motion.arrive(pull(linkage, drag.grip, target));
             this.held = place(linkage, drag.grip);
             return;
         }

@@ -13,10 +13,11 @@ export function keyboard(page) {
         }
         if (isField(event.target) || event.ctrlKey || event.metaKey || event.altKey) return;
         const { linkage } = page;
-        const step = linkage.data.drivers[page.driver]?.kind === "angle" ? Math.PI / 180 : (linkage.ranges[page.driver][1] - linkage.ranges[page.driver][0]) / 200;
+        const k = page.driver;
+        const step = linkage.data.drivers[k]?.kind === "angle" ? Math.PI / 180 : (linkage.ranges[k][1] - linkage.ranges[k][0]) / 200;
         const by = (way) => {
             page.motion.play(false);
-            page.refresh(() => page.move(page.driver, linkage.u[page.driver] + way * step * (event.shiftKey ? 10 : 1)));
+            page.refresh(() => page.move(k, linkage.u[k] + way * step * (event.shiftKey ? 10 : 1))); // every press counts
             page.address.writeSoon();
         };
         const choose = (way) => {

@@ -3,6 +3,7 @@
 import { isGood } from "./engine.js";
 import { axlesOf, formsOf } from "./forms.js";
 import { TURN, placed, remainder } from "./geometry.js";
+import { grouped } from "./numbers.js";
 import { changePointsOf, rangesOf } from "./ranges.js";
 
 const CURVE = 720; // points of a coupler curve
@@ -17,10 +18,10 @@ export class Linkage {
         this.data = data;
         this.engines = engines;
         this.bodies = data.bodies.map((body) => body.name);
-        this.bodyOf = data.points.map((point) => this.bodies.indexOf(point.body));
+        this.numberOf = new Map(this.bodies.map((name, k) => [name, k]));
+        this.bodyOf = data.points.map((point) => this.body(point.body));
         this.parameters = (data.modules.opened || data.modules.written).parameters;
-        this.values = new Map(this.parameters.map((one) => [one.name, one.value]));
-        this.bound = new Map(this.values);
+        this.bound = new Map(this.parameters.map((one) => [one.name, one.value]));
         this.failure = "";
         this.#use("written");
         this.u = Float64Array.from(this.shown.driven(data.run.from).u);
@@ -84,12 +85,16 @@ export class Linkage {
 
     // Move to driver values; return true if the pose is reached. The last good pose stays otherwise.
     goTo(u, rates = null) {
+        if (this.#follow(u, rates)) return true;
+        const message = this.shown.message || "This pose is unreachable.";
+        const { text } = this.shown.gap(this.shown.parameters.slice(), Float64Array.from(u));
+        this.failure = text ? `${message}; there, ${text}` : message;
+        return false;
+    }
+
+    #follow(u, rates = null) {
         const { ud, udd } = rates || this.ratesNear();
-        const status = this.shown.at(Float64Array.from(u), ud, udd);
-        if (!isGood(status)) {
-            this.failure = this.shown.message || "This pose is unreachable.";
-            return false;
-        }
+        if (!isGood(this.shown.at(Float64Array.from(u), ud, udd))) return false;
         this.#keep(u, { ud, udd });
         return true;
     }
@@ -101,7 +106,7 @@ export class Linkage {
         let [reached, target] = [Float64Array.from(this.u), Float64Array.from(u)];
         for (let k = 0; k < 12; k++) {
             const middle = reached.map((value, i) => 0.5 * (value + target[i]));
-            if (this.goTo(middle)) reached = middle;
+            if (this.#follow(middle)) reached = middle;
             else target = middle;
         }
         this.failure = failure;
@@ -113,6 +118,11 @@ export class Linkage {
         const u = offset ? law.u.map((value, k) => value + offset[k]) : law.u;
         this.t = t;
         return this.goTo(Float64Array.from(u), { ud: Float64Array.from(law.ud), udd: Float64Array.from(law.udd) });
+    }
+
+    // Return the number of a body by its name; -1 for frames that are no bodies.
+    body(name) {
+        return this.numberOf.get(name) ?? -1;
     }
 
     bodyPose(body, pose = this.pose) {
@@ -183,26 +193,49 @@ export class Linkage {
 
     // ---- lengths
 
-    // Bind other values of parameters (a Map); return true if the mechanism closes with them at its driver values.
+    // Bind other values of parameters (a Map); return true if the mechanism closes with them at its driver values. If not,
+    // values and pose stay as they are, and `failure` states why.
     setValues(values) {
-        this.values = new Map(values);
-        const isOpened = this.parameters.some((one) => one.isPlace && values.get(one.name) !== one.value);
-        const which = isOpened ? "opened" : "written";
-        const [shown, probe] = this.engines[which];
-        const part = this.data.modules[which];
-        const vector = Float64Array.from(part.parameters, (one) => values.get(one.name) ?? one.value);
+        const { which, shown, probe, vector } = this.#engineFor(values);
         const found = shown.bind(vector);
         if (!found.ok) {
-            this.failure = found.message || "The mechanism does not close with these lengths.";
+            this.failure = this.#gapOf(shown, vector, found.message || "the mechanism does not close");
+            return false;
+        }
+        const before = this.which;
+        this.#use(which);
+        if (!this.goTo(this.u)) {
+            if (before === which) shown.bind(this.#engineFor(this.bound).vector);
+            this.#use(before);
+            this.shown.at(this.u, this.rates.ud, this.rates.udd);
             return false;
         }
         probe.bind(vector);
-        this.#use(which);
         this.changed += 1;
-        if (this.parameters.some((one) => one.isLaw && values.get(one.name) !== this.bound.get(one.name))) this.#tableLaws();
-        if (!this.goTo(this.u)) return false;
+        const areLaws = this.parameters.some((one) => one.isLaw && values.get(one.name) !== this.bound.get(one.name));
         this.bound = new Map(values);
+        if (areLaws) this.#tableLaws();
         return true;
+    }
+
+    // Return the engines that solve with values: those of the file as written as long as no plain number is changed.
+    #engineFor(values) {
+        const isOpened = this.parameters.some((one) => one.isPlace && values.get(one.name) !== one.value);
+        const which = isOpened ? "opened" : "written";
+        const [shown, probe] = this.engines[which];
+        const vector = Float64Array.from(this.data.modules[which].parameters, (one) => values.get(one.name) ?? one.value);
+        return { which, shown, probe, vector };
+    }
+
+    // Return why values do not close: rows and gap at the driver values shown, or else where the laws start.
+    #gapOf(engine, vector, message) {
+        const here = engine.gap(vector, this.u);
+        if (here.hasGap || !here.text) return here.text || message;
+        const there = engine.gap(vector, this.law[0].u);
+        if (there.hasGap) return `at the start of the run, ${there.text}`;
+        const [, rows, gap] = message.match(/: rows (.*) leave a gap of (.*)$/) || []; // of the pose from which all are followed
+        if (rows) return `at the pose as written, rows ${rows} do not close: gap ${gap}`;
+        return message.includes("beyond a singular point") ? `${here.text}, beyond a singular point` : `${message}; ${here.text}`;
     }
 
     // ---- curves and ranges, by the engine that is not shown
@@ -232,6 +265,7 @@ export class Linkage {
         Object.assign(this, rangesOf(this));
         this.changePoints = changePointsOf(this);
         this.shapes = formsOf(this);
+        this.shapesOf = grouped(this.shapes, (shape) => shape.kind);
     }
 
     // Return the value of a driver within its range, if it turns without end.
@@ -283,7 +317,7 @@ export class Linkage {
         all.forEach((k) => add(this.point(k)));
         for (const shape of this.shapes) {
             if (!shape.radius && shape.kind !== "cam") continue;
-            const body = this.bodies.indexOf(shape.frame);
+            const body = this.body(shape.frame);
             if (body < 0) continue;
             for (const [x, y] of shape.points) {
                 const p = placed(this.bodyPose(body), x, y);
@@ -339,45 +373,5 @@ export class Linkage {
             const law = over === "time" ? probe.driven(x) : { u: Float64Array.of(x), ...rates };
             visit(x, isGood(probe.at(law.u, law.ud, law.udd)) ? this.poseOf(probe, over === "time" ? x : this.t) : null);
         }
-    }
-
-    // Return transmission angles [rad] of the loops, with the place of the pin.
-    transmissions(pose = this.pose) {
-        return this.data.loops.map((loop) => {
-            const pins = loop.pins.map((pin) => this.point(pin, pose));
-            if (loop.direction !== undefined) {
-                const [p, s] = pins;
-                const length = Math.hypot(s[0] - p[0], s[1] - p[1]);
-                const normal = [-Math.sin(loop.direction), Math.cos(loop.direction)];
-                const cosine = (normal[0] * (s[0] - p[0]) + normal[1] * (s[1] - p[1])) / length;
-                const arms = [[p[0] - s[0], p[1] - s[1]], [-normal[0], -normal[1]]];
-                return { loop, angle: Math.acos(Math.max(-1, Math.min(1, cosine))), at: s, arms };
-            }
-            const [p, q, c] = pins;
-            const arms = [[p[0] - q[0], p[1] - q[1]], [c[0] - q[0], c[1] - q[1]]];
-            const [[ax, ay], [bx, by]] = arms;
-            return { loop, angle: Math.abs(Math.atan2(ax * by - ay * bx, ax * bx + ay * by)), at: q, arms };
-        });
-    }
-
-    // Return instant centres of moving bodies relative to the ground, and of all pairs of up to four bodies.
-    centres(pose = this.pose) {
-        const twists = this.bodies.map((name, body) => {
-            const { v } = this.motionOf(body, [0, 0], pose);
-            const iphi = pose.triples[body][2];
-            return { name, omega: iphi < 0 ? 0 : pose.qd[iphi], v };
-        });
-        const found = [];
-        const fastest = Math.max(...twists.map((twist) => Math.abs(twist.omega)));
-        for (let i = 0; i < twists.length; i++) {
-            for (let j = i + 1; j < twists.length; j++) {
-                if (i > 0 && twists.length > 4) continue;
-                const omega = twists[j].omega - twists[i].omega;
-                if (Math.abs(omega) <= 1e-6 * fastest) continue;
-                const v = [twists[j].v[0] - twists[i].v[0], twists[j].v[1] - twists[i].v[1]];
-                found.push({ at: [-v[1] / omega, v[0] / omega], label: `${i + 1}${twists.length > 9 ? "," : ""}${j + 1}` });
-            }
-        }
-        return found;
     }
 }

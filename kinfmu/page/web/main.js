@@ -12,6 +12,7 @@ import { Hand } from "./hand.js";
 import { keyboard } from "./keyboard.js";
 import { Linkage } from "./linkage.js";
 import { Motion } from "./motion.js";
+import { sentence } from "./numbers.js";
 import { filesPanel, Plots, showPanel } from "./panels.js";
 import { CanvasPen } from "./pen.js";
 import { Transport } from "./transport.js";
@@ -61,14 +62,14 @@ class Page {
         return this.frames.isAsked;
     }
 
-    // Ask for a new drawing in the next frame; work: what is done first.
-    refresh(work = null) {
-        this.frames.ask(work);
+    // Ask for a new drawing in the next frame; work: what is done first, instead of work that waits under the same key.
+    refresh(work = null, key = undefined) {
+        this.frames.ask(work, key);
     }
 
-    frame(now, work) {
+    frame(now, waiting) {
         if (this.motion.isPlaying) this.motion.advance(now);
-        if (work) work();
+        for (const work of waiting) work();
         this.#trace();
         this.paint();
         return this.motion.isPlaying;
@@ -121,8 +122,8 @@ class Page {
         $("undo").disabled = !design.past.length;
         $("redo").disabled = !design.future.length;
         $("reset").disabled = !design.changes().length;
-        if (!design.isOk) this.#banner("Does not close. ", `${linkage.failure} The last good pose is shown in grey.`);
-        else this.#banner("Stops here. ", motion.blocked);
+        if (!design.isOk) this.#banner("Does not close. ", `${sentence(design.failure)} The last good pose is shown in grey.`);
+        else this.#banner("Stops here. ", motion.blocked && sentence(motion.blocked));
     }
 
     #banner(head, text) {
@@ -158,31 +159,28 @@ class Page {
         this.refresh(() => {
             this.design.set({ [name]: value });
             this.reshape();
+        }, `value ${name}`);
+    }
+
+    // Make the values since the last commit one step to undo, after the work that waits.
+    commit() {
+        this.refresh(() => {
+            this.design.commit();
+            this.address.write();
         });
     }
 
-    // Make the values since the last commit one step to undo, once they are drawn.
-    commit() {
-        const done = () => {
-            this.design.commit();
-            this.address.write();
-            this.#readouts();
-        };
-        if (this.isAsked) requestAnimationFrame(() => requestAnimationFrame(done));
-        else done();
-    }
-
     undo(isRedo = false) {
-        if (isRedo ? this.design.redo() : this.design.undo()) {
+        this.refresh(() => {
+            if (!(isRedo ? this.design.redo() : this.design.undo())) return;
             this.reshape();
             this.address.write();
-        }
+        });
     }
 
-    // Take over values that closed nowhere before, at a pose where they may.
+    // Take over values that did not close before, at a pose where they may.
     recover() {
-        this.design.ok = this.linkage.setValues(this.design.values);
-        if (this.design.ok) this.reshape();
+        if (!this.design.isOk && this.design.set({})) this.reshape();
     }
 
     // ---- parts of the page
@@ -199,9 +197,11 @@ class Page {
         $("undo").addEventListener("click", () => this.undo());
         $("redo").addEventListener("click", () => this.undo(true));
         $("reset").addEventListener("click", () => {
-            this.design.reset();
-            this.reshape();
-            this.address.write();
+            this.refresh(() => {
+                this.design.reset();
+                this.reshape();
+                this.address.write();
+            });
         });
         $("theme").addEventListener("click", () => {
             const name = this.theme.isDark ? "light" : "dark";

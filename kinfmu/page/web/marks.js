@@ -2,12 +2,13 @@
 
 import { css } from "./colours.js";
 import { distance, TURN } from "./geometry.js";
+import { centres, transmissions } from "./instants.js";
 import { degrees } from "./numbers.js";
 
 export function marks(painter, show, { arrows, legend }) {
     if (show.limits) driverMarks(painter);
-    if (show.transmission) transmissions(painter);
-    if (show.centres) centres(painter);
+    if (show.transmission) transmissionMarks(painter);
+    if (show.centres) centreMarks(painter);
     for (const one of arrows) arrow(painter, one);
     legend.forEach((one, k) => scale(painter, one, k));
 }
@@ -20,9 +21,9 @@ function scale({ pen, theme, view }, { length, colour, text }, row) {
     pen.text(x + length + 10, y, text, { colour: css(colour), size: 12 });
 }
 
-function transmissions(painter) {
+function transmissionMarks(painter) {
     const { linkage, pen, theme } = painter;
-    for (const { angle, at, arms } of linkage.transmissions()) {
+    for (const { angle, at, arms } of transmissions(linkage)) {
         const p = painter.dot(at);
         const r = 30;
         const [a, b] = arms.map(([x, y]) => Math.atan2(y, x));
@@ -40,9 +41,9 @@ function transmissions(painter) {
     }
 }
 
-function centres(painter) {
+function centreMarks(painter) {
     const { linkage, pen, theme, view } = painter;
-    const shown = linkage.centres().map(({ at, label }) => ({ p: painter.dot(at), label }));
+    const shown = centres(linkage).map(({ at, label }) => ({ p: painter.dot(at), label }));
     const merged = [];
     for (const one of shown) {
         const same = merged.find((other) => distance(other.p, one.p) < 2);
@@ -84,7 +85,7 @@ function driverMarks(painter) {
     linkage.data.drivers.forEach((driver, k) => {
         if (driver.kind !== "angle" || driver.pivot === null || driver.pivot === undefined) return;
         const centre = painter.dot(linkage.point(driver.pivot));
-        const body = linkage.bodies.indexOf(driver.body);
+        const body = linkage.body(driver.body);
         const reach = Math.max(...linkage.data.points.map((_, i) => (linkage.bodyOf[i] === body ? distance(painter.dot(linkage.point(i)), centre) : 0)));
         const radius = Math.max(reach, 24) + 16;
         const base = linkage.bodyPose(body)[2] - linkage.u[k];

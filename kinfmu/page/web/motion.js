@@ -41,10 +41,15 @@ export class Motion {
             this.glide = this.glide.map((gap) => gap * Math.exp(-6 * elapsed));
             if (this.glide.every((gap) => Math.abs(gap) < 1e-9)) this.glide = null;
         }
-        if (!linkage.goToTime(t, this.glide)) {
-            this.play(false);
-            this.blocked = linkage.failure;
-        } else this.blocked = "";
+        this.arrive(linkage.goToTime(t, this.glide));
+        if (this.blocked) this.play(false);
+    }
+
+    // Note whether a pose was reached; values that did not close before may close there.
+    arrive(isReached) {
+        this.blocked = isReached ? "" : this.linkage.failure;
+        if (isReached) this.page.recover();
+        return isReached;
     }
 
     #repeats() {
@@ -56,10 +61,7 @@ export class Motion {
         const u = this.linkage.u.slice();
         u[k] = value;
         this.linkage.t = this.linkage.timeNear(u);
-        const isReached = this.linkage.goTowards(u);
-        this.blocked = isReached ? "" : this.linkage.failure;
-        if (!this.page.design.isOk && isReached) this.page.recover();
-        return isReached;
+        return this.arrive(this.linkage.goTowards(u));
     }
 
     // Move to a place in a plot.
@@ -67,8 +69,8 @@ export class Motion {
         this.play(false);
         this.page.refresh(() => {
             if (over === "driver") this.move(0, x);
-            else this.blocked = this.linkage.goToTime(x) ? "" : this.linkage.failure;
-        });
+            else this.arrive(this.linkage.goToTime(x));
+        }, "place");
         this.page.address.writeSoon();
     }
 }

@@ -13,3 +13,19 @@ export function number(value, digits = 5) {
 export function degrees(angle, decimals = 2) {
     return `${Number(((angle * 180) / Math.PI).toFixed(decimals)) + 0}\u00b0`;
 }
+
+// Return the members of each group, by what key gives for them.
+export function grouped(members, key) {
+    const found = new Map();
+    for (const one of members) {
+        const name = key(one);
+        if (found.has(name)) found.get(name).push(one);
+        else found.set(name, [one]);
+    }
+    return found;
+}
+
+// Return a text as a sentence: its first letter large, a full stop at its end.
+export function sentence(text) {
+    return `${text.slice(0, 1).toUpperCase()}${text.slice(1).replace(/[.]$/, "")}.`;
+}

@@ -2,9 +2,8 @@
 
 import { element } from "./elements.js";
 import { buildCommand, download, drawing, mechanismFile, table } from "./exports.js";
-import { number } from "./numbers.js";
+import { grouped, number } from "./numbers.js";
 import { defaults, Plot, quantities, sampled } from "./plots.js";
-import { grouped } from "./values.js";
 
 // ---- plots
 
@@ -33,7 +32,7 @@ export class Plots {
 
     add(id) {
         const select = element("select", { "aria-label": "Quantity" });
-        for (const [name, members] of grouped(this.all)) {
+        for (const [name, members] of grouped(this.all, (one) => one.group)) {
             const group = element("optgroup", { label: name });
             members.forEach((one) => group.append(element("option", { value: one.id, textContent: `${one.label} [${one.unit}]` })));
             select.append(group);

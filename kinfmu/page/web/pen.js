@@ -27,7 +27,8 @@ export class CanvasPen {
     text(x, y, text, { colour, size = 12, align = "left", halo = null, italic = false, bold = false } = {}) {
         const c = this.context;
         c.globalAlpha = 1;
-        c.font = `${italic ? "italic " : ""}${bold ? "600 " : ""}${size}px ${FONT}`;
+        const font = `${italic ? "italic " : ""}${bold ? "600 " : ""}${size}px ${FONT}`;
+        if (font !== this.font) c.font = this.font = font; // reading a font takes the browser long
         c.textAlign = align;
         c.textBaseline = "middle";
         if (halo) {
@@ -50,7 +51,7 @@ export class CanvasPen {
             c.lineWidth = width;
             c.lineCap = cap;
             c.lineJoin = "round";
-            c.setLineDash(dash || []);
+            if (dash) c.setLineDash(dash);
             c.strokeStyle = colour;
             c.stroke();
             if (dash) c.setLineDash([]);

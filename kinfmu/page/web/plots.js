@@ -1,5 +1,6 @@
 // Plots of quantities over time or the driver, with one cursor for all.
 
+import { transmissions } from "./instants.js";
 import { degrees, niceStep, number } from "./numbers.js";
 import { FONT } from "./pen.js";
 
@@ -20,7 +21,7 @@ export function quantities(linkage) {
     }
     linkage.data.loops.forEach((loop, k) => {
         const label = `transmission angle ${loop.coupler}-${loop.output}`;
-        const read = (one, pose) => (one.transmissions(pose)[k].angle * 180) / Math.PI;
+        const read = (one, pose) => (transmissions(one, pose)[k].angle * 180) / Math.PI;
         found.push({ id: label, label, group: "transmission", unit: "deg", read });
     });
     linkage.part.forces.forEach(({ name, unit }, k) => {
@@ -67,6 +68,7 @@ export function sampled(linkage, over, wanted, count = SAMPLES) {
 export class Plot {
     constructor(canvas, onPick) {
         this.canvas = canvas;
+        new ResizeObserver(() => this.#measure()).observe(canvas); // asking for the size in each frame takes the browser long
         const pick = (event) => {
             if (!this.range) return;
             const box = canvas.getBoundingClientRect();
@@ -85,14 +87,23 @@ export class Plot {
             if (!way || !this.range) return;
             event.preventDefault();
             const step = (this.range[1] - this.range[0]) / (event.shiftKey ? 36 : 360);
-            onPick(Math.min(this.range[1], Math.max(this.range[0], this.cursor + way * step)));
+            this.cursor = Math.min(this.range[1], Math.max(this.range[0], this.cursor + way * step)); // for the next press
+            onPick(this.cursor);
         });
     }
 
-    draw({ x, values, label, unit, cursor, now, theme, isAngle, xLabel }) {
+    #measure() {
+        this.size = [this.canvas.clientWidth, this.canvas.clientHeight];
+        if (this.last) this.draw(this.last);
+    }
+
+    draw(what) {
+        this.last = what;
+        const { x, values, label, unit, cursor, now, theme, isAngle, xLabel } = what;
+        if (!this.size?.[0]) this.size = [this.canvas.clientWidth, this.canvas.clientHeight];
+        const [width, height] = this.size;
         const { canvas } = this;
         const ratio = window.devicePixelRatio || 1;
-        const [width, height] = [canvas.clientWidth, canvas.clientHeight];
         if (!width || !height) return;
         if (canvas.width !== Math.round(width * ratio)) canvas.width = Math.round(width * ratio);
         if (canvas.height !== Math.round(height * ratio)) canvas.height = Math.round(height * ratio);

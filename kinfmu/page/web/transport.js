@@ -23,9 +23,7 @@ export class Transport {
         [time.min, time.max] = [run.from, run.to];
         time.addEventListener("input", () => {
             page.motion.play(false);
-            page.refresh(() => {
-                page.motion.blocked = linkage.goToTime(Number(time.value)) ? "" : linkage.failure;
-            });
+            page.refresh(() => page.motion.arrive(linkage.goToTime(Number(time.value))), "place");
             page.address.writeSoon();
         });
         this.sliders = drivers.map((driver, k) => {
@@ -35,7 +33,7 @@ export class Transport {
             slider.addEventListener("input", () => {
                 page.motion.play(false);
                 page.driver = k;
-                page.refresh(() => page.move(k, Number(slider.value)));
+                page.refresh(() => page.move(k, Number(slider.value)), `driver ${k}`);
                 page.address.writeSoon();
             });
             field.addEventListener("change", () => {
@@ -76,7 +74,8 @@ export class Transport {
         this.sliders.forEach(({ slider, field, factor }, k) => {
             const value = linkage.wrapped(k);
             if (document.activeElement !== slider || isPlaying) slider.value = value;
-            if (document.activeElement !== field) field.value = number(value * factor, 6);
+            const shown = number(value * factor, 6);
+            if (document.activeElement !== field && field.value !== shown) field.value = shown;
         });
     }
 }

@@ -1,6 +1,6 @@
 // The panel of values: a slider, a number field and a lock for each.
 
-import { number } from "./numbers.js";
+import { grouped, number } from "./numbers.js";
 import { breakable, element, shownUnit } from "./elements.js";
 
 export class Values {
@@ -14,7 +14,7 @@ export class Values {
         const laws = linkage.parameters.filter((one) => one.isLaw);
         if (!linkage.parameters.length && !linkage.data.closedNumbers) root.append(element("p", { className: "quiet", textContent: "This mechanism has no numbers to change." }));
         own.forEach((one) => root.append(this.#row(one)));
-        const groups = Map.groupBy ? Map.groupBy(places, (one) => one.group) : grouped(places);
+        const groups = grouped(places, (one) => one.group);
         const isOpen = !own.length && places.length <= 60;
         for (const [name, members] of groups) {
             const sizes = members.filter((one) => one.value !== 0);
@@ -82,17 +82,11 @@ export class Values {
         if (!this.isReady) return;
         for (const [name, { row, field, slider, factor, one }] of this.rows) {
             const value = this.page.design.values.get(name);
-            if (document.activeElement !== field || !this.page.isTyping) field.value = number(value * factor, 9);
+            const shown = number(value * factor, 9);
+            if (field.value !== shown) field.value = shown;
             if (document.activeElement !== slider) slider.value = value * factor;
             row.classList.toggle("changed", value !== one.value);
             field.classList.toggle("wrong", !this.page.design.isOk && value !== this.page.linkage.bound.get(name));
         }
     }
-}
-
-// Return the members of each group, by its name.
-export function grouped(places) {
-    const found = new Map();
-    for (const one of places) found.set(one.group, [...(found.get(one.group) || []), one]);
-    return found;
 }

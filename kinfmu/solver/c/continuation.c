@@ -86,22 +86,18 @@ static double normal_equations(const kf_model *model, const kf_found *found, int
     return length_of(m, left);
 }
 
-/* Return the smallest length of a block's residuals near z, relative to the size (Levenberg-Marquardt); 0 if there is
- * none.
- */
-static double gap_of(kf_solver *solver, const kf_model *model, int block)
+double kf_gap(kf_solver *solver, const kf_model *model, int block, const double *u, double *z)
 {
     kf_found *const found = &solver->scratch.follow[0].found;
     double normal[KF_ROOM(KF_LARGEST_BLOCK)], damped[KF_ROOM(KF_LARGEST_BLOCK)], right[KF_ROOM(KF_LARGEST_BLOCK)];
     double factors[KF_LU_ROOM(1) + 3 * KF_LARGEST_BLOCK], step[KF_ROOM(KF_LARGEST_BLOCK)];
     double residuals[KF_ROOM(KF_LARGEST_BLOCK)], determinant, damping = 1e-3, left = -1.0, now;
-    double *const best = solver->scratch.z, *const trial = solver->scratch.zd;
+    double *const trial = solver->scratch.zd;
     const int first = kf_first_of(block), k = kf_block_ends[block] - first;
     int turn, i;
-    memcpy(best, solver->anchor.found.x, KF_UNKNOWNS * sizeof(double));
     for (turn = 0; turn < ITERATIONS; ++turn) {
         if (left < 0.0) {
-            if (!kf_evaluated_as_given(model, kf_anchor_u, best, found)) {
+            if (!kf_evaluated_as_given(model, u, z, found)) {
                 return 0.0;
             }
             left = normal_equations(model, found, block, k, normal, right);
@@ -114,17 +110,17 @@ static double gap_of(kf_solver *solver, const kf_model *model, int block)
             break;
         }
         kf_lu_solve(k, factors, right, step);
-        memcpy(trial, best, KF_UNKNOWNS * sizeof(double));
+        memcpy(trial, z, KF_UNKNOWNS * sizeof(double));
         for (i = 0; i < k; ++i) {
             trial[first + i] += step[i];
         }
-        if (!kf_evaluated_as_given(model, kf_anchor_u, trial, found)) {
+        if (!kf_evaluated_as_given(model, u, trial, found)) {
             return 0.0;
         }
         kf_residuals(model, found, block, residuals);
         now = length_of(kf_block_rows[block], residuals);
         if (now < left) {
-            memcpy(best, trial, KF_UNKNOWNS * sizeof(double));
+            memcpy(z, trial, KF_UNKNOWNS * sizeof(double));
             left = -1.0;
             damping = fmax(0.2 * damping, 1e-12);
         } else {
@@ -134,7 +130,7 @@ static double gap_of(kf_solver *solver, const kf_model *model, int block)
             }
         }
     }
-    kf_evaluated_as_given(model, kf_anchor_u, best, found);
+    kf_evaluated_as_given(model, u, z, found);
     kf_residuals(model, found, block, residuals);
     return length_of(kf_block_rows[block], residuals);
 }
@@ -159,7 +155,8 @@ static void append_failure(kf_solver *solver, const double *parameters, int bloc
         kf_append(solver->message, "the mechanism does not close");
         return;
     }
-    gap = gap_of(solver, model, block);
+    memcpy(solver->scratch.z, solver->anchor.found.x, KF_UNKNOWNS * sizeof(double));
+    gap = kf_gap(solver, model, block, kf_anchor_u, solver->scratch.z);
     if (gap > 1e-9) {
         kf_append(solver->message, "the mechanism does not close: rows %s leave a gap of ", kf_block_row_names[block]);
         kf_append_number(solver->message, "%.4g", gap * KF_SIZE);

@@ -217,6 +217,13 @@ kf_status kf_solve_along(kf_solver *solver, kf_pose *start, const double *u, kf_
 void kf_outputs_of(const kf_model *model, const kf_pose *pose, const double *ud, const double *udd, double *outputs,
                    double *rates, double *accelerations);
 
+/* continuation.c */
+
+/* Return the smallest length of a block's residuals near z, relative to the size (Levenberg-Marquardt), and put the
+ * unknowns that give it into z; 0 if nothing can be evaluated there.
+ */
+double kf_gap(kf_solver *solver, const kf_model *model, int block, const double *u, double *z);
+
 /* message.c */
 enum { KF_ROUGHLY = 6, KF_LOCATED = 10 }; /* digits; limits are located to 1e-10 rad */
 void kf_append(char *message, const char *format, ...);
