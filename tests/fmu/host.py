@@ -25,9 +25,19 @@ WORDS = {  # fmpy's names of types in each version
 
 
 class Host:
-    """One instance of an FMU. messages: what it logged, as (status, text)."""
+    """One instance of an FMU. messages: what it logged, as (status, text).
 
-    def __init__(self, path: Path, folder: Path, *, model_exchange: bool = False) -> None:
+    inputs_at: gives inputs by name at any time in a step of FMI 3.0, when the FMU asks for them.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        folder: Path,
+        *,
+        model_exchange: bool = False,
+        inputs_at: Callable[[float], Mapping[str, float]] | None = None,
+    ) -> None:
         if not folder.exists():
             with zipfile.ZipFile(path) as zipped:
                 zipped.extractall(folder)
@@ -51,7 +61,20 @@ class Host:
             self.fmu.instantiate(
                 loggingOn=True,
                 logMessage=lambda _host, status, _category, text: self.messages.append((status, text.decode())),
+                **self._intermediate(inputs_at),
             )
+
+    def _intermediate(self, inputs_at: Callable[[float], Mapping[str, float]] | None) -> dict[str, Any]:
+        """What `instantiate` of FMI 3.0 takes for inputs inside a step."""
+        if inputs_at is None:
+            return {}
+
+        def update(_host: Any, t: float, is_set: bool, is_got: bool, *_others: Any) -> None:
+            assert is_set
+            assert not is_got
+            answer(self.set, inputs_at(t))  # what is refused is in `messages`
+
+        return {"requiredIntermediateVariables": self.of(*inputs_at(0.0)), "intermediateUpdate": update}
 
     def enter(self, t: float, stop: float | None = None) -> None:
         """Into initialization mode."""

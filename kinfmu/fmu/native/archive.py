@@ -55,8 +55,9 @@ CAPABILITIES: dict[FmiVersion, dict[str, dict[str, float | bool]]] = {
         | {"maxOutputDerivativeOrder": 2, "hasEventMode": False},
     },
 }
-_OWNING = CAPABILITIES | {  # the integrator holds inputs during a step
-    "2.0": CAPABILITIES["2.0"] | {"CoSimulation": CAPABILITIES["2.0"]["CoSimulation"] | {"canInterpolateInputs": False}}
+_OWNING = CAPABILITIES | {  # the integrator asks the host for its inputs, if the host wants that
+    "3.0": CAPABILITIES["3.0"]
+    | {"CoSimulation": CAPABILITIES["3.0"]["CoSimulation"] | {"providesIntermediateUpdate": True}}
 }
 
 

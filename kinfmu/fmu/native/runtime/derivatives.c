@@ -462,11 +462,12 @@ kf_answer kf_set_input_derivative(kf_instance *instance, unsigned reference, int
     const char *const name = kf_name_of(reference);
     const unsigned place = KF_PLACE(reference);
 #if KF_TORQUE
-    if (place < KF_REALS) {
-        return kf_answered(instance, KF_ERROR, "%s: this FMU integrates by itself and takes no derivatives of inputs", name);
-    }
-#endif
+    const int part = place < KF_REALS ? kf_part_of[place] : KF_PARTS;
+    const int number = place < KF_REALS ? (int)place - kf_part_first[part] : 0;
+    if (part != KF_PART_EFFORTS && !(part == KF_PART_LOADS && number < KF_LOAD_INPUTS)) {
+#else
     if (place >= 3 * KF_DRIVERS) {
+#endif
         return kf_not_settable(instance, reference, KF_REAL_WORD);
     }
     if (s->model_exchange) {
@@ -480,6 +481,10 @@ kf_answer kf_set_input_derivative(kf_instance *instance, unsigned reference, int
         kf_forget(s);
     }
     kf_touch(s);
+#if KF_TORQUE
+    (part == KF_PART_EFFORTS ? s->effort_rates : s->load_rates)[number][order - 1] = value;
+    s->moving = true;
+#else
     s->input_rates[place][order - 1] = value;
     s->orders[place] = order > s->orders[place] ? (unsigned char)order : s->orders[place];
     s->wired[place] = s->wired[place] || (place % 3 != 0 && value != 0.0);
@@ -487,5 +492,6 @@ kf_answer kf_set_input_derivative(kf_instance *instance, unsigned reference, int
     kf_forget_motion(s);
     s->moving = true;
     s->stray = place + 1;
+#endif
     return KF_DONE;
 }

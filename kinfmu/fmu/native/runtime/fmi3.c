@@ -12,6 +12,9 @@ typedef struct {
     kf_instance common; /* first: a pointer to one is a pointer to the other */
     fmi3LogMessageCallback logger;
     fmi3InstanceEnvironment environment;
+#if KF_TORQUE
+    fmi3IntermediateUpdateCallback update;
+#endif
 } instance3;
 
 static void send(const void *host, kf_answer answer, const char *category, const char *message)
@@ -19,6 +22,17 @@ static void send(const void *host, kf_answer answer, const char *category, const
     const instance3 *const instance = host;
     instance->logger(instance->environment, (fmi3Status)answer, category, message);
 }
+
+#if KF_TORQUE
+/* Ask the host for the inputs at a time in its step, if it named some of them as intermediate variables. */
+static void update(const void *host, double time)
+{
+    const instance3 *const instance = host;
+    fmi3Boolean returns = fmi3False;
+    fmi3Float64 at = time;
+    instance->update(instance->environment, time, fmi3True, fmi3False, fmi3False, fmi3False, &returns, &at);
+}
+#endif
 
 static kf_instance *common(fmi3Instance instance)
 {
@@ -50,7 +64,7 @@ const char *fmi3GetVersion(void)
 }
 
 /* Resources are not read, so any path is accepted. There are no debug messages, so `loggingOn` has no effect: all messages
- * sent state why a status is not OK. Nothing happens inside a step, so there is no early return.
+ * sent state why a status is not OK. Steps do not return early.
  */
 static fmi3Instance instantiate(const char *token, fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
                                 const char *refusal, bool model_exchange)
@@ -92,8 +106,15 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
                                          fmi3LogMessageCallback logMessage,
                                          fmi3IntermediateUpdateCallback intermediateUpdate)
 {
-    return instantiate(instantiationToken, instanceEnvironment, logMessage,
-                       eventModeUsed ? "this FMU has no event mode in co-simulation" : NULL, false);
+    fmi3Instance instance = instantiate(instantiationToken, instanceEnvironment, logMessage,
+                                        eventModeUsed ? "this FMU has no event mode in co-simulation" : NULL, false);
+#if KF_TORQUE
+    if (instance && intermediateUpdate && nRequiredIntermediateVariables) {
+        ((instance3 *)instance)->update = intermediateUpdate;
+        common(instance)->update = update;
+    }
+#endif
+    return instance;
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken,

@@ -81,6 +81,7 @@ typedef struct {
     double start_time, stop_time; /* of the experiment; the stop time is DBL_MAX if none was given */
 #if KF_TORQUE
     double step_size; /* that the integrator would take next, 0 at the start */
+    double effort_rates[KF_DRIVERS][KF_INPUT_ORDERS], load_rates[KF_ROOM(KF_LOADS)][KF_INPUT_ORDERS]; /* of the next step */
 #endif
     kf_status held_status; /* discrete variables of model exchange, which stay between events */
     int held_iterations;
@@ -109,6 +110,8 @@ typedef struct {
     kf_list list;
 #if KF_TORQUE
     kf_pose track[2]; /* of the integrator */
+    void (*update)(const void *host, double time); /* asks the host for the inputs at a time in its step; NULL: it gives none */
+    bool updating; /* the host is asked: only efforts and external loads may be set */
 #endif
     double seed[KF_REALS], slope[KF_REALS], total[KF_REALS], trial[KF_REALS]; /* of directional derivatives */
 } kf_instance;
@@ -221,6 +224,7 @@ bool kf_accelerations(const kf_solver *solver, kf_pose *pose, double t, const do
 int kf_massless(const kf_solver *solver, kf_pose *pose, double t, const double *ud, const double *loads);
 void kf_state_drive(kf_state *state, double *u, double *ud, double *udd);
 bool kf_integrate(kf_instance *instance, double end, double *reached);
+void kf_move_efforts(const kf_state *state, double after, double *efforts, double *loads);
 bool kf_passes_limit(kf_instance *instance, double *reached);
 kf_answer kf_set_states(kf_instance *instance, const double *states, size_t count);
 kf_answer kf_get_states(kf_instance *instance, double *states, size_t count);

@@ -178,10 +178,36 @@ bool kf_follow(kf_course *course, const double *u)
     return true;
 }
 
+/* Efforts and external loads some time after the start of a step of the host: sum of d^n t^n / n!. */
+void kf_move_efforts(const kf_state *s, double after, double *efforts, double *loads)
+{
+    const double *const given = s->real;
+    int k, order;
+    memcpy(efforts, given + kf_part_first[KF_PART_EFFORTS], KF_DRIVERS * sizeof *efforts);
+    memcpy(loads, given + kf_part_first[KF_PART_LOADS], KF_LOADS * sizeof *loads);
+    for (k = 0; s->moving && k < KF_DRIVERS + KF_LOAD_INPUTS; ++k) {
+        const double *const rates = k < KF_DRIVERS ? s->effort_rates[k] : s->load_rates[k - KF_DRIVERS];
+        double *const value = k < KF_DRIVERS ? &efforts[k] : &loads[k - KF_DRIVERS];
+        double term = 1.0;
+        for (order = 0; order < KF_INPUT_ORDERS; ++order) {
+            term *= after / (order + 1);
+            *value += rates[order] * term;
+        }
+    }
+}
+
 /* f: the derivative of a state y at t. */
 static bool derive(kf_course *course, double t, const double *y, double *f)
 {
     const double at = fmin(fmax(t, course->low), course->high);
+    if (course->instance->update) {
+        course->instance->updating = true;
+        course->instance->update(course->instance->host, t);
+        course->instance->updating = false;
+    }
+    if (course->instance->now.moving || course->instance->update) {
+        kf_move_efforts(&course->instance->now, t - course->start, course->efforts, course->loads);
+    }
     memcpy(f, y + KF_DRIVERS, KF_DRIVERS * sizeof *f);
     return kf_follow(course, y) && kf_accelerations(&course->instance->now.solver, course->here, at, y + KF_DRIVERS,
                                                     course->efforts, course->loads, f + KF_DRIVERS);
@@ -320,6 +346,7 @@ bool kf_integrate(kf_instance *instance, double end, double *reached)
 {
     kf_state *const s = &instance->now;
     const double start = s->time;
+    double given[KF_DRIVERS + KF_LOADS]; /* efforts and loads at the start */
     kf_course course;
     kf_end at;
     int k;
@@ -328,8 +355,10 @@ bool kf_integrate(kf_instance *instance, double end, double *reached)
     course.instance = instance;
     course.here = &instance->track[0];
     course.spare = &instance->track[1];
-    course.efforts = KF_REAL(s, KF_PART_EFFORTS);
-    course.loads = KF_REAL(s, KF_PART_LOADS);
+    course.start = start;
+    kf_move_efforts(s, 0.0, course.efforts, course.loads);
+    memcpy(given, course.efforts, sizeof course.efforts);
+    memcpy(given + KF_DRIVERS, course.loads, KF_LOADS * sizeof *given);
     course.tolerance = KF_REAL(s, KF_PART_TOLERANCE)[1];
     course.size = s->step_size;
     at.t = start;
@@ -359,6 +388,8 @@ bool kf_integrate(kf_instance *instance, double end, double *reached)
         if (!done) {
             *reached = course.reached;
             explain(s, &course);
+            memcpy(KF_REAL(s, KF_PART_EFFORTS), given, sizeof course.efforts);
+            memcpy(KF_REAL(s, KF_PART_LOADS), given + KF_DRIVERS, KF_LOADS * sizeof *given);
             s->time = start;
             kf_follow(&course, s->committed_u); /* maps of the committed pose may have been overwritten */
             s->poses[s->committed] = *course.here;
@@ -370,6 +401,14 @@ bool kf_integrate(kf_instance *instance, double end, double *reached)
         }
     }
     s->time = end;
+    if (s->moving) { /* inputs stay at the values that they reached, and their derivatives hold for one step */
+        kf_move_efforts(s, end - start, course.efforts, course.loads);
+        memcpy(KF_REAL(s, KF_PART_EFFORTS), course.efforts, sizeof course.efforts);
+        memcpy(KF_REAL(s, KF_PART_LOADS), course.loads, KF_LOADS * sizeof *course.loads);
+        memset(s->effort_rates, 0, sizeof s->effort_rates);
+        memset(s->load_rates, 0, sizeof s->load_rates);
+        s->moving = false;
+    }
     s->step_size = course.size < INFINITY ? course.size : 0.0;
     for (k = 0; k < KF_DRIVERS; ++k) {
         s->real[3 * k] = at.y[k];

@@ -14,6 +14,7 @@ typedef struct {
 
 /* A motion while it is integrated.
  *
+ * start: of the step of the host, from which efforts and external loads move by their derivatives, if it gave some.
  * here: the last good pose, from which the next is followed; low, high: times at which laws are read, inside a span
  * without jumps; size: of the next step; longest: of all steps; refined: how often the present step was divided to search it
  * for a limit, which may be before `suspect_until`; status and message of the solver, and `reached`: the time of its end.
@@ -21,7 +22,7 @@ typedef struct {
 typedef struct {
     kf_instance *instance;
     kf_pose *here, *spare;
-    const double *efforts, *loads;
+    double start, efforts[KF_DRIVERS], loads[KF_ROOM(KF_LOADS)];
     double tolerance, low, high, span, size, longest, suspect_until, reached;
     int refined, steps;
     kf_status status;

@@ -86,6 +86,11 @@ kf_answer kf_read(kf_instance *instance, unsigned parts)
     const unsigned motion = KF_BIT(KF_PART_VALUES) | KF_BIT(KF_PART_RATES) | KF_BIT(KF_PART_ACCELERATIONS);
     kf_state *const s = &instance->now;
     const unsigned missing = parts & ~s->known;
+#if KF_TORQUE
+    if (instance->updating && missing) {
+        return kf_answered(instance, KF_ERROR, "nothing can be read during a step");
+    }
+#endif
     if (missing) {
         kf_ask(instance);
 #if KF_TORQUE
@@ -245,6 +250,10 @@ static KF_RARE kf_answer set_other(kf_instance *instance, unsigned reference, do
     const int part = place < KF_REALS ? kf_part_of[place] : KF_PARTS;
     const char *const name = kf_name_of(reference);
 #if KF_TORQUE
+    if (instance->updating && part != KF_PART_EFFORTS &&
+        !(part == KF_PART_LOADS && place < (unsigned)(kf_part_first[part] + KF_LOAD_INPUTS))) {
+        return kf_answered(instance, KF_ERROR, "%s cannot be set during a step; efforts and external loads can", name);
+    }
     if (part == KF_PART_STATES && place % 3 == 2) { /* an acceleration is no state */
         return kf_not_settable(instance, reference, KF_REAL_WORD);
     }
