@@ -155,6 +155,8 @@ def _as_request() -> Iterator[None]:
 
 def read_tolerance(name: str, value: object) -> float:
     """Return a tolerance of the solver, or raise a RequestError unless it is a positive number."""
+    if type(value) is float and 0.0 < value < math.inf:
+        return value
     if not (is_number(value) and 0.0 < value < math.inf):  # type: ignore[operator]  # it is a number
         raise RequestError(f"{name} = {quoted(value)} must be a positive number")
     return float(value)  # type: ignore[arg-type]

@@ -214,6 +214,7 @@ class BatchReading:
     ) -> None:
         """Read the measures of the designs of a part that are solved; add the reasons of those without values."""
         closed_ones: dict[tuple[QuantityRead, ...], NDArray[np.bool_]] = {}
+        whole: dict[bool, Motion] = {}  # of all designs: measures of one quantity share its extremes
         for reading in self._readings:
             value, at = self.values[reading.name][part], self.at[reading.name][part]
             if reading.name in self._alone:
@@ -230,8 +231,10 @@ class BatchReading:
                 if not is_chosen.any():
                     continue
                 chosen = np.flatnonzero(is_chosen)
-                some = motion if len(chosen) == len(good) else motion.of_designs(chosen)
-                some = some.going_round(is_closed)
+                if len(chosen) < len(good):
+                    some = motion.of_designs(chosen).going_round(is_closed)
+                else:
+                    some = whole.setdefault(is_closed, motion.going_round(is_closed))
                 try:
                     found = self._found(reading, some)
                 except RequestError as error:

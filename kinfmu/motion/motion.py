@@ -36,6 +36,23 @@ _SAME = 1e-9  # of the way of the driver; values of it closer than this are equa
 Vector = tuple[Taylor, Taylor]
 
 
+class _Names:
+    """What quantities of a mechanism are called."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self._mechanism = mechanism
+
+    @cached_property
+    def orders(self) -> dict[str, tuple[CoordinateName, int]]:
+        """Each coordinate and its rates, with the coordinate and the order."""
+        return coordinate_orders(self._mechanism)
+
+    @cached_property
+    def forces(self) -> dict[str, tuple[ForceName, ...]]:
+        """Forces that are measured, by name."""
+        return {name: made for name, made in measured_forces(self._mechanism).items() if name not in self.orders}
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """A motion of a mechanism, for one design or for many.
@@ -73,7 +90,7 @@ class Motion:
     force: Callable[[str], FloatArray] | None = None
     computed: Mapping[QuantityRead, CoordinateName] = field(default_factory=dict)
     _tracks: dict[QuantityRead, Track] = field(default_factory=dict, repr=False)
-    _known: dict[str, tuple[CoordinateName, int]] = field(default_factory=dict, repr=False)  # of all parts
+    _names: _Names | None = field(default=None, repr=False)  # the same object in all parts and all designs
     _windows: dict[tuple[float | None, float | None, bool], tuple[float, float]] = field(
         default_factory=dict, repr=False
     )
@@ -138,12 +155,15 @@ class Motion:
             _tracks={},
         )
 
+    def __post_init__(self) -> None:
+        if self._names is None:
+            object.__setattr__(self, "_names", _Names(self.mechanism))
+
     @property
-    def _orders(self) -> dict[str, tuple[CoordinateName, int]]:
-        """Each coordinate and its rates, with the coordinate and the order."""
-        if not self._known:
-            self._known.update(coordinate_orders(self.mechanism))
-        return self._known
+    def names(self) -> _Names:
+        """What quantities are called."""
+        assert self._names is not None  # noqa: S101  __post_init__ makes it
+        return self._names
 
     @property
     def argument(self) -> Track:
@@ -224,17 +244,11 @@ class Motion:
 
     def quantity(self, of: str | PoseQuantity, order: int = 0) -> Quantity:
         """Return what a quantity, or its derivative of an order, measures."""
-        if of in self._forces:
-            return self._forces[of][0].quantity
-        own = self._orders.get(of) if isinstance(of, str) else None
+        if of in self.names.forces:
+            return self.names.forces[of][0].quantity
+        own = self.names.orders.get(of) if isinstance(of, str) else None
         order += own[1] if own else 0
         return Quantity(kind_of_measured(of), order, self.per if order else "time")
-
-    @cached_property
-    def _forces(self) -> dict[str, tuple[ForceName, ...]]:
-        """Forces that are measured, by name."""
-        own = coordinate_orders(self.mechanism)
-        return {name: made for name, made in measured_forces(self.mechanism).items() if name not in own}
 
     def ratio_quantity(self, of: str | PoseQuantity, to: str | None, *, inverse: bool = False) -> Quantity:
         """Return what the ratio of two speeds measures."""
@@ -337,10 +351,10 @@ class Motion:
 
     def _whole(self, of: str | PoseQuantity) -> Track:
         """Return a quantity as `track` does, without regard to the window."""
-        if of in self._forces:
+        if of in self.names.forces:
             return self._force_track(str(of))
         if isinstance(of, str):
-            name, order = self._orders.get(of, (of, 0))
+            name, order = self.names.orders.get(of, (of, 0))
             return _derived(self.quantity_track(name), order)  # type: ignore[arg-type]  # unknown names are refused
         return self.quantity_track(of)
 

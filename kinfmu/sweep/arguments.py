@@ -52,6 +52,7 @@ class Arguments:
         self._places = {parameter.name: k for k, parameter in enumerate(plan.parameters)}
         self._constant_places = {constant.name: k for k, constant in enumerate(constants)}
         self.opens_expressions = any(plan.mechanism.parameters[name].expression for name in self._places)
+        self._of_drivers = frozenset(constant.name for constant in plan.law_constants)
         self._positive = {k for k, constant in enumerate(constants) if constant.is_positive}
 
     def setting(self, given: Settings) -> Setting:
@@ -154,8 +155,7 @@ class Arguments:
 
     def mechanism_with(self, setting: Setting) -> Mechanism | Callable[[], Mechanism]:
         """Return the mechanism with parameters and loads as set, or a function that makes it when it is first read."""
-        drivers = {constant.name for constant in self.plan.law_constants}
-        own = {name: value for name, value in setting.given.items() if name not in drivers}
+        own = {name: value for name, value in setting.given.items() if name not in self._of_drivers}
         mechanism = self.mechanism
         return (lambda: mechanism.with_parameters(own)) if own else mechanism
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import NamedTuple
 
 from kinfmu.codegen.python import load_module
@@ -44,10 +45,8 @@ def continued(mechanism: Mechanism, settings: Settings) -> Continued:
     changed = mechanism.with_parameters(settings)
     if not any(name in mechanism.parameters for name in settings) and law_starts(changed) == law_starts(mechanism):
         return Continued(changed)
-    whole = replace(mechanism, coordinates="all", points={})
-    try:
-        plan = compile_plan(settable(whole, settings))
-    except KinfmuError:
+    plan = _plan_of_poses(settable(mechanism, settings))
+    if plan is None:
         return Continued(changed)
     solver = with_parameters(load_module(plan), bound_values(plan, changed))
     pose = at_law_start(solver, changed)
@@ -60,6 +59,15 @@ def continued(mechanism: Mechanism, settings: Settings) -> Continued:
         for body in changed.bodies
     )
     return Continued(replace(changed, bodies=bodies))
+
+
+@lru_cache(maxsize=4)
+def _plan_of_poses(mechanism: Mechanism) -> SolvePlan | None:
+    """Return the plan of all coordinates; None if the mechanism cannot be solved as written."""
+    try:
+        return compile_plan(replace(mechanism, coordinates="all", points={}))
+    except KinfmuError:
+        return None
 
 
 def settable(mechanism: Mechanism, settings: Settings) -> Mechanism:

@@ -20,6 +20,7 @@ from kinfmu.sweep.engine import Driven
 LARGEST_RATE = 1e100  # of drivers; squares of much larger numbers are infinite
 _LARGEST_KEPT = 1_000_000  # numbers
 _FEW = 50  # numbers that are checked sooner one by one
+_DOUBLE = np.dtype(np.float64)
 _DEFAULTS = (0.0, 1.0, 0.0)  # of value (which must be given), speed and acceleration
 
 
@@ -64,6 +65,11 @@ def driven_by_inputs(
         RequestError: An input is unknown, missing or invalid, or the lengths differ.
 
     """
+    if len(drivers) == len(inputs) == rows == 1 and not wrap and drivers[0].inputs[0] in inputs:
+        (name,) = inputs  # the values of a single driver: a short call is done here
+        column = column_of(name, inputs[name])
+        table = column.reshape(-1, 1).copy()
+        return table, _filled(table.shape, _DEFAULTS[1]), _filled(table.shape, _DEFAULTS[2])
     known = [name for driver in drivers for name in driver.inputs]
     for name in inputs:
         if name not in known:
@@ -102,19 +108,22 @@ def _table(columns: Sequence[FloatArray | None], shape: tuple[int, ...], default
 
     Columns are copied: a run reads them later too, when the caller may have changed them.
     """
-    size = math.prod(shape)
-    if all(column is None for column in columns) and size * len(columns) <= _LARGEST_KEPT:
-        return _constant(size * len(columns), default).reshape(*shape, len(columns))
+    if all(column is None for column in columns):
+        return _filled((*shape, len(columns)), default)
     table = np.empty((*shape, len(columns)))
     for k, column in enumerate(columns):
         table[..., k] = default if column is None else column
     return table
 
 
+def _filled(shape: tuple[int, ...], value: float) -> FloatArray:
+    """Return a table of equal numbers; the last ones are kept, because filling them takes as long as solving."""
+    return _constant(shape, value) if math.prod(shape) <= _LARGEST_KEPT else np.full(shape, value)
+
+
 @lru_cache(maxsize=4)
-def _constant(count: int, value: float) -> FloatArray:
-    """Return so many equal numbers; the last ones are kept, because filling them takes as long as solving."""
-    numbers = np.full(count, value)
+def _constant(shape: tuple[int, ...], value: float) -> FloatArray:
+    numbers = np.full(shape, value)
     numbers.flags.writeable = False
     return numbers
 
@@ -135,7 +144,9 @@ def column_of(name: str, values: ArrayLike, rows: int = 1) -> FloatArray:
         RequestError: They are no finite numbers, or have another shape.
 
     """
-    array = np.atleast_1d(numbers_of(name, values))
+    array = numbers_of(name, values)
+    if array.ndim == 0:
+        array = array.reshape(1)
     if array.ndim > 2 or (array.ndim == 2 and (rows == 1 or len(array) != rows)):
         rule = f"of shape (n,) or ({rows}, n)" if rows > 1 else "one-dimensional"
         raise RequestError(f"{name} must be {rule}, not of shape {array.shape}")
@@ -147,6 +158,8 @@ def column_of(name: str, values: ArrayLike, rows: int = 1) -> FloatArray:
 
 def numbers_of(name: str, values: ArrayLike, what: str = "numbers") -> FloatArray:
     """Return an array of floats; raise a RequestError for truth values and what is no number."""
+    if type(values) is np.ndarray and values.dtype is _DOUBLE:
+        return values
     is_truth = isinstance(values, bool) or getattr(getattr(values, "dtype", None), "kind", "") == "b"
     if is_truth or (isinstance(values, list | tuple) and bool in set(map(type, values))):
         raise RequestError(f"{name} must be {what}, not true or false")

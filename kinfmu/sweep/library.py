@@ -33,6 +33,7 @@ MOST_FAILURES = 1000  # intervals without numbers whose reasons are kept
 
 MOST_KEPT = 100_000  # samples; memory that served longer sweeps goes back to the system
 
+_Byte = ctypes.c_char
 _Place = ctypes.c_void_p  # of an array's first number
 
 
@@ -132,6 +133,7 @@ class Library:
         files |= {name: compiler.joined(names) for name, names in RARE.items()}
         library = self._library = compiler.load(files, FLAGS, rare=list(RARE))
         self._idle: list[_Memory] = []
+        self._values = ctypes.c_double * len(plan.parameters)
         for name, (result, *arguments) in _FUNCTIONS.items():
             function = getattr(library, name)
             function.restype, function.argtypes = result, arguments
@@ -187,11 +189,15 @@ class Library:
         start = _start(result.outcomes)  # of the whole allocation
         job.outcomes, job.residual, job.watches = start, start + 8 * count, start + 16 * count
         job.most_failures = MOST_FAILURES
-        with self._memory(count, tolerance, parameters) as memory:
+        memory = self._lent(count)
+        try:
+            self._set(memory, tolerance, parameters)
             job.failures, job.messages = memory.failures, memory.messages
             if not self._library.kf_sweep_run(memory.sweep, ctypes.byref(job)):
                 raise KinfmuError(self._refusal(count))
             failed = memory.failed(job.failure_count) if job.failure_count else []
+        finally:
+            self._returned(memory, count)
         more = job.failure_count - MOST_FAILURES
         if more > 0:
             bad = result.outcomes[:, 0] > Status.BRIDGED
@@ -286,20 +292,27 @@ class Library:
     @contextmanager
     def _memory(self, count: int, tolerance: float, parameters: Sequence[float]) -> Iterator[_Memory]:
         """Lend memory for a sweep of `count` samples, with its parameters set."""
+        memory = self._lent(count)
         try:
-            memory = self._idle.pop()
-        except IndexError:
-            memory = _Memory(self._library, self._refusal(count))
-        try:
-            self._library.kf_sweep_start(memory.sweep, tolerance)
-            if len(parameters):
-                values = (ctypes.c_double * len(parameters))(*parameters)
-                if not self._library.kf_sweep_bind(memory.sweep, values):
-                    raise UnreachedError(self._library.kf_sweep_message(memory.sweep).decode())
+            self._set(memory, tolerance, parameters)
             yield memory
         finally:
-            if count <= MOST_KEPT:
-                self._idle.append(memory)
+            self._returned(memory, count)
+
+    def _lent(self, count: int) -> _Memory:
+        try:
+            return self._idle.pop()
+        except IndexError:
+            return _Memory(self._library, self._refusal(count))
+
+    def _returned(self, memory: _Memory, count: int) -> None:
+        if count <= MOST_KEPT:
+            self._idle.append(memory)
+
+    def _set(self, memory: _Memory, tolerance: float, parameters: Sequence[float]) -> None:
+        self._library.kf_sweep_start(memory.sweep, tolerance)
+        if len(parameters) and not self._library.kf_sweep_bind(memory.sweep, self._values(*parameters)):
+            raise UnreachedError(self._library.kf_sweep_message(memory.sweep).decode())
 
     def _refusal(self, count: int) -> str:
         return (
@@ -315,7 +328,7 @@ class Library:
             if table is not None:
                 row, column = table.strides
                 place = job.tables[k]
-                place.start, place.row, place.column = _start(table), row // 8, column // 8
+                place.start, place.row, place.column = _start(table.T), row // 8, column // 8  # often by outputs
         return job
 
 
@@ -339,8 +352,11 @@ class _Memory:
 
 def _start(array: NDArray[Any]) -> int:
     """Return the place of an array's first number."""
-    place: int = array.__array_interface__["data"][0]
-    return place
+    try:
+        return ctypes.addressof(_Byte.from_buffer(array))  # type: ignore[arg-type]  # an array is a buffer
+    except (TypeError, ValueError):  # read-only, empty, or with gaps between its numbers
+        place: int = array.__array_interface__["data"][0]
+        return place
 
 
 def _text(place: int) -> str:

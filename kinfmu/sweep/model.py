@@ -191,7 +191,7 @@ class Model:
                 poses = model.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, **again)
             return LoadedRun(poses, setting, applied, None if inputs else times)
 
-        run = Run(
+        run = Run.of_fields(
             t=(lambda: np.arange(count, dtype=float)) if inputs else times,
             outputs=self.outputs,
             coordinate_count=plan.coordinate_count,

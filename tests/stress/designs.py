@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +16,8 @@ import kinfmu
 from kinfmu import Designs, Mechanism, Run
 from kinfmu.errors import KinfmuError
 from kinfmu.gallery import names
+from kinfmu.processes import cores, processes, without_main
+from kinfmu.solver.python.status import Status
 from kinfmu.sweep.continued import continued
 from tests.open_lengths import with_open_lengths
 
@@ -20,6 +25,7 @@ SAMPLES = 24  # of a design, over the run of the file
 SPREADS = (0.02, 0.2)  # of the logarithm of a length
 CLOSE = (1e-12, 1e-10, 1e-8)  # of the largest of a column: values, rates, accelerations
 ENGINES = ("python", "native")
+PART = 25  # designs of a task
 
 
 def drawn(mechanism: Mechanism, count: int, seed: int) -> dict[str, np.ndarray]:
@@ -35,43 +41,72 @@ def drawn(mechanism: Mechanism, count: int, seed: int) -> dict[str, np.ndarray]:
     return values
 
 
-def faults(name: str, count: int, seed: int, engines: Sequence[str] = ENGINES) -> Iterator[str]:
-    """Yield what differs between batches of the engines and `solve` of files with the numbers of each design."""
+class Compared(NamedTuple):
+    """Designs compared with their files.
+
+    faults: What differs. samples: Samples by status, of the files. worst: Largest differences of values, rates and
+    accelerations, of the largest of a column. unsolvable: Designs whose file cannot be solved.
+    """
+
+    faults: list[str]
+    samples: Counter[str]
+    worst: tuple[float, ...]
+    unsolvable: int
+
+
+def faults(name: str, count: int, seed: int, engines: Sequence[str] = ENGINES) -> list[str]:
+    """Return what differs between batches of the engines and `solve` of files with the numbers of each design."""
+    return compared(name, count, seed, engines).faults
+
+
+def compared(name: str, count: int, seed: int, engines: Sequence[str] = ENGINES, part: slice | None = None) -> Compared:
+    """Compare batches of the engines with `solve` of files with the numbers of each design; part: of the designs."""
     mechanism = with_open_lengths(kinfmu.load(name))
     t = np.linspace(mechanism.run.start, mechanism.run.stop, SAMPLES)
-    values = drawn(mechanism, count, seed)
+    places = range(count)[part or slice(None)]
+    values = {key: array[places.start : places.stop] for key, array in drawn(mechanism, count, seed).items()}
     batches = {engine: kinfmu.compile(mechanism, engine=engine).solve_designs(values, t) for engine in engines}
-    for k in range(count):
+    found, samples, worst, unsolvable = [], Counter[str](), np.zeros(3), 0
+    for k, place in enumerate(places):
         numbers = {key: float(array[k]) for key, array in values.items()}
         try:
             run = kinfmu.solve(continued(mechanism, numbers).mechanism, t, engine="python")
+            samples.update(Status(status).name.lower() for status in run.status.tolist())
         except KinfmuError:
-            run = None
+            run, unsolvable = None, unsolvable + 1
         for engine, designs in batches.items():
-            for fault in _differences(designs, k, run):
-                yield f"{name}, seed {seed}, design {k}, {engine}: {fault}"
+            apart, differences = _differences(designs, k, run)
+            worst = np.maximum(worst, apart)
+            found += [f"{name}, seed {seed}, design {place}, {engine}: {fault}" for fault in differences]
+    return Compared(found, samples, tuple(worst.tolist()), unsolvable)
 
 
-def _differences(designs: Designs, k: int, run: Run | None) -> Iterator[str]:
-    """Yield what differs between a design and the run of its file; None: the file cannot be solved."""
+def _differences(designs: Designs, k: int, run: Run | None) -> tuple[np.ndarray, list[str]]:
+    """Return the largest differences (3,) of a design from the run of its file, and those that are too large, in words.
+
+    run: None if the file cannot be solved.
+    """
+    worst = np.zeros(3)
     if run is None:
-        if designs.good[k].any():
-            yield "its file cannot be solved, but the design is"
-        return
+        return worst, ["its file cannot be solved, but the design is"] if designs.good[k].any() else []
     if (designs.status[k] != run.status).any():
         sample = int(np.flatnonzero(designs.status[k] != run.status)[0])
-        yield f"status {designs.status[k, sample]} at sample {sample}, of its file {run.status[sample]}"
-        return
+        return worst, [f"status {designs.status[k, sample]} at sample {sample}, of its file {run.status[sample]}"]
+    found = []
     tables = ((designs.values, run.values), (designs.rates, run.rates), (designs.accelerations, run.accelerations))
     for order, (table, wanted) in enumerate(tables):
         if table is None or not run.good.any():
             continue
         size = np.maximum(np.nanmax(np.abs(wanted), axis=0), 1.0)
-        apart = np.nan_to_num(np.abs(table[k] - wanted) / size)
-        if apart.max() > CLOSE[order]:
-            sample, column = np.unravel_index(int(apart.argmax()), apart.shape)
+        is_equal = (table[k] == wanted) | (np.isnan(table[k]) & np.isnan(wanted))
+        apart = np.where(is_equal, 0.0, np.abs(table[k] - wanted) / size)
+        apart[np.isnan(apart)] = np.inf  # a number in one of them alone
+        worst[order] = apart.max()
+        if worst[order] > CLOSE[order]:
+            row, column = np.unravel_index(int(apart.argmax()), apart.shape)
             output = run.outputs[column].derivative(order)
-            yield f"{output} differs by {apart.max():.1e} at sample {sample} of status {run.status[sample]}"
+            found.append(f"{output} differs by {worst[order]:.1e} at sample {row} of status {run.status[row]}")
+    return worst, found
 
 
 def main() -> int:
@@ -80,17 +115,41 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=1000, help="designs of each mechanism; 1000")
     parser.add_argument("--seed", type=int, default=0, help="of the designs; 0")
     parser.add_argument("names", nargs="*", help="mechanisms of the gallery; all")
+    parser.add_argument("--workers", type=int, default=cores(), help="processes; as many as cores")
     given = parser.parse_args()
     wrong = 0
-    for name in given.names or names():
-        begun = time.monotonic()
-        found = list(faults(name, given.count, given.seed))
-        wrong += len(found)
-        took = time.monotonic() - begun
-        print(f"{name}: {given.count} designs in {took:.0f} s, {len(found)} differences", flush=True)
-        print("".join(f"  {fault}\n" for fault in found), end="", flush=True)
+    with processes(given.workers, gc.disable) as pool:
+        for name in given.names or names():
+            begun = time.monotonic()
+            kinfmu.compile(with_open_lengths(kinfmu.load(name)), engine="native")  # once, for the cache of libraries
+            parts = [slice(k, k + PART) for k in range(0, given.count, PART)]
+            with without_main():
+                waiting = [pool.submit(_part, name, given.count, given.seed, part) for part in parts]
+            whole = [future.result() for future in waiting]
+            found = [fault for one in whole for fault in one.faults]
+            samples = sum((one.samples for one in whole), Counter[str]())
+            values, rates, accelerations = np.max([one.worst for one in whole], axis=0)
+            statuses = ", ".join(f"{number} {status}" for status, number in samples.most_common())
+            print(
+                f"{name}: {given.count} designs in {time.monotonic() - begun:.0f} s, {len(found)} differences; "
+                f"{sum(one.unsolvable for one in whole)} files without solution; samples: {statuses}; largest "
+                f"difference: {values:.1e}, {rates:.1e}, {accelerations:.1e}",
+                flush=True,
+            )
+            print("".join(f"  {fault}\n" for fault in found), end="", flush=True)
+            wrong += len(found)
     return 1 if wrong else 0
 
 
+def _part(name: str, count: int, seed: int, part: slice) -> Compared:
+    """Compare a part of the designs; garbage is collected once, after it, which saves up to half of the time."""
+    try:
+        return compared(name, count, seed, part=part)
+    finally:
+        gc.collect()
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    from tests.stress.designs import main as main_of_module  # whose functions the workers find
+
+    sys.exit(main_of_module())

@@ -122,11 +122,41 @@ def advance(model: Model, start: Pose, target: Vector, singularities: Singularit
     path = Path(model, start, target)
     if singularities is not None and singularities is not start.singularities:
         path.pose = with_map(start, singularities)
+    if len(target) == 1:
+        _follow_regular(model, path)
     for _ in range(path.most_steps):
-        _step(model, path)
         if path.end is not None:
             break
+        _step(model, path)
     return path.terminate()
+
+
+def _follow_regular(model: Model, path: Path) -> None:
+    """Go the first steps along the path of a single driver, each the longest and to a regular pose, as `_step` does.
+
+    They end before a bridge, before a step that is not trusted, and before a pose that is not regular.
+    """
+    target, longest, pose = path.target, path.longest, path.pose
+    here = target[0]
+    for _ in range(path.most_steps):
+        singularities = pose.singularities
+        if singularities is not None and not singularities.low <= here <= singularities.high:
+            break
+        distance = here - pose.u[0]
+        is_last = -longest <= distance <= longest
+        s = distance if is_last else longest if distance > 0.0 else -longest
+        trial = trusted_step(model, pose, UNIT_SPEED, s, target if is_last else (pose.u[0] + s,)) if s else None
+        if trial is None or trial.margin < REGULAR:
+            break
+        path.iterations += trial.iterations
+        path.margin = trial.margin
+        if is_last:
+            path.end = trial
+            break
+        path.before, pose = pose, trial
+        path.pose = path.regular = trial
+        path.distance = distance - s
+        path.most_steps -= 1
 
 
 def _step(model: Model, path: Path) -> None:

@@ -68,8 +68,7 @@ def with_parameters(module: Any, values: Vector, tolerance: float = TOLERANCE) -
 
 def reach(module: Any, values: Vector, tolerance: float = TOLERANCE) -> Reached:
     """Follow the anchor from the parameters of the mechanism to `values`."""
-    written = tuple([value for _, value in module.PARAMETERS])
-    model, pose = _at_anchor(module)
+    written, model, pose = _at_anchor(module)
     u = pose.u
     slope = at_rest = (0.0,) * len(pose.z)
     s, step, block = 0.0, 1.0, -1
@@ -104,11 +103,12 @@ def reach(module: Any, values: Vector, tolerance: float = TOLERANCE) -> Reached:
 
 
 @lru_cache(maxsize=8)
-def _at_anchor(module: Any) -> tuple[Model, Pose]:
-    """Return the model with the parameters of the mechanism, and its anchor: equal in every call."""
+def _at_anchor(module: Any) -> tuple[Vector, Model, Pose]:
+    """Return the parameters of the mechanism, the model with them, and its anchor: equal in every call."""
     u, z = module.ANCHOR
-    model = module.bound(tuple([value for _, value in module.PARAMETERS]))
-    return model, Pose(u, evaluated(model, u, z, held=0))
+    written = tuple([value for _, value in module.PARAMETERS])
+    model = module.bound(written)
+    return written, model, Pose(u, evaluated(model, u, z, held=0))
 
 
 def _is_trusted(pose: Pose, trial: Pose) -> bool:
