@@ -78,6 +78,7 @@ def rows_of(table: str) -> dict[str, list[str]]:
     return {cells[0]: cells[1:] for cells in lines}
 
 
+@pytest.mark.long
 def test_tables_and_charts_are_written_in_the_requested_folder(
     command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -203,8 +204,8 @@ def test_the_help_has_a_line_for_every_measurement(command: Command) -> None:
     ("what", "lines"),
     [
         ("sample", ["readable reference", "python engine", "kinfmu.solve", "the same, error"]),
-        ("step", ["fourbar", "toy (sin, cos)", "ratio, round by round"]),
-        ("native", ["FMI 2.0 ", "FMI 3.0 "]),
+        pytest.param("step", ["fourbar", "toy (sin, cos)", "ratio, round by round"], marks=pytest.mark.long),
+        pytest.param("native", ["FMI 2.0 ", "FMI 3.0 "], marks=pytest.mark.long),
         ("import", ["pass", "import kinfmu", "difference"]),
     ],
 )
@@ -227,6 +228,10 @@ def test_designs_are_compared_with_the_closed_form() -> None:
         wanted = crank_rockers.closed_form(angles, *(values[k] for values in lengths.values()))
         off = np.exp(1j * found.values[k]) - np.exp(1j * np.stack(wanted, axis=1))
         assert np.abs(off).max() < 1e-14
+
+
+@pytest.mark.long
+def test_the_table_of_designs_has_a_row_for_every_way_to_solve_them() -> None:
     text = designs.run(rounds=1, designs=8)
     assert "8 crank-rockers at 361 angles" in text
     for row in (
@@ -241,6 +246,7 @@ def test_designs_are_compared_with_the_closed_form() -> None:
         assert row in text
 
 
+@pytest.mark.long
 def test_a_sweep_is_compared_with_the_closed_form(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     try:
         compiler.command()
@@ -272,6 +278,7 @@ def test_the_closed_form_by_hand_is_right(monkeypatch: pytest.MonkeyPatch, tmp_p
     assert oracle.largest_error(columns[[10, 13, 14]].T, exact.qdd) < 1e-13
 
 
+@pytest.mark.long
 def test_chains_report_the_exponent(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(chains, "LOOPS", (1, 2, 3, 4))
     stdout = command("bench", "chains", "--rounds", 2).stdout
@@ -279,6 +286,7 @@ def test_chains_report_the_exponent(command: Command, monkeypatch: pytest.Monkey
     assert re.search(r"exponent from 2 to 4 loops, round by round: -?\d+\.\d{3} \(", stdout)
 
 
+@pytest.mark.long
 def test_logs_are_compared_with_the_package_mcap(monkeypatch: pytest.MonkeyPatch) -> None:
     table = log_files.run(rounds=1, samples=5000, steps=500)
     assert re.search(r"^the record by the package mcap .* us/row +1\.0 +\d+\.\d B/row$", table, re.MULTILINE)
@@ -292,6 +300,7 @@ def test_logs_are_compared_with_the_package_mcap(monkeypatch: pytest.MonkeyPatch
     assert "package mcap " not in table
 
 
+@pytest.mark.long
 def test_a_step_is_measured_alone_and_with_its_record_in_both_flavours(monkeypatch: pytest.MonkeyPatch) -> None:
     lines = log_files.logged_steps(rounds=1, steps=2000)
     assert re.fullmatch(r".* step alone +logged step", lines[0])

@@ -32,7 +32,8 @@ def test_the_commands_of_the_page_run_and_print_what_it_shows(request: pytest.Fi
     for command in commands:
         if "--dask" in command:  # tests/studies/test_workers.py
             continue
-        result = CliRunner().invoke(main, command.split())
+        alone = ["--workers", "1"] if command.startswith("study") else []
+        result = CliRunner().invoke(main, [*command.split(), *alone])
         assert result.exit_code == 0, result.output
         outputs.append(result.output)
     page = re.sub(r"```text\n.*?```", lambda _: f"```text\n{outputs[0]}```", PAGE, flags=re.DOTALL)

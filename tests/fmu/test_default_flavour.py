@@ -22,9 +22,8 @@ module = import_module("kinfmu.fmu.build")
 
 @pytest.fixture(autouse=True)
 def usual(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Restore the default that other tests change; compile into a folder of each test."""
+    """Restore the default that other tests change."""
     monkeypatch.setattr(module, "default_flavour", default_flavour)
-    monkeypatch.setenv("KINFMU_CACHE", str(tmp_path / "cache"))
     monkeypatch.chdir(tmp_path)
 
 
@@ -80,10 +79,11 @@ def test_the_python_flavour_can_be_chosen_and_is_the_default_on_unknown_platform
     assert "no native FMUs are built for s390x" in module.native_obstacle()
 
 
-def test_simulate_of_a_mechanism_starts_without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_simulate_of_a_mechanism_starts_without_a_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def compile_files(*_: object) -> None:
         raise AssertionError("a compiler ran")
 
+    monkeypatch.setenv("KINFMU_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(compiler, "compile_files", compile_files)
     result = CliRunner().invoke(main, ["simulate", "fourbar", "--stop", "3"])
     assert result.exit_code == 0, result.output
