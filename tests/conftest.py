@@ -29,7 +29,7 @@ settings.load_profile("kinfmu")
 
 @pytest.fixture(scope="session", autouse=True)
 def python_fmus() -> Iterator[None]:
-    """FMUs are of the python flavour where a test names none and native is not required: a compiler takes seconds."""
+    """FMUs are of the python flavour and have no page if a test asks for neither: compilers take seconds."""
     module = import_module("kinfmu.fmu.build")
 
     def default_flavour(fmi: int = 2, platforms: str = "host") -> str:
@@ -37,6 +37,7 @@ def python_fmus() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "default_flavour", default_flavour)
+        patch.setattr("kinfmu.cli.build.find_spec", lambda _name: None)
         yield
 
 

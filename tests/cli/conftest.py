@@ -27,7 +27,6 @@ def read_csv(path: Path) -> dict[str, NDArray[np.float64]]:
 def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
     """`command("check", "fourbar")`; an exception that escapes fails the test. The working folder is empty."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("kinfmu.cli.build.find_spec", lambda _name: None)  # a page takes seconds: only with --page
 
     def run(*arguments: object) -> Result:
         result = CliRunner().invoke(main, [str(argument) for argument in arguments])

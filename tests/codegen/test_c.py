@@ -24,6 +24,7 @@ from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.solver.python import Solver
 from kinfmu.sweep import library
 from tests.fmu.test_parameters import geared, linkage
+from tests.gallery_members import FEW, mostly_long
 from tests.solver.c.native import SAME_SINES, STRICT, numbers
 
 
@@ -70,7 +71,9 @@ class Compiled:
         return [value for row in rows for value in row]
 
 
-@pytest.mark.parametrize("name", [*gallery.names(), "fourbar_chain:60", "open_chain:60"])
+@pytest.mark.parametrize(
+    "name", mostly_long([*gallery.names(), "fourbar_chain:60", "open_chain:60"], few=(*FEW, "fourbar_chain:60"))
+)
 def test_c_and_python_agree_to_the_bit(name: str) -> None:
     plan = compile_plan(kinfmu.load(name))
     python, c = load_model(plan), Compiled(plan)

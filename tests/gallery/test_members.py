@@ -17,6 +17,7 @@ from kinfmu.measures.placement import GROUND, BodyFrame, Placement
 from tests.gallery.conftest import Member
 from tests.gallery.reference_file import row, samples
 from tests.gallery.references import REFERENCES
+from tests.gallery_members import mostly_long
 from tests.oracle import mp
 
 AGREEMENT = 1e-11  # of a column's largest magnitude
@@ -24,6 +25,7 @@ FORCES_AGREE = 1e-11  # of a column's largest magnitude; of the largest reaction
 CLOSURE = 1e-12  # of the size
 
 every_member = pytest.mark.parametrize("name", gallery.names())
+few_members = pytest.mark.parametrize("name", mostly_long(gallery.names()))
 
 
 def test_every_mechanism_has_a_reference_and_every_reference_a_mechanism() -> None:
@@ -77,7 +79,7 @@ def test_solved_it_equals_the_reference(name: str, member: Callable[[str], Membe
     assert _largest_force_disagreement(run, asked) <= FORCES_AGREE
 
 
-@every_member
+@few_members
 def test_its_fmu_driven_by_time_equals_the_reference(name: str, member: Callable[[str], Member]) -> None:
     asked, (times, step) = member(name), samples(name)
     run = kinfmu.simulate(asked.fmu("time"), start=times[0], stop=times[-1], step=step)
@@ -86,7 +88,7 @@ def test_its_fmu_driven_by_time_equals_the_reference(name: str, member: Callable
     assert _largest_force_disagreement(run, asked) <= FORCES_AGREE
 
 
-@every_member
+@few_members
 def test_its_fmu_driven_from_a_csv_equals_the_reference(
     name: str, member: Callable[[str], Member], tmp_path: Path
 ) -> None:

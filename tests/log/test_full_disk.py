@@ -15,33 +15,40 @@ from kinfmu.errors import LogError
 from kinfmu.log import write_mcap, write_rrd, write_table
 from tests.log.runs import fourbar
 
-run, path = fourbar(np.arange(0.0, 180.0, 0.02)), sys.argv[1]
-write = {"mcap": write_mcap, "rrd": write_rrd}.get(path.rpartition(".")[2], write_table)
+run = fourbar(np.arange(0.0, 180.0, 0.02))
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)
-try:
-    write(run, path)
-except LogError as error:
-    print(error)
+_, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+for path, limit in zip(sys.argv[1::2], map(int, sys.argv[2::2]), strict=True):
+    write = {"mcap": write_mcap, "rrd": write_rrd}.get(path.rpartition(".")[2], write_table)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
+    try:
+        write(run, path)
+    except LogError as error:
+        print(error)
 """
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the limit on the size of a file simulates a full disk")
-@pytest.mark.parametrize(
-    ("suffix", "limit"), [*((suffix, 200_000) for suffix in ("mcap", "rrd", "csv", "parquet", "npz")), ("rrd", 1)]
-)
-def test_a_file_on_a_full_disk_is_reported_in_one_line(suffix: str, limit: int, tmp_path: Path) -> None:
-    path = tmp_path / f"run.{suffix}"
-    path.write_bytes(b"old")
+def test_a_file_on_a_full_disk_is_reported_in_one_line(tmp_path: Path) -> None:
+    limits = {f"run.{suffix}": 200_000 for suffix in ("mcap", "rrd", "csv", "parquet", "npz")} | {"small.rrd": 1}
+    for name in limits:
+        (tmp_path / name).write_bytes(b"old")
     process = subprocess.run(
-        [sys.executable, "-c", PROGRAM, str(path), str(limit)],
+        [
+            sys.executable,
+            "-c",
+            PROGRAM,
+            *(word for name in limits for word in (str(tmp_path / name), str(limits[name]))),
+        ],
         capture_output=True,
         text=True,
         check=True,
         cwd=Path(__file__).parents[2],
     )
-    assert len(process.stdout.splitlines()) == 1
-    assert process.stdout.startswith(f"{path}: ")
-    assert "written" in process.stdout
-    assert path.read_bytes() == b"old"
-    assert list(tmp_path.iterdir()) == [path]
+    lines = process.stdout.splitlines()
+    assert len(lines) == len(limits)
+    for name, line in zip(limits, lines, strict=True):
+        assert line.startswith(f"{tmp_path / name}: ")
+        assert "written" in line
+        assert (tmp_path / name).read_bytes() == b"old"
+    assert {path.name for path in tmp_path.iterdir()} == set(limits)
