@@ -18,6 +18,7 @@ def test_the_commands_of_the_page_exist() -> None:
     check_commands(PAGE)
 
 
+@pytest.mark.long
 def test_the_python_of_the_page_prints_its_comments(
     capsys: pytest.CaptureFixture[str], request: pytest.FixtureRequest
 ) -> None:

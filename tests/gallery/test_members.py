@@ -63,7 +63,7 @@ def test_a_recomputed_row_equals_the_row_of_the_file(name: str, member: Callable
     assert row(name, float(drawn["time"])) == drawn
 
 
-@every_member
+@few_members
 def test_check_finds_nothing_wrong_and_a_driver_for_every_freedom(name: str, member: Callable[[str], Member]) -> None:
     report = kinfmu.check(member(name).mechanism)
     assert report.problem is None

@@ -10,6 +10,7 @@ import pytest
 import kinfmu
 from kinfmu import Mechanism
 from kinfmu.errors import KinfmuError, RequestError
+from tests.gallery_members import mostly_long
 from tests.open_lengths import with_open_lengths
 
 COUNT, SAMPLES = 12, 70
@@ -54,7 +55,9 @@ def assert_as_solved(model: kinfmu.Model, designs: kinfmu.Designs, **arguments: 
 
 
 @pytest.mark.parametrize("engine", ["python", "native"])
-@pytest.mark.parametrize("name", ["crank_rocker", "fourbar", "five_bar", "slider_crank"])
+@pytest.mark.parametrize(
+    "name", mostly_long(["crank_rocker", "fourbar", "five_bar", "slider_crank"], few=("fourbar", "five_bar"))
+)
 def test_designs_equal_solve_of_each(name: str, engine: str) -> None:
     mechanism = with_open_lengths(kinfmu.load(name))
     model = kinfmu.compile(mechanism, engine=engine)

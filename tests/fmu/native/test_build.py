@@ -32,7 +32,10 @@ def _files(mechanism: kinfmu.Mechanism, version: str) -> dict[str, str]:
 
 
 @pytest.mark.usefixtures("optimized")
-@pytest.mark.parametrize(("name", "version"), [("fourbar", "3.0"), ("five_bar", "2.0"), ("settable", "3.0")])
+@pytest.mark.parametrize(
+    ("name", "version"),
+    [pytest.param("fourbar", "3.0", marks=pytest.mark.long), ("five_bar", "2.0"), ("settable", "3.0")],
+)
 def test_each_file_of_c_is_clean_under_strict_warnings(name: str, version: str) -> None:
     mechanism = linkage() if name == "settable" else kinfmu.load(name)
     assert compiler.shared_library(_files(mechanism, version), STRICT).exists()

@@ -14,6 +14,7 @@ from kinfmu.solver.python.status import Status
 from tests.fmu.conftest import Start
 from tests.fmu.host import OK, Host, answer
 from tests.fmu.test_laws import arms
+from tests.gallery_members import mostly_long
 
 SWINGS = (("simple_harmonic", 1.0, 0.5), ("dwell", 0.5), ("simple_harmonic", 1.5, -0.5), ("cycloidal", 1.0, 0.2))
 JUMPS: dict[str, tuple[Law, list[float]]] = {
@@ -61,7 +62,7 @@ def begin(start: Start, mechanism: Mechanism | str, drive: str = "time") -> tupl
     return host, event
 
 
-@pytest.mark.parametrize("name", JUMPS)
+@pytest.mark.parametrize("name", mostly_long(JUMPS, few=("harmonic", "sequence")))
 def test_every_jump_of_a_law_is_announced_and_has_its_right_hand_value(start: Start, name: str) -> None:
     law, expected = JUMPS[name]
     host, event = begin(start, named(name, law))

@@ -55,6 +55,7 @@ def _objects(folder: Path, prefix: str) -> list[Path]:
 
 
 @pytest.mark.skipif(CC is None or NM is None, reason="a compiler or nm is not there")
+@pytest.mark.long
 def test_fmus_of_both_versions_are_linked_into_one_program(tmp_path: Path) -> None:
     objects = {prefix: _objects(tmp_path / prefix, prefix) for prefix in LINKED}
     for prefix, files in objects.items():

@@ -151,6 +151,7 @@ def test_a_timeline_is_known_by_its_name(name: str, unit: str, label: str, value
 
 
 @pytest.mark.usefixtures("graphics")
+@pytest.mark.long
 def test_at_of_a_recording_over_a_driver_is_the_drivers_value(tmp_path: Path) -> None:
     run = kinfmu.solve(kinfmu.load("fourbar"), crank_angle=np.radians(np.arange(0.0, 90.5, 0.5)))
     recording, record = tmp_path / "run.rrd", tmp_path / "run.mcap"

@@ -222,7 +222,7 @@ def test_c_and_python_are_the_same_where_each_driver_has_singular_points_of_its_
     assert {Status.OK, Status.BRIDGED} <= set(assert_same(compile_plan(mechanism), samples))
 
 
-@pytest.mark.parametrize("carried", [True, False])
+@pytest.mark.parametrize("carried", [True, pytest.param(False, marks=pytest.mark.long)])
 def test_c_and_python_are_the_same_where_blocks_of_one_driver_and_of_several_are_mixed(carried: bool) -> None:
     """Over crossings of one driver, and to crossings of several."""
     machine = change_point_fourbar("4", "1", "3", "2").mechanism
