@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 PAGES = (".html",)
 
 
-def write_page(mechanism: Mechanism, path: Path) -> None:
-    """Write the page of a mechanism.
+def write_page(mechanism: Mechanism, path: Path, over: tuple[str, float, float] | None = None) -> None:
+    """Write the page of a mechanism; over: a driver and its first and last value, if they are its axis.
 
     Raises:
         KinfmuError: There is no page, or it cannot be written.
@@ -27,7 +27,7 @@ def write_page(mechanism: Mechanism, path: Path) -> None:
     from kinfmu.page import page
 
     with patience():
-        text = page(mechanism)
+        text = page(mechanism, over=over)
     try:
         write_whole(path, text.encode())
     except OSError as error:
@@ -44,3 +44,16 @@ def mechanism_of(run: Run) -> Mechanism:
     if not axis_of(run).is_time or len(run) < 2:
         return mechanism
     return replace(mechanism, run=replace(mechanism.run, start=float(run.t[0]), stop=float(run.t[-1])))
+
+
+def driver_of(run: Run) -> tuple[str, float, float] | None:
+    """Return the driver on the axis of a run, with its first and last value; None if there is none."""
+    from kinfmu.run.axis import axis_of
+
+    axis = axis_of(run)
+    if axis.is_time or run.mechanism is None or len(run.mechanism.drivers) != 1 or len(run) < 2:
+        return None
+    values = run.inputs[:, 0]
+    if axis.name != run.mechanism.drivers[0].name or values[0] == values[-1]:
+        return None
+    return axis.name, float(values[0]), float(values[-1])

@@ -37,7 +37,7 @@ def build(
     si: bool = False,
     ssp: bool = False,
     osp: bool = False,
-    page: Callable[[], str] | None = None,
+    page: bool | Callable[[], str] = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Write the FMU of a mechanism and return its path.
@@ -65,8 +65,8 @@ def build(
         ssp: True: write an .ssp that holds the FMU, with its connectors and a set of all parameters. Default: true if
             the path ends in .ssp.
         osp: True: write also `<name>_OspModelDescription.xml`, beside the FMU, with groups of variables for libcosim.
-        page: Called after the FMU is compiled; returns a page, such as that of `kinfmu.page`, to put into its
-            documentation, '' for none. Default: none.
+        page: True: put the page of `kinfmu play` into its documentation, which needs ziglang. Or a function that is
+            called after the FMU is compiled and returns the page, '' for none. Default: no page.
         progress: Called with (platforms done, number of platforms) during compilation.
 
     Returns:
@@ -94,7 +94,7 @@ def build(
     path = _file(path, mechanism.name, ssp=ssp)
     if osp and suffix_of(path) == ".ssp":
         raise RequestError("osp describes an FMU for the folder that it is in; an .ssp holds none")
-    shown, mechanism = mechanism.length_unit, mechanism.in_metres() if si else mechanism
+    given, shown, mechanism = mechanism, mechanism.length_unit, mechanism.in_metres() if si else mechanism
     coordinates, names = chosen_outputs(mechanism, outputs)
     owned, forces = None, {}
     if drive == "torque":
@@ -116,7 +116,13 @@ def build(
         from kinfmu.fmu.native import archive
 
         data = archive.archive(plan, drive, VERSION, FMI_VERSIONS[fmi], platforms, progress, forces, owned, papers)
-    return _written(path, data, page() if page else "", osp=osp)
+    return _written(path, data, page() if callable(page) else _page_of(given) if page else "", osp=osp)
+
+
+def _page_of(mechanism: Mechanism) -> str:
+    from kinfmu.page import page  # it needs the report, which takes long to import
+
+    return page(mechanism)
 
 
 def _written(path: Path, data: bytes, page: str, *, osp: bool) -> Path:

@@ -50,7 +50,13 @@ _IMPORT = re.compile(r"^import .*\n", re.MULTILINE)
 _EXPORT = re.compile(r"^export ", re.MULTILINE)
 
 
-def page(mechanism: Mechanism, *, report: Report | None = None, script: str = "") -> str:
+def page(
+    mechanism: Mechanism,
+    *,
+    report: Report | None = None,
+    script: str = "",
+    over: tuple[str, float, float] | None = None,
+) -> str:
     """Return a page in which a mechanism is dragged: one HTML file that works offline, without any request.
 
     It computes with the C code of the FMU, compiled to WebAssembly: as long as no number of the file but a parameter is
@@ -60,6 +66,8 @@ def page(mechanism: Mechanism, *, report: Report | None = None, script: str = ""
     Args:
         mechanism: The mechanism.
         report: Its report, if `check` was called already. Default: `check` is called.
+        over: A driver and its values from and to which the page shows the motion, in the file's unit or in radians.
+            Default: the time of the run, and the whole range of a single driver.
         script: JavaScript after that of the page, which `started.then((page) => ...)` calls. Default: none.
 
     Returns:
@@ -82,7 +90,9 @@ def page(mechanism: Mechanism, *, report: Report | None = None, script: str = ""
         "written": module_data(as_written, {}),
         "opened": module_data(page_module(change.mechanism, change.labels), places) if places else None,
     }
+    drivers = [driver.name for driver in mechanism.drivers]
     data = describe(mechanism, report) | {
+        "over": over and {"driver": drivers.index(over[0]), "from": over[1], "to": over[2]},
         "size": as_written.plan.size,
         "modules": modules,
         "closedNumbers": len(change.places) if is_large else 0,

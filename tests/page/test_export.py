@@ -18,6 +18,7 @@ import kinfmu
 from kinfmu.errors import CompilerError
 from kinfmu.log import write_mcap
 from tests.cli.conftest import Command, command, fails, refuses
+from tests.page.browser import CHROMIUM, browser
 
 pytest.importorskip("ziglang", reason="pages are compiled by zig")
 DATA = re.compile(r'id="data">([^<]*)<')
@@ -42,6 +43,25 @@ def test_the_page_of_a_run_has_its_parameters_and_its_time(command: Command, tmp
     assert data_of(tmp_path / "part.html")["run"]["to"] == pytest.approx(0.95)
 
 
+def test_the_page_of_a_run_over_an_angle_has_the_axis_of_the_driver(tmp_path: Path, command: Command) -> None:
+    run = kinfmu.solve(kinfmu.load("crank_rocker"), crank_angle=np.radians(np.linspace(30.0, 120.0, 19)))
+    write_mcap(run, tmp_path / "run.mcap")
+    assert command("export", "run.mcap", "-o", "run.html").exit_code == 0
+    assert data_of(tmp_path / "run.html")["over"] == {"driver": 0, "from": np.radians(30.0), "to": np.radians(120.0)}
+    if CHROMIUM is None:
+        return
+    with browser(tmp_path) as chromium, chromium.open_at((tmp_path / "run.html").as_uri()) as page:
+        assert page.get("k.linkage.ranges[0]") == pytest.approx(np.radians([30.0, 120.0]))
+        assert page.get("k.linkage.u[0]") == pytest.approx(np.radians(30.0))
+        assert page.tab.locator("#time").is_hidden()
+        assert page.get("k.design.fragment()") == ""
+        page.tab.click("#tab-plots")
+        assert page.tab.get_by_label("Horizontal axis").locator("option").all_inner_texts() == ["crank"]
+        page.tab.click("#play")
+        page.tab.wait_for_function("window.kinfmu.linkage.u[0] > 0.7")
+        assert page.errors == []
+
+
 def test_a_mechanism_is_exported_as_a_page_only(command: Command, refuses: Callable[..., str], tmp_path: Path) -> None:
     assert command("export", "crank_rocker", "-o", "mech.html").stdout == "written: mech.html\n"
     assert data_of(tmp_path / "mech.html")["run"]["to"] == 2.0
@@ -64,6 +84,14 @@ def test_the_documentation_of_an_fmu_has_the_page(command: Command, tmp_path: Pa
     assert b'<a href="play.html">' in contents["one"].pop("documentation/index.html")
     assert b"play.html" not in contents["none"].pop("documentation/index.html")
     assert contents["one"] == contents["none"]
+
+
+def test_build_puts_the_page_into_the_documentation_if_asked(tmp_path: Path) -> None:
+    mech = kinfmu.load("crank_rocker")
+    for page in (True, False):
+        path = kinfmu.build(mech, tmp_path / f"{page}.fmu", flavour="python", page=page)
+        with zipfile.ZipFile(path) as archive:
+            assert ("documentation/play.html" in archive.namelist()) is page
 
 
 def test_an_fmu_whose_page_cannot_be_compiled(command: Command, fails: Callable[..., str], tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ export class Design {
         this.future = [];
         this.values = new Map(linkage.bound);
         this.saved = new Map(this.values);
+        this.start = linkage.u.slice(); // of the drivers
         this.failure = ""; // why the mechanism does not close with the values; it shows those before
         this.byName = new Map(linkage.parameters.map((one) => [one.name, one]));
     }
@@ -70,7 +71,7 @@ export class Design {
         const parts = this.changes().map(([name, value]) => `${encodeURIComponent(name)}=${value}`);
         this.linkage.data.drivers.forEach((driver, k) => {
             const value = this.linkage.wrapped(k);
-            if (Math.abs(value - this.linkage.law[0].u[k]) > 1e-12) parts.push(`@${encodeURIComponent(driver.name)}=${value}`);
+            if (Math.abs(value - this.start[k]) > 1e-12) parts.push(`@${encodeURIComponent(driver.name)}=${value}`);
         });
         return parts.length ? `#${parts.join("&")}` : "";
     }
@@ -79,7 +80,7 @@ export class Design {
     read(fragment) {
         const ignored = [];
         const values = new Map(this.linkage.parameters.map((one) => [one.name, one.value]));
-        const u = this.linkage.law[0].u.slice();
+        const u = this.start.slice();
         for (const part of fragment.replace(/^#/, "").split("&")) {
             if (!part) continue;
             const [key, text] = part.split("=");

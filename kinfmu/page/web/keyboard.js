@@ -31,7 +31,7 @@ export function keyboard(page) {
         };
         const acts = {
             arrowleft: () => by(-1), arrowright: () => by(1), arrowup: () => choose(-1), arrowdown: () => choose(1),
-            home: () => page.pick("time", linkage.data.run.from), "+": () => page.zoom(1.2), "=": () => page.zoom(1.2), "-": () => page.zoom(1 / 1.2),
+            home: () => (linkage.data.over ? page.pick("driver", linkage.data.over.from) : page.pick("time", linkage.data.run.from)), "+": () => page.zoom(1.2), "=": () => page.zoom(1.2), "-": () => page.zoom(1 / 1.2),
             f: () => page.fit(), e: () => page.toggleMode(), "?": () => $("keys").showModal(),
             w: () => pan(0, 40), s: () => pan(0, -40), a: () => pan(40, 0), d: () => pan(-40, 0),
         };

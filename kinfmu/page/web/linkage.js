@@ -31,6 +31,7 @@ export class Linkage {
         this.#tableLaws();
         this.goTo(this.u);
         if (!this.pose) throw new Error(this.failure);
+        if (data.over) this.goTowards(this.u.map((value, k) => (k === data.over.driver ? data.over.from : value)));
         this.axles = axlesOf(this);
         this.findRanges();
     }
@@ -272,7 +273,7 @@ export class Linkage {
     wrapped(k) {
         const [low, high] = this.ranges[k];
         const value = this.u[k];
-        if (this.data.drivers[k].kind !== "angle" || this.limits.some((limit) => limit.driver === k)) return value;
+        if (this.data.over || this.data.drivers[k].kind !== "angle" || this.limits.some((limit) => limit.driver === k)) return value;
         const period = high - low;
         return low + (((value - low) % period) + period) % period;
     }

@@ -18,11 +18,15 @@ export class Motion {
             return;
         }
         const { linkage } = this;
+        this.clock = null;
+        if (linkage.data.over) {
+            this.page.refresh();
+            return;
+        }
         const t = linkage.timeNear(linkage.u);
         linkage.t = t >= linkage.data.run.to - 1e-9 ? linkage.data.run.from : t;
         const law = linkage.shown.driven(linkage.t).u;
         this.glide = linkage.u.map((value, k) => (linkage.data.drivers[k].turns ? value - law[k] - TURN * Math.round((value - law[k]) / TURN) : value - law[k]));
-        this.clock = null;
         this.page.refresh();
     }
 
@@ -32,6 +36,10 @@ export class Motion {
         const { from, to } = linkage.data.run;
         const elapsed = this.clock === null ? 0 : Math.min((now - this.clock) / 1000, 0.1);
         this.clock = now;
+        if (linkage.data.over) {
+            this.#advanceDriver(elapsed * this.page.transport.speed);
+            return;
+        }
         let t = linkage.t + elapsed * this.page.transport.speed;
         if (t > to) {
             t = from + ((t - from) % (to - from));
@@ -42,6 +50,15 @@ export class Motion {
             if (this.glide.every((gap) => Math.abs(gap) < 1e-9)) this.glide = null;
         }
         this.arrive(linkage.goToTime(t, this.glide));
+        if (this.blocked) this.play(false);
+    }
+
+    // Go on along the values of the driver, all of them in the time of the run; after the last one it starts again.
+    #advanceDriver(elapsed) {
+        const { driver, from, to } = this.linkage.data.over;
+        const { run } = this.linkage.data;
+        const part = (this.linkage.u[driver] - from) / (to - from) + elapsed / (run.to - run.from);
+        this.move(driver, from + (to - from) * (part > 1 ? 0 : Math.max(part, 0)));
         if (this.blocked) this.play(false);
     }
 

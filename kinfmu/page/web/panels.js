@@ -16,7 +16,8 @@ export class Plots {
         this.over = page.linkage.data.drivers.length === 1 ? "driver" : "time";
         this.list = element("div");
         this.plots = [];
-        const choice = element("select", { "aria-label": "Horizontal axis" }, element("option", { value: "time", textContent: "time" }));
+        const choice = element("select", { "aria-label": "Horizontal axis" });
+        if (!page.linkage.data.over) choice.append(element("option", { value: "time", textContent: "time" }));
         if (this.over === "driver") choice.prepend(element("option", { value: "driver", textContent: page.linkage.data.drivers[0].name }));
         choice.value = this.over;
         choice.addEventListener("change", () => {
@@ -127,7 +128,7 @@ export function filesPanel(page, root) {
     };
     add("Mechanism file with the values as set (TOML)", "save-file", () => download(`${name}.toml`, mechanismFile(linkage, design), "application/toml"));
     if (linkage.data.drivers.length === 1) add(`Table over ${linkage.data.drivers[0].name} (CSV)`, "save-driver", () => download(`${name}.csv`, table(linkage, "driver"), "text/csv"));
-    add("Table over time (CSV)", "save-time", () => download(`${name}.csv`, table(linkage, "time"), "text/csv"));
+    if (!linkage.data.over) add("Table over time (CSV)", "save-time", () => download(`${name}.csv`, table(linkage, "time"), "text/csv"));
     add("Drawing as shown (SVG)", "save-svg", () => download(`${name}.svg`, drawing(linkage, page.view, page.show, page.extra()), "image/svg+xml"));
     root.append(element("h2", { textContent: "Save" }), buttons);
     const { command } = buildCommand(linkage, design);

@@ -11,7 +11,9 @@ const SINGULAR = 1e-5; // margin at a change point
 export function rangesOf(linkage) {
     const start = Array.from(linkage.law[0].u);
     const limits = [];
+    const { over } = linkage.data;
     const ranges = linkage.data.drivers.map((driver, k) => {
+        if (over?.driver === k) return [Math.min(over.from, over.to), Math.max(over.from, over.to)];
         const ends = reachOf(linkage, driver, k, start[k]).map((end) => endOf(linkage, start, k, end));
         for (const { at, isLimit } of ends) if (isLimit) limits.push({ driver: k, at });
         if (driver.kind === "angle" && !ends[0].isLimit && !ends[1].isLimit) return [start[k], start[k] + TURN * (driver.turns || 1)];

@@ -21,6 +21,7 @@ export class Transport {
         $("play").addEventListener("click", () => page.motion.play());
         const time = $("time");
         [time.min, time.max] = [run.from, run.to];
+        if (linkage.data.over) for (const one of [time.parentElement, $("clock")]) one.hidden = true; // the driver's slider is the axis
         time.addEventListener("input", () => {
             page.motion.play(false);
             page.refresh(() => page.motion.arrive(linkage.goToTime(Number(time.value))), "place");
