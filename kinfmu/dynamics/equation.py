@@ -65,7 +65,7 @@ class EquationOfMotion:
         pairs = [(k, j) for k in range(d) for j in range(k, d)]
         reduced = [self._inertia_name(k, j) for k, j in pairs]
         known = force_names(plan.mechanism)
-        stage = load_stage(force_steps(plan, [*biases, *reduced], given_coefficients=True))
+        stage = load_stage(force_steps(plan, [*biases, *reduced], coefficients="given"))
         order = [str(name) for name in known if name in {*biases, *reduced}]
         self._places, self._count = list(stage.places), len(order)
         self._biases = [order.index(name) for name in biases]

@@ -128,11 +128,11 @@ def _initial_state(plan: SolvePlan, start: float, given: Mapping[str, float]) ->
 def _run(model: Model, samples: list[Sample], efforts: Efforts, events: tuple[Event, ...], *, ended: bool) -> Run:
     """Return the run of samples: solved at their driver values, with the forces over time."""
     t = np.array([sample.t for sample in samples])
-    driven = [np.array([sample[order] for sample in samples]) for order in (1, 2, 3)]  # u, ud, udd: (n, d)
+    u, ud, udd = (np.array([sample[order] for sample in samples]) for order in (1, 2, 3))  # (n, d)
     inputs: dict[str, Any] = {
         name: table[:, k]
         for k, driver in enumerate(model.plan.drivers)
-        for name, table in zip(driver.inputs, driven, strict=True)
+        for name, table in zip(driver.inputs, (u, ud, udd), strict=True)
     }
     loads = list(efforts.by_name)[len(model.plan.drivers) :]
     applied = _load_efforts(model.plan, samples, efforts) if loads else {}
@@ -142,6 +142,8 @@ def _run(model: Model, samples: list[Sample], efforts: Efforts, events: tuple[Ev
     def loaded() -> LoadedRun:
         return LoadedRun(
             run if poses is model else poses.solve(**inputs),
+            (u, ud, udd),
+            True,
             model.arguments.setting({}),
             applied_efforts(loads, applied, len(t)),
             t,

@@ -79,7 +79,7 @@ def force_stages(plan: SolvePlan, names: Sequence[str], *, are_default: bool) ->
             shared = listed(undetermined[name])  # type: ignore[index]
             raise RequestError(f"outputs: '{name}' is undetermined: rows {shared} share its load in an unknown way")
     found = {
-        "forces": force_steps(plan, names, given_coefficients=True),
+        "forces": force_steps(plan, names, coefficients="given"),
         "reactions": reaction_steps(plan, [name for name in names if name not in undetermined]),
         "shaking": shaking_steps(plan, names),
     }

@@ -55,7 +55,7 @@ def _inertia(plan: SolvePlan) -> ForceSteps:
     for k, driver in enumerate(drivers):
         wanted.append(f"{driver.name}.reduced_inertia")
         wanted += [f"{driver.name}.reduced_inertia.{other.name}" for other in drivers[k + 1 :]]
-    steps = force_steps(plan, wanted, given_coefficients=True)
+    steps = force_steps(plan, wanted, coefficients="given")
     results = {str(name): (name, node) for name, node in zip(steps.names, steps.results, strict=True)}
     names, nodes = zip(*(results[name] for name in wanted), strict=True)
     return ForceSteps(steps.steps, names, list(nodes))
@@ -63,7 +63,7 @@ def _inertia(plan: SolvePlan) -> ForceSteps:
 
 def _jumps_of_loads(plan: SolvePlan) -> tuple[tuple[Node, Node], ...]:
     """Return the times at which laws of loads over time jump, each with its period."""
-    mechanics = Mechanics(plan, given_coefficients=True)
+    mechanics = Mechanics(plan, coefficients="given")
     found = []
     for load in mechanics.members.loads:
         if isinstance(load, Following) and load.over is None and not isinstance(load.law, External):

@@ -116,7 +116,7 @@ def page_sources(plan: SolvePlan, points: Sequence[str], labels: Mapping[str, st
     lines = ["/* The whole module as one unit. Files included here are not compiled separately. */"]
     lines += [f'#include "{name}"' for name in sorted(files) if name.endswith(".c")]
     names = force_names(plan.mechanism)
-    stages = {"forces": force_steps(plan, names, given_coefficients=True)} if names else {}
+    stages = {"forces": force_steps(plan, names, coefficients="given")} if names else {}
     stages |= _reaction_stages(plan)
     files |= {f"{stage}.c": emit_forces(plan, steps, stage, are_loads_open=False) for stage, steps in stages.items()}
     return files | {"page.c": "\n".join(lines) + "\n"}

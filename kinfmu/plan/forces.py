@@ -6,6 +6,7 @@ efforts f of loads along the quantities s through which they act, the principle 
     inertia_kl = sum m K_k.K_l + sum I K_k K_l                    K_k: of the centre of mass; of the angle
     effort_k   = sum m (a - g).K_k + sum I alpha K_k - sum f ds/du_k
     bias_k     = effort_k - sum_l inertia_kl udd_l
+    energy     = 1/2 sum_kl inertia_kl ud_k ud_l
 
 K follows block after block from J K = -r_u, as velocities do. All forces are in SI units, whatever the mechanism's unit
 of length is. Haug (1989), chapters 6 and 7.
@@ -22,7 +23,7 @@ from typing import NamedTuple
 from kinfmu.equations.graph import Graph, Node
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import effort_noun, external_names, force_names
-from kinfmu.plan.mechanics import Mechanics
+from kinfmu.plan.mechanics import Coefficients, Mechanics
 from kinfmu.plan.plan import SolvePlan
 from kinfmu.plan.steps import Step, needed_steps
 from kinfmu.units import ForceName
@@ -66,17 +67,17 @@ def loaded_coordinates(mechanism: Mechanism) -> list[str]:
     return [name for name in mechanism.coordinate_names if name.owner in loaded]
 
 
-def force_steps(plan: SolvePlan, wanted: Sequence[str], *, given_coefficients: bool = False) -> ForceSteps:
+def force_steps(plan: SolvePlan, wanted: Sequence[str], *, coefficients: Coefficients = "solved") -> ForceSteps:
     """Return the steps to forces.
 
     Args:
         plan: The plan, as `Mechanics` takes it.
         wanted: Names of forces, of those of `force_names`.
-        given_coefficients: The velocity coefficients are given, in place of steps that solve for them: at singular
-            points these are known better than the blocks give them.
+        coefficients: Where the velocity coefficients come from. At singular points they are known better than the
+            blocks give them; a single driver that moves needs no steps that solve for them.
 
     """
-    mechanics = Mechanics(plan, given_coefficients=given_coefficients)
+    mechanics = Mechanics(plan, coefficients=coefficients)
     names, found = force_names(plan.mechanism), _forces(plan, mechanics)
     return chosen_steps(names, [found[name] for name in names], mechanics.steps, wanted)
 
@@ -117,7 +118,11 @@ def _forces(plan: SolvePlan, mechanics: Mechanics) -> dict[str, Node]:
         for other, reduced in zip(plan.drivers, row, strict=True):
             suffix = "" if other is driver else f".{other.name}"
             found[f"{driver.name}.reduced_inertia{suffix}"] = reduced
-    found["kinetic_energy"] = _sum(graph, (one.amount * (one.rate * one.rate) for one in inertias)) * 0.5
+    if len(plan.drivers) == 1:
+        (inertia,) = row
+        found["kinetic_energy"] = inertia * (speeds[0] * speeds[0]) * 0.5
+    else:  # motions by two drivers may cancel, and the terms of their inertias with them
+        found["kinetic_energy"] = _sum(graph, (one.amount * (one.rate * one.rate) for one in inertias)) * 0.5
     found["potential_energy"] = _potential_energy(plan, mechanics)
     found |= {name: graph.symbol(name) for name in external_names(plan.mechanism)}
     return found
@@ -127,16 +132,15 @@ def _inertias(mechanics: Mechanics) -> list[_Inertia]:
     """Return all that is accelerated."""
     found = []
     for center in mechanics.centers():
-        mass = mechanics.graph.lift(center.body.mass)
-        inertia = mechanics.graph.lift(center.body.inertia)
-        angle = mechanics.graph.lift(mechanics.pose(center.body.name).phi)
-        for amount, position, acceleration in (
-            (mass, center.position[0], center.acceleration[0]),
-            (mass, center.position[1], center.acceleration[1]),
-            (inertia, angle, center.alpha),
-        ):
-            (rate,) = mechanics.rates.of([position])
-            found.append(_Inertia(amount, rate, acceleration, mechanics.coefficients(position)))
+        mass, inertia = mechanics.graph.lift(center.body.mass), mechanics.graph.lift(center.body.inertia)
+        frame = (*center.origin, center.phi)
+        rates, slopes = mechanics.rates.of(frame), list(zip(*map(mechanics.coefficients, frame), strict=True))
+        along = zip(*map(center.turned, slopes), strict=True)
+        found += [
+            _Inertia(mass, rate, acceleration, coefficients)
+            for rate, acceleration, coefficients in zip(center.turned(rates), center.acceleration, along, strict=True)
+        ]
+        found.append(_Inertia(inertia, rates[2], center.alpha, tuple(phi for *_, phi in slopes)))
     return [one for one in found if one.amount.constant != 0.0]
 
 

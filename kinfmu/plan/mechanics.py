@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from kinfmu.equations.graph import Node
 from kinfmu.loads import Load
@@ -21,6 +21,9 @@ from kinfmu.plan.steps import Tracing, derivative_name, law_symbol
 from kinfmu.plan.trace import Tracer
 from kinfmu.units import METRES
 
+Coefficients = Literal["solved", "given", "rates"]
+"""Velocity coefficients: solved block after block; given symbols; or rates over the speed of the only driver."""
+
 
 class Center(NamedTuple):
     """The centre of mass of a body.
@@ -28,17 +31,26 @@ class Center(NamedTuple):
     Attributes:
         body: The body, its numbers as nodes.
         arm: From the body's origin, in world axes [m].
-        position: Seen from the plan's origin [m].
+        origin: The body's origin, seen from the plan's origin [m].
+        position: Origin and arm [m].
         acceleration: Relative to free fall [m/s2].
+        phi: Angle of the body [rad].
         alpha: Angular acceleration of the body [rad/s2].
 
     """
 
     body: Body
     arm: tuple[Node, Node]
+    origin: tuple[Node, Node]
     position: tuple[Node, Node]
     acceleration: tuple[Node, Node]
+    phi: Node
     alpha: Node
+
+    def turned(self, rates: Sequence[Node]) -> tuple[Node, Node]:
+        """Return a rate (x, y) of the position from the rates (x, y, phi) of origin and angle."""
+        (x, y, phi), (arm_x, arm_y) = rates, self.arm
+        return x - phi * arm_y, y + phi * arm_x
 
 
 class Mechanics(Tracing):
@@ -48,11 +60,11 @@ class Mechanics(Tracing):
 
     Args:
         plan: The plan. It must solve the bodies that have masses and those on which loads act.
-        given_coefficients: Derivatives of unknowns with respect to drivers are given symbols; else they are solved.
+        coefficients: How derivatives of unknowns with respect to drivers are found.
 
     """
 
-    def __init__(self, plan: SolvePlan, *, given_coefficients: bool = False) -> None:
+    def __init__(self, plan: SolvePlan, *, coefficients: Coefficients = "solved") -> None:
         self.tracer = Tracer(localized(plan.mechanism)[0], [parameter.name for parameter in plan.parameters])
         graph, one = self.tracer.graph, self.tracer.graph.constant(1.0)
         changes = [{graph.symbol(driver.inputs[0]): one} for driver in plan.drivers]
@@ -67,13 +79,17 @@ class Mechanics(Tracing):
         self.rates = TimeDerivatives(self.tracer, self.known)
         self._per_driver = [1.0 if driver.quantity.kind == "angle" else 1.0 / self.metre for driver in plan.drivers]
         for block in plan.blocks:
-            if given_coefficients:
-                for name in block.unknowns:
-                    for number, change in enumerate(self.changes):
-                        change[graph.symbol(name)] = graph.symbol(derivative_name(name, number))
-                self.assigned(block)
-            else:
+            if coefficients == "solved":
                 self.positions(block)
+                continue
+            for name in block.unknowns:
+                for number, (change, driver) in enumerate(zip(self.changes, plan.drivers, strict=True)):
+                    if coefficients == "rates":
+                        slope = graph.symbol(name.derivative(1)) * (one / graph.symbol(driver.inputs[1]))
+                    else:
+                        slope = graph.symbol(derivative_name(name, number))
+                    change[graph.symbol(name)] = slope
+            self.assigned(block)
 
     def pose(self, body: str, free: str = "") -> BodyFrame:
         """Return the frame of a body, seen from the plan's origin [length]; free: a coordinate that stays a symbol."""
@@ -99,7 +115,10 @@ class Mechanics(Tracing):
         return x, y
 
     def centers(self) -> Iterator[Center]:
-        """Yield the centres of mass of the moving bodies."""
+        """Yield the centres of mass of the moving bodies.
+
+        a = a_origin + alpha x arm - omega^2 arm - g        less work than two derivatives of the position
+        """
         graph = self.graph
         for body in self.members.bodies:
             if body.is_ground:
@@ -107,10 +126,14 @@ class Mechanics(Tracing):
             pose, (s_x, s_y) = self.pose(body.name), body.center_of_mass
             arm_x = graph.lift(pose.c * s_x - pose.s * s_y) * self.metre
             arm_y = graph.lift(pose.s * s_x + pose.c * s_y) * self.metre
-            x, y = graph.lift(pose.x) * self.metre + arm_x, graph.lift(pose.y) * self.metre + arm_y
-            a_x, a_y, alpha = self.rates.second([x, y, graph.lift(pose.phi)])
-            g_x, g_y = self.gravity()
-            yield Center(body, (arm_x, arm_y), (x, y), (a_x - g_x, a_y - g_y), alpha)
+            x, y, phi = graph.lift(pose.x) * self.metre, graph.lift(pose.y) * self.metre, graph.lift(pose.phi)
+            (omega,), (a_x, a_y, alpha) = self.rates.of([phi]), self.rates.second([x, y, phi])
+            square, (g_x, g_y) = omega * omega, self.gravity()
+            acceleration = (
+                a_x - (alpha * arm_y + square * arm_x) - g_x,
+                a_y + (alpha * arm_x - square * arm_y) - g_y,
+            )
+            yield Center(body, (arm_x, arm_y), (x, y), (x + arm_x, y + arm_y), acceleration, phi, alpha)
 
     def placement(self, load: Load, free: str = "") -> Placement:
         """Return the poses of the bodies of a load; free: a coordinate that stays a symbol."""

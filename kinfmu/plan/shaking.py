@@ -28,7 +28,7 @@ def shaking_steps(plan: SolvePlan, wanted: Container[str] | None = None) -> Forc
         wanted: Names of those that are wanted. Default: all.
 
     """
-    mechanics = Mechanics(plan, given_coefficients=True)
+    mechanics = Mechanics(plan, coefficients="given")
     nodes = shaking_nodes(plan, mechanics)  # of loads too, whose slopes are along symbols of known coordinates
     mechanics.steps += [Assignment(name, node) for name, node in mechanics.known.items()]
     return chosen_steps(shaking_names(plan.mechanism), nodes, mechanics.steps, wanted)

@@ -1,7 +1,7 @@
 /* Stage: formulas of many results, for many samples side by side.
  *
  * A generated file defines KF_GIVEN, KF_VALUES and KF_RESULTS and includes this one. Its function fills a block of results
- * from a block of values, of which the first KF_GIVEN are given and the others are in between.
+ * from a block of given numbers and of values in between, which have places after KF_GIVEN copies of given numbers.
  */
 #ifndef KF_STAGE_H
 #define KF_STAGE_H
@@ -22,6 +22,7 @@ typedef double kf_numbers[KF_BLOCK]; /* one for each sample */
 
 /* Samples of a stage. step: between the given numbers of two samples, 0 if it is one number for all. pitch: of the rows of
  * results, which are aligned to cache lines. places: rows of the results in order. is_large: larger than the caches.
+ * is_checked: whether all results are finite is wanted.
  */
 typedef struct {
     int64_t count;
@@ -30,6 +31,7 @@ typedef struct {
     double *results;
     int64_t pitch;
     bool is_large;
+    bool is_checked;
 } kf_stage;
 
 /* Exchange a and b in the samples of the mask. */
@@ -120,16 +122,17 @@ static inline void kf_solutions(int size, int columns, kf_numbers *j, kf_numbers
     }
 }
 
-/* Copy the given numbers of a block; samples after the last one repeat it. */
-static inline void kf_gather(const kf_stage *stage, int64_t first, int count, kf_numbers *x)
+/* Find the given numbers of a block: where they are, or in x as copies; samples after the last one repeat it. */
+static inline void kf_find(const kf_stage *stage, int64_t first, int count, kf_numbers *x, const double **given)
 {
     int k, i;
     for (k = 0; k < KF_GIVEN; ++k) {
         const int64_t step = stage->step[k];
         const double *const from = stage->given[k] + step * first;
+        given[k] = x[k];
         if (step == 1 && count == KF_BLOCK) {
-            memcpy(x[k], from, sizeof x[k]);
-        } else {
+            given[k] = from;
+        } else if (step != 0 || first == 0) { /* one number for all is copied once */
             for (i = 0; i < KF_BLOCK; ++i) {
                 x[k][i] = from[step * (i < count ? i : count - 1)];
             }
@@ -137,55 +140,70 @@ static inline void kf_gather(const kf_stage *stage, int64_t first, int count, kf
     }
 }
 
-/* Write the results of a block to their rows; return whether all of them are finite. */
-static inline bool kf_scatter(const kf_stage *stage, const int *places, int64_t first, int count, kf_numbers *found)
+/* Write the results of a block to their rows. */
+static inline void kf_scatter(const kf_stage *stage, double *const *rows, int count, kf_numbers *found)
 {
-    kf_numbers zero; /* NaN where a result is not finite */
-    double sum = 0.0;
     int k, i;
-    memset(zero, 0, sizeof zero);
     for (k = 0; k < KF_RESULTS; ++k) {
-        double *const to = stage->results + places[k] * stage->pitch + first;
-        KF_EACH (i) {
-            zero[i] += 0.0 * found[k][i];
-        }
         if (stage->is_large && count == KF_BLOCK) {
             for (i = 0; i < KF_BLOCK; i += KF_LINE) {
-                kf_stream_line(to + i, found[k] + i);
+                kf_stream_line(rows[k] + i, found[k] + i);
             }
         } else {
-            memcpy(to, found[k], (size_t)count * sizeof(double));
+            memcpy(rows[k], found[k], (size_t)count * sizeof(double));
         }
     }
-    for (i = 0; i < count; ++i) {
-        sum += zero[i];
-    }
-    return sum == 0.0;
 }
 
-/* Fill the results of a stage: 1, or 0 if some are not finite; -1: no memory is left. */
-static inline int kf_fill(const kf_stage *stage, const int *places, void (*fill)(kf_numbers *x, kf_numbers *results))
+/* Fill the results of a stage: 1, or 0 if it is to be checked and some are not finite; -1: no memory is left.
+ *
+ * fill: from given numbers and values in between, to results. Whole blocks are written where they belong.
+ */
+static inline int kf_fill(
+    const kf_stage *stage, const int *places, void (*fill)(const double **given, kf_numbers *x, double **results))
 {
     const size_t line = KF_LINE * sizeof(double);
     void *const memory = malloc((KF_VALUES + KF_RESULTS) * sizeof(kf_numbers) + line);
-    kf_numbers *x;
-    bool is_finite = true;
+    const double *given[KF_GIVEN + 1];
+    double *rows[KF_RESULTS + 1], *results[KF_RESULTS + 1];
+    kf_numbers *x, *found;
+    kf_numbers zero; /* NaN where a result is not finite */
+    double sum = 0.0;
     int64_t s;
+    int i, k;
     if (memory == NULL) {
         return -1;
     }
     x = (kf_numbers *)(((uintptr_t)memory + line - 1) / line * line);
+    found = x + KF_VALUES;
+    memset(zero, 0, sizeof zero);
     for (s = 0; s < stage->count; s += KF_BLOCK) {
         const int count = stage->count - s < KF_BLOCK ? (int)(stage->count - s) : KF_BLOCK;
-        kf_gather(stage, s, count, x);
-        fill(x, x + KF_VALUES);
-        is_finite = kf_scatter(stage, places, s, count, x + KF_VALUES) && is_finite;
+        const bool is_direct = count == KF_BLOCK && !stage->is_large;
+        for (k = 0; k < KF_RESULTS; ++k) {
+            rows[k] = stage->results + places[k] * stage->pitch + s;
+            results[k] = is_direct ? rows[k] : found[k];
+        }
+        kf_find(stage, s, count, x, given);
+        fill(given, x, results);
+        for (k = 0; k < KF_RESULTS && stage->is_checked; ++k) {
+            const double *const result = results[k];
+            KF_EACH (i) {
+                zero[i] += 0.0 * result[i];
+            }
+        }
+        if (!is_direct) {
+            kf_scatter(stage, rows, count, found);
+        }
     }
     if (stage->is_large) {
         kf_stream_end();
     }
+    for (i = 0; i < KF_BLOCK; ++i) {
+        sum += zero[i];
+    }
     free(memory);
-    return is_finite;
+    return sum == 0.0;
 }
 
 #endif

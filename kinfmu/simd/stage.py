@@ -38,6 +38,7 @@ class _Stage(ctypes.Structure):
         ("results", ctypes.c_void_p),
         ("pitch", ctypes.c_int64),
         ("is_large", ctypes.c_bool),
+        ("is_checked", ctypes.c_bool),
     )
 
 
@@ -86,7 +87,7 @@ def stage_source(stage: CompiledStage) -> str:
             stores += [f"x[{places[name]}][i] = {entry}" for name, entry in zip(one.names, one.right, strict=True)]
         else:
             stores = [f"results[{n}][i] = {result}" for n, result in enumerate(results)]
-        body += _loop(loop, stores, places)
+        body += _loop(loop, stores, places, len(stage.given))
         if k < len(solves):
             body.append(f"    kf_solutions({one.size}, {one.columns}, x + {jacobian}, x + {places[one.names[0]]});")
     values = jacobian + max((len(one.jacobian) for one in solves), default=0)
@@ -101,9 +102,11 @@ def stage_source(stage: CompiledStage) -> str:
             *curve_tables(curves),
             *array("static int places", stage.places),
             "",
-            "static void fill(kf_numbers *x, kf_numbers *results)",
+            "static void fill(const double **given, kf_numbers *x, double **results)",
             "{",
             "    int i;",
+            "    (void)given;",
+            "    (void)x;",
             *body,
             "}",
             "",
@@ -137,13 +140,15 @@ def _places_of_values(
     return len(places)
 
 
-def _loop(lines: Sequence[str], stores: Sequence[str], places: dict[str, int]) -> Iterator[str]:
-    """Yield a loop over the samples of a block: it reads and writes values that have places."""
+def _loop(lines: Sequence[str], stores: Sequence[str], places: dict[str, int], given: int) -> Iterator[str]:
+    """Yield a loop over the samples of a block: it reads and writes values with places; the first ones are given."""
     own = [_assigned(line) for line in lines]
     read = [name for name in _words([*lines, *stores]) if name in places and name not in own]
     kept = [f"x[{places[name]}][i] = {name}" for name in own if name in places]
     yield "    KF_EACH (i) {"
-    yield from (f"        const double {name} = x[{places[name]}][i];" for name in read)
+    for name in read:
+        table = "given" if places[name] < given else "x"
+        yield f"        const double {name} = {table}[{places[name]}][i];"
     yield from (f"        const double {line};" for line in lines)
     yield from (f"        {line};" for line in (*kept, *stores))
     yield "    }"
@@ -157,11 +162,11 @@ def _words(lines: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(re.findall(r"\b[A-Za-z_]\w*", "\n".join(lines))))
 
 
-def load_native_stage(stage: CompiledStage) -> Callable[[Sequence[FloatArray | float], FloatArray], bool]:
+def load_native_stage(stage: CompiledStage) -> Callable[[Sequence[FloatArray | float], FloatArray, bool], bool]:
     """Return the compiled stage.
 
-    It fills the rows of `empty_results` that are not 0, from arrays (n,) or single numbers, and returns whether all are
-    finite.
+    It fills the rows of `empty_results` that are not 0, from arrays (n,) or single numbers. The last argument: whether
+    all are finite is wanted, and returned.
 
     Raises:
         CompilerError: There is no compiler, or it fails.
@@ -174,7 +179,7 @@ def load_native_stage(stage: CompiledStage) -> Callable[[Sequence[FloatArray | f
     evaluate = compiler.load(files, compiler.VECTORIZED).kf_evaluate
     numbers, places, counts = (kind * len(stage.given) for kind in (ctypes.c_double, ctypes.c_size_t, ctypes.c_int64))
 
-    def fill(given: Sequence[FloatArray | float], results: FloatArray) -> bool:
+    def fill(given: Sequence[FloatArray | float], results: FloatArray, is_checked: bool) -> bool:
         single = numbers()
         starts, steps = places(), counts()
         first = ctypes.addressof(single)
@@ -191,6 +196,7 @@ def load_native_stage(stage: CompiledStage) -> Callable[[Sequence[FloatArray | f
             results.__array_interface__["data"][0],
             results.strides[0] // ITEM,
             results.size > LARGE,
+            is_checked,
         )
         answer: int = evaluate(ctypes.byref(job))
         if answer < 0:

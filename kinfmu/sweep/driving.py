@@ -128,6 +128,19 @@ def _constant(shape: tuple[int, ...], value: float) -> FloatArray:
     return numbers
 
 
+def with_constants(drivers: Sequence[DriverInfo], driven: Driven, inputs: Mapping[str, ArrayLike]) -> Driven:
+    """Return the same driver values; tables of single numbers repeat one row, which costs no memory to read."""
+    if not inputs or not len(driven[0]):
+        return driven
+    u, ud, udd = (
+        np.broadcast_to(table[0], table.shape)
+        if all(isinstance(inputs.get(driver.inputs[order], 0.0), float | int) for driver in drivers)
+        else table
+        for order, table in enumerate(driven)
+    )
+    return u, ud, udd
+
+
 def without_huge_rates(driven: Driven) -> Driven:
     """Return the driver values; NaN where a law has no value, or has rates whose squares overflow."""
     u, ud, udd = driven

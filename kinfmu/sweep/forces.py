@@ -24,21 +24,25 @@ from kinfmu.solver.python.status import Status
 from kinfmu.sweep.arguments import Setting
 from kinfmu.sweep.designs import Solvable
 from kinfmu.sweep.driving import column_of
+from kinfmu.sweep.engine import Driven
 from kinfmu.sweep.stages import native_stage, stage_results
 
 LEAST_SPEED = 1e-100  # [rad/s, ...] of a driver; products with smaller ones lose digits
-_STAGES = 4  # forces, the same with coefficients given, reactions, those on the ground alone
+_STAGES = 5  # forces by each kind of coefficients, reactions, those on the ground alone
 Given = dict[str, FloatArray | float]
 
 
 class LoadedRun(NamedTuple):
     """What the forces of a run are computed from.
 
-    poses: a run of the force plan; efforts: of external loads, (n,) by their inputs; times: (n,) for the laws of loads,
-    or None where driver values are given in place of times: laws over time then have no values.
+    poses: a run of the force plan; driven: (n, d) values, speeds and accelerations of the drivers; has_gaps: False if
+    all samples are known to have numbers; efforts: of external loads, (n,) by their inputs; times: (n,) for the laws of
+    loads, or None where driver values are given in place of times: laws over time then have no values.
     """
 
     poses: Run
+    driven: Driven
+    has_gaps: bool
     setting: Setting
     efforts: Mapping[str, FloatArray]
     times: FloatArray | None
@@ -78,9 +82,14 @@ class ForceModel:
     def forces(self, run: LoadedRun) -> FloatArray:
         """Return the forces at all samples, (n, names); NaN where the run has no numbers.
 
-        Samples that are interpolated across a singular point take the velocity coefficients from rates, which are
-        interpolated likewise: there the blocks do not give them.
+        The velocity coefficients of a single driver that never rests are the rates over its speed. Else blocks give
+        them; not at samples that are interpolated across a singular point, where they come from rates.
         """
+        if self._is_moved_by_one(run):
+            forces = self._evaluated(self._stage_of_rates, run, slice(None), len(run.poses))
+            if run.has_gaps:
+                forces[run.poses.status > Status.BRIDGED] = np.nan
+            return forces
         forces, irregular = self._at_regular_samples(self._stage, run)
         bridged = irregular[run.poses.status[irregular] == Status.BRIDGED]
         if len(bridged):
@@ -95,13 +104,12 @@ class ForceModel:
         where the rows do not determine them, and for rows that share a load with redundant ones. Shaking force and
         moment follow from the motion alone.
         """
-        names = reaction_names_of(self.poses.plan.mechanism)
         reactions, irregular = self._at_regular_samples(self._reaction_stage, run)
-        reactions[:, [names.index(name) for name in undetermined_reactions(self.poses.plan)]] = np.nan
+        reactions[:, self._undetermined] = np.nan
         bridged = irregular[run.poses.status[irregular] == Status.BRIDGED]
         if len(bridged):
             shaking = self._evaluated(self._shaking_stage, run, bridged, len(bridged))
-            reactions[bridged, len(names) - shaking.shape[1] :] = shaking
+            reactions[bridged, -shaking.shape[1] :] = shaking
         return reactions
 
     def shaking(self, run: LoadedRun) -> FloatArray:
@@ -110,6 +118,14 @@ class ForceModel:
         shaking = self._evaluated(self._shaking_stage, run, slice(None), len(status))
         shaking[status > Status.BRIDGED] = np.nan
         return shaking
+
+    def _is_moved_by_one(self, run: LoadedRun) -> bool:
+        """Return whether there is a single driver and its speed is nowhere too small to divide by."""
+        speeds = run.driven[1]
+        if speeds.shape[1] > 1:
+            return False
+        different = speeds[:1] if speeds.strides[0] == 0 else speeds
+        return bool(different.min(initial=np.inf) > LEAST_SPEED or different.max(initial=-np.inf) < -LEAST_SPEED)
 
     def _at_regular_samples(self, stage: CompiledStage, run: LoadedRun) -> tuple[FloatArray, IntArray]:
         """Return the results of a stage, (n, results), and the numbers of all other samples, where they are NaN.
@@ -128,7 +144,11 @@ class ForceModel:
 
     @cached_property
     def _stage_of_coefficients(self) -> CompiledStage:
-        return load_stage(force_steps(self.poses.plan, self.names, given_coefficients=True))
+        return load_stage(force_steps(self.poses.plan, self.names, coefficients="given"))
+
+    @cached_property
+    def _stage_of_rates(self) -> CompiledStage:
+        return load_stage(force_steps(self.poses.plan, self.names, coefficients="rates"))
 
     @cached_property
     def _reaction_stage(self) -> CompiledStage:
@@ -139,10 +159,16 @@ class ForceModel:
         return load_stage(shaking_steps(self.poses.plan))
 
     @cached_property
+    def _undetermined(self) -> list[int]:
+        """Columns of the reactions that redundant rows leave undetermined."""
+        names = reaction_names_of(self.poses.plan.mechanism)
+        return [names.index(name) for name in undetermined_reactions(self.poses.plan)]
+
+    @cached_property
     def _columns(self) -> dict[str, tuple[int, int]]:
-        """Table and column of each symbol that a run has: values, rates, accelerations, inputs."""
+        """Table and column of each symbol that a run has: values, rates, accelerations, the same of the drivers."""
         names = [[name.derivative(order) for name in self.poses.plan.outputs] for order in range(3)]
-        names.append([name for driver in self.poses.plan.drivers for name in driver.inputs])
+        names += [[driver.inputs[order] for driver in self.poses.plan.drivers] for order in range(3)]
         return {name: (table, k) for table, own in enumerate(names) for k, name in enumerate(own)}
 
     def _given(self, run: LoadedRun, samples: Any) -> Given:
@@ -165,11 +191,11 @@ class ForceModel:
         speed of 1 and the others rest.
         """
         plan = self.poses.plan
-        speed = run.poses.inputs[samples, 1:2]
+        speed = run.driven[1][samples]
         if len(plan.drivers) == 1 and (np.abs(speed) > LEAST_SPEED).all():
             rates = run.poses.rates[samples] / speed
             return {derivative_name(name, 0): rate for name, rate in zip(plan.outputs, rates.T, strict=True)}
-        values = {driver.inputs[0]: run.poses.inputs[samples, 3 * k] for k, driver in enumerate(plan.drivers)}
+        values = {driver.inputs[0]: run.driven[0][samples, k] for k, driver in enumerate(plan.drivers)}
         found: Given = {}
         for number in range(len(plan.drivers)):
             speeds: dict[str, Any] = {driver.inputs[1]: float(k == number) for k, driver in enumerate(plan.drivers)}
@@ -182,11 +208,11 @@ class ForceModel:
     ) -> FloatArray:
         """Return the results of a stage at n samples, (n, results)."""
         poses, columns = run.poses, self._columns
-        tables = (poses.values, poses.rates, poses.accelerations, poses.inputs)
+        tables = (poses.values, poses.rates, poses.accelerations, *run.driven)
         given = self._given(run, samples) | (coefficients or {})
         native = self._native(stage) if self.poses.is_native(n) else None
         numbers = [given[name] if name in given else _column(tables, columns[name], samples) for name in stage.given]
-        results, _ = stage_results(stage, native, numbers, (len(stage.steps.results), n))
+        results, _ = stage_results(stage, native, numbers, (len(stage.steps.results), n), is_checked=False)
         return results.T
 
 

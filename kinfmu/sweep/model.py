@@ -27,7 +27,7 @@ from kinfmu.solver.python.solver import TOLERANCE
 from kinfmu.sweep.arguments import Arguments, Setting, Settings
 from kinfmu.sweep.continued import anew as anew_note
 from kinfmu.sweep.designs import Batch, Designs, Driving, solve_batch
-from kinfmu.sweep.driving import column_of, driven_by_inputs, run_times, without_huge_rates
+from kinfmu.sweep.driving import column_of, driven_by_inputs, run_times, with_constants, without_huge_rates
 from kinfmu.sweep.engine import Engine, Tables, UnreachedError, require_engine, tables_for
 from kinfmu.sweep.forces import ForceModel, LoadedRun, applied_efforts, force_plan
 from kinfmu.sweep.python_engine import PythonEngine
@@ -184,12 +184,13 @@ class Model:
 
         def loaded() -> LoadedRun:
             """Return what forces are computed from; tables that were given may hold other numbers by now."""
-            poses = itself()
+            poses, moved, has_gaps = itself(), with_constants(plan.drivers, given, inputs), bool(result.failures)
             if poses is None or self._force_model.poses is not self or out is not None:
                 again: dict[str, Any] = dict(inputs)
                 model = self._force_model.poses
                 poses = model.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, **again)
-            return LoadedRun(poses, setting, applied, None if inputs else times)
+                moved, has_gaps = (poses.inputs[:, ::3], poses.inputs[:, 1::3], poses.inputs[:, 2::3]), True
+            return LoadedRun(poses, moved, has_gaps, setting, applied, None if inputs else times)
 
         run = Run.of_fields(
             t=(lambda: np.arange(count, dtype=float)) if inputs else times,

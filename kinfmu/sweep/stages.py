@@ -13,7 +13,7 @@ from kinfmu.simd.stage import empty_results, is_printable, load_native_stage
 
 AT_ONCE = 512  # samples; the arrays of a stage then stay in the processor's cache
 
-Native = Callable[[Sequence[FloatArray | float], FloatArray], bool]  # fills results (rows, n) from arrays (n,)
+Native = Callable[[Sequence[FloatArray | float], FloatArray, bool], bool]  # fills results (rows, n) from arrays (n,)
 
 
 def native_stage(stage: CompiledStage) -> Native | None:
@@ -27,18 +27,23 @@ def native_stage(stage: CompiledStage) -> Native | None:
 
 
 def stage_results(
-    stage: CompiledStage, native: Native | None, numbers: Sequence[FloatArray | float], shape: tuple[int, int]
+    stage: CompiledStage,
+    native: Native | None,
+    numbers: Sequence[FloatArray | float],
+    shape: tuple[int, int],
+    *,
+    is_checked: bool = True,
 ) -> tuple[FloatArray, bool]:
     """Return all results of a stage, (rows, n), and whether all are finite; they are not where a block is singular.
 
-    numbers: arrays (n,), or one number each.
+    numbers: arrays (n,), or one number each. Without `is_checked` results pass as finite.
     """
     n = shape[1]
     results = empty_results(*shape)
     for rows_at_zero in stage.zeros:
         results[rows_at_zero] = 0.0
     if native is not None:
-        return results, native(numbers, results)
+        return results, native(numbers, results, is_checked)
     if n <= stage.few:
         columns = [number.tolist() if isinstance(number, np.ndarray) else [number] * n for number in numbers]
         rows = []
@@ -55,4 +60,4 @@ def stage_results(
                 own = [number[part] if isinstance(number, np.ndarray) else number for number in numbers]
                 for place, result in zip(stage.places, stage.of_samples(own), strict=True):
                     results[place, part] = result
-    return results, bool(np.isfinite(results).all())
+    return results, not is_checked or bool(np.isfinite(results).all())

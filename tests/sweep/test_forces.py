@@ -207,6 +207,26 @@ def test_reactions_and_torques_balance_every_body(name: str) -> None:
     np.testing.assert_allclose(shaking, on_ground, rtol=0, atol=1e-10 * max(largest, np.abs(on_ground).max()))
 
 
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("name", ["fourbar", "slider_crank", "jansen_leg", "double_pendulum"])
+def test_forces_of_a_driver_that_moves_are_those_of_one_that_rests_somewhere(name: str, engine: str) -> None:
+    """Coefficients from rates, or solved where a speed is 0; bridges and limits are on the way."""
+    model = kinfmu.compile(loaded(name), engine=engine)  # type: ignore[arg-type]
+    (driver,) = model.plan.drivers
+    value, speed, acceleration = driver.inputs
+    inputs: dict[str, Any] = {value: np.linspace(0.1, 7.0, 200), acceleration: np.linspace(-3.0, 2.0, 200)}
+    speeds = np.where(np.arange(200) == 0, 0.0, -0.7)
+    moving, resting = model.solve(**inputs, **{speed: -0.7}), model.solve(**inputs, **{speed: speeds})
+    assert moving.forces is not None
+    assert resting.forces is not None
+    np.testing.assert_array_equal(np.isnan(moving.forces), np.broadcast_to(~moving.good[:, None], moving.forces.shape))
+    regular = moving.good & (moving.margin > 0.05)
+    regular[0] = False
+    assert regular.sum() > 20
+    largest = np.abs(moving.forces[regular]).max(axis=0)
+    np.testing.assert_allclose(moving.forces[regular] / largest, resting.forces[regular] / largest, rtol=0, atol=1e-13)
+
+
 def test_a_run_with_forces_is_freed_when_it_is_no_longer_used() -> None:
     """Its tables are large: they must not wait for the collector of cycles."""
     model = kinfmu.compile(loaded("crank_rocker"), engine="python")
