@@ -211,7 +211,7 @@ def empty_results(rows: int, n: int) -> FloatArray:
     pitch = -(-n // LINE) * LINE
     pitch += LINE if pitch % _UNEVEN == 0 else 0
     whole = np.empty(rows * pitch + LINE)
-    first = -whole.ctypes.data // whole.itemsize % LINE
+    first = -whole.__array_interface__["data"][0] // ITEM % LINE
     return whole[first : first + rows * pitch].reshape(rows, pitch)[:, :n]
 
 

@@ -133,7 +133,7 @@ def with_constants(drivers: Sequence[DriverInfo], driven: Driven, inputs: Mappin
     if not inputs or not len(driven[0]):
         return driven
     u, ud, udd = (
-        np.broadcast_to(table[0], table.shape)
+        np.ndarray(table.shape, float, table, strides=(0, table.strides[1]))  # np.broadcast_to takes 10 us
         if all(isinstance(inputs.get(driver.inputs[order], 0.0), float | int) for driver in drivers)
         else table
         for order, table in enumerate(driven)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from kinfmu.codegen.python.stage import CompiledStage, load_stage
 from kinfmu.errors import RequestError
+from kinfmu.mechanism.force_names import shaking_names
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.forces import force_names, force_steps, loaded_coordinates
 from kinfmu.plan.origin import localized
@@ -19,7 +20,7 @@ from kinfmu.plan.reactions import reaction_names_of, reaction_steps, undetermine
 from kinfmu.plan.shaking import shaking_steps
 from kinfmu.plan.steps import derivative_name, law_symbol
 from kinfmu.plan.trace import parameter_symbol
-from kinfmu.run import FloatArray, IntArray, Run
+from kinfmu.run import FloatArray, Run
 from kinfmu.solver.python.status import Status
 from kinfmu.sweep.arguments import Setting
 from kinfmu.sweep.designs import Solvable
@@ -86,12 +87,12 @@ class ForceModel:
         them; not at samples that are interpolated across a singular point, where they come from rates.
         """
         if self._is_moved_by_one(run):
-            forces = self._evaluated(self._stage_of_rates, run, slice(None), len(run.poses))
-            if run.has_gaps:
-                forces[run.poses.status > Status.BRIDGED] = np.nan
-            return forces
-        forces, irregular = self._at_regular_samples(self._stage, run)
-        bridged = irregular[run.poses.status[irregular] == Status.BRIDGED]
+            return self._without_gaps(self._evaluated(self._stage_of_rates, run, slice(None), len(run.poses)), run)
+        status = run.poses.status
+        forces = self._evaluated(self._stage, run, slice(None), len(status))
+        irregular = np.flatnonzero(status >= Status.BRIDGED)  # few: tables of the others would be copied without them
+        forces[irregular] = np.nan
+        bridged = irregular[status[irregular] == Status.BRIDGED]
         if len(bridged):
             coefficients = self._coefficients(run, bridged)
             forces[bridged] = self._evaluated(self._stage_of_coefficients, run, bridged, len(bridged), coefficients)
@@ -104,20 +105,27 @@ class ForceModel:
         where the rows do not determine them, and for rows that share a load with redundant ones. Shaking force and
         moment follow from the motion alone.
         """
-        reactions, irregular = self._at_regular_samples(self._reaction_stage, run)
+        reactions = self._evaluated(self._reaction_stage, run, slice(None), len(run.poses))
         reactions[:, self._undetermined] = np.nan
-        bridged = irregular[run.poses.status[irregular] == Status.BRIDGED]
-        if len(bridged):
-            shaking = self._evaluated(self._shaking_stage, run, bridged, len(bridged))
-            reactions[bridged, -shaking.shape[1] :] = shaking
-        return reactions
+        status = run.poses.status
+        irregular = np.flatnonzero(status >= Status.BRIDGED)
+        reactions[irregular, : reactions.shape[1] - self._shaking_count] = np.nan
+        bridged = irregular[status[irregular] == Status.BRIDGED]
+        singular = bridged[np.isnan(reactions[bridged, -1])]  # a division by 0 leaves a sample without all results
+        if len(singular):
+            shaking = self._evaluated(self._shaking_stage, run, singular, len(singular))
+            reactions[singular, -self._shaking_count :] = shaking
+        return self._without_gaps(reactions, run)
 
     def shaking(self, run: LoadedRun) -> FloatArray:
         """Return shaking force and moment at all samples, (n, 3); NaN where the run has no numbers."""
-        status = run.poses.status
-        shaking = self._evaluated(self._shaking_stage, run, slice(None), len(status))
-        shaking[status > Status.BRIDGED] = np.nan
-        return shaking
+        return self._without_gaps(self._evaluated(self._shaking_stage, run, slice(None), len(run.poses)), run)
+
+    def _without_gaps(self, results: FloatArray, run: LoadedRun) -> FloatArray:
+        """Return results (n, ...), NaN at the samples that have no numbers."""
+        if run.has_gaps:
+            results[run.poses.status > Status.BRIDGED] = np.nan
+        return results
 
     def _is_moved_by_one(self, run: LoadedRun) -> bool:
         """Return whether there is a single driver and its speed is nowhere too small to divide by."""
@@ -126,17 +134,6 @@ class ForceModel:
             return False
         different = speeds[:1] if speeds.strides[0] == 0 else speeds
         return bool(different.min(initial=np.inf) > LEAST_SPEED or different.max(initial=-np.inf) < -LEAST_SPEED)
-
-    def _at_regular_samples(self, stage: CompiledStage, run: LoadedRun) -> tuple[FloatArray, IntArray]:
-        """Return the results of a stage, (n, results), and the numbers of all other samples, where they are NaN.
-
-        The stage runs over these too: they are few, and tables of the others would be copied without them.
-        """
-        status = run.poses.status
-        results = self._evaluated(stage, run, slice(None), len(status))
-        irregular = np.flatnonzero(status >= Status.BRIDGED)
-        results[irregular] = np.nan
-        return results, irregular
 
     @cached_property
     def _stage(self) -> CompiledStage:
@@ -157,6 +154,11 @@ class ForceModel:
     @cached_property
     def _shaking_stage(self) -> CompiledStage:
         return load_stage(shaking_steps(self.poses.plan))
+
+    @cached_property
+    def _shaking_count(self) -> int:
+        """How many columns, the last of the reactions, are shaking force and moment."""
+        return len(shaking_names(self.poses.plan.mechanism))
 
     @cached_property
     def _undetermined(self) -> list[int]:
