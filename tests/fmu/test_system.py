@@ -13,6 +13,9 @@ import pytest
 import kinfmu
 from kinfmu.errors import FmuError, KinfmuError, RequestError
 from kinfmu.log import McapLog, read, write_mcap, write_rrd
+from kinfmu.log.viewer.card import card
+from kinfmu.scene.components import component_runs
+from kinfmu.scene.scene import drawable
 from kinfmu.units import SignalName
 from tests.fmu.test_drive_example import HOSTS, STOP, example, fmus  # noqa: F401  # fixtures
 
@@ -64,6 +67,25 @@ def test_the_jacobi_exchange_has_the_numbers_of_another_host(fmus: Mapping[str, 
     run = kinfmu.simulate(fmus["press_drive"], stop=0.4, step=2e-3, exchange="jacobi")
     wanted = np.column_stack([run["motor.angle"], run["motor.speed"]])[1:]
     np.testing.assert_allclose(rows, wanted, rtol=1e-11)
+
+
+def test_the_ecos_command_runs_the_ssp_with_the_same_numbers(fmus: Mapping[str, Path], tmp_path: Path) -> None:  # noqa: F811
+    from tests.fmu.native.test_hosts import ecos_command, table_of_ecos
+
+    if ecos_command() is None:
+        pytest.skip("ecospy is not installed: no ecos command")
+    header, lines = table_of_ecos(fmus["press_drive"], 0.4, 2e-3, tmp_path, "--parameterSet", "initialValues")
+    names = [cell.strip() for cell in header]
+    run = kinfmu.simulate(fmus["press_drive"], stop=0.398, step=2e-3, exchange="jacobi")
+    assert [float(line[1]) for line in lines] == pytest.approx(run.t.tolist(), abs=1e-6)
+    for theirs, ours in (
+        ("motor::angle", "motor.angle"),
+        ("motor::speed", "motor.speed"),
+        ("press::ram.y", "ram.y"),
+        ("press::crank.reduced_inertia", "crank.reduced_inertia"),
+    ):
+        column = [float(line[names.index(f"{theirs}[REAL]")]) for line in lines]
+        np.testing.assert_allclose(column, run[ours], rtol=0, atol=6e-7)  # the command writes 6 decimals
 
 
 def test_a_foreign_fmu_is_stepped_recorded_and_drawn(fmus: Mapping[str, Path], tmp_path: Path) -> None:  # noqa: F811
@@ -217,3 +239,38 @@ def test_what_is_no_system_is_refused(tmp_path: Path) -> None:
 def test_names_of_signals_have_owners() -> None:
     owners = {name: SignalName(name).owner for name in ("h", "motor.i", "der(x.y)", "motor.der(x)")}
     assert owners == {"h": "", "motor.i": "motor", "der(x.y)": "", "motor.der(x)": "motor"}
+
+
+def test_each_mechanism_of_a_system_is_drawn_under_its_name(ssp: Ssp, tmp_path: Path) -> None:
+    from tests.log.viewer.test_rerun_file import entities, verified
+
+    inputs = ("crank_angle", "crank_speed", "crank_acceleration")
+    connectors = "".join(f'<ssd:Connector name="{name}" kind="input"><ssc:Real/></ssd:Connector>' for name in inputs)
+    second = (
+        '<ssd:Component name="second press" type="application/x-fmu-sharedlibrary" '
+        f'source="resources/toggle_press.fmu"><ssd:Connectors>{connectors}</ssd:Connectors></ssd:Component>'
+    )
+    wires = "".join(
+        f'<ssd:Connection startElement="motor" startConnector="{of}" endElement="second press" endConnector="{to}"/>'
+        for of, to in zip(("angle", "speed", "acceleration"), inputs, strict=True)
+    )
+    path = ssp(("</ssd:Elements>", f"{second}</ssd:Elements>"), ("<ssd:Connections>", f"<ssd:Connections>{wires}"))
+    record = tmp_path / "presses.mcap"
+    run = kinfmu.simulate(path, stop=0.1, step=1e-3, sink=McapLog(record))
+    for one in (run, read(record)):
+        parts = component_runs(one)
+        assert list(parts) == ["press", "second press"]
+        second_run = parts["second press"]
+        np.testing.assert_array_equal(second_run["ram.y"], one["ram.y"])  # the same press at the same crank
+        assert second_run.fixed == one.fixed
+        assert second_run.good.all()
+        found, note = drawable(second_run)
+        assert found is not None
+        assert not note
+    write_rrd(run, tmp_path / "presses.rrd")
+    assert verified(tmp_path / "presses.rrd")
+    drawn = entities(tmp_path / "presses.rrd")
+    for name in ("press", "second\\ press"):
+        assert {f"/linkage/{name}/bodies/{body}" for body in ("crank", "ram")} <= drawn
+    assert not any(entity.startswith("/linkage/bodies") for entity in drawn)
+    assert "[bodies" not in card(run)

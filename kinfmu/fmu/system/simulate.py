@@ -21,9 +21,10 @@ from kinfmu.fmu.system.samples import SystemSamples
 from kinfmu.fmu.system.slave import AnySlave, foreign_slave
 from kinfmu.fmu.system.structure import STRUCTURE, Component, Structure, of_fmu, of_ssp
 from kinfmu.fmu.unpacked import unpacked
-from kinfmu.mechanism import toml_file
+from kinfmu.mechanism import Mechanism, toml_file, toml_text
 from kinfmu.run import Event, Run
 from kinfmu.run.channels import kept_samples
+from kinfmu.run.components import mechanism_info
 from kinfmu.run.run import Sink
 from kinfmu.solver.python.status import Status
 from kinfmu.units import SignalName
@@ -243,11 +244,15 @@ def _column(one: Component, port: Port) -> str:
     return f"fmu.{name}" if name in RESERVED or name.startswith("solver.") else name
 
 
+def _mechanism_of(one: Component, values: Mapping[str, Mapping[str, float]]) -> Mechanism:
+    """Return the mechanism of a component, with the parameters that are set."""
+    return as_set(toml_file.parse(one.mechanism, f"{one.path}: mechanism.toml"), values[one.name])
+
+
 def _samples_of(one: Component, count: int, values: Mapping[str, Mapping[str, float]]) -> Samples:
     """Return the samples of kinfmu's FMU in the system."""
     assert one.own is not None  # noqa: S101  # for the type
-    mechanism = toml_file.parse(one.mechanism, f"{one.path}: mechanism.toml")
-    mechanism = as_set(mechanism, values[one.name])
+    mechanism = _mechanism_of(one, values)
     text = (one.folder / "modelDescription.xml").read_text("utf-8")
     return Samples(one.own, count, settings=values[one.name], mechanism=mechanism, model_description=text)
 
@@ -263,4 +268,7 @@ def _info(system: Structure, values: Mapping[str, Mapping[str, float]], main: Co
             "connections": ", ".join(map(str, system.connections)),
         }
     parts |= {} if main else {"token": ""}
+    others = [one for one in system.components if one.own is not None and one is not main]
+    texts = [(one.name, toml_text.text(_mechanism_of(one, values))) for one in others]
+    parts |= mechanism_info(main.name if main else "", texts)
     return {"name": system.name, "title": system.title, **parts, "parameters": ", ".join(given)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from kinfmu.log.viewer.linkage import trail_path, trail_time, view_box
 from kinfmu.log.viewer.series import KINDS, ORDERS, Group
@@ -24,17 +24,27 @@ PLOT, NARROW = 400.0, 200.0  # [points], widths of plots on a usual screen
 LEAST_LEGEND, MOST_LEGEND = 0.15, 0.6  # of the run's time, left free after the curves for the legend
 
 
+class Drawn(NamedTuple):
+    """A linkage of a recording: title of its view, root entity, its run, and what is drawn of it, if anything."""
+
+    title: str
+    root: str
+    run: Run
+    scene: Scene | None
+
+
 def single(
     timeline: Timeline,
     run: Run,
-    scene: Scene | None,
+    drawn: Sequence[Drawn],
     curves: Mapping[tuple[str, str], Group],
     forces: Sequence[Group],
     solver: Sequence[Group],
 ) -> rrb.Blueprint:
-    """Return the layout of one run: linkage on the left; on the right one row per order, one column per unit.
+    """Return the layout of one run: linkages on the left, each in a view of its own; plots on the right.
 
-    Efforts, energies and signals, then the solver's diagnostics are below the curves.
+    There is one row per order, with one column per unit. Efforts, energies and signals, then the solver's diagnostics
+    are below the curves.
     """
     import rerun.blueprint as rrb
 
@@ -52,11 +62,13 @@ def single(
     if solver:
         rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], timeline, [run], NARROW) for group in solver]))
         shares.append(1.5)
-    has_motion = scene is not None or bool(run.outputs)
+    has_motion = bool(run.outputs) or any(one.scene for one in drawn)
     if has_motion:
         rows.append(status_view([""], timeline, [run]))
         shares.append(1.0)
-    left = _left(linkage_view(["/linkage"], timeline, [run], [scene]) if has_motion else None, [""], [run])
+    linked = [linkage_view([one.root], timeline, [one.run], [one.scene], one.title) for one in drawn]
+    linkages = (linked[0] if len(linked) == 1 else rrb.Grid(*linked)) if has_motion and linked else None
+    left = _left(linkages, [""], [run])
     right = rrb.Vertical(*rows, row_shares=shares)
     return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), timeline, [run])
 
@@ -89,7 +101,7 @@ def compared(
     return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), timeline, runs)
 
 
-def _left(linkage: rrb.View | None, roots: Sequence[str], runs: Sequence[Run]) -> rrb.Container:
+def _left(linkage: rrb.View | rrb.Container | None, roots: Sequence[str], runs: Sequence[Run]) -> rrb.Container:
     """Return the left side: linkage, if there is one, card, and the log if there are events.
 
     The log does not wrap its texts, so it gets the full width; the card wraps them.
@@ -190,7 +202,11 @@ def _legend_part(names: Sequence[str], width: float) -> float:
 
 
 def linkage_view(
-    roots: Sequence[str], timeline: Timeline, runs: Sequence[Run], scenes: Sequence[Scene | None]
+    roots: Sequence[str],
+    timeline: Timeline,
+    runs: Sequence[Run],
+    scenes: Sequence[Scene | None],
+    title: str = "linkage",
 ) -> rrb.Spatial2DView:
     """Return the view of the linkages with trails; its origin is the root, so that the flip of the plane applies."""
     import rerun as rr
@@ -211,7 +227,7 @@ def linkage_view(
             ranges = rrb.VisibleTimeRange(timeline.name, start=back, end=relative(**timeline.number(0.0)))
             trails[trail_path(root, point)] = rrb.VisibleTimeRanges([ranges])
     contents = [f"{root}/**" for root in roots]
-    return rrb.Spatial2DView(name="linkage", origin="/", contents=contents, visual_bounds=bounds, overrides=trails)
+    return rrb.Spatial2DView(name=title, origin="/", contents=contents, visual_bounds=bounds, overrides=trails)
 
 
 def card_view() -> rrb.TextDocumentView:

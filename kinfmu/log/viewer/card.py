@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
+from kinfmu.run.components import is_of_mechanisms
 from kinfmu.run.verdict import MEANINGS, counts, notable_events, worst_residual
 
 MOST_EVENTS = 12  # listed on the card; the log has all
@@ -37,7 +38,11 @@ def card(run: Run, note: str = "") -> str:
             f"Watched, set aside as redundant: {plain(', '.join(run.watch_names[:MOST_EVENTS]))}"
             + (f" and {len(run.watch_names) - MOST_EVENTS} more." if len(run.watch_names) > MOST_EVENTS else "."),
         ]
-    about = {_WORDS.get(key, key): value for key, value in run.info.items() if key not in _UNSHOWN and value}
+    about = {
+        _WORDS.get(key, key): value
+        for key, value in run.info.items()
+        if key not in _UNSHOWN and value and not is_of_mechanisms(key)
+    }
     lines += _table("about", about)
     lines += _table("constant", {name: f"{value:g}" for name, value in run.fixed.items()})
     return "\n".join(lines) + "\n"

@@ -20,7 +20,7 @@ import numpy as np
 
 from kinfmu.errors import LogError
 from kinfmu.log.cdr import nanoseconds
-from kinfmu.log.viewer.blueprint import single
+from kinfmu.log.viewer.blueprint import Drawn, single
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.decimated import decimated
 from kinfmu.log.viewer.headless import executable, last_error
@@ -125,7 +125,9 @@ class LiveView:
         if scene:
             Linkage(self._stream, "/linkage", timeline, shown, scene).log_paths(scene.paths)
         log_card(self._stream, card(run, " ".join([*left_out(run, shown), note]).strip()))
-        self._stream.send_blueprint(single(timeline, shown, scene, groups(shown), forces, solver))
+        self._stream.send_blueprint(
+            single(timeline, shown, [Drawn("linkage", "/linkage", shown, scene)], groups(shown), forces, solver)
+        )
         self._flush()
 
     def _flush(self) -> None:

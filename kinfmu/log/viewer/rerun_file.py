@@ -1,5 +1,6 @@
 """Rerun recording: the picture of a run, with its blueprint inside.
 
+    /linkage/...        of a system with several mechanisms /linkage/<component>/..., each in a view of its own
     /linkage/...        bodies with what joints add to them, pins, bars, cylinders, supports, rails; y up
     /linkage/paths/...  where points of interest go; /linkage/trails/...: where they just came from
     /position/angle     and /position/length, /velocity/..., /acceleration/...: one entity for each kind of quantity,
@@ -34,15 +35,17 @@ from kinfmu.errors import LogError
 from kinfmu.log.cdr import nanoseconds
 from kinfmu.log.target import replacing
 from kinfmu.log.viewer.arrows import log_arrows
-from kinfmu.log.viewer.blueprint import single
+from kinfmu.log.viewer.blueprint import Drawn, single
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.decimated import decimated
 from kinfmu.log.viewer.linkage import APPLICATION, Linkage, send
 from kinfmu.log.viewer.series import Group, accuracy, efforts, error_estimates, groups, iterations, margin, signals
 from kinfmu.log.viewer.timeline import Timeline, timeline_of
 from kinfmu.run import Run
+from kinfmu.run.components import is_of_mechanisms
 from kinfmu.run.verdict import changes, label, notable_events, sentence
 from kinfmu.scene import palette
+from kinfmu.scene.components import component_runs
 from kinfmu.scene.scene import drawable
 from kinfmu.solver.python.status import Status
 
@@ -72,22 +75,41 @@ def write_rrd(run: Run, path: str | Path) -> None:
     nanoseconds(run.t)  # reports invalid times before a file is made
     timeline = timeline_of([run])
     shown = timeline.placed(decimated(run))
-    scene, note = drawable(shown) if shown.outputs or shown.mechanism_text else (None, "")
+    drawn, note = drawn_linkages(shown)
     curves = groups(shown)
     solver = [group for group in (accuracy(shown), error_estimates(shown), margin(shown), iterations(shown)) if group]
     forces = [*efforts(shown), *signals(shown)]
     name = run.info.get("title") or run.info.get("name") or Path(path).stem
-    layout = single(timeline, shown, scene, curves, forces, solver)
+    layout = single(timeline, shown, drawn, curves, forces, solver)
     with recording(path, name, layout, application([shown], [*curves.values(), *forces])) as rec:
         rec.send_property("kinfmu", _properties(run))
-        if scene:
-            linkage = Linkage(rec, "/linkage", timeline, shown, scene)
-            linkage.log()
-            log_arrows(linkage)
+        for one in drawn:
+            if one.scene:
+                linkage = Linkage(rec, one.root, timeline, one.run, one.scene)
+                linkage.log()
+                log_arrows(linkage)
         for group in (*curves.values(), *forces, *solver):
             log_group(rec, "", timeline, shown, group)
         log_status(rec, "", timeline, timeline.placed(run))
         log_card(rec, card(run, " ".join([*left_out(run, shown), note]).strip()))
+
+
+def drawn_linkages(run: Run) -> tuple[list[Drawn], str]:
+    """Return the linkages of a run, one for each mechanism of a system, and a sentence on what cannot be drawn."""
+    import rerun as rr
+
+    parts = component_runs(run)
+    if not parts:
+        if not (run.outputs or run.mechanism_text):
+            return [], ""
+        scene, note = drawable(run)
+        return [Drawn("linkage", "/linkage", run, scene)], note
+    found, notes = [], []
+    for name, part in parts.items():
+        scene, note = drawable(part)
+        found.append(Drawn(name, f"/linkage/{rr.escape_entity_path_part(name)}", part, scene))
+        notes += [f"{name}: {note}"] if note else []
+    return found, " ".join(notes)
 
 
 def left_out(run: Run, shown: Run) -> list[str]:
@@ -107,6 +129,8 @@ def application(runs: Sequence[Run], groups: Iterable[Group]) -> str:
     facts = repr(
         (spans, ranges, [(run.mechanism_text, run.outputs, run.axis, bool(notable_events(run))) for run in runs])
     )
+    parts = [name for run in runs for name in component_runs(run)]
+    facts += repr(parts) if parts else ""  # each has a view
     names = [re.sub("[^a-z0-9]+", "_", run.info.get("name", "run").lower()) for run in runs]
     return "_".join([APPLICATION, *dict.fromkeys(names), f"{crc32(facts.encode()):08x}"])
 
@@ -193,7 +217,8 @@ def _properties(run: Run) -> rr.AnyValues:
     import rerun as rr
 
     about = rr.AnyValues()
-    for name, text in {**run.info, "length_unit": run.length_unit, "verdict": sentence(run)}.items():
+    info = {key: text for key, text in run.info.items() if not is_of_mechanisms(key)}
+    for name, text in {**info, "length_unit": run.length_unit, "verdict": sentence(run)}.items():
         about.with_component_from_data(name, text)
     return about
 
