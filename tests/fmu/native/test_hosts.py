@@ -129,12 +129,14 @@ def test_ecospy_steps_it(built_native: Build, fmi: int, tmp_path: Path) -> None:
     np.testing.assert_allclose(rows, _wanted("fourbar_loaded", times), rtol=0, atol=1e-9)
 
 
-def _table_of_ecos(fmu: Path, stop: float, step: float, folder: Path) -> tuple[list[str], list[list[str]]]:
-    """Return the header and the rows of the CSV file that the ecos command writes."""
-    ecos = _ecos()
+def table_of_ecos(
+    fmu: Path, stop: float, step: float, folder: Path, *options: str
+) -> tuple[list[str], list[list[str]]]:
+    """Return the header and the rows of the CSV file that the ecos command writes, of an FMU or an SSP."""
+    ecos = ecos_command()
     assert ecos is not None
     ecos.chmod(0o755)
-    command = [str(ecos), "simulate", "--path", str(fmu), "--stopTime", str(stop), "--stepSize", str(step)]
+    command = [str(ecos), "simulate", "--path", str(fmu), "--stopTime", str(stop), "--stepSize", str(step), *options]
     done = subprocess.run(command, capture_output=True, text=True, cwd=folder, timeout=120)
     if "error while loading shared libraries" in done.stderr:
         pytest.skip("the ecos command lacks libtbb12")
@@ -144,7 +146,7 @@ def _table_of_ecos(fmu: Path, stop: float, step: float, folder: Path) -> tuple[l
     return header, [line for line in lines if len(line) > 1]
 
 
-def _ecos() -> Path | None:
+def ecos_command() -> Path | None:
     """The native command inside the wheel of ecospy."""
     code = "import importlib.util as u; print(u.find_spec('ecospy').submodule_search_locations[0])"
     done = subprocess.run([PYTHON, "-c", code], capture_output=True, text=True)
@@ -152,9 +154,9 @@ def _ecos() -> Path | None:
     return next((path for path in found if path.is_file()), None)
 
 
-@pytest.mark.skipif(_ecos() is None, reason="ecospy is not installed: no ecos command")
+@pytest.mark.skipif(ecos_command() is None, reason="ecospy is not installed: no ecos command")
 def test_the_ecos_command_steps_it(built_native: Build, fmi: int, tmp_path: Path) -> None:
-    header, lines = _table_of_ecos(built_native("fourbar_loaded", fmi, "time"), STEP * COUNT, STEP, tmp_path)
+    header, lines = table_of_ecos(built_native("fourbar_loaded", fmi, "time"), STEP * COUNT, STEP, tmp_path)
     columns = [next(k for k, cell in enumerate(header) if f"::{name}[" in cell.replace(" ", "")) for name in NAMES]
     rows = np.array([[float(line[k]) for k in (1, *columns)] for line in lines])
     np.testing.assert_allclose(
@@ -241,9 +243,9 @@ def test_hosts_react_to_a_limit_as_documented(
     np.testing.assert_allclose(rows[past, 2], values[9], rtol=0, atol=1e-12)
 
 
-@pytest.mark.skipif(_ecos() is None, reason="ecospy is not installed: no ecos command")
+@pytest.mark.skipif(ecos_command() is None, reason="ecospy is not installed: no ecos command")
 def test_the_ecos_command_writes_ok_as_a_column_that_turns_0_at_the_limit(built_native: Build, tmp_path: Path) -> None:
-    header, lines = _table_of_ecos(built_native("double_pendulum", 2, "time"), 3.0, 0.1, tmp_path)
+    header, lines = table_of_ecos(built_native("double_pendulum", 2, "time"), 3.0, 0.1, tmp_path)
     (ok,) = (k for k, cell in enumerate(header) if "::solver.ok[BOOL]" in cell)
     rows = [(float(line[1]), int(line[ok])) for line in lines]
     assert {t for t, good in rows if not good} == {t for t, _ in rows if t > 2.0 + 1e-9}  # 360 degrees are there at 2 s
