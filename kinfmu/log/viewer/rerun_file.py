@@ -6,6 +6,7 @@
     /position/angle     and /position/length, /velocity/..., /acceleration/...: one entity for each kind of quantity,
                         one curve a coordinate, in rad and the mechanism's unit of length
     /forces/torque      efforts of drivers, with /forces/force, /forces/power, /forces/energy [N m, N, W, J]
+    /reactions/force    sizes of the forces of joints; /reactions/torque: moments; with shaking force and moment
     /signals/0          outputs of FMUs that are not kinfmu's, an entity for each unit
     /linkage/forces     arrows of the forces that joints transmit, with a legend
     /solver/accuracy    log10 of residual and watches; /solver/error: of the estimated errors; /solver/margin
@@ -39,6 +40,7 @@ from kinfmu.log.viewer.blueprint import Drawn, single
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.decimated import decimated
 from kinfmu.log.viewer.linkage import APPLICATION, Linkage, send
+from kinfmu.log.viewer.reactions import reactions
 from kinfmu.log.viewer.series import Group, accuracy, efforts, error_estimates, groups, iterations, margin, signals
 from kinfmu.log.viewer.timeline import Timeline, timeline_of
 from kinfmu.run import Run
@@ -78,7 +80,7 @@ def write_rrd(run: Run, path: str | Path) -> None:
     drawn, note = drawn_linkages(shown)
     curves = groups(shown)
     solver = [group for group in (accuracy(shown), error_estimates(shown), margin(shown), iterations(shown)) if group]
-    forces = [*efforts(shown), *signals(shown)]
+    forces = [*efforts(shown), *reactions(shown), *signals(shown)]
     name = run.info.get("title") or run.info.get("name") or Path(path).stem
     layout = single(timeline, shown, drawn, curves, forces, solver)
     with recording(path, name, layout, application([shown], [*curves.values(), *forces])) as rec:

@@ -84,7 +84,8 @@ def efforts(run: Run) -> list[Group]:
         found.append(
             Group(
                 path=f"forces/{kind}",
-                title=f"{kind} [{unit_of(Quantity(kind), run.length_unit)}]",
+                title=f"{run.force_names[columns[0]] if len(columns) == 1 else kind} "  # one curve has no legend
+                f"[{unit_of(Quantity(kind), run.length_unit)}]",
                 names=tuple(str(run.force_names[k]) for k in columns),
                 colours=tuple(palette.body(place) for place in range(len(columns))),
                 values=values,

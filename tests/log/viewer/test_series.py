@@ -117,7 +117,7 @@ def test_errors_are_drawn_where_they_are_estimated(run: Run) -> None:
 def test_efforts_and_energies_have_a_plot_for_each_unit() -> None:
     run = kinfmu.solve(loaded("slider_crank"), np.linspace(0.0, 0.1, 21))
     found = efforts(run)
-    assert [group.title for group in found] == ["torque [N m]", "power [W]", "energy [J]"]
+    assert [group.title for group in found] == ["crank.torque [N m]", "crank.power [W]", "energy [J]"]
     assert found[0].names == ("crank.torque",)  # the bias at a constant speed is the torque, and would hide it
     faster = kinfmu.solve(loaded("slider_crank"), crank_angle=np.linspace(0.0, 0.1, 21), crank_acceleration=3.0)
     assert efforts(faster)[0].names == ("crank.torque", "crank.bias_torque")

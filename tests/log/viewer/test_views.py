@@ -48,7 +48,7 @@ def _loaded(path: Path) -> None:
         ("gap.rrd", _single, {"linkage", "angular velocity [rad/s]", "log10 margin", "solver status", "log", "run"}),
         ("one.rrd", _one_sample, {"linkage", "position [m]"}),
         ("selected.rrd", _selected, {"linkage", "angle [rad]", "solver status"}),
-        ("loaded.rrd", _loaded, {"linkage", "torque [N m]", "power [W]", "energy [J]"}),
+        ("loaded.rrd", _loaded, {"linkage", "crank.torque [N m]", "crank.power [W]", "energy [J]"}),
         ("compared.rrd", _compared, {"linkage", "B - A: position [m]", "position [m] of A (wide) and B"}),
     ],
 )

@@ -1,0 +1,51 @@
+"""Curves of reactions and arrows of forces in recordings, against the numbers of the run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+import kinfmu
+from kinfmu.log import write_rrd
+from kinfmu.log.viewer.reactions import reactions
+from kinfmu.run import Run
+from tests.log.viewer.test_rerun_file import SCALARS, rows, statics
+from tests.sweep.test_forces import loaded
+
+
+def test_a_recording_has_curves_of_reactions_with_names_and_arrows_with_a_scale(tmp_path: Path) -> None:
+    run = kinfmu.solve(loaded("slider_crank"), np.linspace(0.0, 1.0, 41))
+    force, moment = reactions(run)
+    joints = list(dict.fromkeys(name.owner for name in run.reaction_names if name.owner))
+    assert (force.title, moment.title) == ("joint force [N]", "joint moment [N m]")
+    assert list(force.names) == [*joints, "shaking"]
+    path = tmp_path / "run.rrd"
+    write_rrd(run, path)
+    assert statics(path, "/reactions/force", "SeriesLines:names") == list(force.names)
+    recorded = np.array([values for _, values in rows(path, "/reactions/force", SCALARS)])
+    first = np.hypot(run[f"{joints[0]}.force_x"], run[f"{joints[0]}.force_y"])
+    np.testing.assert_allclose(recorded[:, 0], first, rtol=1e-12)
+    shaking = np.hypot(run["shaking_force_x"], run["shaking_force_y"])
+    np.testing.assert_allclose(recorded[:, -1], shaking, rtol=1e-12)
+    assert list(moment.names)[-1] == "shaking"
+    (label,) = statics(path, "/linkage/forces/legend", "Arrows2D:labels")
+    (along,) = statics(path, "/linkage/forces/legend", "Arrows2D:vectors")
+    newton, unit = str(label).split()
+    assert unit == "N"
+    per_newton = np.hypot(*np.array(along, float)) / float(newton)  # the scale of all arrows
+    pin = f"/linkage/forces/joints/{joints[0]}"
+    assert statics(path, pin, "Arrows2D:labels") == [joints[0]]
+    arrows = np.array([vectors[0] for _, vectors in rows(path, pin, "Arrows2D:vectors")], float)  # type: ignore[index]
+    np.testing.assert_allclose(np.hypot(*arrows.T), first * per_newton, rtol=1e-5)
+
+
+def test_undetermined_and_missing_reactions_have_no_curves(run: Run) -> None:
+    assert reactions(run) == []  # without masses
+    four = kinfmu.solve(loaded("fourbar"), np.linspace(0.0, 1.0, 11))
+    named = {name for group in reactions(four) for name in group.names}
+    assert named == {"shaking"}  # the redundant bar shares all loads
+    crank = kinfmu.solve(loaded("slider_crank"), np.linspace(0.0, 1.0, 11))
+    left_out = [name for name in crank.reaction_names if name.owner == crank.reaction_names[0].owner]
+    kept = {name for group in reactions(crank.without(left_out)) for name in group.names}
+    assert crank.reaction_names[0].owner not in kept
