@@ -107,6 +107,7 @@ def build(
     """
     from kinfmu.fmu import build as built
     from kinfmu.fmu.build import default_drive, default_flavour, native_obstacle, platforms_of
+    from kinfmu.mechanism.metres import kept_numbers
 
     for option, value, plain in (("--fmi", fmi, "2"), ("--platforms", platforms, "host")):
         if flavour == "python" and value != plain:
@@ -117,6 +118,11 @@ def build(
     drive = drive or default_drive(mech)
     stated = {"author": author, "version": version, "license": license_, "copyright": copyright_, "date": date}
     chosen = flavour or default_flavour(int(fmi), platforms)
+    if si and mech.length_unit != "m" and (kept := kept_numbers(mech)):
+        note(
+            f"{listed(kept)}: without a unit, so these parameters stay numbers in {mech.length_unit}; "
+            f'give them one in the file: {kept[0]} = "{float(mech.parameters[kept[0]].value):g} {mech.length_unit}"'
+        )
     with errors_of(mechanism), Progress("compiling for all platforms", least=2) as progress:
         path = built(
             mech,

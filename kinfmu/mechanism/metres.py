@@ -61,6 +61,19 @@ def in_metres(mechanism: Mechanism) -> Mechanism:
     return replace(mechanism, length_unit="m", parameters=parameters, **parts)
 
 
+def kept_numbers(mechanism: Mechanism) -> tuple[str, ...]:
+    """Return the parameters whose quantity is unknown and whose numbers stay lengths in the mechanism's unit."""
+    metric = in_metres(mechanism)
+    pairs = [(one, metric.expressions[place]) for place, one in mechanism.expressions.items()]
+    for name, one in mechanism.parameters.items():
+        new = metric.parameters[name].expression
+        if one.expression and new:
+            pairs.append((one.expression, new))
+    names = {name for old, new in pairs if old.text != new.text for name in old.names}
+    known = dimensions_of(mechanism.parameters)
+    return tuple(name for name in mechanism.parameters if name in names and not known[name].is_known)
+
+
 def _power(quantity: Quantity) -> int:
     """Return the power of the unit of length in numbers of a quantity; those with a mass are in SI units."""
     return int(quantity.kind == "length") - (quantity.order if quantity.per == "length" else 0)

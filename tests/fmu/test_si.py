@@ -8,14 +8,17 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from fmpy.validation import validate_fmu
 from lxml import etree
 
 import kinfmu
 from kinfmu import gallery
+from kinfmu.cli import main
 from kinfmu.fmu import build, simulate, verify
 from kinfmu.mechanism import toml_file, toml_text
 from kinfmu.units import METRES
+from tests.gallery_members import mostly_long
 
 PRESS = """
 name = "small_press"
@@ -86,7 +89,7 @@ def _is_rounding(name: str) -> bool:
     return name.startswith(("solver.", "watch.")) or name == "message"
 
 
-@pytest.mark.parametrize("name", [name for name in gallery.names() if gallery.load(name).length_unit != "m"])
+@pytest.mark.parametrize("name", mostly_long(name for name in gallery.names() if gallery.load(name).length_unit != "m"))
 def test_a_mechanism_in_metres_moves_as_in_its_own_unit(name: str) -> None:
     mechanism = gallery.load(name)
     metric = mechanism.in_metres()
@@ -199,3 +202,14 @@ def test_a_mechanism_in_metres_is_the_same_fmu_with_si(tmp_path: Path) -> None:
     mechanism = gallery.load("fourbar")
     files = [build(mechanism, tmp_path / f"{si}.fmu", flavour="python", si=si).read_bytes() for si in (True, False)]
     assert files[0] == files[1]
+
+
+def test_parameters_whose_unit_is_unknown_are_named(tmp_path: Path) -> None:
+    result = CliRunner().invoke(
+        main, ["build", "jansen_leg", "--si", "--flavour", "python", "--no-page", "-o", str(tmp_path / "leg.fmu")]
+    )
+    assert result.exit_code == 0
+    assert result.stderr.splitlines() == [
+        "kinfmu: note: d, e, h, i: without a unit, so these parameters stay numbers in mm; give them one in the file: "
+        'd = "40.1 mm"'
+    ]

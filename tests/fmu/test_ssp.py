@@ -240,3 +240,34 @@ def test_libcosim_connects_the_groups_of_a_system_structure(both: Path) -> None:
     assert np.ptp(drive[:, 1]) > 0.0
     np.testing.assert_array_equal(press[1:, :2], drive[:-1, :2])  # what passes is a step late in libcosim
     np.testing.assert_array_equal(drive[1:, 2], press[:-1, 2])
+
+
+def test_libcosim_and_ecos_pass_numbers_as_they_are(both: Path, ssp: Path, tmp_path: Path) -> None:
+    wire = 'startElement="drive" startConnector="ram_position" endElement="press" endConnector="ram_position"'
+    parts = [("drive", "output", "mm"), ("press", "input", "m")]
+    components = "".join(
+        f'<ssd:Component name="{name}" type="application/x-fmu-sharedlibrary" source="resources/{name}.fmu">'
+        f'<ssd:Connectors><ssd:Connector name="ram_position" kind="{kind}"><ssc:Real unit="{unit}"/></ssd:Connector>'
+        "</ssd:Connectors></ssd:Component>"
+        for name, kind, unit in parts
+    )
+    structure = (
+        '<ssd:SystemStructureDescription xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" '
+        'xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription" name="both" version="1.0">'
+        f'<ssd:System name="both"><ssd:Elements>{components}</ssd:Elements><ssd:Connections><ssd:Connection {wire}/>'
+        "</ssd:Connections></ssd:System></ssd:SystemStructureDescription>"
+    )
+    system = tmp_path / "both.ssp"
+    with zipfile.ZipFile(system, "w") as archive:
+        archive.writestr("SystemStructure.ssd", structure)
+        archive.write(both / "by_torque" / "small_press.fmu", "resources/drive.fmu")
+        archive.writestr("resources/press.fmu", _inside(ssp, "resources/small_press.fmu"))
+    with zipfile.ZipFile(BytesIO(_inside(ssp, "resources/small_press.fmu"))) as fmu:
+        references = description.read(fmu.read("modelDescription.xml"), "").interface.value_references()
+    place = str(references["ram_position"])
+    for module, script, name in (("libcosimpy", OSP, place), ("ecospy", ECOS, "ram_position")):
+        _needs(module)
+        kind = ("ssp",) if module == "libcosimpy" else ()
+        script = script.replace('parameter_set="initialValues"', "")
+        rows = _rows(script, *kind, str(system), "0.001", "3", "press", name, cwd=tmp_path)
+        assert rows[-1, 0] == pytest.approx(123.0, rel=1e-2)  # 123 mm arrive as 123 m

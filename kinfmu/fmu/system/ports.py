@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,7 @@ from kinfmu.units import factors, quantity_in, spelled
 VERSIONS = ("2.0", "3.0")
 _REALS = ("Real", "Float64", "Float32")
 _INTEGERS = ("Integer", "Enumeration", *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)))
+_NUMBER = re.compile(r"\s*+([+-]?+(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?+[0-9]++)?+)\s*+(.*?)\s*+")
 _BASES = ("kg", "m", "s", "A", "K", "mol", "cd")  # without rad: an angle has no dimension
 
 
@@ -67,13 +69,12 @@ class Port:
         items = dict(self.items or {})
         if value in items:
             return float(items[value])
-        words = value.split(maxsplit=1)
-        try:
-            number, unit = float(words[0]), words[1] if len(words) == 2 else self.unit
-        except (ValueError, IndexError):
+        stated = _NUMBER.fullmatch(value)
+        if stated is None:
             valid = f"one of {listed(items)}" if items else f"a number, such as '1 {self.unit}'"
-            raise RequestError(f"{name} = {quoted(value)} must be {valid}") from None
-        unit = spelled(unit) if unit not in self.units() else unit
+            raise RequestError(f"{name} = {quoted(value)} must be {valid}")
+        number, unit = float(stated[1]), stated[2] or self.unit
+        unit = unit if unit in self.units() else spelled(unit)
         if unit not in self.units():
             known = self.units()
             raise RequestError(f"{name}: unit {quoted(unit)} must be one of {listed(known)}{suggestion(unit, known)}")

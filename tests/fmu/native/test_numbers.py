@@ -73,7 +73,7 @@ def test_fmpy_ends_past_a_limit_and_its_recorder_holds_the_rows(
 ) -> None:
     from fmpy import simulate_fmu
 
-    page = (Path(__file__).parents[3] / "docs" / "fmu.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "host-fmpy.md").read_text(encoding="utf-8")
     (block,) = (block for block in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "step_finished" in block)
     options: dict[str, Any] = {
         "fmi_type": kind,
@@ -84,7 +84,7 @@ def test_fmpy_ends_past_a_limit_and_its_recorder_holds_the_rows(
     }
     call = f"simulate_fmu({str(built_native('double_pendulum', fmi, 'time'))!r}, **options, "
     names: dict[str, Any] = {"simulate_fmu": simulate_fmu, "options": options}
-    exec(compile(block.replace('simulate_fmu("fourbar.fmu", ', call), "fmu.md", "exec"), names)  # noqa: S102  our page
+    exec(compile(block.replace('simulate_fmu("fourbar.fmu", ', call), "host-fmpy.md", "exec"), names)  # noqa: S102  our page
     assert names["kept"]
     times = names["rows"]["time"].tolist()  # an event, such as a new status at the limit, is recorded twice
     assert times == [0.0, 0.5, 1.0, 1.5, 2.0, *([2.0] if kind == "ModelExchange" else [])]
