@@ -49,7 +49,7 @@ def test_rods_in_line_keep_their_change_points() -> None:
 
 @pytest.mark.parametrize("rods", [LOCOMOTIVE, ROW])
 @pytest.mark.parametrize("engine", ["python", "native"])
-@pytest.mark.parametrize("second", [False, True])
+@pytest.mark.parametrize("second", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_coupled_wheels_turn_alike_at_every_angle(
     rods: dict[str, tuple[int, int, float]], engine: str, second: bool
 ) -> None:

@@ -50,7 +50,7 @@ def test_with_several_drivers_the_path_back_from_a_near_singular_pose_is_the_pat
     assert np.abs(there - back).max() <= 2.0 * run.error[:, 0].max()
 
 
-@pytest.mark.parametrize("flavour", ["python", "native 2", "native 3"])
+@pytest.mark.parametrize("flavour", ["python", pytest.param("native 2", marks=pytest.mark.long), "native 3"])
 def test_in_fmus_the_path_back_from_a_near_singular_pose_is_the_path_there(flavour: str, tmp_path: Path) -> None:
     name, _, fmi = flavour.partition(" ")
     path = kinfmu.build(
@@ -209,7 +209,7 @@ def test_a_pose_of_two_bridges_comes_back_from_its_numbers_to_the_bit() -> None:
     assert far.z == solver.solve(ahead, (3.0, 3.3)).z
 
 
-@pytest.mark.parametrize("flavour", ["python", "native 2", "native 3"])
+@pytest.mark.parametrize("flavour", ["python", pytest.param("native 2", marks=pytest.mark.long), "native 3"])
 def test_fmus_follow_a_crossing_with_blocks_of_several_drivers_and_go_back_to_a_state(
     flavour: str, tmp_path: Path
 ) -> None:
