@@ -42,7 +42,7 @@ from kinfmu.sweep.designs import Batch, Driving, solve_batch, solve_by_library
 from kinfmu.sweep.driving import column_of, run_times
 from kinfmu.units import CoordinateName, InputName, Quantity, unit_of
 
-SAMPLES_AT_ONCE = 50_000  # of designs that are solved and measured together
+SAMPLES_AT_ONCE = 150_000  # of designs that are solved and measured together
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,8 @@ class BatchReading:
 
     def run(self, workers: int) -> None:
         """Solve and measure all designs."""
-        size = max(1, SAMPLES_AT_ONCE // len(self._driving.times))
+        most = max(1, SAMPLES_AT_ONCE // len(self._driving.times))
+        size = max(1, min(most, -(-self._count // (4 * workers)))) if workers > 1 else most  # some for each thread
         parts = [slice(first, min(first + size, self._count)) for first in range(0, self._count, size)]
         is_native = self._model.is_native(self._count * len(self._driving.times))
         if not is_native or not self._needed.quantities:

@@ -212,19 +212,18 @@ bool kf_solver_bind(kf_solver *solver, const double *parameters)
             break;
         }
     }
-    solver->unsolvable = true;
-    append_parameters(solver->message, parameters);
-    if (!is_there) {
-        if (turn < MOST_STEPS) {
-            append_failure(solver, parameters, block);
-        } else {
-            kf_append(solver->message, "too far from the parameters as written");
-        }
-    } else if (!(solver->anchor.found.watch <= solver->tolerance)) {
-        kf_append_watch(solver->message, &solver->model, &solver->anchor.found, "gap about ", "%.4g");
-    } else {
+    solver->unsolvable = !is_there || !(solver->anchor.found.watch <= solver->tolerance);
+    if (!solver->unsolvable) {
         solver->message[0] = '\0';
-        solver->unsolvable = false;
+        return true;
     }
-    return !solver->unsolvable;
+    append_parameters(solver->message, parameters);
+    if (is_there) {
+        kf_append_watch(solver->message, &solver->model, &solver->anchor.found, "gap about ", "%.4g");
+    } else if (turn < MOST_STEPS) {
+        append_failure(solver, parameters, block);
+    } else {
+        kf_append(solver->message, "too far from the parameters as written");
+    }
+    return false;
 }
