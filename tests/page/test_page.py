@@ -16,6 +16,7 @@ from tests.page.browser import PHONE, Browser, browser, needs_browser, text_of
 
 pytestmark = needs_browser
 LARGEST = 300_000  # [bytes] of a page
+LABELS = Path(__file__).with_name("labels.js").read_text("utf-8")
 CONTRASTS = Path(__file__).with_name("contrasts.js").read_text("utf-8")
 
 
@@ -228,7 +229,7 @@ def test_change_points_are_found_again_with_new_lengths(chromium: Browser) -> No
         assert page.errors == []
 
 
-def test_text_has_the_contrast_of_wcag_aa_in_both_themes(chromium: Browser) -> None:
+def test_text_has_the_contrast_of_wcag_aa_and_controls_have_names_and_marks(chromium: Browser) -> None:
     with chromium.open(text_of("crank_rocker")) as page:
         page.get("document.querySelectorAll('details').forEach(one => { one.open = true; })")
         for _ in range(2):
@@ -239,6 +240,9 @@ def test_text_has_the_contrast_of_wcag_aa_in_both_themes(chromium: Browser) -> N
                 found = page.tab.evaluate(CONTRASTS)
                 assert len(found) > 20
                 assert [one for one in found if one["ratio"] < one["least"]] == []
+                controls = page.tab.evaluate(LABELS)
+                assert controls["count"] > 20
+                assert controls["found"] == []
             page.tab.click("#theme")
 
 
