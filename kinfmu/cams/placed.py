@@ -69,7 +69,7 @@ def placed_cam(mechanism: Mechanism, joint: CamJoint, poses: Mapping[str, tuple[
     why = joint.law.why_not_periodic()
     if why:
         raise MechanismError(f"{where}: {why}, so the cam has no closed profile")
-    cam, follower, touching = _bodies(joint)
+    cam, follower, touching = members_of(joint)
     if touching is None:
         raise MechanismError(
             f"{where}: [joints.{joint.name}] needs the key 'contact', the centre of the roller or a point of the face"
@@ -110,7 +110,7 @@ def placed_cam(mechanism: Mechanism, joint: CamJoint, poses: Mapping[str, tuple[
     )
 
 
-def _bodies(joint: CamJoint) -> tuple[str, str, str | None]:
+def members_of(joint: CamJoint) -> tuple[str, str, str | None]:
     """Return cam and follower, and the follower's point that is the roller's centre or on the face; None if unknown."""
     if isinstance(joint, CamTranslating):
         return joint.cam, body_of(joint.between[1]), joint.between[1]

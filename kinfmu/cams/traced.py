@@ -90,6 +90,34 @@ def _led_roller(placed: PlacedCam, s: FloatArray, f: FloatArray, f1: FloatArray,
     return _rolled(s, follower, along, (z, z1, z2), np.ones(len(s)), -1.0)
 
 
+def given_curve(joint: CamRoller | CamFlatFace, s: FloatArray) -> tuple[ComplexArray, ComplexArray, FloatArray]:
+    """Return a given pitch curve or profile, from its pole: points, outward normals and radii of curvature (n,).
+
+    Args:
+        joint: The joint with the curve.
+        s: Angles in the cam's frame, of the points or of the normals (n,) [rad].
+
+    """
+    f, f1, f2 = law_values(joint.law, s)
+    out = np.exp(1j * s)
+    if isinstance(joint, CamFlatFace):
+        return out * (f + 1j * f1), out, f + f2
+    z = f * out
+    return z, *_bent((f1 + 1j * f) * out, (f2 + 2j * f1 - f) * out, 1.0)
+
+
+def _bent(slope: ComplexArray, bend: ComplexArray, sense: float) -> tuple[ComplexArray, FloatArray]:
+    """Return outward normals and radii of curvature of a curve from its derivatives; sense: 1 if counter-clockwise.
+
+    rho = |z'|^3 / Im(z'* z'')
+    """
+    speed = np.abs(slope)
+    normal = -1j * sense * slope / np.where(speed == 0.0, 1.0, speed)
+    turning = sense * (slope.conj() * bend).imag
+    with np.errstate(divide="ignore"):
+        return normal, np.where(turning == 0.0, np.inf, speed**3 / turning)
+
+
 def _rolled(
     angle: FloatArray,
     follower: FloatArray,
@@ -98,16 +126,9 @@ def _rolled(
     rate: FloatArray,
     sense: float,
 ) -> Traced:
-    """Return a pitch curve z with its derivatives, which goes round the axle in a sense, 1 counter-clockwise.
-
-    rho = |z'|^3 / Im(z'* z'')
-    """
+    """Return a pitch curve z with its derivatives, which goes round the axle in a sense, 1 counter-clockwise."""
     place, slope, bend = z
-    speed = np.abs(slope)
-    normal = -1j * sense * slope / np.where(speed == 0.0, 1.0, speed)
-    turning = sense * (slope.conj() * bend).imag
-    with np.errstate(divide="ignore"):
-        radius = np.where(turning == 0.0, np.inf, speed**3 / turning)
+    normal, radius = _bent(slope, bend, sense)
     return Traced(angle, follower, along, place, normal, radius, np.zeros(len(angle)), rate)
 
 

@@ -16,7 +16,6 @@ from kinfmu.draw.painting import placed
 from kinfmu.draw.writing import write_bytes
 from kinfmu.errors import FigureError, MissingPackageError
 from kinfmu.files.whole_file import suffix_of
-from kinfmu.joints import CamRoller
 from kinfmu.measures.placement import body_of
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import Run
@@ -25,16 +24,20 @@ from kinfmu.scene.instant import Instant
 from kinfmu.scene.shapes import shapes
 
 DXF_UNITS = {"in": 1, "ft": 2, "mm": 4, "cm": 5, "m": 6, "km": 7, "um": 13}  # $INSUNITS
-_DRAWN = ("link", "rod", "bar", "slot", "rail", "rack", "wheel", "barrel", "shaft")  # what has true dimensions
+_DRAWN = (  # what has true dimensions
+    *("link", "rod", "bar", "slot", "rail", "rack", "wheel", "barrel", "shaft"),
+    *("cam", "pitch", "roller"),
+)
 POINT_STYLE = 34  # $PDMODE: a cross in a circle
 
 
 def dxf(run: Run, path: str | Path, at: float | None = None) -> None:
     """Write the pose of `run` at one sample into a .dxf file, in the mechanism's unit of length.
 
-    Each body has a layer of its name and colour, with its lines and circles and its points as POINT. The pitch curve of
-    a `cam_roller` is a closed polyline on the layer of its cam, one corner a degree. What has no true dimensions, such
-    as supports, blocks, rollers and names, is left out. The same run gives the same bytes with the same ezdxf.
+    Each body has a layer of its name and colour, with its lines and circles and its points as POINT. Profile and pitch
+    curve of a cam are closed polylines on the layer of the cam, one corner a degree; `kinfmu.draw.cam` draws them
+    within a tolerance. What has no true dimensions, such as supports, blocks and names, is left out. The same run gives
+    the same bytes with the same ezdxf.
 
     Args:
         run: The run.
@@ -71,18 +74,16 @@ def _drawing(ezdxf: Any, shown: Instant, length_unit: str) -> str:
     drawing = ezdxf.new("R2010", units=DXF_UNITS.get(length_unit, 0))
     drawing.header["$PDMODE"] = POINT_STYLE
     space = drawing.modelspace()
-    rollers = {joint.name for joint in shown.joints if isinstance(joint, CamRoller)}
     for body in (GROUND_NAME, *(body.name for body in shown.mechanism.moving_bodies)):
         drawing.layers.add(body, true_color=ezdxf.rgb2int(shown.colour(body)))
     for shape in placed(shown, shapes(shown)):
-        is_pitch = shape.kind == "pitch" and shape.name in rollers
-        if not is_pitch and shape.kind not in _DRAWN:
+        if shape.kind not in _DRAWN:
             continue
         look = {"layer": shape.frame if drawing.layers.has_entry(shape.frame) else GROUND_NAME}
         if shape.radius:
             space.add_circle(tuple(map(float, shape.points[0])), shape.radius, dxfattribs=look)
         elif len(shape.points) > 1:
-            space.add_lwpolyline(shape.points.tolist(), close=shape.is_closed or is_pitch, dxfattribs=look)
+            space.add_lwpolyline(shape.points.tolist(), close=shape.is_closed, dxfattribs=look)
     for name in shown.body_points:
         space.add_point(tuple(map(float, shown.point(name))), dxfattribs={"layer": body_of(name)})
     text = io.StringIO()

@@ -17,7 +17,7 @@ from kinfmu.analysis import Report
 from kinfmu.analysis.loops import FourBar, Place
 from kinfmu.draw.instant import instant
 from kinfmu.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
-from kinfmu.joints import CamRoller, Coordinate, Distance, PointOnLine, Revolute, Translational
+from kinfmu.joints import CamFlatFace, CamRoller, Coordinate, Distance, PointOnLine, Revolute, Translational
 from kinfmu.joints.joint import Joint
 from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism
@@ -307,7 +307,11 @@ def _shape(shown: Instant, shape: Shape, numbers: Mapping[str, int]) -> dict[str
             found["anchor"] = anchor
     if shape.kind == "cam":
         pole = next(
-            (joint.between[0] for joint in shown.joints if isinstance(joint, CamRoller) and joint.name == shape.name),
+            (
+                joint.between[0]
+                for joint in shown.joints
+                if isinstance(joint, CamRoller | CamFlatFace) and joint.name == shape.name
+            ),
             None,
         )
         if pole is not None:  # the file has the pitch curve itself, not what the roller does

@@ -89,10 +89,16 @@ def _cylinder(shown: Instant, driver: DistanceDriver) -> tuple[float, float]:
 def _cams(shown: Instant) -> Iterator[Shape]:
     for cam in cam_shapes(shown):
         colour = shown.colour(cam.cam)
-        yield Shape("cam", cam.joint, cam.cam, cam.profile, colour, is_closed=True)
-        yield Shape("pitch", cam.joint, cam.cam, cam.pitch, colour, is_closed=True)
-        yield Shape("roller", cam.joint, cam.follower, cam.roller[None], radius=cam.radius)
-        yield Shape("contact", cam.joint, cam.follower, cam.contact[None])
+        if cam.profile is not None:
+            yield Shape("cam", cam.joint, cam.cam, cam.profile, colour, is_closed=True)
+        if cam.pitch is not None:
+            yield Shape("pitch", cam.joint, cam.cam, cam.pitch, colour, is_closed=True)
+        if cam.radius:
+            yield Shape("roller", cam.joint, cam.follower, cam.roller[None], radius=cam.radius)
+        if cam.face is not None:
+            yield Shape("rod", cam.joint, cam.follower, cam.face, shown.colour(cam.follower))
+        if cam.contact is not None:
+            yield Shape("contact", cam.joint, cam.follower, cam.contact[None])
 
 
 def _slides(shown: Instant, sliding: Sequence[Slide]) -> Iterator[Shape]:

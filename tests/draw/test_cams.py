@@ -9,12 +9,13 @@ import pytest
 
 from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, RunSettings, Translational
 from kinfmu.draw.instant import instant
-from kinfmu.joints import CamOscillating, CamRoller, CamTranslating
+from kinfmu.joints import CamFlatFace, CamOscillating, CamRoller, CamTranslating
 from kinfmu.joints.joint import Joint
-from kinfmu.laws import Law, MotionSequence, Polynomial, Segment
+from kinfmu.laws import Harmonic, Law, MotionSequence, Segment
 from kinfmu.scene.cams import CamShape, cam_shapes
 
 QUARTER = 0.5 * math.pi
+RADIUS = 6.0  # of the roller
 
 
 def lift(height: float, start: float = 0.0) -> Law:
@@ -44,7 +45,9 @@ def translating(contact: Joint, angle: float) -> CamShape:
 
 def oscillating(angle: float) -> CamShape:
     follower = Body("follower", {"C": (0, 0), "tip": (50, 0)}, (60, 0, 2.3))
-    contact = CamOscillating("contact", ("ground", "follower"), "cam", lift(0.4), offset=2.2)
+    contact = CamOscillating(
+        "contact", ("ground", "follower"), "cam", lift(0.4), 2.2, contact="follower.tip", roller_radius=RADIUS
+    )
     return the_disc(cam(follower, Revolute("C", ("ground.C", "follower.C")), contact, angle))
 
 
@@ -57,8 +60,8 @@ def drawn(kind: str, angle: float) -> CamShape:
     if kind == "oscillating":
         return oscillating(angle)
     if kind == "roller":
-        return translating(CamRoller("contact", ("cam.O", "follower.tip"), lift(12.0, start=25.0)), angle)
-    contact = CamTranslating("contact", ("ground.O", "follower.tip"), "cam", lift(12.0), axis=QUARTER, offset=30.0)
+        return translating(CamRoller("contact", ("cam.O", "follower.tip"), lift(12.0, start=25.0), RADIUS), angle)
+    contact = CamTranslating("contact", ("ground.O", "follower.tip"), "cam", lift(12.0), QUARTER, 30.0, RADIUS)
     return translating(contact, angle)
 
 
@@ -73,22 +76,54 @@ def distance_to(curve: np.ndarray, point: np.ndarray) -> float:
 @pytest.mark.parametrize("kind", ["translating", "oscillating", "roller"])
 def test_the_roller_is_on_the_pitch_curve_and_touches_the_profile(kind: str, angle: float) -> None:
     disc = drawn(kind, angle)
+    assert disc.profile is not None
+    assert disc.pitch is not None
+    assert disc.contact is not None
+    assert disc.radius == RADIUS
+    np.testing.assert_allclose(np.hypot(*(disc.profile - disc.pitch).T), RADIUS, rtol=1e-12)
     assert distance_to(disc.pitch, disc.roller) < 1e-2  # of 30: the curve has a corner each degree
-    assert distance_to(disc.profile, disc.roller) == pytest.approx(disc.radius, abs=2e-2)
-    assert distance_to(disc.profile, disc.contact) < 5e-2
+    assert np.hypot(*(disc.contact - disc.roller)) == pytest.approx(RADIUS, abs=1e-11)
+    assert distance_to(disc.profile, disc.contact) < 1e-2
+    gaps = np.hypot(*(disc.profile - disc.roller).T) - RADIUS
+    assert gaps.min() > -1e-9
 
 
 @pytest.mark.parametrize("kind", ["translating", "oscillating", "roller"])
 def test_a_cam_turns_as_one_piece(kind: str) -> None:
     first, second = drawn(kind, 0.0), drawn(kind, 1.0)
+    assert first.pitch is not None
+    assert second.pitch is not None
     c, s = math.cos(1.0), math.sin(1.0)
     np.testing.assert_allclose(second.pitch, first.pitch @ np.array([[c, s], [-s, c]]), atol=1e-9)
 
 
 def test_an_eccentric_is_drawn_as_a_circle() -> None:
-    level = CamTranslating(
-        "contact", ("ground.O", "follower.tip"), "cam", Polynomial((0.0,)), axis=QUARTER, offset=30.0
-    )
+    law = Harmonic(0.0, 1.0)
+    level = CamTranslating("contact", ("ground.O", "follower.tip"), "cam", law, QUARTER, 30.0, RADIUS)
     disc = translating(level, 0.4)
-    np.testing.assert_allclose(np.hypot(*disc.pitch.T), math.hypot(5.0, 30.0), rtol=1e-12)
-    np.testing.assert_allclose(np.hypot(*disc.profile.T), math.hypot(5.0, 30.0) - disc.radius, rtol=1e-12)
+    assert disc.profile is not None
+    np.testing.assert_allclose(np.hypot(*disc.profile.T), math.hypot(5.0, 30.0) - RADIUS, rtol=1e-12)
+
+
+def test_a_flat_face_is_drawn_where_it_touches_the_profile() -> None:
+    contact = CamTranslating("contact", ("ground.O", "follower.tip"), "cam", lift(8.0), QUARTER, 30.0, normal=QUARTER)
+    for joint in (contact, CamFlatFace("contact", ("cam.O", "follower.tip"), Harmonic(5.0, 1.0, 30.0), QUARTER)):
+        disc = translating(joint, 0.9)
+        assert disc.profile is not None
+        assert disc.face is not None
+        assert disc.contact is not None
+        assert disc.pitch is None
+        np.testing.assert_allclose(disc.face[:, 1], disc.contact[1], rtol=1e-12)
+        assert disc.face[:, 0].min() < disc.contact[0] < disc.face[:, 0].max()
+        assert disc.profile[:, 1].max() == pytest.approx(disc.contact[1], abs=1e-2)
+
+
+@pytest.mark.parametrize("radius", [None, 29.5])
+def test_a_profile_that_is_not_known_or_not_possible_is_not_drawn(radius: float | None) -> None:
+    """Of an unknown roller, and of one that would undercut."""
+    contact = CamTranslating("contact", ("ground.O", "follower.tip"), "cam", lift(12.0), QUARTER, 30.0, radius)
+    disc = translating(contact, 0.4)
+    assert disc.profile is None
+    assert disc.contact is None
+    assert disc.radius == 0.0
+    assert disc.pitch is not None

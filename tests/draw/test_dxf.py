@@ -26,8 +26,9 @@ def test_a_pose_is_drawn_in_layers_with_its_true_dimensions(tmp_path: Path) -> N
     assert not drawing.audit().errors
     assert drawing.units == ezdxf.units.MM
     space = drawing.modelspace()
-    (pitch,) = [line for line in space.query("LWPOLYLINE") if line.dxf.layer == "cam"]
+    profile, pitch = [line for line in space.query("LWPOLYLINE") if line.dxf.layer == "cam"]
     corners = np.array(pitch.get_points("xy"))
+    inside = np.array(profile.get_points("xy"))
     (law,) = [joint.law for joint in mechanism.joints if joint.name == "pitch"]
     angle = np.radians(np.arange(360.0))
     radii = np.array([law.at(one) for one in angle])
@@ -36,7 +37,11 @@ def test_a_pose_is_drawn_in_layers_with_its_true_dimensions(tmp_path: Path) -> N
     assert pitch.closed
     points = {tuple(np.round([*one.dxf.location.vec2], 9)) for one in space.query("POINT") if one.dxf.layer == "lever"}
     assert points == {(90.0, 0.0), tuple(np.round([run["roller.x"][100], run["roller.y"][100]], 9))}
-    assert not space.query("CIRCLE")  # the radius of the roller is not known
+    (roller,) = space.query("CIRCLE")
+    assert roller.dxf.radius == 12.0
+    np.testing.assert_allclose(np.hypot(*(inside - corners).T), 12.0, rtol=1e-12)
+    gaps = np.hypot(*(inside - np.array([*roller.dxf.center.vec2])).T) - 12.0
+    assert abs(gaps.min()) < 4e-3  # the profile has a corner at each degree
 
 
 def test_drawings_and_videos_that_cannot_be_made_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
