@@ -16,6 +16,8 @@ from kinfmu.run import FloatArray
 
 _SAMPLES = 721  # in a turn, between which extremes are searched
 _EDGE = 1e-12  # [rad] before a jump of the law, where the values of the left side count
+_SAME_ANGLE = 1e-7  # [rad]; places of extremes are known to half the digits
+_NOISE = 1e-13  # of the largest value; smaller differences are rounding
 _TOUCH = 1e-9  # of the size; smaller radii of curvature and overlaps are rounding
 
 
@@ -140,7 +142,8 @@ class _Search:
     def least(self, of: Callable[[Traced], FloatArray]) -> Extreme:
         """Return the smallest value of a quantity: that of the samples, improved between their neighbours."""
         values = of(self.found)
-        k = int(np.argmin(values))
+        noise = _NOISE * float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+        k = int(np.argmax(values <= values.min() + noise))  # the first of equal ones
         best, at = float(values[k]), float(self.s[k])
         a, b = next(part for part in self.parts if part[0] <= at <= part[1])
         low, high = max(a, self.s[max(k - 1, 0)]), min(b, self.s[min(k + 1, len(self.s) - 1)])
@@ -148,9 +151,9 @@ class _Search:
             refined = minimize_scalar(
                 lambda x: float(of(self._at(x))[0]), bounds=(low, high), method="bounded", options={"xatol": 1e-10}
             )
-            if refined.fun < best:
+            if refined.fun < best - noise:
                 best, at = float(refined.fun), float(refined.x)
-        return Extreme(best, float(self._at(at).angle[0]) % TURN)
+        return Extreme(best, _in_turn(float(self._at(at).angle[0])))
 
     def below(self, of: Callable[[Traced], FloatArray]) -> tuple[Cut, ...]:
         """Return the parts of the turn where a quantity is negative, their ends by Brent's method."""
@@ -174,6 +177,12 @@ class _Search:
             is_inside = angles[0] <= float(self._at(middle).angle[0]) % TURN <= angles[1]
             found.append(Cut(*(angles if is_inside else angles[::-1])))
         return tuple(sorted(found, key=lambda cut: cut.begin))
+
+
+def _in_turn(angle: float) -> float:
+    """Return an angle in [0, 2 pi), 0 for one that rounding leaves below 2 pi."""
+    angle %= TURN
+    return 0.0 if TURN - angle < _SAME_ANGLE else angle
 
 
 def _gouge(placed: PlacedCam, found: Traced) -> Extreme | None:

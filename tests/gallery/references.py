@@ -413,6 +413,15 @@ def cam_roller(u: Series) -> Coordinates:
     return {"cam.phi": u, "lever.phi": psi, **point("roller", c + turned(psi, 80))}
 
 
+@reference(cam_angle=turning(0, 360))
+def flat_face_lever(u: Series) -> Coordinates:
+    """The face of a lever about (90, 0) touches a disc of radius 30 about a point 10 from the axle."""
+    c = Vector(90, 0)
+    way = turned(u, 10) - c
+    psi = heading(way, mp.pi) - asin(30 / sqrt(way.dot(way)))
+    return {"cam.phi": u, "lever.phi": psi, **point("tip", c + turned(psi, 150))}
+
+
 # ------------------------------------------------------------------------------------------- several drivers, gears
 
 
