@@ -58,7 +58,8 @@ def describe(mechanism: Mechanism, report: Report) -> dict[str, Any]:
     lines = {slide.name: slide for slide in sliding}
     found = []
     for shape in shapes(shown):
-        slide = next(along[shape.frame]) if shape.kind == "rod" else lines.get(shape.name)
+        is_rod = shape.kind == "rod" and shape.name == shape.frame  # not the flat face on a cam
+        slide = next(along[shape.frame]) if is_rod else lines.get(shape.name)
         found.append(_shape(shown, shape, numbers) | _line(shape, slide, numbers))
     bodies = [GROUND_NAME, *(body.name for body in mechanism.moving_bodies)]
     return {

@@ -80,7 +80,7 @@ def page(
     """
     require_mechanism(mechanism, "page")
     report = report or check(mechanism)
-    if report.problem is not None:
+    if report.problem is not None and report.plan is None:
         raise report.problem
     as_written = page_module(mechanism)
     change = opened(mechanism)

@@ -17,6 +17,7 @@ import kinfmu
 from kinfmu.cams import PlacedCam, critical
 from kinfmu.cams.traced import Traced
 from kinfmu.errors import KinfmuError, MechanismError, RequestError
+from kinfmu.page.describe import describe
 from kinfmu.readings import PressureAngle
 from tests.cams import followers
 from tests.oracle import Series, cos, mp, sin
@@ -286,6 +287,15 @@ def test_check_reports_an_undercut_cam_as_its_problem_and_the_motion_is_still_so
     # the ends are where the pitch curve has the roller's radius
     ends = kinfmu.cam_profile(followers.lifted_roller(8.0), "lift", [*found["undercut"][0].values()]).radius
     np.testing.assert_allclose(ends, 23.0, rtol=1e-8)
+
+
+@pytest.mark.parametrize("made", [followers.lifted_face, lambda: followers.lifted_roller(31.0)])
+def test_pages_hold_flat_faces_and_cams_that_cannot_be_made(made: Any) -> None:
+    mechanism = made()
+    found = describe(mechanism, kinfmu.check(mechanism))
+    kinds = {shape["kind"]: shape for shape in found["shapes"] if shape["name"] == "lift"}
+    assert ("cam" in kinds) == ("rod" in kinds) == (made is followers.lifted_face)
+    assert "line" not in kinds.get("rod", {})
 
 
 def test_check_reports_a_steep_cam_as_a_note() -> None:
