@@ -277,7 +277,7 @@ def _leads_to(mechanism: Mechanism, plan: SolvePlan, start: Mapping[str, Start],
         assembly = find_assembly(system)
         if assembly.pose is None:
             return False
-        assembled = find_anchor(system, assembly)
+        assembled = find_anchor(system, assembly, range(system.joint_row_count))
     except KinfmuError:
         return False
     return _distance(plan, _moved_to(system, assembled, plan.anchor.u), pose) <= _SAME

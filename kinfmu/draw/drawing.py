@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
+from kinfmu.draw.gap import gap_note, gaps
 from kinfmu.draw.instant import instant, pose_note
 from kinfmu.draw.motion import motion
 from kinfmu.draw.names import Mark, Name, place
@@ -44,7 +45,8 @@ def figure(
 
     The figure shows bodies, joints, drivers and points of interest with their names, and the paths of these points over
     the file's run; the axes are in the mechanism's unit of length, with equal scales. The same mechanism gives the same
-    bytes. A mechanism that closes but cannot be solved is drawn too.
+    bytes. A mechanism that closes but cannot be solved is drawn too, and so is one that does not close: with its loops
+    closed up to the first open one, whose gap is a red line.
 
     Args:
         mechanism: The mechanism.
@@ -61,14 +63,14 @@ def figure(
         FigureError: The suffix is unknown, the file cannot be written, `at` cannot be reached, or neither or both of
             `path` and `ax` are given.
         MissingPackageError: matplotlib is not installed.
-        AssemblyError: The mechanism does not close.
+        AssemblyError: The mechanism has no pose to draw, or none at `at`.
         MechanismError: The mechanism is invalid.
 
     """
     check_target("figure", path, ax)
     if path is None:
-        return sheet_of(instant(mechanism, at), ax).axes
-    write(Path(path), lambda: sheet_of(instant(mechanism, at)).figure)
+        return sheet_of(instant(mechanism, at, with_gap=True), ax).axes
+    write(Path(path), lambda: sheet_of(instant(mechanism, at, with_gap=True)).figure)
     return None
 
 
@@ -80,8 +82,8 @@ def sheet_of(shown: Instant, ax: Axes | None = None) -> Sheet:
     reach = np.vstack([extent(found), *(mark.extent() for mark in (*arrows, *places, *tracks))])
     size = float(np.ptp(reach, axis=0).max())
     sheet = Sheet(reach, shortest(found, size), mechanism.length_unit, mechanism.title or mechanism.name, ax)
-    names = draw(sheet, found, tracks, [*arrows, *places])
-    notes = [pose] if (pose := pose_note(shown)) else []
+    names = draw(sheet, found, tracks, [*arrows, *places, *gaps(shown)])
+    notes = [text for text in (gap_note(shown), pose_note(shown)) if text]
     if len(names) <= MOST_NAMES:
         place(names, sheet)
     else:

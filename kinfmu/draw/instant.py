@@ -19,8 +19,9 @@ from kinfmu.measures.placement import body_of, unit_vector
 from kinfmu.mechanism import Mechanism, Point
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.plan import SolvePlan, compile_plan, localized
+from kinfmu.plan.open_loop import OpenLoop
 from kinfmu.run import FloatArray, Run
-from kinfmu.scene.instant import Instant
+from kinfmu.scene.instant import Instant, OpenGap
 from kinfmu.scene.outline import points_of, rim
 from kinfmu.scene.placing import poses_of, world
 from kinfmu.sweep import run_times, solve
@@ -36,20 +37,21 @@ _PIN = 0.05  # cost of a pin that covers a link of another joint
 _MOST_LINKS = 60  # with more links no pose is clearly better than the start
 
 
-def instant(mechanism: Mechanism, at: float | None = None) -> Instant:
+def instant(mechanism: Mechanism, at: float | None = None, *, with_gap: bool = False) -> Instant:
     """Return the pose of a mechanism to draw, and its run.
 
     at: value of the only driver [rad or length]. Default: the start of the run, if links do not hide one another there;
     else the assembled pose, if it is near the run, or the sample of the run in which they hide one another least. A
     mechanism that closes but cannot be solved, for example without a driver, is shown at the start pose without a run.
-    A KinfmuError is raised if the mechanism does not close or `at` cannot be reached.
+    with_gap: a mechanism that does not close is shown with its loops closed up to the first open one, and its gap.
+    A KinfmuError is raised if `at` cannot be reached or, without `with_gap`, the mechanism does not close.
     """
     try:
         plan = compile_plan(replace(mechanism, coordinates="all"))
     except KinfmuError as problem:
         if at is not None:
             raise
-        return _without_run(mechanism, problem)
+        return _without_run(mechanism, problem, with_gap=with_gap)
     return _with_run(mechanism, plan, at)
 
 
@@ -121,8 +123,9 @@ def _is_near(u: FloatArray, values: FloatArray) -> bool:
     return bool((np.abs(values - u) / ranges).max(axis=1).min() <= _NEAR_RUN)
 
 
-def _without_run(mechanism: Mechanism, problem: KinfmuError) -> Instant:
+def _without_run(mechanism: Mechanism, problem: KinfmuError, *, with_gap: bool) -> Instant:
     """Return only the start pose, closed with all rows or, if drivers contradict them, with those of the joints."""
+    open_gap = None
     local, origin = localized(mechanism)
     system = System(local)
     start, assembled = find_assembly(system)
@@ -131,8 +134,12 @@ def _without_run(mechanism: Mechanism, problem: KinfmuError) -> Instant:
     else:
         q, gap = close(Part(system, range(system.joint_row_count)), start.q, start.u)
         if gap > CLOSED:
-            raise problem
-    return Instant(mechanism, _by_body(mechanism, q, origin), {driver.name: 1.0 for driver in mechanism.drivers})
+            loop = problem.data.get("loop")
+            if not with_gap or not isinstance(loop, OpenLoop):
+                raise problem
+            q, open_gap = loop.pose, OpenGap(loop.joint, f"gap {loop.gap:.4g} {loop.unit}")
+    directions = {driver.name: 1.0 for driver in mechanism.drivers}
+    return Instant(mechanism, _by_body(mechanism, q, origin), directions, open_gap)
 
 
 def _by_body(mechanism: Mechanism, q: FloatArray, origin: Point) -> dict[str, FloatArray]:

@@ -3,36 +3,38 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from kinfmu.equations.assembly import SINGULAR, Assembled, AssembledStart, closes_beside
 from kinfmu.equations.closing import branches, close, margin
-from kinfmu.equations.part import Part
 from kinfmu.equations.start_poses import StartValues
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import AmbiguousStartError, AssemblyError, MobilityError, listed
+from kinfmu.plan.open_loop import find_open_loop
 
 
-def find_anchor(system: System, assembly: AssembledStart) -> Assembled:
+def find_anchor(system: System, assembly: AssembledStart, kept: Sequence[int]) -> Assembled:
     """Return the closed start pose, or a pose near it if it is singular.
 
     Args:
         system: The equations of the mechanism.
         assembly: Its start values and assembled pose.
+        kept: Its independent joint rows, by index into System.rows.
 
     Returns:
         The anchor, from which every run is followed.
 
     Raises:
-        AssemblyError: The mechanism does not close; the message has the widest gap.
+        AssemblyError: The mechanism does not close; the message has the loop and its gap.
         AmbiguousStartError: The start pose is singular and several branches leave it.
         MobilityError: The mechanism is singular near the start pose too.
 
     """
     start, found = assembly
     if found is None:
-        raise _does_not_close(system, start)
+        raise _does_not_close(system, start, kept)
     if found.margin <= SINGULAR:
         names = listed(driver.name for driver in system.mechanism.drivers)
         if not closes_beside(system, found):
@@ -51,24 +53,17 @@ def find_anchor(system: System, assembly: AssembledStart) -> Assembled:
     return found
 
 
-def _does_not_close(system: System, start: StartValues) -> AssemblyError:
-    """Return the error of the joint with the widest gap, with its gap once the others are closed."""
-    u = start.u
-    pose, _ = close(system, start.q, u)
-    widest = system.rows[int(system.relative_gaps(system.residual(pose, u)).argmax())].owner
-    others = [k for k, row in enumerate(system.rows) if row.owner != widest]
-    pose, _ = close(Part(system, others), pose, u)
-    phi = system.residual(pose, u)
-    gaps, relative = system.gaps(phi), system.relative_gaps(phi)
-    of_widest = [k for k, row in enumerate(system.rows) if row.owner == widest]
-    worst = max(of_widest, key=lambda k: relative[k])
-    same = [k for k in of_widest if system.rows[k].kind == system.rows[worst].kind]
-    gap, unit = math.hypot(*(gaps[k] for k in same)), system.gap_unit(system.rows[worst])
+def _does_not_close(system: System, start: StartValues, kept: Sequence[int]) -> AssemblyError:
+    """Return the error of the loop that does not close, with its gap and the pose that has it."""
+    loop = find_open_loop(system, start, kept)
+    cure = (
+        "check start poses: the loop closes from others" if loop.closes_elsewhere else "check lengths and start poses"
+    )
     return AssemblyError(
-        f"the mechanism does not close near its start pose ({_at(system, u)}): with the other joints closed, "
-        f"'{widest}' does not close: gap {gap:.4g} {unit}; check lengths and start poses",
-        joint=widest,
-        gap=gap,
+        f"the mechanism does not close near its start pose ({_at(system, start.u)}): {loop}; {cure}",
+        joint=loop.joint,
+        gap=loop.gap,
+        loop=loop,
     )
 
 

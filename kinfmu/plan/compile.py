@@ -88,7 +88,7 @@ def plan_from(
     refuse_inconsistent(system, redundancy)
     refuse_mobility(system, redundancy)
     refuse_negative_distances(system, redundancy.assembly.start)
-    anchor = find_anchor(system, redundancy.assembly)
+    anchor = find_anchor(system, redundancy.assembly, redundancy.kept)
     refuse_undefined_loads(system, redundancy.assembly.start, anchor)
     settable = _parameters(mechanism, parameters)
     tracer = Tracer(local, [parameter.name for parameter in settable])

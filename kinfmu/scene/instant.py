@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,18 +20,26 @@ from kinfmu.scene.placing import seen_from, world
 from kinfmu.scene.shape import frames
 
 
+class OpenGap(NamedTuple):
+    """The joint at which a mechanism does not close in the drawn pose, and its gap such as 'gap 7.5 mm'."""
+
+    joint: str
+    text: str
+
+
 @dataclass(frozen=True, eq=False)
 class Instant:
     """The pose to draw, and the poses of the run.
 
     poses: (1 + n, 3) by body, ground included: x, y [length], phi [rad] of the drawn pose, then of n samples of the
     run, NaN at samples without numbers. Bodies whose pose is not in the run are missing, and so are their joints.
-    directions: +1.0 or -1.0 by driver, the direction of its first motion.
+    directions: +1.0 or -1.0 by driver, the direction of its first motion. open_gap: where the mechanism does not close.
     """
 
     mechanism: Mechanism
     poses: Mapping[str, FloatArray]
     directions: Mapping[str, float]
+    open_gap: OpenGap | None = None
 
     @property
     def joints(self) -> Sequence[Joint]:

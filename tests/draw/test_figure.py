@@ -109,13 +109,17 @@ def test_a_mechanism_that_only_closes_is_drawn(drivers: tuple[AngleDriver, ...],
     assert {"crank", "coupler", "rocker", "O", "P", "Q", "C"} <= set(texts_in(path).split())
 
 
-def test_a_mechanism_that_does_not_close_is_reported_in_one_line_and_nothing_is_written(tmp_path: Path) -> None:
+def test_a_mechanism_that_does_not_close_is_drawn_with_its_gap(tmp_path: Path) -> None:
     path = tmp_path / "figure.svg"
-    with pytest.raises(AssemblyError) as caught:
-        figure(fourbar(9.0, 1.0, 3.5, 3.0), path)
-    assert str(caught.value).startswith("the mechanism does not close near its start pose")
-    assert "\n" not in str(caught.value)
-    assert not path.exists()
+    mechanism = fourbar(9.0, 1.0, 3.5, 3.0)
+    figure(mechanism, path)
+    u = float(mechanism.drivers[0].law.at(0.0))
+    gap = f"gap {math.dist((9.0, 0.0), (math.cos(u), math.sin(u))) - 6.5:.4g} m"
+    shown = texts_in(path)
+    assert gap in shown
+    assert f"does not close: {gap}" in shown
+    with pytest.raises(AssemblyError, match=r"^the mechanism does not close near its start pose"):
+        figure(mechanism, path, at=u)
 
 
 @pytest.mark.parametrize("name", ["figure.eps", "figure", "svg"])
@@ -188,7 +192,7 @@ def test_check_as_json_stays_json_with_a_figure(run_cli: Callable[..., tuple[int
     assert path.stat().st_size > 1000
 
 
-def test_check_reports_its_findings_before_a_figure_that_cannot_be_drawn(
+def test_check_draws_a_mechanism_that_does_not_close_and_still_fails(
     run_cli: Callable[..., tuple[int, str, str]], tmp_path: Path
 ) -> None:
     path = tmp_path / "mine.toml"
@@ -198,7 +202,7 @@ def test_check_reports_its_findings_before_a_figure_that_cannot_be_drawn(
     assert "mobility" in out
     (line,) = err.splitlines()
     assert line.startswith(f"kinfmu: {path}: the mechanism does not close near its start pose")
-    assert not (tmp_path / "figure.svg").exists()
+    assert "gap " in (tmp_path / "figure.svg").read_text(encoding="utf-8")
 
 
 def test_check_draws_a_mechanism_without_a_driver_and_still_fails(

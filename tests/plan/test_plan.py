@@ -3,11 +3,12 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, load, solve
+from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Point, Revolute, load, solve
 from kinfmu.errors import AmbiguousStartError, AssemblyError, MobilityError, RequestError
 from kinfmu.plan import compile_plan, determinant_formula
 from tests.mechanisms import bar_as_body, bar_linkage, five_bar, fourbar, reference_fourbar, six_bar, slider_crank
@@ -180,7 +181,8 @@ def test_a_rough_start_pose_is_assembled() -> None:
     assert again.anchor.margin > 0.01
 
 
-def test_what_does_not_close_is_told_with_its_widest_gap() -> None:
+def test_the_loop_that_does_not_close_is_named_with_the_distance_that_its_links_lack() -> None:
+    """The links reach 2 + 3 from the crank's end P = (cos 1, sin 1) toward C = (9, 0)."""
     mechanism = Mechanism(
         "apart",
         [
@@ -192,8 +194,49 @@ def test_what_does_not_close_is_told_with_its_widest_gap() -> None:
         fourbar(4, 1, 3.5, 3).joints,
         [AngleDriver("crank", "crank", ConstantSpeed(1.0, 1.0))],
     )
-    with pytest.raises(AssemblyError, match=r"\(crank = 1 rad .*\): with the other joints closed, '.' does not"):
+    loop = r"the loop of bodies coupler, rocker with joints P, Q, C does not close: gap 3\.501 m at '[PQC]'"
+    with pytest.raises(AssemblyError, match=rf"\(crank = 1 rad .*\): {loop} with the others closed") as caught:
         compile_plan(mechanism)
+    assert caught.value.gap == pytest.approx(math.dist((math.cos(1.0), math.sin(1.0)), (9.0, 0.0)) - 5.0, rel=1e-4)
+
+
+def test_a_loop_of_possible_lengths_that_no_step_closes_from_its_start_poses_blames_these() -> None:
+    """All links in one line, folded where they are too far apart: a saddle of the squared gaps, but the lengths fit."""
+    four = fourbar(4, 1, 3.5, 3, start=0.0)
+    starts = {"crank": (0, 0, 0), "coupler": (1, 0, 0), "rocker": (4, 0, 0)}
+    in_line = replace(four, bodies=[replace(body, start=starts.get(body.name, body.start)) for body in four.bodies])
+    with pytest.raises(AssemblyError, match=r"with the others closed; check start poses: the loop closes from others"):
+        compile_plan(in_line)
+
+
+@pytest.mark.parametrize("rod", [0.4, 9.0])
+def test_a_loop_that_a_wrong_length_opens_is_blamed_and_none_before_it(rod: float) -> None:
+    """A crank-rocker that closes drives a second dyad from Q; the joints of the four-bar are innocent."""
+    four = fourbar(4, 1, 3.5, 3)
+    ground = next(body for body in four.bodies if body.is_ground)
+    mechanism = replace(
+        four,
+        bodies=(
+            *(
+                replace(body, points={**body.points, "E": Point(7.0, 0.0)}) if body is ground else body
+                for body in four.bodies
+            ),
+            Body("rod", {"Q": (0, 0), "D": (rod, 0)}, (4, 3, 0.0)),
+            Body("flap", {"E": (0, 0), "D": (1, 0)}, (7, 0, 2.0)),
+        ),
+        joints=(
+            *four.joints,
+            Revolute("Q2", ("rocker.Q", "rod.Q")),
+            Revolute("D", ("rod.D", "flap.D")),
+            Revolute("E", ("ground.E", "flap.E")),
+        ),
+    )
+    with pytest.raises(AssemblyError, match=r"the loop of bodies rod, flap with joints Q2, D, E does not") as caught:
+        compile_plan(mechanism)
+    q = exact_fourbar(4, 1, 3.5, 3, [float(four.drivers[0].law.at(0.0))]).q[0]
+    away = math.dist((7.0, 0.0), (4.0 + 3.0 * math.cos(q[2]), 3.0 * math.sin(q[2])))
+    lacks = away - rod - 1.0 if rod < 1.0 else rod - 1.0 - away
+    assert caught.value.gap == pytest.approx(lacks, rel=1e-3)
 
 
 @pytest.mark.parametrize(("lengths", "start"), [((4, 1, 3, 2), np.pi), ((2, 1, 2, 1), np.pi), ((2, 1, 2, 1), 0.0)])
