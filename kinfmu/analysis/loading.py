@@ -19,7 +19,7 @@ from kinfmu.analysis.singular import DriverRange
 from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.laws import ConstantSpeed, External
 from kinfmu.mechanism import Mechanism
-from kinfmu.motion.motion import Motion, force_of
+from kinfmu.motion.motion import Motion, break_places, force_of
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import effort_noun
 from kinfmu.plan.reactions import undetermined_reactions
@@ -110,7 +110,7 @@ def loading(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Loading | None:
     shared = tuple((tuple(names), rows) for rows, names in undetermined.items())
     try:
         arguments, over = _motion(mechanism, ranges)
-        run = solve(mechanism, **arguments)
+        run = _with_breaks(solve(mechanism, **arguments), mechanism, arguments)
         over = over or f"the run of the file, {axis_of(run).range()}"
         missing = int((~run.good).sum())
         if missing == len(run):
@@ -139,6 +139,19 @@ def _motion(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> tuple[dict[s
         times = mechanism.run.start + turned / abs(speed)
         return {"t": times}, f"{count} of {driver.name} at {speed:.6g} {unit}"
     return {}, ""
+
+
+def _with_breaks(run: Run, mechanism: Mechanism, arguments: dict[str, Any]) -> Run:
+    """Return a run with samples where derivatives of laws jump too: there forces have kinks, or their peaks."""
+    name = next(iter(arguments), "t")
+    samples = np.asarray(arguments.get(name, run.t))
+    with suppress(RequestError):  # the samples are too few, or not in order
+        added = break_places(run)
+        near = 1e-6 * float(np.diff(samples).min())
+        added = [x for x in added if np.abs(samples - x).min() > near]
+        if added:
+            return solve(mechanism, **{**arguments, name: np.sort(np.concatenate([samples, added]))})
+    return run
 
 
 def _efforts(mechanism: Mechanism) -> list[str]:

@@ -112,7 +112,7 @@ def critical_values(placed: PlacedCam) -> Critical:
 def _intervals(placed: PlacedCam) -> list[tuple[float, float]]:
     """Return the parts of a turn of the parameter between jumps of the law."""
     law = placed.joint.law
-    jumps = law.jumps(**{name: constant.value for name, constant in law.constants().items()})
+    jumps = law.own_breaks()
     period = float(jumps.period) or TURN
     at = {0.0, TURN}
     for jump in map(float, jumps.at):

@@ -62,7 +62,7 @@ def read_efforts(known: Sequence[str], given: Mapping[str, Any], span: tuple[flo
         elif isinstance(value, Law) and not isinstance(value, External):
             value.check(name)
             by_name[name] = _of_law(value)
-            jumps.update(_within(_law_jumps(value), span))
+            jumps.update(_within(value.own_breaks(), span))
         elif callable(value):
             by_name[name] = _function(name, value)
         elif times is not None and not isinstance(value, str):
@@ -79,12 +79,8 @@ def jumps_of_loads(loads: Sequence[Load], span: tuple[float, float]) -> set[floa
     for load in loads:
         law = getattr(load, "law", None)
         if law is not None and getattr(load, "over", None) is None:
-            found.update(_within(_law_jumps(law), span))
+            found.update(_within(law.own_breaks(), span))
     return found
-
-
-def _law_jumps(law: Law) -> Jumps:
-    return law.jumps(**{name: constant.value for name, constant in law.constants().items()})
 
 
 def _within(jumps: Jumps, span: tuple[float, float]) -> Iterator[float]:

@@ -110,7 +110,8 @@ def _(x: Taylor, data: CurveData, order: int = 0) -> Taylor:
 def _(like: Taylor, y: Taylor | float, x: Taylor | float) -> Taylor:  # noqa: ARG001
     """w = (x y' - y x') / r^2 and w' = (x y'' - y x'' - 2 w (x x' + y y')) / r^2."""
     y, x = _lifted(y), _lifted(x)
-    squared = x.f * x.f + y.f * y.f or NO_LENGTH
+    length = x.f * x.f + y.f * y.f
+    squared = np.where(length == 0.0, NO_LENGTH, length) if isinstance(length, np.ndarray) else length or NO_LENGTH
     d1 = (x.f * y.d1 - y.f * x.d1) / squared
     d2 = (x.f * y.d2 - y.f * x.d2 - 2.0 * d1 * (x.f * x.d1 + y.f * y.d1)) / squared
-    return Taylor(float(np.arctan2(y.f, x.f)), d1, d2)
+    return Taylor(_plain(np.arctan2(y.f, x.f)), d1, d2)

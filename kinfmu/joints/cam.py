@@ -49,8 +49,11 @@ class Cam(Joint):
         return self.led, "angle"
 
     def residual(self, at: Placement) -> tuple[Value, ...]:
-        turn = AngleBetween(self.cam, self.holder()).value(at)
-        return (self.follower().value(at) - self.offset - self.law.at(turn),)
+        law, turn = self.led_by(at)
+        return (self.follower().value(at) - self.offset - law.at(turn),)
+
+    def led_by(self, at: Placement) -> tuple[Law, Value]:
+        return self.law, AngleBetween(self.cam, self.holder()).value(at)
 
     def kinds(self) -> tuple[str, ...]:
         return (self.led,)

@@ -48,9 +48,13 @@ class CamFlatFace(Joint):
         return tuple(map(body_of, self.between))
 
     def residual(self, at: Placement) -> tuple[Value, ...]:
+        law, angle = self.led_by(at)
+        (d_x, d_y), (m_x, m_y) = at.vector(self.between), at.direction(body_of(self.between[1]), self.normal)
+        return (m_x * d_x + m_y * d_y - law.at(angle),)
+
+    def led_by(self, at: Placement) -> tuple[Law, Value]:
         cam, follower = self.bodies()
-        (d_x, d_y), (m_x, m_y) = at.vector(self.between), at.direction(follower, self.normal)
-        return (m_x * d_x + m_y * d_y - self.law.at(at.angle(follower) + self.normal - at.angle(cam)),)
+        return self.law, at.angle(follower) + self.normal - at.angle(cam)
 
     def reach(self) -> float:
         return max(float(self.law.at(k * TURN / _SAMPLES)) for k in range(_SAMPLES))

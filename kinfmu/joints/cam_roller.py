@@ -48,10 +48,14 @@ class CamRoller(Joint):
         return tuple(map(body_of, self.between))
 
     def residual(self, at: Placement) -> tuple[Value, ...]:
+        law, angle = self.led_by(at)
+        d_x, d_y = at.vector(self.between)
+        return (sqrt(d_x * d_x + d_y * d_y) - law.at(angle),)
+
+    def led_by(self, at: Placement) -> tuple[Law, Value]:
         d_x, d_y = at.vector(self.between)
         (e_x, e_y), (n_x, n_y) = (at.direction(body_of(self.between[0]), angle) for angle in (0.0, 0.5 * math.pi))
-        angle = atan2(n_x * d_x + n_y * d_y, e_x * d_x + e_y * d_y)
-        return (sqrt(d_x * d_x + d_y * d_y) - self.law.at(angle),)
+        return self.law, atan2(n_x * d_x + n_y * d_y, e_x * d_x + e_y * d_y)
 
     def reach(self) -> float:
         return max(float(self.law.at(k * TURN / _SAMPLES)) for k in range(_SAMPLES))

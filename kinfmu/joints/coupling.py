@@ -42,6 +42,9 @@ class Coupling(Joint):
     def residual(self, at: Placement) -> tuple[Value, ...]:
         return (self.output.value(at) - self.law.at(self.input.value(at)),)
 
+    def led_by(self, at: Placement) -> tuple[Law, Value]:
+        return self.law, self.input.value(at)
+
     def kinds(self) -> tuple[str, ...]:
         return (self.output.kind,)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple
 
+from kinfmu.laws import Law
 from kinfmu.measures.arithmetic import Value
 from kinfmu.measures.placement import Placement
 
@@ -48,6 +49,10 @@ class Joint(ABC):
     @abstractmethod
     def residual(self, at: Placement) -> tuple[Value, ...]:
         """Return Phi, one value per row; zero where the joint holds."""
+
+    def led_by(self, at: Placement) -> tuple[Law, Value] | None:  # noqa: ARG002  most joints have none
+        """Return the law that the joint follows, with its argument at a pose; None if it has no law."""
+        return None
 
     def check(self) -> None:  # noqa: B027  most joints accept all values
         """Raise a MechanismError for invalid values; numbers are finite and references valid by then."""

@@ -32,17 +32,17 @@ class Jumps(NamedTuple):
 
 
 @cache
-def jumping_breaks(data: CurveData) -> tuple[float, ...]:
-    """Return the breaks of a curve at which its value, first or second derivative differs between the two sides."""
+def jumping_breaks(data: CurveData, order: int = 2) -> tuple[float, ...]:
+    """Return the breaks of a curve at which its value or a derivative up to an order differs between the two sides."""
     breaks, pieces = data
     found = set()
-    for order in range(3):
+    for one in range(order + 1):
         sides = [
-            (curve(((), (before,)), order, x), curve(((), (after,)), order, x))
+            (curve(((), (before,)), one, x), curve(((), (after,)), one, x))
             for x, (before, after) in zip(breaks, pairwise(pieces), strict=True)
         ]
-        between = [curve(data, order, 0.5 * (a + b)) for a, b in pairwise(breaks)]
-        largest = max((abs(value) for value in (*between, *(one for side in sides for one in side))), default=0.0)
+        between = [curve(data, one, 0.5 * (a + b)) for a, b in pairwise(breaks)]
+        largest = max((abs(value) for value in (*between, *(value for side in sides for value in side))), default=0.0)
         found |= {x for x, (left, right) in zip(breaks, sides, strict=True) if abs(right - left) > SAME * largest}
     return tuple(sorted(found))
 
@@ -96,9 +96,17 @@ class Law(ABC):
     def target(self, x: Value, **constants: Value) -> Value:
         """Return f(x), in plain arithmetic, with the constants given by name."""
 
-    def jumps(self, **constants: Value) -> Jumps:  # noqa: ARG002  smooth laws have none
+    def jumps(self, **constants: Value) -> Jumps:
         """Return the arguments at which f, f' or f'' jumps, in plain arithmetic, with the constants given by name."""
+        return self.breaks(2, **constants)
+
+    def breaks(self, order: int, /, **constants: Value) -> Jumps:  # noqa: ARG002  smooth laws have none
+        """Return the arguments at which f or a derivative of it up to an order jumps, as `jumps` does."""
         return Jumps()
+
+    def own_breaks(self, order: int = 2) -> Jumps:
+        """Return the arguments at which f or a derivative up to an order jumps, with the law's own constants."""
+        return self.breaks(order, **{name: constant.value for name, constant in self.constants().items()})
 
     def numbers(self) -> dict[ConstantPath, Constant]:
         """Return every number of the law, by its path in the law's table; here the fields that are numbers."""

@@ -32,9 +32,9 @@ class Rise(Law):
         part = (x - constants["begin"]) / constants["duration"]
         return constants["start"] + constants["rise"] * curve(part, self.shape)
 
-    def jumps(self, **constants: Value) -> Jumps:
+    def breaks(self, order: int, /, **constants: Value) -> Jumps:
         begin, duration = constants["begin"], constants["duration"]
-        return Jumps(tuple(begin + duration * x for x in jumping_breaks(self.shape)))
+        return Jumps(tuple(begin + duration * x for x in jumping_breaks(self.shape, order)))
 
 
 def polynomial(origin: float, *coefficients: float) -> Piece:

@@ -82,13 +82,13 @@ class MotionSequence(Law):
             begin = begin + durations[k]
         return value
 
-    def jumps(self, **constants: Value) -> Jumps:
+    def breaks(self, order: int, /, **constants: Value) -> Jumps:
         found: list[Value] = []
         begin = constants["begin"]
         for k, segment in enumerate(self.segments, start=1):
             duration = constants[f"duration_{k}"]
             if segment.law != DWELL:
-                found += [begin + duration * x for x in jumping_breaks(_SHAPES[segment.law])]
+                found += [begin + duration * x for x in jumping_breaks(_SHAPES[segment.law], order)]
             begin = begin + duration
         return Jumps(tuple(found), begin - constants["begin"] if self.repeat else 0.0)
 

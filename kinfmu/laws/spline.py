@@ -70,9 +70,9 @@ class Spline(Law):
             x = split_periods(x, first, last, -first)[1]
         return curve(x, self.data)
 
-    def jumps(self, **constants: Value) -> Jumps:  # noqa: ARG002  it has none
+    def breaks(self, order: int, /, **constants: Value) -> Jumps:  # noqa: ARG002  it has none
         width = self.points[-1][0] - self.points[0][0]
-        return Jumps(jumping_breaks(self.data), width if self.ends == PERIODIC else 0.0)
+        return Jumps(jumping_breaks(self.data, order), width if self.ends == PERIODIC else 0.0)
 
     def check(self, where: str) -> None:
         if self.ends not in ENDS:

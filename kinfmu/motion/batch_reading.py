@@ -30,6 +30,7 @@ from kinfmu.motion.motion import Motion
 from kinfmu.motion.needed import QuantityRead, needed
 from kinfmu.motion.quantity_model import quantity_model
 from kinfmu.motion.quintic import FloatArray, use_compiled
+from kinfmu.motion.splitting import has_breaks
 from kinfmu.motion.track import FEWEST
 from kinfmu.plan.plan import PlanParameter
 from kinfmu.plan.trace import parameter_symbol
@@ -362,6 +363,8 @@ class BatchReading:
         """Return the names of measures that are read design by design: their numbers or samples differ."""
         plan, driven = self._model.plan, self._driving.driven
         names = {reading.name for reading in self._readings}
+        if has_breaks(self._model.mechanism, over_time=driven is None):
+            return names
         if driven is None:
             behind = {symbol.name for symbol in symbols([node for law in plan.laws for node in law[1:]])}
             given = {parameter_symbol(name) for name in self._open} | set(self.parameters)

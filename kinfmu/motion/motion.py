@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
@@ -26,6 +27,7 @@ from kinfmu.motion.going_round import goes_round
 from kinfmu.motion.needed import Cosine, PathCoordinate, QuantityRead, cosine_between, is_angle, value_of
 from kinfmu.motion.quintic import FloatArray, IntArray
 from kinfmu.motion.sampled import sampled_track
+from kinfmu.motion.splitting import ORDER, Break, distinct, law_breaks, split_at
 from kinfmu.motion.track import FEWEST, Track
 from kinfmu.run import Run
 from kinfmu.run.axis import TIME
@@ -72,6 +74,8 @@ class Motion:
         window: First and last argument of the part that readings see; None: all of it.
         force: The samples (..., n) of a force by its name; None if the motion has none.
         computed: Outputs that are quantities which measures read, by the quantity.
+        is_seamed: True if a law's derivatives jump at the ends of a motion that goes round. Inside x is twice where
+            they jump, once for each side.
 
     """
 
@@ -89,6 +93,7 @@ class Motion:
     window: tuple[float, float] | None = None
     force: Callable[[str], FloatArray] | None = None
     computed: Mapping[QuantityRead, CoordinateName] = field(default_factory=dict)
+    is_seamed: bool = False
     _tracks: dict[QuantityRead, Track] = field(default_factory=dict, repr=False)
     _names: _Names | None = field(default=None, repr=False)  # the same object in all parts and all designs
     _windows: dict[tuple[float | None, float | None, bool], tuple[float, float]] = field(
@@ -125,7 +130,38 @@ class Motion:
             force=lambda name: force_of(run, name)[order],
         )
         outputs = [(motion.quantity_track(name), name.is_angle) for name in run.outputs]
-        return motion.going_round(bool(outputs) and bool(goes_round(outputs)))
+        is_closed = bool(outputs) and bool(goes_round(outputs))
+        return motion._split(motion.breaks(over_time=run.axis == TIME), is_closed=is_closed).going_round(is_closed)
+
+    def breaks(self, *, over_time: bool) -> list[Break]:
+        """Return where derivatives of laws of drivers and joints jump; over_time: drivers follow their laws."""
+        found: list[Break] = []
+        laws = [(driver.law, self.argument) for driver in self.mechanism.drivers] if over_time else []
+        for joint in self.mechanism.joints:
+            with suppress(RequestError):  # the motion does not hold the bodies
+                led = joint.led_by(self._placement(joint.bodies()))
+                laws += [(led[0], self._as_track(led[1]))] if led else []
+        for law, track in laws:
+            if track.is_known:
+                found += law_breaks(track, law.own_breaks(ORDER), law.own_breaks())
+        return distinct(found, self.x)
+
+    def _split(self, breaks: Sequence[Break], *, is_closed: bool) -> Motion:
+        """Return the motion with samples on both sides of each break."""
+        split = split_at(self.x, breaks, is_closed=is_closed)
+        if split.is_empty:
+            return replace(self, is_seamed=split.is_seamed, _tracks={})
+        force = self.force
+        return replace(
+            self,
+            x=split.x_split,
+            tables=split.tables(self.tables),
+            drive=None if self.drive is None else split.driver(self.drive),
+            margin=None if self.margin is None else self.margin[split.source],
+            force=None if force is None else lambda name: split.samples(force(name)),
+            is_seamed=split.is_seamed,
+            _tracks={},
+        )
 
     def goes_round(self, quantities: Sequence[QuantityRead]) -> NDArray[np.bool_]:
         """Return (...) whether quantities go round, whatever else moves."""
@@ -168,7 +204,7 @@ class Motion:
     @property
     def argument(self) -> Track:
         """The argument itself as a track: what rates are derivatives by, and the driver where it is one."""
-        return Track(self.x, self.x, np.ones_like(self.x), np.zeros_like(self.x), self.is_closed)
+        return Track(self.x, self.x, np.ones_like(self.x), np.zeros_like(self.x), self.is_closed, self.is_seamed)
 
     @property
     def driver_quantity(self) -> Quantity:
@@ -362,8 +398,8 @@ class Motion:
         """Return a force, of which only samples are known."""
         if self.force is None:
             unknown = np.full(self.tables[0].shape[:-1], np.nan)
-            return Track(self.x, unknown, unknown, unknown, self.is_closed)
-        return sampled_track(self.x, self.force(name), is_closed=self.is_closed)
+            return Track(self.x, unknown, unknown, unknown, self.is_closed, self.is_seamed)
+        return sampled_track(self.x, self.force(name), is_closed=self.is_closed, is_seamed=self.is_seamed)
 
     def _path(self, point: str) -> tuple[Track, Track]:
         """Return the world coordinates of a point, without regard to the window."""
@@ -373,7 +409,7 @@ class Motion:
         """Return the track of a coordinate."""
         if name in self.fixed:
             constant = self.fixed[name] + np.zeros_like(self.x)  # type: ignore[index]  # a name is a text
-            return Track(self.x, constant, 0.0 * constant, 0.0 * constant, self.is_closed)
+            return Track(self.x, constant, 0.0 * constant, 0.0 * constant, self.is_closed, self.is_seamed)
         if name not in self.outputs:
             raise RequestError(
                 f"there is no output '{name}', which a measure needs; solve or compile the mechanism with it, or with "
@@ -381,7 +417,7 @@ class Motion:
             )
         k = [str(output) for output in self.outputs].index(name)
         value, rate, acceleration = (table[..., k] for table in self.tables)
-        return Track(self.x, value, rate, acceleration, self.is_closed)
+        return Track(self.x, value, rate, acceleration, self.is_closed, self.is_seamed)
 
     def _cut(self, track: Track) -> Track:
         """Return the part of a track that is in the window."""
@@ -401,8 +437,19 @@ class Motion:
 
     def _as_track(self, value: Value) -> Track:
         """Return a computed quantity as a track of this motion."""
-        like = Track(self.x, self.x, self.x, self.x, self.is_closed)
+        like = Track(self.x, self.x, self.x, self.x, self.is_closed, self.is_seamed)
         return Track.of(like, value if isinstance(value, Taylor) else Taylor(float(value)))
+
+
+def break_places(run: Run) -> list[float]:
+    """Return the arguments of a run, time or driver values, at which derivatives of laws jump.
+
+    Raises:
+        RequestError: As `Motion.of_run`.
+
+    """
+    motion = Motion.of_run(run, with_margin=False)
+    return [one.x for one in motion.breaks(over_time=run.axis == TIME)]
 
 
 def force_of(run: Run, name: str) -> FloatArray:

@@ -86,7 +86,13 @@ def maxima(x: FloatArray, rows: Rows, sign: float = 1.0) -> tuple[FloatArray, Fl
     return np.where(is_known, value, np.nan), np.where(is_known, at, np.nan)
 
 
-def higher_derivatives(rows: Rows, weights: tuple[FloatArray, FloatArray], *, is_closed: bool) -> Rows:
+def higher_derivatives(
+    rows: Rows,
+    weights: tuple[FloatArray, FloatArray],
+    *,
+    is_closed: bool,
+    neighbours: tuple[IntArray, IntArray],
+) -> Rows:
     """Return the third and fourth derivative at the samples, which are sums of numbers of three samples.
 
     Args:
@@ -94,16 +100,16 @@ def higher_derivatives(rows: Rows, weights: tuple[FloatArray, FloatArray], *, is
         weights: (8, n) of rate and acceleration of a sample, then of change, rate and acceleration of two others, for
             the third derivative; and the same for the fourth.
         is_closed: The motion goes round: the others are the neighbours; else at an end the next two samples.
+        neighbours: The numbers of the two others.
 
     Returns:
         Second, third and fourth derivatives, (m, n) each.
 
     """
-    if _compiled:
+    near, far = neighbours
+    if _compiled and not (np.diff(near[1:-1]) != 1).any():  # it knows no breaks
         return _compiled_higher(rows, weights, is_closed=is_closed)
     value, rate, acceleration = rows
-    n = value.shape[1]
-    near, far = neighbours(n, is_closed=is_closed)
     data = [rate, acceleration]
     for other, end, way in ((near, 0, -1.0), (far, -1, 1.0)):
         change = value[:, other] - value

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 
 from kinfmu.motion.quintic import FloatArray, IntArray
@@ -12,7 +15,7 @@ _ROUGH = 1e-3  # of the range of 7 samples; where the rates of both polynomials 
 _PERIODIC = 1e-6  # of the range; a quantity whose first and last sample differ by less goes round
 
 
-def sampled_track(x: FloatArray, value: FloatArray, *, is_closed: bool) -> Track:
+def sampled_track(x: FloatArray, value: FloatArray, *, is_closed: bool, is_seamed: bool = False) -> Track:
     """Return the track of samples (n,) at x, with the rates of the polynomial of degree 6 through 7 samples.
 
     Extremes have an error of order h^7 (h: distance of the samples). Where the samples do not follow a smooth curve, at
@@ -22,8 +25,28 @@ def sampled_track(x: FloatArray, value: FloatArray, *, is_closed: bool) -> Track
         x: (n,) ascending arguments.
         value: (n,) the quantity.
         is_closed: The motion goes round.
+        is_seamed: Derivatives jump at its ends. Inside they jump where two samples have the same argument.
 
     """
+    cuts = np.flatnonzero(np.diff(x) == 0.0) + 1
+    if not len(cuts):
+        return replace(_smooth_track(x, value, is_closed=is_closed and not is_seamed), is_closed=is_closed)
+    parts = [(x[a:b], value[a:b]) for a, b in pairwise([0, *cuts.tolist(), len(x)])]
+    joins = is_closed and not is_seamed and abs(float(value[-1] - value[0])) <= _PERIODIC * float(np.ptp(value))
+    if joins:  # the last part goes on in the first
+        (first_x, first), (last_x, last) = parts[0], parts[-1]
+        parts[0] = np.concatenate([last_x[:-1] - (x[-1] - x[0]), first_x]), np.concatenate([last[:-1], first])
+        del parts[-1]
+    tracks = [_smooth_track(*part, is_closed=False) for part in parts]
+    rows = [np.concatenate([row[k] for row in (track.rows for track in tracks)]) for k in (1, 2)]
+    if joins:
+        count = len(last_x) - 1
+        rows = [np.concatenate([row[count:], row[: count + 1]]) for row in rows]
+    return Track(x, value, rows[0], rows[1], is_closed, is_seamed)
+
+
+def _smooth_track(x: FloatArray, value: FloatArray, *, is_closed: bool) -> Track:
+    """Return the track of samples between which no derivative is known to jump."""
     span = float(np.ptp(value)) if len(value) else 0.0
     wraps = is_closed and abs(float(value[-1] - value[0])) <= _PERIODIC * span
     if len(x) <= _WIDE or not np.isfinite(value).all():

@@ -48,6 +48,8 @@ class Track:
         rate: (..., n) its derivative by x.
         acceleration: (..., n) its second derivative by x.
         is_closed: True if the motion goes round: the last sample is the first, after one period.
+        is_seamed: True if derivatives jump at the ends of a motion that goes round. Inside they jump where two samples
+            have the same argument, one for each side.
 
     """
 
@@ -56,6 +58,7 @@ class Track:
     rate: FloatArray
     acceleration: FloatArray
     is_closed: bool = False
+    is_seamed: bool = False
 
     @classmethod
     def of(cls, like: Track, quantity: Taylor) -> Track:
@@ -63,7 +66,7 @@ class Track:
         parts = (np.asarray(part, float) for part in (quantity.f, quantity.d1, quantity.d2))
         shape = np.broadcast_shapes(*(np.shape(part) for part in (quantity.f, quantity.d1, quantity.d2)), like.x.shape)
         value, rate, acceleration = (np.broadcast_to(part, shape) for part in parts)
-        return cls(like.x, value, rate, acceleration, like.is_closed)
+        return cls(like.x, value, rate, acceleration, like.is_closed, like.is_seamed)
 
     @property
     def taylor(self) -> Taylor:
@@ -101,12 +104,12 @@ class Track:
         of the samples): the polynomial of degree 8 with their values, rates and accelerations.
         """
         _, third, _ = self._higher
-        return Track(self.x, self.rate, self.acceleration, third, self.is_closed)
+        return Track(self.x, self.rate, self.acceleration, third, self.is_closed, self.is_seamed)
 
     def second_derivative(self) -> Track:
         """Return the track of the second derivative; its own derivatives are estimated as in `derivative`."""
         _, third, fourth = self._higher
-        return Track(self.x, self.acceleration, third, fourth, self.is_closed)
+        return Track(self.x, self.acceleration, third, fourth, self.is_closed, self.is_seamed)
 
     @cached_property
     def _higher(self) -> Rows:
@@ -114,11 +117,13 @@ class Track:
 
             f(x_0 + d) = f_0 + v_0 d + a_0 d^2/2 + d^3 g(d):   6 g(0) and 24 g'(0)
 
-        g is the polynomial of degree 5 through two other samples: both neighbours, at an end the next two. Its values
-        are sums of the samples' numbers with weights that depend on x only.
+        g is the polynomial of degree 5 through two other samples: both neighbours, at an end or a break the next two.
+        Its values are sums of the samples' numbers with weights that depend on x only.
         """
+        wraps = self.is_closed and not self.is_seamed
+        near = neighbours_within(self.x, is_closed=wraps)
         found = higher_derivatives(
-            self._flat, _weights(self.x.tobytes(), is_closed=self.is_closed), is_closed=self.is_closed
+            self._flat, _weights(self.x.tobytes(), is_closed=wraps), is_closed=wraps, neighbours=near
         )
         shape = self.value.shape
         return found[0].reshape(shape), found[1].reshape(shape), found[2].reshape(shape)
@@ -167,7 +172,8 @@ class Track:
             turns = (turn, 0.0 * turn, 0.0 * turn)
             rows = [np.concatenate([row, row[..., 1:] + more], -1) for row, more in zip(self.rows, turns, strict=True)]
             whole = Track(np.concatenate([self.x, self.x[1:] + self.span]), rows[0], rows[1], rows[2])
-        least = _NEAR * float(np.min(np.diff(self.x)))
+        steps = np.diff(self.x)
+        least = _NEAR * float(np.min(steps[steps > 0.0]))
         first, last = np.searchsorted(whole.x, begin + least, "right"), np.searchsorted(whole.x, end - least, "left")
         x = np.concatenate([[begin], whole.x[first:last], [end]])
         rows = []
@@ -252,6 +258,15 @@ class Track:
         return tuple(np.where(known, one, np.nan).reshape(shape) for one in (start, stop))  # type: ignore[return-value]
 
 
+def neighbours_within(x: FloatArray, *, is_closed: bool) -> tuple[IntArray, IntArray]:
+    """Return the neighbours of samples; at a break, which is two samples with the same argument, those of one side."""
+    near, far = neighbours(len(x), is_closed=is_closed)
+    before = np.flatnonzero(np.diff(x) == 0.0)
+    near[before], far[before] = before - 1, before - 2
+    near[before + 1], far[before + 1] = before + 2, before + 3
+    return near, far
+
+
 @lru_cache(maxsize=8)
 def _weights(arguments: bytes, *, is_closed: bool) -> tuple[FloatArray, FloatArray]:
     """Return the weights (8, n) of the third and of the fourth derivative at n arguments, as bytes.
@@ -260,7 +275,7 @@ def _weights(arguments: bytes, *, is_closed: bool) -> tuple[FloatArray, FloatArr
     distances d_a and d_b.
     """
     x = np.frombuffer(arguments)
-    near, far = neighbours(len(x), is_closed=is_closed)
+    near, far = neighbours_within(x, is_closed=is_closed)
     d_a, d_b = x[near] - x, x[far] - x
     if is_closed:
         d_a[0] -= x[-1] - x[0]
