@@ -57,7 +57,7 @@ STANDARD_OUTPUT = Path("-")
 
 
 class OutputFile(_File):
-    """A file to write into an existing folder; or_standard_output: '-' is STANDARD_OUTPUT."""
+    """A file to write; missing folders are made with it; or_standard_output: '-' is STANDARD_OUTPUT."""
 
     def __init__(self, *suffixes: str, or_standard_output: bool = False) -> None:
         super().__init__(*suffixes)
@@ -70,8 +70,9 @@ class OutputFile(_File):
         _check_suffix(path, self.suffixes)
         if _is_folder(path):
             raise ValueError(f"{path}: is a folder; the name of a file is needed")
-        if not _is_folder(path.parent):
-            raise ValueError(f"{path}: there is no folder '{path.parent}'")
+        in_the_way = next((one for one in path.parents if exists(one)), None)
+        if in_the_way is not None:
+            raise ValueError(f"{path}: '{in_the_way}' is a file, not a folder")
         return path
 
 

@@ -76,7 +76,6 @@ def main() -> int:
     print(f"\nlargest difference from the closed form: {difference} ({'within' if exact else 'MORE THAN'} {EXACT:g})")
 
     logs = Path("logs")
-    logs.mkdir(exist_ok=True)
     write_mcap(run, logs / "fourbar.mcap")
     write_rrd(run, logs / "fourbar.rrd")
     command = "kinfmu" if shutil.which("kinfmu") else quote(str(Path(sys.executable).with_name("kinfmu")))

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Sequence
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
@@ -24,7 +23,6 @@ from kinfmu.cli.settings import (
     checked_settings,
     set_option,
 )
-from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.files.whole_file import suffix_of
 
 if TYPE_CHECKING:
@@ -112,11 +110,10 @@ def simulate(
         fmu, parameters = _fmu(model, settings, Path(folder), drive, has_inputs=inputs is not None)
         record, recording = _logs(model, mcap, rrd) if is_logged else (None, None)
         is_replaced = record is not None and record.exists()
-        needs_folder = is_logged and mcap is None
         sinks: list[Sink] = [McapLog(record, drawn=is_drawn(names))] if record else []
         if live:
             sinks.append(LiveView())
-        with _logs_folder() if needs_folder else nullcontext(), Progress() as progress, errors_as(str(fmu), model):
+        with Progress() as progress, errors_as(str(fmu), model):
             run = simulated(
                 fmu,
                 drive=drive,
@@ -191,19 +188,3 @@ def _logs(model: str, mcap: Path | None, rrd: Path | None) -> tuple[Path, Path]:
     name = file.stem if suffix_of(file) in (".toml", ".fmu", ".ssp") else file.name
     record = mcap or LOGS / f"{name}.mcap"
     return record, rrd or record.with_suffix(".rrd")
-
-
-@contextmanager
-def _logs_folder() -> Iterator[None]:
-    """Make the folder of logs; remove a new one if the run leaves no file."""
-    existed = LOGS.is_dir()
-    try:
-        LOGS.mkdir(exist_ok=True)
-    except OSError as error:
-        raise KinfmuError(f"{LOGS}: cannot be made ({error.strerror})") from None
-    try:
-        yield
-    except (RequestError, KeyboardInterrupt):
-        if not existed:
-            LOGS.rmdir()
-        raise

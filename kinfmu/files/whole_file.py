@@ -1,10 +1,13 @@
-"""Files that appear whole or not at all: written next to the target under a hidden name, then renamed; suffixes."""
+"""Files that appear whole or not at all: written next to the target under a hidden name, then renamed; suffixes.
+
+Missing folders of a target are made, and removed again if the file is not written.
+"""
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path, PurePath
 from uuid import uuid4
@@ -47,15 +50,34 @@ def replacement(target: Path) -> Iterator[Path]:
 
     """
     temporary = hidden_sibling(target)
+    made: list[Path] = []
     try:
+        made = make_folder(target.parent)
         temporary.open("xb").close()  # not tempfile: its files are readable by their owner only
         yield temporary
         with _alone_in(target.parent):
             check_is_free(target)
             temporary.replace(target)
+        made = []
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
+        remove_folders(made)
+
+
+def make_folder(folder: Path) -> list[Path]:
+    """Make a folder and its parents, and return those that were missing, the innermost first."""
+    missing = [one for one in (folder, *folder.parents) if not one.exists()]
+    if missing:
+        folder.mkdir(parents=True, exist_ok=True)
+    return missing
+
+
+def remove_folders(made: Iterable[Path]) -> None:
+    """Remove folders that `make_folder` returned, as far as they are empty."""
+    with suppress(OSError):
+        for folder in made:
+            folder.rmdir()
 
 
 def hidden_sibling(target: Path) -> Path:

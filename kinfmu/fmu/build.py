@@ -220,7 +220,6 @@ def _file(path: str | Path | None, name: str, *, ssp: bool) -> Path:
 def _write(path: Path, data: bytes) -> None:
     """Write the whole file or none, so that a host never reads an incomplete FMU."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, data)
     except OSError as error:
         raise FmuError(f"{path}: cannot be written ({error.strerror})") from None

@@ -50,7 +50,6 @@ def write_ssp(fmu: Path, path: Path) -> Path:
         f"resources/{name}.ssv": parameter_set(about.interface),
     }
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, zipped(contents, STRUCTURE))
     except OSError as error:
         raise FmuError(f"{path}: cannot be written ({error.strerror})") from None

@@ -8,14 +8,14 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from kinfmu.errors import LogError
-from kinfmu.files.whole_file import check_is_free, hidden_sibling, replacement
+from kinfmu.files.whole_file import check_is_free, hidden_sibling, make_folder, remove_folders, replacement
 
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
     """Yield an empty file in the folder of `path`, which replaces `path` when the block ends without an error.
 
-    After a failure `path` is unchanged. LogError for a folder that is missing or cannot be written.
+    Missing folders are made. After a failure `path` is unchanged. LogError for a folder that cannot be written.
     """
     target = target_of(path)
     try:
@@ -30,23 +30,25 @@ def target_of(path: str | Path) -> Path:
     target = Path(os.path.realpath(path))  # the link is kept
     if target.is_dir():
         raise LogError(f"{path}: is a folder; the name of a file is needed")
-    if not target.parent.is_dir():
-        raise LogError(f"{path}: the folder '{target.parent}' does not exist")
     if target.exists() and not target.is_file():
         raise LogError(f"{path}: is a device or a pipe, which a file would replace; the name of a file is needed")
     return target
 
 
 def check_writable(path: str | Path) -> None:
-    """Raise a LogError if no file can be made at `path`, or if another run is being written to it."""
+    """Raise a LogError if no file can be made at `path`, or if another run is being written to it; leave nothing."""
     target = target_of(path)
     temporary = hidden_sibling(target)
+    made: list[Path] = []
     try:
+        made = make_folder(target.parent)
         check_is_free(target)
         temporary.open("xb").close()
         temporary.unlink()
     except OSError as error:
         raise write_error(path, error) from error
+    finally:
+        remove_folders(made)
 
 
 def write_error(path: str | Path, error: OSError, more: str = "") -> LogError:

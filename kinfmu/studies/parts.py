@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from kinfmu.errors import KinfmuError, StudyError
-from kinfmu.files.whole_file import BeingWrittenError, check_is_free, lock_for_writing, replacement
+from kinfmu.files.whole_file import BeingWrittenError, check_is_free, lock_for_writing, make_folder, replacement
 from kinfmu.studies.definition import Study
 
 SUFFIX = ".parts"
@@ -39,7 +39,7 @@ class PartsFolder:
         self._manifest = self.folder / _MANIFEST
         self._lock: int | None = None
         with _as_study_error(self.folder):
-            self.folder.mkdir(exist_ok=True)
+            make_folder(self.folder)
             self._take(restart=restart)
 
     def _take(self, *, restart: bool) -> None:

@@ -127,8 +127,6 @@ def run_study(
     path = Path(output)
     if suffix_of(path) != RESULTS:
         raise RequestError(f"{path}: results are written as Parquet; the name must end in {RESULTS}")
-    if not path.parent.is_dir():
-        raise RequestError(f"{path}: there is no folder '{path.parent}'")
     if restart or not is_result_of(path, study):
         _run(study, path, workers, dask, progress or _quiet, restart=restart)
     else:

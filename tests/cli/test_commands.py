@@ -74,7 +74,8 @@ def test_new_does_not_overwrite(refuses: Callable[..., str], tmp_path: Path) -> 
 
 
 def test_new_reports_a_file_that_cannot_be_written(fails: Callable[..., str], refuses: Callable[..., str]) -> None:
-    assert refuses("new", "fourbar", "none/mine.toml").endswith("none/mine.toml: there is no folder 'none'")
+    Path("none").touch()
+    assert refuses("new", "fourbar", "none/mine.toml").endswith("none/mine.toml: 'none' is a file, not a folder")
     assert fails("new", "fourbar", "n" * 300 + ".toml").endswith(": cannot be written (File name too long)")
     assert refuses("new", "fourbar", "mine.txt").endswith("mine.txt: its name must end in .toml")
     assert "'forbar' is not in the gallery; did you mean 'fourbar'?" in refuses("new", "forbar", "mine.toml")

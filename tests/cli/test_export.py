@@ -41,7 +41,8 @@ def test_parquet_holds_the_units(record: Path, command: Command, tmp_path: Path)
 
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_every_format_says_where_it_cannot_be_written(suffix: str, record: Path, refuses: Callable[..., str]) -> None:
-    assert refuses("export", record, "-o", f"none/run{suffix}").endswith(f"none/run{suffix}: there is no folder 'none'")
+    name = f"{record}/run{suffix}"
+    assert refuses("export", record, "-o", name).endswith(f"{name}: '{record}' is a file, not a folder")
 
 
 def test_what_cannot_be_exported_is_reported(

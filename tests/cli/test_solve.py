@@ -142,9 +142,10 @@ def test_a_name_or_number_that_the_mechanism_does_not_have_is_reported(
     assert refuses("solve", "fourbar", "-o", "run.csv", *arguments).startswith(message)
 
 
-def test_a_folder_that_is_missing_is_reported(refuses: Callable[..., str]) -> None:
-    message = refuses("solve", "fourbar", "-o", "none/run.csv", "--times", "0:1:1")
-    assert message == "Invalid value for '-o': none/run.csv: there is no folder 'none'"
+def test_a_file_in_place_of_a_folder_is_reported(refuses: Callable[..., str]) -> None:
+    Path("none").touch()
+    message = refuses("solve", "fourbar", "-o", "none/deep/run.csv", "--times", "0:1:1")
+    assert message == "Invalid value for '-o': none/deep/run.csv: 'none' is a file, not a folder"
 
 
 @pytest.mark.parametrize(

@@ -252,9 +252,10 @@ def test_a_failure_while_writing_leaves_the_old_file(run: Run, tmp_path: Path, m
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_missing_folder_is_named(run: Run, tmp_path: Path) -> None:
-    with pytest.raises(LogError, match=r"run\.mcap: the folder '.*nowhere' does not exist$"):
-        write_mcap(run, tmp_path / "nowhere" / "run.mcap")
+def test_a_folder_in_the_place_of_the_file_and_a_file_in_that_of_a_folder_are_named(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(LogError, match=r"run\.mcap: cannot be written \(Not a directory\)$"):
+        write_mcap(run, tmp_path / "file" / "run.mcap")
     with pytest.raises(LogError, match=r"is a folder; the name of a file is needed$"):
         write_mcap(run, tmp_path)
 

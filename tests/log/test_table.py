@@ -89,6 +89,6 @@ def test_an_unknown_kind_of_table_is_refused(run: Run, tmp_path: Path) -> None:
         write_table(run, tmp_path / "run.xls")
 
 
-def test_a_missing_folder_is_named(run: Run, tmp_path: Path) -> None:
-    with pytest.raises(LogError, match=r"the folder '.*nowhere' does not exist$"):
-        write_table(run, tmp_path / "nowhere" / "run.csv")
+def test_missing_folders_are_made(run: Run, tmp_path: Path) -> None:
+    write_table(run, tmp_path / "new" / "deep" / "run.csv")
+    assert (tmp_path / "new" / "deep" / "run.csv").is_file()

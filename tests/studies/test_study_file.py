@@ -155,7 +155,7 @@ def test_variations_and_motions_are_read_with_their_units(tmp_path: Path) -> Non
     assert np.allclose(times, [0.0, 0.005, 0.01, 0.015, 0.02])
 
 
-def test_arguments_of_a_call_are_refused_likewise(tmp_path: Path) -> None:
+def test_arguments_of_a_call_are_refused_likewise() -> None:
     ranges = {"crank": {"from": 15, "to": 25}}
     with pytest.raises(RequestError, match="designs = 0 must be a whole number"):
         kinfmu.study(linkage(), ranges, designs=0)
@@ -163,8 +163,6 @@ def test_arguments_of_a_call_are_refused_likewise(tmp_path: Path) -> None:
         kinfmu.study(linkage(), ranges, workers=0)
     with pytest.raises(RequestError, match=r"rows.csv: results are written as Parquet; the name must end in .parquet"):
         kinfmu.study(linkage(), ranges, output="rows.csv")
-    with pytest.raises(RequestError, match="there is no folder"):
-        kinfmu.study(linkage(), ranges, output=tmp_path / "none" / "rows.parquet")
     with pytest.raises(RequestError, match="give times or inputs, not both: t and crank_angle"):
         kinfmu.study(linkage(), ranges, t=[0.0, 1.0], crank_angle=[0.0, 1.0])
     with pytest.raises(RequestError, match="engine 'fast' is not known"):

@@ -158,11 +158,9 @@ def test_what_was_not_kept_has_no_curves(run: Run, tmp_path: Path) -> None:
     }
 
 
-def test_a_missing_folder_is_named_and_nothing_is_left_behind(run: Run, tmp_path: Path) -> None:
-    with pytest.raises(LogError, match=r"the folder '.*nowhere' does not exist$"):
-        write_rrd(run, tmp_path / "nowhere" / "run.rrd")
+def test_a_run_that_cannot_be_recorded_leaves_nothing_behind(run: Run, tmp_path: Path) -> None:
     with pytest.raises(LogError, match="time of sample 0 is inf s"):
-        write_rrd(dataclasses.replace(run, t=run.t + np.inf), tmp_path / "run.rrd")
+        write_rrd(dataclasses.replace(run, t=run.t + np.inf), tmp_path / "new" / "run.rrd")
     assert not list(tmp_path.iterdir())
 
 
