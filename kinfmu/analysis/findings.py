@@ -114,6 +114,8 @@ class Findings:
         none is determined) and shaking (force and moment): name, value (the peak with its sign), unit, driver, at
         (driver value), at_unit, rms;
         reduced_inertias: name, smallest, largest, unit; undetermined: reactions, and rows that share their load;
+        lift_offs (contacts of cams that would have to pull): joint, force (column), sense (1 if positive values press),
+        unit, driver, at_unit, parts (begin, end), largest_tension (value, at);
         reason (why there are no numbers), samples_without_numbers.
         cams, only of mechanisms with cams: joint, element ('roller', 'knife edge', 'flat face', 'unknown'), driver (in
         whose values `at`, begin and end are), reason (why there are no values), cam, follower, swings (true or false),

@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from kinfmu.analysis.cams import CamFindings
+from kinfmu.analysis.lift_off import LiftOff, lift_offs
 from kinfmu.analysis.measuring import SAMPLES_PER_TURN, turns_of_cycle
 from kinfmu.analysis.singular import DriverRange
 from kinfmu.errors import KinfmuError, RequestError
@@ -64,7 +66,8 @@ class Loading:
 
     over: the motion, as text; efforts: of each driver; inertias: reduced; reaction: the joint that transmits the
     largest determined force; shaking: force and moment on the ground; undetermined: reactions that share a load, with
-    the rows that share it; reason: why there are no numbers, '' if there are; missing: samples without numbers.
+    the rows that share it; reason: why there are no numbers, '' if there are; missing: samples without numbers;
+    lift_offs: contacts of cams that would have to pull.
     """
 
     over: str
@@ -75,6 +78,7 @@ class Loading:
     undetermined: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = ()
     reason: str = ""
     missing: int = 0
+    lift_offs: tuple[LiftOff, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """Return the forces as plain data."""
@@ -85,12 +89,13 @@ class Loading:
             "largest_reaction": None if self.reaction is None else asdict(self.reaction),
             "shaking": [asdict(peak) for peak in self.shaking],
             "undetermined": [{"reactions": list(names), "rows": list(rows)} for names, rows in self.undetermined],
+            "lift_offs": [one.as_json() for one in self.lift_offs],
             "reason": self.reason or None,
             "samples_without_numbers": self.missing,
         }
 
 
-def loading(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Loading | None:
+def loading(plan: SolvePlan, ranges: Sequence[DriverRange], cams: Sequence[CamFindings] = ()) -> Loading | None:
     """Return the forces of a mechanism over its motion; None without masses and loads.
 
     A single driver with a constant speed, or without a law, that turns all the way round makes one cycle, without a law
@@ -99,6 +104,7 @@ def loading(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Loading | None:
     Args:
         plan: The plan of the mechanism.
         ranges: Ranges of its drivers.
+        cams: Its cams.
 
     """
     mechanism = plan.mechanism
@@ -118,7 +124,8 @@ def loading(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Loading | None:
         forces = _Forces(run)
         efforts = tuple(map(forces.peak, _efforts(mechanism)))
         inertias, shaking = tuple(forces.inertias()), tuple(map(forces.peak, ("shaking_force", "shaking_moment")))
-        return Loading(over, efforts, inertias, forces.largest_reaction(), shaking, shared, missing=missing)
+        reaction, lifts = forces.largest_reaction(), forces.lift_offs(cams)
+        return Loading(over, efforts, inertias, reaction, shaking, shared, missing=missing, lift_offs=lifts)
     except KinfmuError as reason:
         return Loading("no motion", undetermined=shared, reason=str(reason))
 
@@ -195,6 +202,10 @@ class _Forces:
         return max(
             (peak for peak in peaks if math.isfinite(peak.value)), key=lambda peak: abs(peak.value), default=None
         )
+
+    def lift_offs(self, cams: Sequence[CamFindings]) -> tuple[LiftOff, ...]:
+        """Return the contacts of cams that would have to pull."""
+        return () if self._motion is None else tuple(lift_offs(self._motion, cams))
 
     def _extremes(self, name: str) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the smallest and the largest value of a force, each with the driver value or time at which it is."""

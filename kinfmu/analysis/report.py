@@ -95,5 +95,5 @@ def check(mechanism: Mechanism) -> Report:
     notes += [cam.note() for cam in cams if cam.note()]
     cut = next((problem for problem in (cam.problem() for cam in cams) if problem is not None), None)
     measured = measurements(mechanism, ranges)
-    forces = loading(plan, ranges)
+    forces = loading(plan, ranges, cams)
     return Report(mechanism, redundancy, cut, plan, ranges, loops, None, tuple(notes), measured, forces, cams)

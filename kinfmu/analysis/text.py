@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from kinfmu.analysis.cam_text import cam_lines
 from kinfmu.analysis.findings import Findings
+from kinfmu.analysis.lift_off import LiftOff
 from kinfmu.analysis.loading import Peak
 from kinfmu.analysis.loops import FourBar, Link, SliderCrank
 from kinfmu.analysis.named_loops import NamedLoop
@@ -260,12 +261,29 @@ def _forces(report: Findings) -> Iterator[ReportLine]:
         yield ReportLine("", f"largest reaction: {loading.reaction.name} {_peak_text(loading.reaction)}")
     for peak in loading.shaking:
         yield ReportLine("", f"{peak.name}: peak {_peak_text(peak)}")
+    for lift in loading.lift_offs:
+        yield ReportLine("", _lift_off_text(lift))
     redundant = {row.row.name: row.row.owner for row in report.redundant}
     for names, rows in loading.undetermined:
         others = [row for row in rows if row in redundant]
         joints = {redundant[row] for row in others}
         shared = [name for name in names if name.partition(".")[0] not in joints]
         yield ReportLine("", f"statically indeterminate: {_names(shared)} share the load with {_names(others)}")
+
+
+def _lift_off_text(lift: LiftOff) -> str:
+    """Return where a follower lifts off, and the tension that would hold it."""
+
+    def at(value: float) -> str:
+        return degrees(value) if lift.at_unit == "rad" else f"{value:.6g} {lift.at_unit}"
+
+    parts = listed([f"{at(begin)} to {at(end)}" for begin, end in lift.parts])
+    kind = "moment" if lift.force.endswith("moment") else "force"
+    sign = "negative" if lift.sense > 0 else "positive"
+    return (
+        f"{lift.joint}: the follower lifts off: contact {kind} {lift.force} {sign} from {parts} of {lift.driver}; "
+        f"largest tension {lift.largest:.6g} {lift.unit} ({lift.driver} at {at(lift.at)})"
+    )
 
 
 def _peak_text(peak: Peak) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from kinfmu.cams.critical import Critical, Cut, Extreme, critical_values
 from kinfmu.cams.placed import CAM_JOINTS, CamJoint, PlacedCam, placed_cam
 from kinfmu.cams.profile import CamProfile, profile_at, turn_of
+from kinfmu.cams.traced import pressing_sign
 
 __all__ = [
     "CAM_JOINTS",
@@ -16,6 +17,7 @@ __all__ = [
     "PlacedCam",
     "critical_values",
     "placed_cam",
+    "pressing_sign",
     "profile_at",
     "turn_of",
 ]

@@ -231,6 +231,19 @@ def _on_tangents(
     return Traced(_angle(m / out), follower, along, out * (h + 1j * h1), out, h + h2, offset, turned - 1.0)
 
 
+def pressing_sign(placed: PlacedCam) -> int:
+    """Return 1 if a positive reaction of the joint presses follower and cam together, -1 if a negative one does.
+
+    The reaction of a joint with a given curve is along its outward normal. That of a lift is along the lift, which may
+    go towards the cam.
+    """
+    if isinstance(placed.joint, CamRoller | CamFlatFace):
+        return 1
+    at = traced(placed, np.zeros(1))
+    outward = at.normal * np.exp(1j * at.angle)
+    return 1 if float((outward * at.along.conj()).real[0]) > 0.0 else -1
+
+
 def _motion(placed: PlacedCam, touching: ComplexArray) -> ComplexArray:
     """Return the unit vectors in which points of the follower move, all in the holder's frame."""
     if placed.pivot is None:

@@ -8,6 +8,7 @@ from kinfmu.codegen.forces import STAGES
 from kinfmu.equations.graph import Node, symbols
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.fmu.interface import Variable
+from kinfmu.joints import CamFlatFace, CamOscillating, CamRoller, CamTranslating
 from kinfmu.mechanism import LawConstant, Mechanism
 from kinfmu.mechanism.force_names import external_names
 from kinfmu.plan import SolvePlan
@@ -36,6 +37,14 @@ _ROWS = {
     "force_x": "force along x",
     "force_y": "force along y",
     "moment": "moment",
+}
+_OF_CAMS = {
+    CamRoller: "force of the cam on its follower, from pole to roller, positive where pressed",
+    CamFlatFace: "force of the cam on its follower, along the face's normal, positive where pressed",
+    CamTranslating: "force of the cam on its follower, along the lift's axis, positive where pressed if the axis "
+    "points away from the cam",
+    CamOscillating: "moment of the cam on its follower, counter-clockwise; positive where pressed if the lift moves "
+    "it away from the cam",
 }
 
 
@@ -149,7 +158,7 @@ def force_variables(plan: SolvePlan, steps: ForceSteps) -> Iterator[Variable]:
             "Real",
             "output",
             "continuous",
-            _description(plan, name),
+            variable_description(plan, name),
             initial="calculated",
             unit=unit_of(name.quantity, plan.mechanism.length_unit),
             dependencies=inputs,
@@ -163,10 +172,13 @@ def force_variables(plan: SolvePlan, steps: ForceSteps) -> Iterator[Variable]:
         )
 
 
-def _description(plan: SolvePlan, name: ForceName) -> str:
+def variable_description(plan: SolvePlan, name: ForceName) -> str:
     if not name.owner:
         return _WORDS[name.noun]
     if name in reaction_names_of(plan.mechanism):
+        joint = next(one for one in plan.mechanism.joints if one.name == name.owner)
+        if type(joint) in _OF_CAMS:
+            return f"Joint {name.owner}: {_OF_CAMS[type(joint)]}"
         return f"Joint {name.owner}: {_ROWS.get(name.noun, name.noun)} of its first body on its second"
     noun, _, other = name.noun.partition(".")
     if other:

@@ -1,0 +1,97 @@
+"""Where the followers of cams would lift off: the contact would have to pull, which a cam without a groove cannot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from kinfmu.analysis.cams import CamFindings
+from kinfmu.cams import pressing_sign
+from kinfmu.mechanism.force_names import names_of_rows
+from kinfmu.motion.motion import Motion
+from kinfmu.motion.track import Track
+from kinfmu.units import unit_of
+
+_ROUNDING = 1e-9  # of the largest contact force; smaller tensions are rounding
+
+
+@dataclass(frozen=True)
+class LiftOff:
+    """A contact of a cam that would have to pull.
+
+    joint: the cam's; force: the column of the contact force or moment; sense: 1 if a positive value presses
+    follower and cam together, -1 if a negative one does; parts: where it would pull, each from begin to end, in values
+    of the driver or times; of a motion that goes round a part may go on past its end; largest, at: the largest tension,
+    as a positive number, and where it occurs.
+    """
+
+    joint: str
+    force: str
+    sense: int
+    unit: str
+    driver: str
+    at_unit: str
+    parts: tuple[tuple[float, float], ...]
+    largest: float
+    at: float
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the values as plain data."""
+        return {
+            "joint": self.joint,
+            "force": self.force,
+            "sense": self.sense,
+            "unit": self.unit,
+            "driver": self.driver,
+            "at_unit": self.at_unit,
+            "parts": [{"begin": begin, "end": end} for begin, end in self.parts],
+            "largest_tension": {"value": self.largest, "at": self.at},
+        }
+
+
+def lift_offs(motion: Motion, cams: Sequence[CamFindings]) -> Iterator[LiftOff]:
+    """Yield the contacts of cams that would have to pull during a motion with forces.
+
+    A lever of which no contact is known has no sense in which it is pressed, so it is left out.
+    """
+    for cam in cams:
+        if cam.cam is None:
+            continue
+        (name,) = names_of_rows(cam.cam.joint)
+        sense = pressing_sign(cam.cam)
+        track = motion.track(name)
+        if sense < 0:
+            track = track.negative()
+        if not track.is_known:
+            continue
+        low, high = track.minimum(), track.maximum()
+        if -float(low.value) <= _ROUNDING * max(-float(low.value), float(high.value)):
+            continue
+        unit = motion.mechanism.length_unit
+        yield LiftOff(
+            joint=cam.joint,
+            force=name,
+            sense=sense,
+            unit=unit_of(name.quantity, unit),
+            driver=motion.driver,
+            at_unit=unit_of(motion.driver_quantity, unit),
+            parts=tuple(_negative_parts(motion, track)),
+            largest=-float(low.value),
+            at=float(motion.driven_at(np.asarray(low.x))),
+        )
+
+
+def _negative_parts(motion: Motion, track: Track) -> Iterator[tuple[float, float]]:
+    """Yield the parts of a motion in which a quantity is negative, as values of the driver."""
+    crossings = np.sort(track.crossings(np.asarray(0.0))[1])
+    ends = [float(track.x[0]), *crossings.tolist(), float(track.x[-1])]
+    parts = [(a, b) for a, b in pairwise(ends) if b > a and track.at(np.array([0.5 * (a + b)]))[0] < 0]
+    if track.is_closed and len(parts) > 1 and parts[0][0] == ends[0] and parts[-1][1] == ends[-1]:
+        parts = [*parts[1:-1], (parts[-1][0], parts[0][1])]  # one part goes on past the end
+    for part in parts:
+        begin, end = (float(one) for one in motion.driven_at(np.array(part)))
+        yield begin, end

@@ -1,0 +1,143 @@
+"""The contact force of cams against free bodies, for every joint of a cam: positive where the follower is pressed.
+
+All followers move by A cos(theta) away from the cam, theta: the cam's angle. So the contact force is
+
+    m (g - A w^2 cos theta)
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu.fmu.force_variables import variable_description
+from kinfmu.mechanism.force_names import reaction_names_of
+from kinfmu.mechanism.toml_file import parse
+
+MASS, GRAVITY, SPEED, AMPLITUDE = 2.0, 9.81, 60.0, 0.004
+HEAD = """
+name = "tappet"
+[units]
+length = "m"
+[gravity]
+x = 0
+y = "-9.81 m/s2"
+[bodies.cam]
+points = { O = [0, 0] }
+[drivers.cam]
+type = "angle"
+of = "cam"
+law = "constant_speed"
+speed = "60 rad/s"
+[joints.O]
+type = "revolute"
+between = ["ground.O", "cam.O"]
+[joints.lift]
+law = "harmonic"
+frequency = 1
+"""
+SLIDING = """
+[bodies.ground]
+points = { O = [0, 0], G = [0, 0] }
+[bodies.stem]
+mass = "2 kg"
+points = { roller = [0, 0] }
+start = { x = 0, y = 0.05 }
+[joints.guide]
+type = "translational"
+between = ["ground.G", "stem.roller"]
+axis = "90 deg"
+"""
+COS = 'amplitude = 0.004\nphase = "90 deg"\n'
+JOINTS = {
+    "up": COS + 'type = "cam_translating"\nbetween = ["ground.O", "stem.roller"]\ncam = "cam"\naxis = "90 deg"\n'
+    "offset = 0.05\nroller_radius = 0.01",
+    "down": COS.replace("= 0", "= -0")
+    + 'type = "cam_translating"\nbetween = ["ground.O", "stem.roller"]\ncam = "cam"\n'
+    'axis = "270 deg"\noffset = -0.05\nroller_radius = 0.01',
+    "face": COS + 'type = "cam_translating"\nbetween = ["ground.O", "stem.roller"]\ncam = "cam"\naxis = "90 deg"\n'
+    'offset = 0.05\nnormal = "90 deg"',
+    "roller": 'amplitude = 0.004\ntype = "cam_roller"\nbetween = ["cam.O", "stem.roller"]\nstart = 0.05',
+    "flat": 'amplitude = 0.004\ntype = "cam_flat_face"\nbetween = ["cam.O", "stem.roller"]\nstart = 0.05\n'
+    'normal = "90 deg"',
+}  # r(angle) and h(angle) = 0.05 + 0.004 sin(90 deg - theta)
+
+
+def sliding(joint: str) -> kinfmu.Mechanism:
+    return parse(HEAD + JOINTS[joint] + SLIDING)
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_contact_force_of_sliding_followers(joint: str) -> None:
+    theta = np.linspace(0.1, math.tau, 41)
+    run = kinfmu.solve(sliding(joint), cam_angle=theta, cam_speed=SPEED)
+    np.testing.assert_allclose(run["stem.y"], 0.05 + AMPLITUDE * np.cos(theta), atol=1e-15)
+    exact = MASS * (GRAVITY - AMPLITUDE * SPEED**2 * np.cos(theta))
+    sense = -1.0 if joint == "down" else 1.0  # the lift of a cam may go towards it
+    np.testing.assert_allclose(sense * run["lift.force"], exact, rtol=1e-12, atol=1e-11)
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_check_reports_where_sliding_followers_lift_off(joint: str) -> None:
+    report = kinfmu.check(sliding(joint))
+    assert report.loading is not None
+    (found,) = report.loading.lift_offs
+    end = math.acos(GRAVITY / (AMPLITUDE * SPEED**2))
+    ((begin, stop),) = found.parts
+    assert (math.tau - begin, stop) == pytest.approx((end, end), rel=1e-8)
+    assert found.largest == pytest.approx(MASS * (AMPLITUDE * SPEED**2 - GRAVITY), rel=1e-9)
+    assert math.remainder(found.at, math.tau) == pytest.approx(0.0, abs=1e-6)
+    assert (found.force, found.sense, found.unit) == ("lift.force", -1 if joint == "down" else 1, "N")
+    sign = "positive" if joint == "down" else "negative"
+    text = (
+        f"lift: the follower lifts off: contact force lift.force {sign} from 312.941 deg to 47.0586 deg of cam; "
+        "largest tension 9.18 N (cam at 0 deg)"
+    )
+    assert text in str(report)
+
+
+@pytest.mark.parametrize(("side", "sense"), [(-1.0, 1), (1.0, -1)])
+def test_moment_on_a_lever(side: float, sense: int) -> None:
+    """A lever with its centre of mass at the pivot: the moment on it is its inertia times its acceleration.
+
+    With the pivot left of the cam, counter-clockwise is away from the cam; right of it, clockwise.
+    """
+    amplitude = 0.06 * sense
+    text = HEAD + (
+        f'type = "cam_oscillating"\nbetween = ["ground", "lever"]\ncam = "cam"\namplitude = {amplitude}\n'
+        'phase = "90 deg"\ncontact = "lever.R"\nroller_radius = 0.005\n'
+        f"[bodies.ground]\npoints = {{ O = [0, 0], G = [{side * 0.1}, 0.05] }}\n"
+        f"[bodies.lever]\nmass = 1\ninertia = 0.02\ncenter_of_mass = [0, 0]\n"
+        f"points = {{ G = [0, 0], R = [{-side * 0.1}, 0] }}\nstart = {{ x = {side * 0.1}, y = 0.05, phi = 0 }}\n"
+        '[joints.G]\ntype = "revolute"\nbetween = ["ground.G", "lever.G"]\n'
+    )
+    mechanism = parse(text)
+    theta = np.linspace(0.1, math.tau, 41)
+    run = kinfmu.solve(mechanism, cam_angle=theta, cam_speed=SPEED)
+    np.testing.assert_allclose(run["lift.moment"], -0.02 * amplitude * SPEED**2 * np.cos(theta), rtol=1e-11, atol=1e-11)
+    report = kinfmu.check(mechanism)
+    assert report.loading is not None
+    (found,) = report.loading.lift_offs
+    assert (found.force, found.sense, found.unit) == ("lift.moment", sense, "N m")
+    ((begin, end),) = found.parts
+    assert (begin, end) == pytest.approx((1.5 * math.pi, 0.5 * math.pi), rel=1e-8)
+    assert found.largest == pytest.approx(0.02 * 0.06 * SPEED**2, rel=1e-9)
+
+
+def test_a_pressed_follower_has_no_such_line() -> None:
+    report = kinfmu.check(parse((HEAD + JOINTS["up"] + SLIDING).replace("60 rad/s", "40 rad/s")))
+    assert report.loading is not None
+    assert report.loading.lift_offs == ()
+    assert "lifts off" not in str(report)
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_the_variable_of_an_fmu_states_its_sign(joint: str) -> None:
+    mechanism = sliding(joint)
+    (name,) = (name for name in reaction_names_of(mechanism) if name.owner == "lift")
+    text = variable_description(kinfmu.check(mechanism).plan, name)
+    assert text.startswith("Joint lift: force of the cam on its follower, ")
+    assert "positive where pressed" in text
