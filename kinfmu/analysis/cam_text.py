@@ -14,7 +14,11 @@ def cam_lines(cam: CamFindings) -> list[str]:
     placed, found = cam.cam, cam.critical
     if placed is None or found is None:
         return [f"{cam.joint}: no profile, because {cam.reason}"]
-    texts = [f"{cam.joint}: {placed.cam} moves {placed.follower}, {_element(cam, placed)}", _pressure(cam, found)]
+    texts = [f"{cam.joint}: {placed.cam} moves {placed.follower}, {_element(cam, placed)}"]
+    if cam.program:
+        parts = [f"{part} {degrees(begin)} to {degrees(end)}" for part, begin, end in cam.program]
+        texts.append(f"program over {cam.driver}: {', '.join(parts)}")
+    texts.append(_pressure(cam, found))
     if not cam.is_cut:
         texts.append(_curvature(cam, found))
     if found.width is not None:

@@ -13,11 +13,23 @@ from numpy.typing import ArrayLike
 
 from kinfmu.analysis.driver_path import DriverPath, follow
 from kinfmu.analysis.values import degrees
-from kinfmu.cams import CAM_JOINTS, CamJoint, CamProfile, Critical, Extreme, PlacedCam, critical_values, placed_cam
+from kinfmu.cams import (
+    CAM_JOINTS,
+    CamJoint,
+    CamProfile,
+    Critical,
+    Extreme,
+    PlacedCam,
+    critical_values,
+    placed_cam,
+    pressing_sign,
+)
 from kinfmu.cams.profile import TURN, angles_within, profile_at
+from kinfmu.cams.traced import traced
 from kinfmu.drivers import Driver
 from kinfmu.errors import KinfmuError, MechanismError, RequestError, listed, suggestion
 from kinfmu.joints import CamFlatFace
+from kinfmu.laws import MotionSequence
 from kinfmu.measures import AngleBetween
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
@@ -29,6 +41,7 @@ from kinfmu.solver.python import Pose
 
 SLIDING_LIMIT, SWINGING_LIMIT = math.radians(30.0), math.radians(45.0)  # [rad], usual for pressure angles
 _ANGLES = 361  # of a table by default, one a degree
+_SAME_ANGLE = 1e-7  # [rad]; closer angles are equal
 
 
 @dataclass(frozen=True)
@@ -68,6 +81,29 @@ class CamFindings:
     def limit(self) -> float:
         """The usual limit of the pressure angle [rad]: 30 degrees, of swinging followers 45."""
         return SLIDING_LIMIT if self.cam is None or self.cam.pivot is None else SWINGING_LIMIT
+
+    @property
+    def program(self) -> tuple[tuple[str, float, float], ...]:
+        """The parts of a law with segments, by begin: 'rise', 'dwell' or 'return', begin and end as driver values.
+
+        A rise moves the follower away from the cam while the driver's value grows.
+        """
+        if self.cam is None or self.critical is None or not isinstance(law := self.cam.joint.law, MotionSequence):
+            return ()
+        edges = law.begin + np.cumsum([0.0, *(segment.duration for segment in law.segments)])
+        angles = traced(self.cam, edges).angle  # of the cam
+        outwards = pressing_sign(self.cam)
+        parts = []
+        for segment, (a, b) in zip(law.segments, pairwise(angles.tolist()), strict=True):
+            ends = [self.at(a % TURN), self.at(b % TURN)]
+            inside = (self.at((a + 0.01 * (b - a)) % TURN) - ends[0]) % TURN  # small if the driver's value grows
+            grows = inside < math.pi
+            lifted = segment.rise * outwards * (1.0 if grows else -1.0)
+            begin, end = ends if grows else ends[::-1]
+            begin = 0.0 if TURN - begin < _SAME_ANGLE else begin
+            end = TURN if end < _SAME_ANGLE else end
+            parts.append(("rise" if lifted > 0.0 else "return" if lifted < 0.0 else "dwell", begin, end))
+        return tuple(sorted(parts, key=lambda part: part[1]))
 
     def place(self, angle: float) -> str:
         """Return an angle of the cam as the value of the driver: 'cam at 40 deg'."""
@@ -140,6 +176,8 @@ class CamFindings:
             return None if extreme is None else {"value": extreme.value, "at": self.at(extreme.at)}
 
         values: dict[str, Any] = {"reason": self.reason or None}
+        if self.program:
+            values["program"] = [{"part": part, "begin": begin, "end": end} for part, begin, end in self.program]
         if found is not None and self.cam is not None:
             values |= {
                 "cam": self.cam.cam,

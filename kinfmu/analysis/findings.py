@@ -119,9 +119,10 @@ class Findings:
         reason (why there are no numbers), samples_without_numbers.
         cams, only of mechanisms with cams: joint, element ('roller', 'knife edge', 'flat face', 'unknown'), driver (in
         whose values `at`, begin and end are), reason (why there are no values), cam, follower, swings (true or false),
-        roller_radius; value and at of smallest_pressure_angle, largest_pressure_angle, smallest_convex_radius and
-        smallest_concave_radius (of the profile), smallest_pitch_radius, gouge (depth); undercut: begin, end; face: low
-        and high (ends of the contact on a flat face); null where there is none.
+        roller_radius, program (of laws with segments: part, begin, end); value and at of smallest_pressure_angle,
+        largest_pressure_angle, smallest_convex_radius and smallest_concave_radius (of the profile),
+        smallest_pitch_radius, gouge (depth); undercut: begin, end; face: low and high (ends of the contact on a flat
+        face); null where there is none.
         notes: text; problem: text or null. `kinfmu check --json` adds matrices and assemblies with their options.
         """
         plan, mechanism = self.plan, self.mechanism

@@ -9,6 +9,8 @@ import numpy as np
 from kinfmu.equations.system import System, placement
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.joints.cam import Cam
+from kinfmu.joints.cam_flat_face import CamFlatFace
+from kinfmu.joints.cam_roller import CamRoller
 from kinfmu.laws import External
 from kinfmu.measures.placement import Placement
 from kinfmu.mechanism import Mechanism
@@ -31,7 +33,8 @@ def motion_of(run: Run, name: str) -> tuple[FloatArray, str]:
 
     Args:
         run: A run that holds its mechanism and the positions, velocities and accelerations of all coordinates.
-        name: A coordinate such as 'slider.x', a point of interest's, or a cam joint for its follower's lift.
+        name: A coordinate such as 'slider.x', a point of interest's, or a cam joint for its follower's lift: of
+            cam_roller the radius of the pitch curve at the roller, of cam_flat_face the distance of the face.
 
     Returns:
         (n, 4) values, rates, accelerations and jerks; the kind.
@@ -79,9 +82,13 @@ def motion_of(run: Run, name: str) -> tuple[FloatArray, str]:
 def _quantity(mechanism: Mechanism, name: str, at: Placement) -> tuple[Any, str]:
     """Return a coordinate or the lift of a cam as a jet, and its kind."""
     owner, _, axis = name.rpartition(".")
-    cams = {joint.name: joint for joint in mechanism.joints if isinstance(joint, Cam)}
-    if name in cams:
-        return cams[name].follower().value(at) - cams[name].offset, cams[name].led
+    cams = {joint.name: joint for joint in mechanism.joints if isinstance(joint, Cam | CamRoller | CamFlatFace)}
+    cam = cams.get(name)
+    if isinstance(cam, Cam):
+        return cam.follower().value(at) - cam.offset, cam.led
+    if cam is not None:
+        law, argument = cam.led_by(at)
+        return law.at(argument), cam.law_kinds[0]
     bodies = [body.name for body in mechanism.moving_bodies]
     if axis == "phi" and owner in bodies:
         return at.angle(owner), "angle"

@@ -15,6 +15,7 @@ from kinfmu.draw import svaj
 from kinfmu.errors import RequestError
 from kinfmu.motion.jerk import motion_of
 from kinfmu.run.channels import select
+from tests.analysis.test_lift_off import sliding
 from tests.mechanisms import slider_crank
 
 CAM = """
@@ -105,3 +106,13 @@ def test_jerk_has_a_gap_at_a_bridge_and_is_refused_if_it_is_not_known() -> None:
         motion_of(part, "crank.phi")
     with pytest.raises(kinfmu.KinfmuError, match=r"^the run does not hold 'crank\.omega'"):
         motion_of(select(run, ["q"]), "crank.phi")
+
+
+@pytest.mark.parametrize("joint", ["roller", "flat"])
+def test_jerk_of_followers_on_given_cams(joint: str) -> None:
+    """The law's value is the height 0.05 + 0.004 cos theta of the follower."""
+    theta = np.linspace(0.1, 6.0, 9)
+    table, kind = motion_of(kinfmu.solve(sliding(joint), cam_angle=theta, cam_speed=1.0), "lift")
+    exact = [np.cos(theta), -np.sin(theta), -np.cos(theta), np.sin(theta)]
+    np.testing.assert_allclose(table, 0.004 * np.array(exact).T + [0.05, 0.0, 0.0, 0.0], atol=1e-14)
+    assert kind == "length"
