@@ -191,10 +191,10 @@ def _line(shape: Shape, slide: Slide | None, numbers: Mapping[str, int]) -> dict
 def label_of(place: NumberPath) -> str:
     """Return the place of a number in words: 'crank.P x', 'AB length'."""
     if place[0] == "bodies":
-        _, body, _, *rest = place
-        if len(rest) == 2:
-            return f"{body}.{rest[0]} {AXES[int(rest[1])]}"
-        return f"{body} {' '.join(map(str, place[2:]))}"
+        _, body, *rest = place
+        if isinstance(rest[-1], int):
+            return f"{body}.{rest[-2]} {AXES[rest[-1]]}"
+        return f"{body} {' '.join(map(str, rest))}"
     return " ".join(str(part) for part in place[1:] if part != "law")
 
 

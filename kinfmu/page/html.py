@@ -25,6 +25,7 @@ _SCRIPTS = (
     "engine",
     "forms",
     "ranges",
+    "branches",
     "linkage",
     "instants",
     "marks",

@@ -16,6 +16,13 @@
 #define LARGEST_RATE 1e100   /* of drivers; squares of much larger numbers are infinite */
 #define LARGEST_NUMBER 1e30  /* of parameters: as mechanism files have them */
 #define CLOSED 1e-10         /* gap of rows that close, relative to the size */
+#define TURN 6.283185307179586
+#define SAME 1e-6            /* difference of poses of one branch, in radians and sizes */
+#define NEAR 0.1             /* the same, at singular poses, from which no branch can be followed */
+#define SHORTEST 1e-13       /* step between parameters that are followed from the pose shown */
+
+/* What became of parameters to bind; the order is that of web/engine.js. */
+typedef enum { REFUSED, BOUND, UNREACHED, OTHER_BRANCH } binding;
 
 /* The pose shown, and another solver with the same parameters: for sweeps, and for parameters that may have no solution. */
 static kf_follower followers[2];
@@ -107,13 +114,72 @@ static bool starts(kf_follower *follower)
     return !is_elsewhere || KF_GOOD(kf_followed(follower, there[0])->status);
 }
 
+/* Return the largest difference of two poses with the same parameters, in radians and sizes, without whole turns. */
+static double apart(const kf_solver *solver, kf_pose *here, kf_pose *there)
+{
+    double largest = 0.0;
+    int k;
+    kf_motion(solver, here, NULL, NULL, swept[0], NULL, NULL);
+    kf_motion(solver, there, NULL, NULL, swept[1], NULL, NULL);
+    for (k = 0; k < KF_OUTPUTS; ++k) {
+        double gap = swept[0][k] - swept[1][k];
+        gap = kf_output_is_angle[k] ? gap - TURN * floor(gap / TURN + 0.5) : gap / KF_SIZE;
+        largest = fmax(largest, fabs(gap));
+    }
+    return largest;
+}
+
+/* Return whether a determinant has another sign: branches that cross nearby come as close as any tolerance. */
+static bool is_across(const kf_pose *here, const kf_pose *there)
+{
+    int k;
+    for (k = 0; k < KF_BLOCKS; ++k) {
+        if (here->found.determinants[k] * there->found.determinants[k] < 0.0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Bind the settings to a follower with those bound now; if the pose shown is to stay on its branch, go to it.
+ *
+ * That branch is followed from the pose shown with the drivers at rest, from the values bound to the settings. The new
+ * pose itself is that of the mechanism with these values, as everywhere: followed from the start of its laws.
+ */
+static binding bound_by(kf_follower *next, bool stays)
+{
+    static kf_pose expected;
+    kf_pose *const from = pose_of(&followers[shown]), *pose;
+    double u[KF_DRIVERS];
+    kf_continuation path;
+    bool is_known;
+    memcpy(u, KF_POSE_U(from), sizeof u);
+    expected = *from;
+    is_known = stays && kf_continued(&next->solver, bound, settings, u, SHORTEST, &expected, &path);
+    if (!kf_solver_bind(&next->solver, settings) || !starts(next)) {
+        return REFUSED;
+    }
+    if (!stays) {
+        kf_restart(next);
+        return BOUND;
+    }
+    pose = kf_followed(next, u);
+    if (!KF_GOOD(pose->status)) {
+        return UNREACHED;
+    }
+    if (is_known ? apart(&next->solver, &expected, pose) > SAME || is_across(&expected, pose)
+                 : from->found.margin > KF_UNDECIDED || apart(&next->solver, from, pose) > NEAR) {
+        return OTHER_BRANCH;
+    }
+    return BOUND;
+}
+
 /* Take over the follower whose parameters are set, and set those of the other one to the same. */
 static void show(int number)
 {
     shown = number;
     memcpy(&followers[1 - number].solver, &followers[number].solver, KF_SOLVER_STATE);
-    kf_restart(&followers[0]);
-    kf_restart(&followers[1]);
+    kf_restart(&followers[1 - number]);
 }
 
 static void read_model(void)
@@ -129,33 +195,38 @@ void kf_page_start(void)
     memcpy(settings, kf_parameters_written, KF_PARAMETERS * sizeof(double));
     memcpy(settings + KF_PARAMETERS, kf_constants_written, KF_CONSTANTS * sizeof(double));
     memcpy(bound, settings, sizeof bound);
+    kf_restart(&followers[0]);
     show(0);
     read_model();
 }
 
-/* Set the parameters to the settings; if they have no solution, those bound before stay, and so does the pose. */
-bool kf_page_bind(void)
+/* Set the parameters to the settings; if they have no solution, those bound before stay, and so does the pose.
+ *
+ * stays: the pose has the driver values shown and lies on the branch shown, or the settings are refused; otherwise the
+ * next pose is followed from the start.
+ */
+int kf_page_bind(bool stays)
 {
     kf_follower *const next = &followers[1 - shown];
-    if (!is_accepted()) {
-        message = refusal;
-        memcpy(settings, bound, sizeof bound);
-        return false;
-    }
-    kf_restart(next);
-    if (kf_solver_bind(&next->solver, settings) && starts(next)) {
-        show(1 - shown);
-        memcpy(bound, settings, sizeof bound);
-        read_model();
-        message = "";
-        return true;
-    }
-    memcpy(refusal, next->solver.message, sizeof refusal);
+    binding found = REFUSED;
+    refusal[0] = '\0';
     message = refusal;
-    memcpy(&next->solver, &followers[shown].solver, KF_SOLVER_STATE);
-    kf_restart(next);
+    if (is_accepted()) {
+        kf_restart(next);
+        found = bound_by(next, stays);
+        if (found == BOUND) {
+            show(1 - shown);
+            memcpy(bound, settings, sizeof bound);
+            read_model();
+            message = "";
+            return BOUND;
+        }
+        memcpy(refusal, next->solver.message, sizeof refusal);
+        memcpy(&next->solver, &followers[shown].solver, KF_SOLVER_STATE);
+        kf_restart(next);
+    }
     memcpy(settings, bound, sizeof bound);
-    return false;
+    return found;
 }
 
 /* Append "row AB" or "rows C.x, C.y" and what they do, in the form of the verb for one or for several. */

@@ -31,18 +31,17 @@ class Opened(NamedTuple):
 
 
 def opened(mechanism: Mechanism) -> Opened:
-    """Return a mechanism with parameters in place of the plain numbers of its points and joints.
+    """Return a mechanism with parameters in place of the plain numbers of its bodies, joints and loads.
 
-    These are coordinates of points, and lengths, angles, offsets and ratios of joints. Numbers given by expressions
-    stay expressions, constants of laws can be set anyway, and laws of cams and couplings stay numbers.
+    These are coordinates of points, masses and moments of inertia, lengths, angles, offsets and ratios of joints,
+    and constants of loads and of their laws. Numbers given by expressions stay expressions, constants of the
+    drivers' laws can be set anyway, and laws of cams and couplings and tables stay numbers.
     """
     places: dict[str, NumberPath] = {}
     parameters: dict[str, Parameter] = {}
 
     def open_number(place: NumberPath, value: Any, quantity: Quantity) -> Any:
-        is_point = place[0] == "bodies" and place[2] == "points"
-        is_of_joint = place[0] == "joints" and "law" not in place
-        if not (is_point or is_of_joint) or type(value) is not float:
+        if type(value) is not float or not _can_be_opened(place, value):
             return value
         name = _unused(f"opened_{len(places)}", mechanism)
         places[name] = place
@@ -51,9 +50,22 @@ def opened(mechanism: Mechanism) -> Opened:
 
     members = mechanism.members.changed(open_number)
     changed = replace(
-        mechanism, bodies=members.bodies, joints=members.joints, parameters={**mechanism.parameters, **parameters}
+        mechanism,
+        bodies=members.bodies,
+        joints=members.joints,
+        loads=members.loads,
+        parameters={**mechanism.parameters, **parameters},
     )
     return Opened(changed, places)
+
+
+def _can_be_opened(place: NumberPath, value: float) -> bool:
+    """Return whether a page can set the number of a place; a body without a mass has zeros that are in no file."""
+    if place[0] == "bodies":
+        return place[2] == "points" or (place[2] != "start" and value != 0.0)
+    if place[0] == "joints":
+        return "law" not in place
+    return place[0] == "loads" and "points" not in place
 
 
 def place_text(place: NumberPath) -> str:

@@ -155,7 +155,7 @@ def test_bound_parameters_equal_the_native_engine_to_the_bit(
     u, ud, udd = driven_of(start)
     given = {"crank_angle": u[:, 0], "crank_speed": ud[:, 0], "crank_acceleration": udd[:, 0]}
     expected = native("jansen_leg").solve(parameters=OTHER_LEG, **given)
-    assert bind == {"ok": True, "message": ""}
+    assert bind == {"ok": True, "result": "bound", "message": ""}
     assert np.array_equal(table(sweep["values"], 3 * expected.values.shape[1]), rows_of(expected))
     assert driven == {"u": [0.75], "ud": [3.0], "udd": [0.0]}
     assert status == Status.OK
@@ -173,7 +173,11 @@ def test_parameters_without_a_solution_leave_those_before(
     if all(value == value for value in changed.values()):
         with pytest.raises(KinfmuError) as caught:
             native("jansen_leg").solve(np.zeros(1), parameters=changed)
-        assert bind == {"ok": False, "message": str(caught.value)}
+        assert bind == {"ok": False, "result": "refused", "message": str(caught.value)}
     else:
-        assert bind == {"ok": False, "message": "crank.speed = nan must be a number of at most 1e+30"}
+        assert bind == {
+            "ok": False,
+            "result": "refused",
+            "message": "crank.speed = nan must be a number of at most 1e+30",
+        }
     assert (after, parameters) == (q, settings({}))

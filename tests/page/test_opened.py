@@ -104,7 +104,7 @@ def test_binding_a_length_equals_the_file_with_that_length(crank_rocker: dict[st
     found = table(sweep["values"], 3 * len(outputs))
     columns = [outputs.index(name) for name in expected.outputs]
     found = found[:, [order * len(outputs) + column for order in range(3) for column in columns]]
-    assert bind == {"ok": True, "message": ""}
+    assert bind == {"ok": True, "result": "bound", "message": ""}
     assert set(sweep["status"]) == {Status.OK}
     assert np.abs(found - rows).max() < CLOSE * np.abs(rows).max()
     assert np.array_equal(table(points, 2), list(changed.body_points.values()))

@@ -12,7 +12,7 @@ import kinfmu
 from kinfmu import Mechanism
 from kinfmu.gallery.chains import fourbar_chain
 from kinfmu.page import page
-from tests.page.browser import Browser, browser, needs_browser
+from tests.page.browser import PHONE, Browser, browser, needs_browser
 
 pytestmark = needs_browser
 LARGEST = 300_000  # [bytes] of a page of the gallery
@@ -112,3 +112,59 @@ def test_file_with_the_values_of_a_page_gives_an_fmu_with_its_numbers(chromium: 
     columns = dict(zip(names, np.array(poses).T, strict=True))
     for name in ("tracer.x", "tracer.y", "rocker.phi", "coupler.x"):
         assert np.abs(columns[name] - run[name]).max() < 1e-9, name
+
+
+def test_a_length_that_leads_to_another_branch_is_taken_over_before_the_change_point(chromium: Browser) -> None:
+    name = "bodies.ground.points.O_4.x"
+    beyond, before = float(np.deg2rad(193.2)), float(np.deg2rad(150.0))
+    with chromium.open(page(kinfmu.load("fourbar_chain"))) as shown:
+        shown.move(beyond)
+        kept = shown.get("Array.from(k.linkage.pose.q)")
+        shown.get(f"k.setValue('{name}', 0.98 * k.design.values.get('{name}'))")
+        shown.settle()
+        banner = shown.tab.inner_text("#banner")
+        assert banner.startswith("Another branch. ")
+        assert "beyond crank = 180°" in banner
+        assert shown.get("Array.from(k.linkage.pose.q)") == kept
+        shown.move(before)
+        assert shown.tab.is_hidden("#banner")
+        assert shown.get(f"k.linkage.bound.get('{name}') === k.design.values.get('{name}')")
+        assert shown.errors == []
+
+
+def test_fingers_drag_zoom_and_press(chromium: Browser) -> None:
+    with chromium.open(page(kinfmu.load("excavator")), has_touch=True) as shown:
+        shown.tab.set_viewport_size(PHONE)
+        shown.tab.wait_for_timeout(100)
+        shown.settle()
+        fingers = shown.tab.context.new_cdp_session(shown.tab)
+
+        def touch(kind: str, *places: tuple[float, float]) -> None:
+            points = [{"x": x, "y": y, "id": number} for number, (x, y) in enumerate(places)]
+            fingers.send("Input.dispatchTouchEvent", {"type": f"touch{kind}", "touchPoints": points})
+            shown.settle()
+
+        tip = shown.at("bucket.tip")
+        touch("Start", tip)
+        for step in range(1, 9):
+            touch("Move", (tip[0] - 4.0 * step, tip[1] + 1.0 * step))
+        touch("End")
+        moved = shown.at("bucket.tip")
+        assert np.hypot(moved[0] - tip[0] + 32.0, moved[1] - tip[1] - 8.0) < 3.0
+        scale, middle = shown.get("k.view.scale"), (180.0, 200.0)
+        touch("Start", (middle[0] - 40.0, middle[1]), (middle[0] + 40.0, middle[1]))
+        for step in range(1, 9):
+            touch("Move", (middle[0] - 40.0 - 5.0 * step, middle[1]), (middle[0] + 40.0 + 5.0 * step, middle[1]))
+        touch("End")
+        assert abs(shown.get("k.view.scale") / scale - 2.0) < 1e-6
+        shown.tab.tap("#fit")
+        shown.settle()
+        assert abs(shown.get("k.view.scale") / scale - 1.0) < 0.2
+        shown.tab.tap("#play")
+        shown.tab.wait_for_timeout(300)
+        assert shown.get("k.isPlaying")
+        shown.tab.tap("#play")
+        shown.tab.tap("#tab-plots")
+        assert shown.tab.is_visible("#plots")
+        assert shown.tab.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+        assert shown.errors == []

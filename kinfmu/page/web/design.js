@@ -27,6 +27,7 @@ export class Design {
 
     #bind() {
         this.failure = this.linkage.setValues(this.values) ? "" : this.linkage.failure;
+        this.isOtherBranch = !this.isOk && this.linkage.isOtherBranch;
         return this.isOk;
     }
 
@@ -99,6 +100,7 @@ export class Design {
             else ignored.push(name);
         }
         this.values = values;
+        this.linkage.goTo(this.start); // where each design starts
         if (same(values, this.linkage.bound)) this.failure = "";
         else this.#bind();
         this.saved = new Map(values);

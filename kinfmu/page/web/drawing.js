@@ -7,6 +7,7 @@ import { grouped, niceStep, number } from "./numbers.js";
 import { BUTTONS } from "./view.js";
 
 const MOST_NAMES = 80; // at once, the most important ones; more are unreadable, and those in view come with zooming in
+const SPOTS = [[0.9, -0.9], [-0.9, -0.9], [0.9, 0.9], [-0.9, 0.9], [0, -1.2], [0, 1.2], [1.2, 0], [-1.2, 0]]; // around a place
 const CELL = 48; // [px] of the grid that finds names in the way
 
 // Draw a pose; show: what is switched on; view: from the plane to pixels.
@@ -31,7 +32,8 @@ class Painter {
     constructor(pen, linkage, view, theme, isGhost) {
         Object.assign(this, { pen, linkage, view, theme, isGhost });
         this.pose = linkage.pose;
-        this.boxes = new Boxes();
+        this.boxes = new Boxes(); // of names and pins
+        this.lines = new Boxes(); // of links and arrows
         this.wanted = [];
         this.fine = linkage.fineness;
         this.width = Math.max(4, Math.min(15, 13 * this.fine));
@@ -83,6 +85,15 @@ class Painter {
 
     name(text, places, colour, off, rank) {
         this.wanted.push({ text, places, colour, off, rank });
+    }
+
+    // Keep names off a line of a width, if there is room elsewhere.
+    cover(a, b, width) {
+        const count = Math.min(Math.ceil(distance(a, b) / 10), 100);
+        for (let k = 0; k <= count; k++) {
+            const [x, y] = [0, 1].map((axis) => a[axis] + ((b[axis] - a[axis]) * k) / Math.max(count, 1));
+            this.lines.add([x - width / 2, y - width / 2, x + width / 2, y + width / 2]);
+        }
     }
 
     grid(isOn) {
@@ -200,6 +211,7 @@ class Painter {
             if (found.closed) this.pen.line(routes[0].points, { width: 0, fill: paleOf(this.isGhost ? GREY : link.colour, this.theme), closed: true, alpha: 0.85 });
             for (const { points, closed } of routes) this.pen.line(points, { width: width + 1.4, colour: edge, closed });
             for (const { points, closed } of routes) this.pen.line(points, { width: width - 1.4, colour: fill, closed });
+            for (const { points, closed } of routes) (closed ? [...points, points[0]] : points).slice(1).forEach((b, k) => this.cover(points[k], b, width));
             for (const rib of found.ribs) this.pen.line(rib.map(place), { width: width * 0.5, colour: fill });
             const middles = routes.flatMap(({ points, closed }) => middlesOf(points, closed));
             if (found.closed) middles.unshift(centreOf(routes[0].points));
@@ -227,6 +239,7 @@ class Painter {
             const width = 0.5 * this.width;
             this.pen.line(points, { width: width + 1.2, colour: this.edge(GREY) });
             this.pen.line(points, { width: Math.max(width - 1, 1), colour: fillOf(GREY, this.theme) });
+            this.cover(...points, width);
             this.name(bar.name, middlesOf(points, false), this.edge(GREY), width / 2 + 8, 3);
         }
     }
@@ -266,6 +279,7 @@ class Painter {
             this.pen.line([at(5), at(tube - 1)], { width: 1.15 * w - 1, colour: fillOf(GREY, this.theme), cap: "butt" });
             const disc = Math.min(Math.max(piston, 7), tube - 3);
             this.pen.line([at(disc - 1.6), at(disc + 1.6)], { width: 1.15 * w - 1, colour: this.edge(GREY), cap: "butt" });
+            this.cover(a, b, 1.15 * w);
             this.name(barrel.name, [at(0.35 * length), at(0.6 * length)], this.edge(GREY), 0.6 * w + 8, 3);
         }
     }
@@ -303,28 +317,29 @@ class Painter {
     names() {
         const { pen, theme } = this;
         this.wanted.sort((a, b) => a.rank - b.rank);
-        let left = MOST_NAMES;
-        for (const { text, places, colour, off } of this.wanted) {
-            if (!left) break;
-            const width = 6.6 * text.length + 4;
-            let done = false;
+        this.wanted.slice(0, MOST_NAMES).forEach((name) => {
+            const box = this.place(name, [1, 1.8, 2.8], (one) => this.boxes.isFree(one) && this.lines.isFree(one)) || this.place(name, [1], (one) => this.boxes.isFree(one));
+            if (!box) return;
+            this.boxes.add(box);
+            pen.text((box[0] + box[2]) / 2, (box[1] + box[3]) / 2, name.text, { colour: name.colour, size: 12, align: "center", halo: theme.paper });
+        });
+    }
+
+    // Return the first free rectangle for a name next to one of its places, at factors of its distance; null without one.
+    place({ text, places, off }, factors, isFree) {
+        const width = 6.6 * text.length + 4;
+        for (const factor of off === 0 ? [1] : factors) {
             for (const [x, y] of places) {
-                const spots = off === 0 ? [[0, 0]] : [[0.9, -0.9], [-0.9, -0.9], [0.9, 0.9], [-0.9, 0.9], [0, -1.2], [0, 1.2], [1.2, 0], [-1.2, 0]];
-                for (const [dx, dy] of spots) {
-                    const cx = x + dx * off + (Math.sign(dx) * width) / 2;
-                    const cy = y + dy * off;
+                for (const [dx, dy] of off === 0 ? [[0, 0]] : SPOTS) {
+                    const cx = x + dx * off * factor + (Math.sign(dx) * width) / 2;
+                    const cy = y + dy * off * factor;
                     const box = [cx - width / 2, cy - 8, cx + width / 2, cy + 8];
-                    if (box[0] < 2 || box[2] > this.view.width - 2 || box[1] < BUTTONS + 10 || box[3] > this.view.height - 2) continue;
-                    if (!this.boxes.isFree(box)) continue;
-                    this.boxes.add(box);
-                    left -= 1;
-                    pen.text(cx, cy, text, { colour, size: 12, align: "center", halo: theme.paper });
-                    done = true;
-                    break;
+                    const isIn = box[0] >= 2 && box[2] <= this.view.width - 2 && box[1] >= BUTTONS + 10 && box[3] <= this.view.height - 2;
+                    if (isIn && isFree(box)) return box;
                 }
-                if (done) break;
             }
         }
+        return null;
     }
 }
 

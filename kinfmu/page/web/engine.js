@@ -3,6 +3,7 @@
 // All arrays are views of the module's memory: they hold until the next call that writes them, and are not to be kept.
 
 const ARRAYS = ["settings", "bound", "drive", "motion", "swept", "errors", "fixed", "points", "forces", "efforts", "reactions"]; // as in interface.c
+const BINDINGS = ["refused", "bound", "unreached", "other branch"]; // as in interface.c
 const BRIDGED = 2; // the last status of a pose with numbers: see kinfmu.Status
 
 // Return the bytes that `packed` of kinfmu/page/module.py made a text: gzip in base64.
@@ -49,13 +50,16 @@ export class Engine {
     return this.#arrays.bound;
   }
 
-  // Set parameters and law constants, followed from the written lengths: { ok, message }. If not ok, those bound before
-  // stay, and so does the pose; if ok, the pose is that of the next call of at, followed from the start.
-  bind(values) {
+  // Set parameters and law constants, followed from the written lengths: { ok, result, message }. If not ok, those bound
+  // before stay, and so does the pose.
+  //
+  // stays: the pose keeps its driver values, and "other branch" is the result if with the values, followed from the start,
+  // it does not lie on the branch of the pose before. Otherwise the pose is that of the next call of at, from the start.
+  bind(values, stays = false) {
     this.#expect("bind", "values", values, this.#arrays.settings.length);
     this.#arrays.settings.set(values);
-    const ok = this.#code.kf_page_bind() !== 0;
-    return { ok, message: this.message };
+    const result = BINDINGS[this.#code.kf_page_bind(stays)];
+    return { ok: result === "bound", result, message: this.message };
   }
 
   // Why nothing closes with values at driver values u: { hasGap, text } names rows and their smallest gap near the last

@@ -1,5 +1,6 @@
 // The mechanism that moves: engines, the pose that is shown, curves and ranges, quantities of the pose.
 
+import { comesTo, partingOf } from "./branches.js";
 import { isGood } from "./engine.js";
 import { axlesOf, formsOf } from "./forms.js";
 import { TURN, placed, remainder } from "./geometry.js";
@@ -194,24 +195,31 @@ export class Linkage {
 
     // ---- lengths
 
-    // Bind other values of parameters (a Map); return true if the mechanism closes with them at its driver values. If not,
-    // values and pose stay as they are, and `failure` states why.
+    // Bind other values of parameters (a Map); return true if the mechanism closes with them at its driver values, on the
+    // branch that is shown. If not, values and pose stay as they are, and `failure` states why.
     setValues(values) {
-        const { which, shown, probe, vector } = this.#engineFor(values);
-        const found = shown.bind(vector);
-        if (!found.ok) {
-            this.failure = this.#gapOf(shown, vector, found.message || "the mechanism does not close");
+        const which = this.#whichFor(values);
+        const through = this.which === "opened" ? "opened" : which; // the engine that follows the pose to the values
+        const [shown, probe] = this.engines[through];
+        const vector = this.#vector(through, values);
+        const before = this.#vector(through, this.bound);
+        const comes = through === this.which || comesTo(this, through, before, this.shown);
+        const { ok, result, message } = comes ? shown.bind(vector, true) : { result: "other branch" };
+        const isThere = ok && (through === which || comesTo(this, which, this.#vector(which, values), shown));
+        if (ok && !isThere) shown.bind(before, true);
+        this.isOtherBranch = result === "other branch" || (ok && !isThere);
+        if (this.isOtherBranch) {
+            this.failure = partingOf(this, probe, before, vector);
             return false;
         }
-        const before = this.which;
+        if (!ok) {
+            const here = result === "unreached" ? shown.gap(vector, this.u).text : "";
+            this.failure = result === "unreached" ? message + (here && `; there, ${here}`) : this.#gapOf(shown, vector, message || "the mechanism does not close");
+            return false;
+        }
         this.#use(which);
-        if (!this.goTo(this.u)) {
-            if (before === which) shown.bind(this.#engineFor(this.bound).vector);
-            this.#use(before);
-            this.shown.at(this.u, this.rates.ud, this.rates.udd);
-            return false;
-        }
-        probe.bind(vector);
+        if (!this.goTo(this.u)) throw new Error(this.failure);
+        if (through === which) probe.bind(vector);
         this.changed += 1;
         const areLaws = this.parameters.some((one) => one.isLaw && values.get(one.name) !== this.bound.get(one.name));
         this.bound = new Map(values);
@@ -219,13 +227,14 @@ export class Linkage {
         return true;
     }
 
-    // Return the engines that solve with values: those of the file as written as long as no plain number is changed.
-    #engineFor(values) {
-        const isOpened = this.parameters.some((one) => one.isPlace && values.get(one.name) !== one.value);
-        const which = isOpened ? "opened" : "written";
-        const [shown, probe] = this.engines[which];
-        const vector = Float64Array.from(this.data.modules[which].parameters, (one) => values.get(one.name) ?? one.value);
-        return { which, shown, probe, vector };
+    // Return which engines solve with values: those of the file as written as long as no plain number is changed.
+    #whichFor(values) {
+        return this.parameters.some((one) => one.isPlace && values.get(one.name) !== one.value) ? "opened" : "written";
+    }
+
+    // Return values for engines, in their order.
+    #vector(which, values) {
+        return Float64Array.from(this.data.modules[which].parameters, (one) => values.get(one.name) ?? one.value);
     }
 
     // Return why values do not close: rows and gap at the driver values shown, or else where the laws start.

@@ -76,7 +76,14 @@ function arrow(painter, { from, along, colour, text }) {
     if (length < 2) return;
     const ink = css(colour);
     head(painter.pen, a, b, ink);
+    painter.cover(a, b, 6);
     if (text) painter.name(text, [b], ink, 10, -1);
+}
+
+// Return how far the cam of a body reaches from a place, in pixels: a circle within it would look like its base circle.
+function outerOf(painter, body, centre) {
+    const corners = painter.all("cam").filter((shape) => shape.frame === body).flatMap((shape) => painter.at(shape));
+    return corners.reduce((most, p) => Math.max(most, distance(painter.dot(p), centre)), 0);
 }
 
 // Mark the range of a turning driver, its limits and change points on a circle about its pivot.
@@ -87,7 +94,7 @@ function driverMarks(painter) {
         const centre = painter.dot(linkage.point(driver.pivot));
         const body = linkage.body(driver.body);
         const reach = Math.max(...linkage.data.points.map((_, i) => (linkage.bodyOf[i] === body ? distance(painter.dot(linkage.point(i)), centre) : 0)));
-        const radius = Math.max(reach, 24) + 16;
+        const radius = Math.max(reach, outerOf(painter, driver.body, centre), 24) + 16;
         const base = linkage.bodyPose(body)[2] - linkage.u[k];
         const tip = linkage.data.points.reduce((best, _, i) => (linkage.bodyOf[i] === body && distance(linkage.local(i), linkage.local(driver.pivot)) > distance(linkage.local(best), linkage.local(driver.pivot)) ? i : best), driver.pivot);
         const [tx, ty] = linkage.local(tip).map((value, i) => value - linkage.local(driver.pivot)[i]);

@@ -167,51 +167,59 @@ static void append_failure(kf_solver *solver, const double *parameters, int bloc
     }
 }
 
-bool kf_solver_bind(kf_solver *solver, const double *parameters)
+bool kf_continued(kf_solver *solver, const double *from, const double *to, const double *u, double shortest,
+                  kf_pose *pose, kf_continuation *path)
 {
-    const double tolerance = solver->tolerance;
     kf_model *const ahead = &solver->scratch.ahead;
     kf_pose *const trial = &solver->scratch.poses[0];
     double *const slope = solver->scratch.zd;
     double p[KF_ROOM(KF_PARAMETERS)], s = 0.0, step = 1.0;
-    int turn, k, block = -1;
     bool is_there = true;
-    kf_solver_start(solver);
-    solver->tolerance = tolerance;
+    int k;
+    path->block = -1;
     for (k = 0; k < KF_PARAMETERS; ++k) {
-        is_there = is_there && parameters[k] == kf_parameters_written[k];
+        is_there = is_there && to[k] == from[k];
     }
     memset(slope, 0, KF_UNKNOWNS * sizeof(double));
-    for (turn = 0; turn < MOST_STEPS && !is_there; ++turn) {
-        const kf_found *const found = &solver->anchor.found;
+    for (path->steps = 0; path->steps < MOST_STEPS && !is_there; ++path->steps) {
         const double there = fmin(s + step, 1.0);
         char why[WHY];
         for (k = 0; k < KF_PARAMETERS; ++k) {
-            const double written = kf_parameters_written[k];
-            p[k] = there == 1.0 ? parameters[k] : written + there * (parameters[k] - written);
+            p[k] = there == 1.0 ? to[k] : from[k] + there * (to[k] - from[k]);
         }
         kf_fresh(trial, -1, -INFINITY, INFINITY);
         if (kf_bind(ahead, p, why, sizeof why)) {
             const int failed =
-                kf_position(ahead, kf_anchor_u, found->x, slope, kf_at_rest, there - s, NULL, &trial->found);
-            if (failed < 0 && is_trusted(found, &trial->found)) {
+                kf_position(ahead, u, pose->found.x, slope, kf_at_rest, there - s, NULL, &trial->found);
+            if (failed < 0 && is_trusted(&pose->found, &trial->found)) {
                 for (k = 0; k < KF_UNKNOWNS; ++k) {
-                    slope[k] = (trial->found.x[k] - found->x[k]) / (there - s);
+                    slope[k] = (trial->found.x[k] - pose->found.x[k]) / (there - s);
                 }
-                solver->anchor = *trial;
+                *pose = *trial;
                 solver->model = *ahead;
                 s = there;
                 step *= 2.0;
                 is_there = s == 1.0;
                 continue;
             }
-            block = failed >= 0 ? failed : block;
+            path->block = failed >= 0 ? failed : path->block;
         }
         step *= 0.5;
-        if (step < SHORTEST) {
+        if (step < shortest) {
             break;
         }
     }
+    return is_there;
+}
+
+bool kf_solver_bind(kf_solver *solver, const double *parameters)
+{
+    const double tolerance = solver->tolerance;
+    kf_continuation path;
+    bool is_there;
+    kf_solver_start(solver);
+    solver->tolerance = tolerance;
+    is_there = kf_continued(solver, kf_parameters_written, parameters, kf_anchor_u, SHORTEST, &solver->anchor, &path);
     solver->unsolvable = !is_there || !(solver->anchor.found.watch <= solver->tolerance);
     if (!solver->unsolvable) {
         solver->message[0] = '\0';
@@ -220,8 +228,8 @@ bool kf_solver_bind(kf_solver *solver, const double *parameters)
     append_parameters(solver->message, parameters);
     if (is_there) {
         kf_append_watch(solver->message, &solver->model, &solver->anchor.found, "gap about ", "%.4g");
-    } else if (turn < MOST_STEPS) {
-        append_failure(solver, parameters, block);
+    } else if (path.steps < MOST_STEPS) {
+        append_failure(solver, parameters, path.block);
     } else {
         kf_append(solver->message, "too far from the parameters as written");
     }

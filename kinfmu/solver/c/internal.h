@@ -224,6 +224,17 @@ void kf_outputs_of(const kf_model *model, const kf_pose *pose, const double *ud,
  */
 double kf_gap(kf_solver *solver, const kf_model *model, int block, const double *u, double *z);
 
+/* How a continuation went: its steps, and the block that failed last, -1 without one. */
+typedef struct {
+    int steps, block;
+} kf_continuation;
+
+/* Follow a good pose at driver values u from parameters to others in a straight line; `pose` and the solver's model
+ * are then those reached. shortest: step, as a part of the line, at which it gives up. Return whether that is the end.
+ */
+bool kf_continued(kf_solver *solver, const double *from, const double *to, const double *u, double shortest,
+                  kf_pose *pose, kf_continuation *path);
+
 /* message.c */
 enum { KF_ROUGHLY = 6, KF_LOCATED = 10 }; /* digits; limits are located to 1e-10 rad */
 void kf_append(char *message, const char *format, ...);
