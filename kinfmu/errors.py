@@ -103,6 +103,14 @@ OTHER_WORDS = {  # words of other programs and of drawings, with the words of ki
     **dict.fromkeys(("meter", "meters", "metre", "metres"), "m"),
     **dict.fromkeys(("turn", "turns", "revolution", "revolutions"), "rev"),
 }
+OTHER_COORDINATES = {  # words for coordinates and their rates, with the endings of kinfmu, the likeliest first
+    **dict.fromkeys(("angle", "rotation", "rot", "theta", "orientation"), ("phi",)),
+    **dict.fromkeys(("angular_velocity", "angular_speed", "w"), ("omega",)),
+    "angular_acceleration": ("alpha",),
+    **dict.fromkeys(("speed", "velocity", "v"), ("omega", "vx")),
+    **dict.fromkeys(("acceleration", "a"), ("alpha", "ax")),
+    **dict.fromkeys(("position", "pos"), ("x",)),
+}
 LONGEST_WORD = 200  # characters of a word that may be a misspelt name
 
 
@@ -121,6 +129,8 @@ def suggestion(word: str, known: Iterable[str]) -> str:
     if len(word) > LONGEST_WORD:  # not a misspelt name, and slow to compare
         return ""
     known = list(known)
-    near = [ours for ours in [OTHER_WORDS.get(word.lower())] if ours in known]
+    owner, _, ending = word.rpartition(".")
+    others = [OTHER_WORDS.get(word.lower()), *(f"{owner}.{ours}" for ours in OTHER_COORDINATES.get(ending.lower(), ()))]
+    near = [ours for ours in others if ours in known]
     near = near or difflib.get_close_matches(word, known, n=1) or [k for k in known if k.lower() == word.lower()]
     return f"; did you mean '{near[0]}'?" if near else ""

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from kinfmu.analysis.joint_advice import idle_body, missing_pins, stiff_joints
 from kinfmu.drivers import AngleDriver, CoordinateDriver, Driver, RelativeAngleDriver, SlideDriver
 from kinfmu.equations.closing import motion_samples, null_space
 from kinfmu.equations.part import Part
@@ -36,14 +37,15 @@ class SurplusDriver(NamedTuple):
 
 
 class Suggestion(NamedTuple):
-    """A driver that could be added, and the keys of its table."""
+    """A driver or joint that could be added, the keys of its table, and that table's name."""
 
     name: str
     keys: dict[str, Any]
+    table: str = "drivers"
 
     def __str__(self) -> str:
         keys = ", ".join(f"{key} = {_toml(value)}" for key, value in self.keys.items())
-        return f"[drivers] {self.name} = {{ {keys} }}"
+        return f"[{self.table}] {self.name} = {{ {keys} }}"
 
 
 @dataclass(frozen=True)
@@ -51,14 +53,17 @@ class DriverAdvice:
     """Motion that the drivers leave free, at generic poses.
 
     missing: number of further drivers needed; surplus: drivers of quantities already determined; loose: names of
-    coordinates that joints and drivers leave free; suggestions: drivers that, added together, would determine
-    the motion.
+    coordinates that joints and drivers leave free; suggestions: pins that are probably missing, and drivers; added
+    together they would determine the motion. idle: the body that moves alone though several joints hold it, such as a
+    roller, None if there is none; stiff: fixed joints, each of which as a revolute one would leave the motion driven.
     """
 
     missing: int
     surplus: tuple[SurplusDriver, ...]
     loose: tuple[CoordinateName, ...]
     suggestions: tuple[Suggestion, ...]
+    idle: str | None = None
+    stiff: tuple[str, ...] = ()
 
     @property
     def loose_bodies(self) -> tuple[str, ...]:
@@ -71,7 +76,9 @@ class DriverAdvice:
             "missing": self.missing,
             "surplus": [{"name": s.name, "implied_by": list(s.implied_by)} for s in self.surplus],
             "loose": list(self.loose),
-            "suggestions": [{"name": s.name, "keys": s.keys} for s in self.suggestions],
+            "suggestions": [{"table": s.table, "name": s.name, "keys": s.keys} for s in self.suggestions],
+            "idle": self.idle,
+            "stiff": list(self.stiff),
         }
 
 
@@ -93,7 +100,11 @@ def driver_advice(system: System, redundancy: Redundancy) -> DriverAdvice | None
     loose = tuple(
         name for name, part in zip(system.coordinates, free, strict=True) if np.abs(part).max(initial=0.0) > _MOVES
     )
-    return DriverAdvice(free.shape[1], tuple(surplus), loose, tuple(_suggestions(system, poses[-1], free)))
+    missing, start = free.shape[1], redundancy.assembly.start.q
+    suggestions = tuple(_suggestions(system, start, poses[-1], free))
+    idle = idle_body(system.mechanism, tuple(dict.fromkeys(name.owner for name in loose)), missing)
+    stiff = stiff_joints(system.mechanism, redundancy)
+    return DriverAdvice(missing, tuple(surplus), loose, suggestions, idle, stiff)
 
 
 def _independent_rows(
@@ -120,8 +131,12 @@ def _independent_rows(
     return [*rows, *counted], surplus
 
 
-def _suggestions(system: System, pose: FloatArray, free: FloatArray) -> Iterator[Suggestion]:
-    """Yield drivers for the free directions one by one, the most natural first."""
+def _suggestions(system: System, start: FloatArray, pose: FloatArray, free: FloatArray) -> Iterator[Suggestion]:
+    """Yield pins that are probably missing, then drivers for the free directions left, the most natural first."""
+    for pin in missing_pins(system, start, pose, free):
+        yield Suggestion(pin.name, {"type": pin.type, "between": list(pin.between)}, "joints")
+        probe = System(replace(system.mechanism, joints=(pin,), drivers=()))
+        free = free @ null_space(probe.scaled_jacobian(pose) @ free)
     taken = {driver.name for driver in system.mechanism.drivers}
     for driver in _candidates(system.mechanism):
         if free.shape[1] == 0:
@@ -193,7 +208,14 @@ def _toml(value: Any) -> str:
 
 def clearer_problem(problem: KinfmuError, redundancy: Redundancy, advice: DriverAdvice | None) -> KinfmuError:
     """Return the problem, or one that names drivers of one degree of freedom while another is free."""
-    if advice is None or not advice.surplus or redundancy.inconsistent or not advice.loose:
+    if advice is None or redundancy.inconsistent:
+        return problem
+    is_of_mobility = isinstance(problem, MobilityError)
+    if advice.stiff and is_of_mobility:
+        return MobilityError(f"{problem}; is {listed(advice.stiff)} a revolute joint?", **problem.data)
+    if advice.idle and not advice.surplus and is_of_mobility:
+        return MobilityError(f"{problem}; or leave out {advice.idle}, which no other body follows", **problem.data)
+    if not advice.surplus or not advice.loose:
         return problem
     conflicts = [
         f"[drivers.{surplus.name}] drives what "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,13 +13,16 @@ from kinfmu.analysis.values import LOOKS, law_values, value_text
 from kinfmu.drivers import AngleDriver, DistanceDriver
 from kinfmu.equations.start_poses import StartValues, start_from_poses
 from kinfmu.equations.system import System
-from kinfmu.errors import listed
+from kinfmu.errors import KinfmuError, listed
 from kinfmu.joints.cam import Cam
 from kinfmu.laws import MotionSequence, Spline
 from kinfmu.measures import AngleBetween
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.dimension import Dimension
+from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.members import NumberPath, path_text
+from kinfmu.mechanism.parameters import dimensions_of
 from kinfmu.plan import SolvePlan
 from kinfmu.sweep import solve
 from kinfmu.units import Quantity, looks_like_degrees
@@ -45,6 +48,7 @@ def file_notes(mechanism: Mechanism) -> Iterator[str]:
                 f"[drivers.{driver.name}] the distance is {first:.6g} {mechanism.length_unit} at the start of the run: "
                 "its magnitude counts, and decreases as the value increases"
             )
+    yield from _lengths_without_a_unit(mechanism)
     yield from _cams(mechanism)
     yield from _loads(mechanism)
     large: list[tuple[NumberPath, float]] = []
@@ -61,6 +65,49 @@ def file_notes(mechanism: Mechanism) -> Iterator[str]:
             f"{path_text(place)} = {value:.6g} rad is {math.degrees(value):.6g} deg, more than a turn: "
             "a bare angle is in radians; degrees are written such as '60 deg'"
         )
+
+
+def _lengths_without_a_unit(mechanism: Mechanism) -> Iterator[str]:
+    """Yield a line for each pure number that would be a length in every expression with it: '0.8*crank' of a length."""
+    dimensions, length = dimensions_of(mechanism.parameters), Quantity("length")
+    places: dict[str, list[tuple[Expression, Quantity]]] = {}
+
+    def look(place: NumberPath, value: Any, quantity: Quantity) -> Any:
+        if place in mechanism.expressions:
+            expression = mechanism.expressions[place]
+            for name in expression.names:
+                places.setdefault(name, []).append((expression, quantity))
+        return value
+
+    mechanism.members.changed(look)
+    derived = {name for p in mechanism.parameters.values() if p.expression for name in p.expression.names}
+    for name, parameter in mechanism.parameters.items():
+        value = float(parameter.value)
+        if parameter.kind != "number" or parameter.expression or name in derived or value == 1.0:  # 1: a scale
+            continue
+        uses = places.get(name, [])
+        if uses and all(quantity == length and _is_length(one, name, dimensions) for one, quantity in uses):
+            yield (
+                f"[parameters] {name} = {value:.12g} has no unit and is a pure number, although '{uses[0][0].text}' is "
+                f'a length: if {name} is one, write {name} = "{value:.12g} {mechanism.length_unit}", '
+                "a unit that studies, fits and FMUs then know"
+            )
+
+
+def _is_length(expression: Expression, name: str, dimensions: Mapping[str, Dimension]) -> bool:
+    """Return True if an expression is a length with this parameter as a length, and none with it as a number."""
+    if any(not dimensions[other].is_known for other in expression.names if other != name):
+        return False
+    length = Dimension.of(Quantity("length"))
+
+    def is_length(of_parameter: Dimension) -> bool:
+        try:
+            found = expression.dimension({**dimensions, name: of_parameter})
+        except KinfmuError:
+            return False
+        return found.is_known and found.powers == length.powers
+
+    return is_length(length) and not is_length(Dimension())
 
 
 def _cams(mechanism: Mechanism) -> Iterator[str]:

@@ -123,6 +123,14 @@ def _advice(report: Findings) -> Iterator[ReportLine]:
             f"{advice.missing} more driver{'s' * (advice.missing > 1)} needed" if report.mobility else "nothing drives"
         )
         yield ReportLine("loose", f"{_names(advice.loose)}: {more}")
+    for name in advice.stiff:
+        yield ReportLine("could be", f'[joints.{name}] type = "revolute" in place of "fixed", which leaves no motion')
+    if advice.idle:
+        yield ReportLine(
+            "could omit",
+            f"[bodies.{advice.idle}]: it moves alone and no other body follows, such as a roller on its pin; give its "
+            "joints the point of the body that carries it",
+        )
     for suggestion in advice.suggestions:
         yield ReportLine("could add", str(suggestion))
 

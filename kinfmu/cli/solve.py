@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -93,7 +94,8 @@ def solve(
     else:
         t = run_times(RunSettings(*times)) if times else None
         _warn_of_external(mech.drivers)
-    with errors_of(mechanism):
+    with errors_of(mechanism), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of degrees; --angle has a note of its own
         run = solved(
             mech,
             t,
@@ -118,7 +120,10 @@ def _check_one_driver(name: str, given: Settings) -> None:
         names = listed(driver.name for driver in drivers)
         raise click.UsageError(f"--angle drives one driver, {name} has {names}; simulate --input drives them")
     for constant in given.constants.keys() & {one.name for one in given.written.law_constants}:
-        raise click.UsageError(f"--set {constant} changes the law, which --angle does not use")
+        raise click.UsageError(
+            f"--set {constant} changes the law, which --angle does not use: rates are then derivatives with respect to "
+            f"{drivers[0].name}; to drive by the law, give --times A:B:STEP in place of --angle"
+        )
 
 
 def _driver_values(text: str, driver: Driver, length_unit: str, wrap: bool) -> dict[str, Any]:

@@ -385,6 +385,8 @@ class _Parser:
         token = self._token
         found = {"end": "the end", "character": quoted(token.text)}.get(token.kind, f"'{token.text}'")
         near = suggestion(token.text, self._units) if token.kind == "character" else ""  # a degree or inch sign
+        if re.fullmatch(r"\d,\d", self._text[max(0, token.at - 1) : token.at + 2]):
+            near = "; a decimal has a point, not a comma"
         return _error(self._text, token.at, f"expected {valid}, found {found}{near}")
 
 

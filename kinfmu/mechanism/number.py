@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.mechanism.dimension import Dimension
@@ -108,7 +109,30 @@ def expression_error(
 def _wrong_unit(where: str, value: str, unit: str, known: Collection[str]) -> MechanismError:
     near = suggestion(unit, known)
     valid = f"must be one of {listed(known)}{near}" if known else "does not belong to a pure number"
-    return MechanismError(f"{where} = {quoted(value)}: unit {quoted(unit)} {valid}")
+    return MechanismError(f"{where} = {quoted(value)}: unit {quoted(unit)} {valid}", unit=None if known else unit)
+
+
+@contextmanager
+def unit_advice(name: str, number: float, length_unit: str) -> Iterator[None]:
+    """Complete the error about a unit of a value of a parameter that has none: where to write the unit.
+
+    Args:
+        name: The parameter; of constants of laws nothing is added.
+        number: Its value in the mechanism file.
+        length_unit: Unit of length of the mechanism.
+
+    """
+    try:
+        yield
+    except MechanismError as error:
+        unit = error.data.get("unit")
+        if unit not in every_unit(length_unit) or "." in name:  # constants of laws have the quantity of their key
+            raise
+        usual = unit_of(every_unit(length_unit)[str(unit)][0], length_unit)
+        raise MechanismError(
+            f"{error}; {name} has no unit in the mechanism file: if it is no pure number, write there "
+            f'{name} = "{number:.12g} {usual}"'
+        ) from None
 
 
 def _example(quantity: Quantity | None, length_unit: str) -> str:

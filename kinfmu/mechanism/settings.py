@@ -15,7 +15,7 @@ from kinfmu.loads.following import Following
 from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.members import NumberPath
-from kinfmu.mechanism.number import read_constant, read_number
+from kinfmu.mechanism.number import read_constant, read_number, unit_advice
 from kinfmu.mechanism.parameters import NUMBER, Parameter
 from kinfmu.mechanism.valid import is_number, quoted
 from kinfmu.units import Quantity
@@ -126,7 +126,7 @@ class Settable:
 
         """
         setting = self.constants.get(name) or self.parameters[name]
-        with _as_request():
+        with _as_request(), unit_advice(name, setting.value, self._length_unit):
             number = read_constant(name, value, setting.quantity or NUMBER, self._length_unit)
         if isinstance(setting, LawConstant) and setting.is_positive and not number > 0.0:
             raise RequestError(f"{name} = {quoted(value)} must be positive")

@@ -20,6 +20,7 @@ from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.repeats import COUNTS, REPEAT, expanded
 from kinfmu.mechanism.table_file import read_table
+from kinfmu.mechanism.toml_hints import explained
 from kinfmu.mechanism.toml_tables import (
     check_keys,
     class_of_type,
@@ -120,7 +121,7 @@ def document_of(text: str, where: str) -> dict[str, Any]:
     except RecursionError:
         raise MechanismError(f"{where}: not valid TOML: nested too deeply") from None
     except tomllib.TOMLDecodeError as error:
-        raise MechanismError(f"{where}: not valid TOML: {error}") from None
+        raise MechanismError(f"{where}: not valid TOML: {explained(text, error)}") from None
     except ValueError:  # Python refuses whole numbers of thousands of digits
         raise MechanismError(f"{where}: not valid TOML: a number has too many digits") from None
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.mechanism import LawConstant, Mechanism
-from kinfmu.mechanism.number import read_constant
+from kinfmu.mechanism.number import read_constant, unit_advice
 from kinfmu.mechanism.parameters import NUMBER
 from kinfmu.mechanism.toml_tables import check_keys
 from kinfmu.mechanism.valid import is_number, quoted
@@ -144,7 +144,8 @@ def read_variation(where: str, name: str, table: Mapping[str, Any], mechanism: M
     is_positive = isinstance(setting, LawConstant) and setting.is_positive
 
     def number(key: str, value: object, *, above: float | None = None) -> float:
-        found = read_constant(f"{where} {key}", value, quantity, length)
+        with unit_advice(name, setting.value, length):
+            found = read_constant(f"{where} {key}", value, quantity, length)
         if above is not None and not found > above:
             raise MechanismError(f"{where} {key} = {quoted(value)} must be more than {above:g}")
         if is_positive and not found > 0.0:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from functools import lru_cache
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from kinfmu.errors import RequestError
@@ -16,8 +18,10 @@ from kinfmu.solver.python.solver import TOLERANCE
 from kinfmu.sweep.arguments import Settings
 from kinfmu.sweep.engine import Tables, require_engine
 from kinfmu.sweep.model import Model
+from kinfmu.units import in_turns
 
 MODELS_KEPT = 16
+_FEWEST, _WIDE = 4, 30.0  # whole numbers and their range [rad] from which angles are probably in degrees
 
 
 def solve(
@@ -54,7 +58,8 @@ def solve(
         out: Three arrays (n, outputs) for values, rates and accelerations; by outputs (order="F") is faster.
         **inputs: Driver values in place of t, such as crank_angle=(n,) [rad] with crank_speed= and crank_acceleration=,
             arrays or numbers. Default speed: 1, default acceleration: 0, so that rates are per unit of the driver. The
-            run's t then counts the samples, and its axis is the driver's value.
+            run's t then counts the samples, and its axis is the driver's value. Angles that are whole numbers over many
+            turns give a UserWarning: they are probably degrees.
 
     Returns:
         The run, with a status for every sample.
@@ -76,7 +81,23 @@ def solve(
         derived = [name for name, p in mechanism.parameters.items() if p.expression and name in set_ones]
         chosen = outputs if outputs is None or isinstance(outputs, str) else tuple(outputs)
         model = _model(mechanism, chosen, tuple(derived), engine)
+    for driver in model.plan.drivers if inputs and not wrap else ():
+        if driver.quantity.kind == "angle":
+            _warn_of_degrees(driver.inputs[0], inputs.get(driver.inputs[0]))
     return model.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, anew=anew, out=out, **inputs)
+
+
+def _warn_of_degrees(name: str, angles: ArrayLike | None) -> None:
+    """Warn of an array of whole numbers over many turns: degrees, where radians are needed."""
+    if angles is None or np.ndim(angles) != 1 or len(angles) < _FEWEST:  # type: ignore[arg-type]  # it is an array
+        return
+    low, high = float(np.min(angles)), float(np.max(angles))
+    if high - low >= _WIDE and bool(np.all(np.mod(angles, 1.0) == 0.0)):
+        warnings.warn(
+            f"{name}: {low:g} to {high:g} rad, {in_turns(high - low)}, in whole numbers: inputs of angles are in "
+            f"radians; for degrees give {name}=np.radians(...)",
+            stacklevel=3,
+        )
 
 
 @lru_cache(maxsize=MODELS_KEPT)

@@ -9,6 +9,7 @@ from typing import Any
 from kinfmu.errors import MechanismError, RequestError, listed
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
+from kinfmu.mechanism.number import unit_advice
 from kinfmu.mechanism.parameters import NUMBER
 from kinfmu.mechanism.valid import check_name
 from kinfmu.run import FloatArray
@@ -152,7 +153,8 @@ class FitProblem:
                 raise RequestError(f"[unknowns] {settable.unknown(name, settable.names)}")
             setting: Any = constant or parameter
             where = f"[unknowns] {name}"
-            bounds[name] = read_bounds(where, value, setting.quantity or NUMBER, self.mechanism.length_unit)
+            with unit_advice(name, setting.value, self.mechanism.length_unit):
+                bounds[name] = read_bounds(where, value, setting.quantity or NUMBER, self.mechanism.length_unit)
         return bounds
 
 

@@ -51,6 +51,54 @@ def test_a_body_in_the_open_could_be_driven_by_its_angle_and_a_point() -> None:
     assert [suggestion.keys["type"] for suggestion in advice.suggestions] == ["angle", "coordinate", "coordinate"]
 
 
+@pytest.mark.parametrize("left_out", ["P", "Q", "C"])
+def test_a_pin_that_is_missing_is_proposed_first_and_completes_the_mechanism(left_out: str) -> None:
+    whole = fourbar(4, 1, 3.5, 3)
+    mechanism = replace(whole, joints=tuple(joint for joint in whole.joints if joint.name != left_out))
+    report = kinfmu.check(mechanism)
+    assert report.advice is not None
+    (suggestion,) = report.advice.suggestions
+    (joint,) = (joint for joint in whole.joints if joint.name == left_out)
+    assert isinstance(joint, Revolute)
+    assert f"  could add   {suggestion}" in str(report)
+    assert (suggestion.table, set(suggestion.keys["between"])) == ("joints", set(joint.between))
+    pasted = str(suggestion).replace("[joints] ", "joints.")
+    assert kinfmu.check(parse(pasted + "\n" + text(mechanism))).problem is None
+
+
+def test_a_roller_as_a_body_of_its_own_could_be_left_out() -> None:
+    linkage = fourbar(4, 1, 3.5, 3)
+    roller = Body("roller", {"Q": (0, 0), "R": (0, 0)}, (3, 3, 0))
+    ground = Body("ground", {"O": (0, 0), "C": (4, 0)})
+    mechanism = replace(
+        linkage,
+        bodies=(ground, *(body for body in linkage.bodies if not body.is_ground), roller),
+        joints=(
+            *(joint for joint in linkage.joints if joint.name != "Q"),
+            Revolute("Q", ("coupler.Q", "roller.Q")),
+            Revolute("R", ("roller.R", "rocker.Q")),
+        ),
+    )
+    report = kinfmu.check(mechanism)
+    assert "  could omit  [bodies.roller]: it moves alone and no other body follows" in str(report)
+    assert "; or leave out roller, which no other body follows" in str(report.problem)
+
+
+def test_a_pendulum_is_no_idle_body() -> None:
+    advice = kinfmu.check(with_arm()).advice
+    assert advice is not None
+    assert advice.idle is None
+
+
+@pytest.mark.parametrize("name", ["P", "Q"])
+def test_a_pin_written_as_fixed_is_named_where_no_motion_is_left(name: str) -> None:
+    whole = fourbar(4, 1, 3.5, 3)
+    joints = [Fixed(name, joint.between, 1.0) if joint.name == name else joint for joint in whole.joints]
+    report = kinfmu.check(replace(whole, joints=joints))
+    assert str(report.problem).endswith(f"there is nothing to drive; is {name} a revolute joint?")
+    assert f'  could be    [joints.{name}] type = "revolute" in place of "fixed"' in str(report)
+
+
 def test_a_slide_could_be_driven_along_its_axis() -> None:
     bodies = [Body("ground", {"G": (0, 0)}), Body("block", {"P": (0, 0)})]
     advice = kinfmu.check(Mechanism("slide", bodies, [Translational("rail", ("ground.G", "block.P"), 0.5)])).advice

@@ -27,6 +27,28 @@ def test_parameters_that_are_used_nowhere_are_reported() -> None:
     assert note in str(report)
 
 
+@pytest.mark.parametrize("text", ["0.8*size", "size + 10 mm"])
+def test_a_number_that_is_a_length_in_every_expression_is_reported_with_its_unit(text: str) -> None:
+    mechanism = parse(CRANK_ROCKER.replace("crank = 1.0", f'crank = "{text}"\nsize = 1.25', 1))
+    assert list(file_notes(mechanism)) == []  # the unit of the key is known through another parameter
+    mechanism = parse(CRANK_ROCKER.replace("crank = 1.0", "size = 1.25", 1).replace('"crank", 0', f'"{text}", 0', 1))
+    (note,) = file_notes(mechanism)
+    assert note.startswith(
+        f"[parameters] size = 1.25 has no unit and is a pure number, although '{text}' is a length: "
+    )
+    assert 'if size is one, write size = "1.25 m"' in note
+    cured = parse(CRANK_ROCKER.replace("crank = 1.0", 'size = "1.25 m"', 1).replace('"crank", 0', f'"{text}", 0', 1))
+    assert list(file_notes(cured)) == []
+    assert cured.parameters["size"].kind == "length"
+
+
+@pytest.mark.parametrize("text", ["rod*size", "rod/size", "size*teeth", "1 m*size"])
+def test_a_factor_of_a_length_and_one_of_two_numbers_are_no_lengths(text: str) -> None:
+    given = 'size = 1.25\nrod = "0.5 m"\nteeth = 12'
+    mechanism = parse(CRANK_ROCKER.replace("crank = 1.0", given, 1).replace('"crank", 0', f'"{text}", 0', 1))
+    assert not [note for note in file_notes(mechanism) if "no unit" in note]
+
+
 def test_an_angle_that_looks_like_degrees_is_reported() -> None:
     mechanism = parse(CRANK_ROCKER.replace('phi = "60 deg"', "phi = 60", 1))
     assert list(file_notes(mechanism)) == [

@@ -54,7 +54,7 @@ WRONG_USAGE = [
     ("solve fourbar -o run.csv --times 0:1", "must be A:B:STEP"),
     ("solve fourbar -o run.csv --angle 0:1:2 --times 0:1:1", "exclude each other"),
     ("solve five_bar -o run.csv --angle 0:1:2", "five_bar has left, right; simulate --input drives them"),
-    ("solve fourbar -o run.csv --angle 0:1:2 --set crank.speed=2", "--set crank.speed changes the law, which --angle"),
+    ("solve fourbar -o run.csv --angle 0:1:2 --set crank.speed=2", "give --times A:B:STEP in place of --angle"),
     ("solve fourbar -o run.csv --engine nativ", "'nativ' is not one of"),
     ("build forbar", "did you mean 'fourbar'?"),
     ("build fourbar -o four.zip", "four.zip: is no folder, and the file of an FMU ends in .fmu"),

@@ -34,7 +34,7 @@ def changed(old: str, new: str) -> str:
 
 TYPES = (
     "revolute, translational, fixed, distance, point_on_line, coordinate, angle, relative_angle, gear, "
-    "rack_and_pinion, cam_translating, cam_oscillating, cam_roller, coupling"
+    "rack_and_pinion, cam_translating, cam_oscillating, cam_roller, cam_flat_face, coupling"
 )
 LAWS = (
     "constant_speed, constant, polynomial, harmonic, simple_harmonic, cycloidal, modified_sine, modified_trapezoid, "
@@ -350,7 +350,57 @@ def test_coordinates_of_the_outputs_are_checked() -> None:
 def test_two_joints_with_the_same_name_are_reported_with_the_line() -> None:
     text = changed("[joints.P]", "[joints.O]")
     line = 1 + [k for k, line in enumerate(text.splitlines()) if line == "[joints.O]"][1]
-    assert message(text) == f"not valid TOML: Cannot declare ('joints', 'O') twice (at line {line}, column 10)"
+    first = 1 + text.splitlines().index("[joints.O]")
+    assert message(text) == f"not valid TOML: line {line}: 'joints.O' is written twice, first in line {first}; keep one"
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("link = 127,5", "link = 127,5: a decimal has a point, not a comma: link = 127.5"),
+        ("start = { x = -1,5, y = 0 }", "x = -1,5: a decimal has a point, not a comma: x = -1.5"),
+        ("of = crank  # its body", 'of = crank: text, also a number with a unit, needs quotes: of = "crank"'),
+        ("of = crank.A", 'of = crank.A: text, also a number with a unit, needs quotes: of = "crank.A"'),
+        ("speed = 60 rpm", 'speed = 60 rpm: text, also a number with a unit, needs quotes: speed = "60 rpm"'),
+        ("a = { b = 90 deg }", 'b = 90 deg: text, also a number with a unit, needs quotes: b = "90 deg"'),
+        ("length = 2*a", 'length = 2*a: text, also a number with a unit, needs quotes: length = "2*a"'),
+        ("repeat = True", "repeat = True: written in small letters: repeat = true"),
+        ("A = (28, 21)", "A = (28, 21): a list has brackets, not parentheses: A = [28, 21]"),
+        ('a = "b = c, 1,5" + 1', None),  # what is in quotes is no mistake
+    ],
+)
+def test_a_slip_in_toml_is_reported_with_its_line_and_what_to_write(line: str, said: str | None) -> None:
+    text = f'name = "a"\n\n[run]\n{line}\nstop = 1\n'
+    found = message(text)
+    assert found == f"not valid TOML: line 4: {said}" if said else found.startswith("not valid TOML: Expected newline")
+
+
+def test_a_key_written_twice_is_named_with_both_lines() -> None:
+    text = 'name = "a"\n[joints]\nA = { type = "revolute" }\n[drivers]\nA = 1\n[joints.B]\n[bodies]\nx.y = 1\n'
+    for twice, name, lines in (("[joints]\n", "joints", (9, 2)), ("x.y = 2\n", "bodies.x.y", (9, 8))):
+        said = f"line {lines[0]}: '{name}' is written twice, first in line {lines[1]}; keep one"
+        assert message(text + twice) == f"not valid TOML: {said}"
+
+
+def test_a_decimal_comma_in_text_is_named() -> None:
+    found = message(f'{FOURBAR}\n[parameters]\nlink = "127,5 mm"\n')
+    assert found.endswith("character 4: expected one of + - * / **, found ','; a decimal has a point, not a comma")
+
+
+@pytest.mark.parametrize(
+    ("word", "ours"),
+    [
+        ("crank.angle", "crank.phi"),
+        ("crank.theta", "crank.phi"),
+        ("crank.angular_velocity", "crank.omega"),
+        ("crank.speed", "crank.omega"),
+        ("crank.angular_acceleration", "crank.alpha"),
+        ("crank.position", "crank.x"),
+    ],
+)
+def test_other_words_for_coordinates_lead_to_those_of_kinfmu(word: str, ours: str) -> None:
+    found = message(f'{FOURBAR}\n[measures.m]\ntype = "range"\nof = "{word}"\n')
+    assert f"'{word}' is not a coordinate of this mechanism; did you mean '{ours}'?" in found
 
 
 def test_a_mechanism_of_the_ground_only_is_refused() -> None:

@@ -166,3 +166,15 @@ def test_a_solve_of_a_plan_resolves_no_mechanism(monkeypatch: pytest.MonkeyPatch
     plan = compile_plan(kinfmu.load("fourbar"))
     monkeypatch.setattr(kinfmu.Mechanism, "with_parameters", None)  # calling it fails
     assert kinfmu.solve(plan, crank_angle=[0.4, 0.5]).good.all()
+
+
+def test_whole_numbers_over_many_turns_are_probably_degrees() -> None:
+    mechanism = kinfmu.load("fourbar")
+    with pytest.warns(
+        UserWarning, match=r"crank_angle: 0 to 359 rad, 57\.1 turns, .* crank_angle=np\.radians\("
+    ) as caught:
+        kinfmu.solve(mechanism, crank_angle=np.arange(0, 360))
+    assert caught[0].filename == __file__
+    for angles in (np.radians(np.arange(360)), np.linspace(0.0, 100.0, 360), np.arange(6), [0.0, 360.0], 60.0):
+        kinfmu.solve(mechanism, crank_angle=angles)  # a warning is an error here
+    kinfmu.solve(mechanism, crank_angle=np.arange(0, 360), wrap=True)

@@ -87,6 +87,14 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache").absolute() / "kinfmu"
 
 
+def holds_any(suffix: str) -> bool:
+    """Return True if a library with this suffix was stored before."""
+    try:
+        return any(cache_folder().glob(f"*{suffix}"))
+    except (CompilerError, OSError):
+        return False
+
+
 @contextmanager
 def _private_folder() -> Iterator[Path]:
     """Yield the folder, made private; turn errors of the system in it into a CompilerError."""
