@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
-from functools import cache
+from functools import cache, reduce
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,7 @@ import pytest
 import kinfmu
 from kinfmu import Mechanism, Parameter, Run, Status
 from kinfmu.mechanism.members import NumberPath
+from kinfmu.page.describe import written_file
 from kinfmu.page.module import page_module
 from kinfmu.page.opened import Opened, opened, place_text
 from tests.page.engines import answers, driven_of, needs_node, rows_of, sweep_call, table
@@ -30,7 +33,7 @@ def of(name: str) -> tuple[Mechanism, Opened]:
 def with_number(mechanism: Mechanism, label: str, value: float) -> Mechanism:
     """Return the mechanism with another number at a place."""
     members = mechanism.members.changed(lambda place, old, _: value if place_text(place) == label else old)
-    return replace(mechanism, bodies=members.bodies, joints=members.joints)
+    return replace(mechanism, bodies=members.bodies, joints=members.joints, loads=members.loads)
 
 
 def worst_difference(run: Run, other: Run, size: float) -> float:
@@ -118,3 +121,31 @@ def test_lengths_that_do_not_close_are_named_by_their_places(crank_rocker: dict[
         f"parameters {ROD} = 120: the mechanism does not close: rows C.x, C.y leave a gap of 50 mm"
     )
     assert after == before
+
+
+@needs_node
+def test_masses_and_loads_that_are_set_give_the_forces_of_the_file(tmp_path: Path) -> None:
+    set_to = {"bodies.ram.mass": 30.0, "loads.balance.stiffness": 4000.0, "loads.work.law.rise_1": -900.0}
+    mechanism, found = of("toggle_press")
+    module = page_module(found.mechanism, found.labels)
+    written = [one.value for one in (*module.plan.parameters, *module.plan.law_constants)]
+    assert set(set_to) <= set(module.parameters)
+    values = [set_to.get(name, value) for name, value in zip(module.parameters, written, strict=True)]
+    changed = reduce(lambda part, one: with_number(part, *one), set_to.items(), mechanism)
+    times = np.linspace(mechanism.run.start, mechanism.run.stop, 25)
+    run, before = kinfmu.solve(changed, times), kinfmu.solve(mechanism, times)
+    u, ud, udd = (numbers.ravel().tolist() for numbers in driven_of(run))
+    columns = [3 * len(module.plan.outputs) + k for k in range(len(module.forces))]
+    calls = [["bind", values], ["sweep", u, columns, ud, udd, times.tolist()]]
+    ((bind, sweep),) = answers(tmp_path, [(module, calls)])
+    assert bind["ok"]
+    scale = np.abs(run.forces).max()
+    assert np.abs(run.forces - before.forces).max() > 0.01 * scale
+    assert np.abs(table(sweep["values"], len(columns)) - run.forces).max() < 1e-9 * scale
+
+
+def test_file_of_a_page_has_a_place_for_each_mass_and_load() -> None:
+    mechanism, found = of("toggle_press")
+    text = written_file(mechanism, page_module(mechanism), found.places)
+    slots = set(re.findall(r"\{\{([\w.]+)\}\}", text))
+    assert {"bodies.ram.mass", "loads.balance.stiffness", "loads.work.law.rise_1"} <= slots
