@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from pathlib import Path
 
@@ -16,6 +17,7 @@ import kinfmu
 from kinfmu import gallery
 from kinfmu.cli import main
 from kinfmu.fmu import build, simulate, verify
+from kinfmu.gallery.load import folder
 from kinfmu.mechanism import toml_file, toml_text
 from kinfmu.units import METRES
 from tests.gallery_members import mostly_long
@@ -205,8 +207,11 @@ def test_a_mechanism_in_metres_is_the_same_fmu_with_si(tmp_path: Path) -> None:
 
 
 def test_parameters_whose_unit_is_unknown_are_named(tmp_path: Path) -> None:
+    leg = tmp_path / "leg.toml"
+    text = (folder() / "jansen_leg" / "mechanism.toml").read_text("utf-8")
+    leg.write_text(re.sub(r'^([dehi]) = "(.*) mm"$', r"\1 = \2", text, flags=re.MULTILINE), "utf-8")
     result = CliRunner().invoke(
-        main, ["build", "jansen_leg", "--si", "--flavour", "python", "--no-page", "-o", str(tmp_path / "leg.fmu")]
+        main, ["build", str(leg), "--si", "--flavour", "python", "--no-page", "-o", str(tmp_path / "leg.fmu")]
     )
     assert result.exit_code == 0
     assert result.stderr.splitlines() == [
