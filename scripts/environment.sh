@@ -59,6 +59,13 @@ must_be_made() {
     [[ "$elsewhere" != "$ROOT" ]]
 }
 
+# A copy of kinfmu in .venv, not the checkout itself.
+is_installed_by_hand() {
+    local shown
+    shown="$("$VENV/bin/python" -m pip show kinfmu 2>/dev/null)" || return 1
+    [[ "$shown" == *"Name: kinfmu"* && "$shown" != *"Editable project location"* ]]
+}
+
 install() {
     local kind="$1" python what=".[figures]"
     if [[ "$kind" == dev ]]; then what=".[dev]"; fi
@@ -69,6 +76,9 @@ install() {
         mkdir "$VENV"
         touch "$VENV/unfinished" # until all is installed: pip takes a package that it was interrupted in for whole
         "$python" -m venv "$VENV"
+    fi
+    if [[ ! -e "$VENV/installed" ]] && is_installed_by_hand; then
+        echo "kinfmu: .venv has kinfmu as pip installed it; this checkout itself, which later edits change, replaces it" >&2
     fi
     touch "$VENV/unfinished"
     rm -f "$VENV/installed"

@@ -35,7 +35,8 @@ class CamRoller(Joint):
     ]
     law: Annotated[
         Law,
-        "radius f > 0 of the pitch curve over the polar angle in the cam's frame [length over rad], period: a turn",
+        "radius of the pitch curve as a function of the polar angle in the cam's frame [length over rad]; positive, "
+        "with a period of a turn",
     ]
     roller_radius: RollerRadius = None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 
 import kinfmu
 from kinfmu import log
+from kinfmu.cli.messages import patience
 from tests.cli.conftest import Command, read_csv
 
 
@@ -150,3 +152,17 @@ def test_a_constant_of_an_angle_that_looks_like_degrees_is_reported(notes: Calla
     ]
     assert notes(*call, "--set", "crank.start=90deg") == []
     assert notes(*call, "--set", "crank.speed=90") == []
+
+
+@pytest.mark.parametrize("is_first", [True, False])
+def test_only_the_first_page_is_announced_to_take_a_minute(
+    is_first: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
+    if not is_first:
+        (tmp_path / "key-digest.wasm").touch()
+    with patience(seconds=0.0):
+        time.sleep(0.2)
+    said = capsys.readouterr().err
+    assert said.startswith("kinfmu: note: compiling the page")
+    assert ("takes a minute" in said) is is_first

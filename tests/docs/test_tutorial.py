@@ -7,14 +7,18 @@ import shlex
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import kinfmu
 from kinfmu.cli import main
 from kinfmu.log import read
+from kinfmu.mechanism.toml_file import parse
 
 DOCS = Path(__file__).parents[2] / "docs"
 PATH = DOCS / "tutorial.md"
@@ -93,3 +97,23 @@ def test_the_tutorial_works_word_for_word(in_folder: Path, request: pytest.Fixtu
     assert run.good.all()
     assert len(run) == 201
     assert Path("review.rrd").stat().st_size > 0
+
+
+def test_points_of_a_sketch_in_the_world_give_the_same_motion() -> None:
+    wiper = parse(re.findall(r"```toml\n(.*?)```", PATH.read_text(encoding="utf-8"), re.DOTALL)[0])
+    run = kinfmu.solve(wiper)
+    pose = {name: float(run[name][0]) for name in run.names} | run.fixed
+
+    def sketched(body: kinfmu.Body) -> kinfmu.Body:
+        origin, turn = complex(pose[f"{body.name}.x"], pose[f"{body.name}.y"]), np.exp(1j * pose[f"{body.name}.phi"])
+        world = {name: origin + turn * complex(*point) for name, point in body.points.items()}
+        points = {name: (float(at.real), float(at.imag)) for name, at in world.items()}
+        return kinfmu.Body(body.name, points, (0.0, 0.0, 0.0))
+
+    (motor,) = wiper.drivers
+    motor = replace(motor, law=replace(motor.law, start=0.0))  # type: ignore[type-var]  # a dataclass
+    bodies = tuple(body if body.is_ground else sketched(body) for body in wiper.bodies)
+    sketch = kinfmu.solve(replace(wiper, bodies=bodies, drivers=(motor,), parameters={}))
+    for name in ("tip.x", "tip.y"):
+        np.testing.assert_allclose(sketch[name], run[name], rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(sketch["arm.phi"], run["arm.phi"] - run["arm.phi"][0], rtol=0.0, atol=1e-11)

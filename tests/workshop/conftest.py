@@ -21,6 +21,7 @@ case "$*" in
 "--version") echo "Python 3.11"; exit ;;
 "-m venv "*) mkdir -p "$3/bin"; cp "$0" "$3/bin/python"; cp "$0" "$3/bin/kinfmu" ;;
 esac
+case "$*" in "-m pip show kinfmu") printf '%b' "${PIP_SHOWS:-}"; exit ;; esac
 echo "$(basename "$0") $*" >>"$ASKED"
 echo "PYTHONPATH=${PYTHONPATH-unset} VIRTUAL_ENV=${VIRTUAL_ENV-unset} cwd=$(pwd -P)" >>"$ASKED.environment"
 case "$*" in "-m pip install"*) exit "${PIP_FAILS:-0}" ;; esac

@@ -98,6 +98,19 @@ def test_an_environment_that_somebody_made_by_hand_is_kept(miniature: Miniature)
     assert (tools / "theirs").exists()
 
 
+def test_a_copy_installed_by_hand_is_replaced_with_a_word(miniature: Miniature) -> None:
+    tools = miniature.root / ".venv" / "bin"
+    tools.mkdir(parents=True)
+    shutil.copy(miniature.python, tools / "python")
+    said = "kinfmu: .venv has kinfmu as pip installed it; this checkout itself, which later edits change, replaces it"
+    shown = "Name: kinfmu\\nVersion: 1.0\\n"
+    assert said in miniature.run("demo", PIP_SHOWS=shown)[1].splitlines()
+    assert miniature.asked == [f"{INSTALL}.[figures]", "python -m kinfmu.cli.demo"]
+    (miniature.root / ".venv" / "installed").unlink()
+    for other in (shown + "Editable project location: /here\\n", ""):
+        assert said not in miniature.run("demo", PIP_SHOWS=other)[1]
+
+
 def test_no_python_at_all_is_reported_in_one_line(miniature: Miniature) -> None:
     miniature.python.unlink()
     status, said = miniature.run("demo")
