@@ -47,10 +47,11 @@ def test_a_mechanism_is_loaded_from_a_file_by_text_or_path(tmp_path: Path) -> No
 
 def test_saving_to_an_unwritable_path_is_an_error(tmp_path: Path) -> None:
     mechanism = kinfmu.load("fourbar")
-    path = tmp_path / "none" / "mine.toml"
+    (tmp_path / "file").write_text("")
+    path = tmp_path / "file" / "mine.toml"
     with pytest.raises(MechanismError) as caught:
         kinfmu.save(mechanism, path)
-    assert str(caught.value) == f"{path}: cannot be written (No such file or directory)"
+    assert str(caught.value) == f"{path}: cannot be written (Not a directory)"
 
 
 def test_a_saved_file_has_the_same_bytes_on_every_system(tmp_path: Path) -> None:
