@@ -34,6 +34,11 @@ class Report(Findings, Displayed):
     def __str__(self) -> str:
         return "\n".join(lines(self))
 
+    @property
+    def has_cut_cam(self) -> bool:
+        """True if the problem is a cam that cannot be made: the mechanism still moves as its law says."""
+        return self.plan is not None and any(cam.is_cut for cam in self.cams)
+
     def assemblies(self) -> Assemblies:
         """Return all assemblies of the mechanism at its start driver values.
 
@@ -42,7 +47,7 @@ class Report(Findings, Displayed):
             AssemblyError: If no assembly is found.
 
         """
-        if self.problem is not None and not isinstance(self.problem, AssemblyError):
+        if self.problem is not None and not (isinstance(self.problem, AssemblyError) or self.has_cut_cam):
             raise self.problem
         return find_assemblies(self.mechanism, self.plan)
 

@@ -54,7 +54,7 @@ def check(
         report = checked(mech)
     if as_json:
         findings = report.as_json()
-        if matrices and report.problem is None:
+        if matrices and (report.problem is None or report.has_cut_cam):
             findings["matrices"] = [matrix.as_json() for matrix in report.matrices()]
         if assemblies:
             found = _assemblies(report)
@@ -64,7 +64,7 @@ def check(
         click.echo(str(report))
         if assemblies and (found := _assemblies(report)) is not None:
             click.echo(str(found))
-        if matrices and report.problem is None:
+        if matrices and (report.problem is None or report.has_cut_cam):
             for matrix in report.matrices():
                 click.echo(f"\n{matrix}")
     with errors_of(mechanism):

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import kinfmu
+from kinfmu.cli import main
 from kinfmu.mechanism.toml_file import parse
 from tests.motion.test_breaks import TEXT, tappet
 
@@ -48,3 +51,18 @@ def test_the_parts_of_given_cams_are_those_of_the_motion(joint: str) -> None:
         inside = begin + width * np.linspace(0.01, 0.99, 9)
         speed = kinfmu.solve(mechanism, cam_angle=inside)["stem.vy"]
         assert {"rise": (speed > 0.0).all(), "return": (speed < 0.0).all(), "dwell": (speed == 0.0).all()}[part]
+
+
+def test_a_cam_that_cannot_be_made_has_matrices_and_assemblies(tmp_path: Path) -> None:
+    """A roller that reaches the axle is a problem of the profile, not of the motion."""
+    text = TEXT.replace("LAW", "cycloidal").replace("BEGIN", "0 deg")
+    path = tmp_path / "cut.toml"
+    path.write_text(text.replace("offset = 0.05", "offset = 0.05\nroller_radius = 0.06"), encoding="utf-8")
+    plain, matrices, assemblies = (
+        CliRunner().invoke(main, ["check", str(path), *more]) for more in ([], ["--matrices"], ["--assemblies"])
+    )
+    for result in (plain, matrices, assemblies):
+        assert result.exit_code == 1
+        assert "the roller of radius 0.06 m reaches the cam's axle" in result.stderr
+    assert "row-reduced" in matrices.stdout
+    assert len(assemblies.stdout) > len(plain.stdout)
