@@ -131,10 +131,11 @@ def test_another_kind_of_file_is_refused(name: str, tmp_path: Path) -> None:
 
 
 def test_a_path_that_cannot_be_written_is_reported(tmp_path: Path) -> None:
+    (tmp_path / "none").touch()
     path = tmp_path / "none" / "figure.svg"
     with pytest.raises(FigureError) as caught:
         figure(reference_fourbar(), path)
-    assert str(caught.value) == f"{path}: cannot be written (No such file or directory)"
+    assert str(caught.value) == f"{path}: cannot be written (Not a directory)"
 
 
 def test_without_matplotlib_the_line_that_installs_it_is_reported(
