@@ -1,4 +1,4 @@
-"""Ships the gallery, which lies in fmus/ beside the package, inside the wheel as kinfmu/fmus."""
+"""Ships the gallery, which lies in fmus/ next to the package, inside the wheel as kinfmu/fmus."""
 
 from pathlib import Path
 from shutil import copyfile

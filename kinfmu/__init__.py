@@ -16,7 +16,7 @@ __version__ = VERSION
 
 
 def _public_names():
-    """Return the package of every public name, as the stub beside this file imports it."""
+    """Return the package of every public name, as the stub next to this file imports it."""
     stub = __loader__.get_data(f"{__path__[0]}/__init__.pyi").decode()  # in a folder or in a zip file
     imports = [line.split() for line in stub.splitlines() if line.startswith("from ")]
     return {name: package for _, package, _, name, *_ in imports}

@@ -83,7 +83,7 @@ install() {
     touch "$VENV/unfinished"
     rm -f "$VENV/installed"
     echo "kinfmu: installing into .venv" >&2
-    # compat: a plain path, so that a script beside a checkout named kinfmu imports the package and not that folder.
+    # compat: a plain path, so that a script next to a checkout named kinfmu imports the package and not that folder.
     (cd "$ROOT" && "$VENV/bin/python" -m pip install --quiet --config-settings editable_mode=compat --editable "$what") ||
         fail "installing into .venv failed, see above"
     rm "$VENV/unfinished"

@@ -177,7 +177,7 @@ def with_arm(linkage: Mechanism) -> Mechanism:
     )
 
 
-def beside(one: Mechanism, other: Mechanism, apart: float = 9.0) -> Mechanism:
+def side_by_side(one: Mechanism, other: Mechanism, apart: float = 9.0) -> Mechanism:
     """Return a mechanism of pins and another one next to it in one file, whose names end in 2."""
     ground, *bodies = other.bodies
     pins = {f"{name}2": (point.x + apart, point.y) for name, point in ground.points.items()}
@@ -208,7 +208,7 @@ def beside(one: Mechanism, other: Mechanism, apart: float = 9.0) -> Mechanism:
 
 def with_second(linkage: Mechanism) -> Mechanism:
     """Return a four-bar and a copy next to it with its own driver: `second`, of `crank2`."""
-    both = beside(linkage, linkage)
+    both = side_by_side(linkage, linkage)
     return replace(both, drivers=(*linkage.drivers, replace(both.drivers[-1], name="second")))
 
 

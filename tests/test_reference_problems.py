@@ -63,9 +63,9 @@ def test_fourbar_stays_a_parallelogram_through_turns_both_ways(rate: float) -> N
 
 @pytest.mark.parametrize("centre", [0.0, np.pi, -np.pi, 2 * np.pi])
 def test_fourbar_is_right_at_and_close_to_its_singular_points(centre: float) -> None:
-    beside = [centre] + [centre + side * 10.0**-k for k in range(1, 13) for side in (1.0, -1.0)]
-    run = kinfmu.solve(kinfmu.load("fourbar"), crank_angle=beside)
-    exact = exact_fourbar(beside)
+    angles = [centre] + [centre + side * 10.0**-k for k in range(1, 13) for side in (1.0, -1.0)]
+    run = kinfmu.solve(kinfmu.load("fourbar"), crank_angle=angles)
+    exact = exact_fourbar(angles)
     assert largest_error(run.q, exact.q) <= 1e-12
     assert largest_error(run.qd, exact.qd) <= 1e-10
     assert largest_error(run.qdd, exact.qdd) <= 1e-8

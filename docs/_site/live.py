@@ -1,4 +1,4 @@
-"""The page of each mechanism of the gallery in which it is dragged, and its FMU: files beside the pages of the site."""
+"""Pages in which a mechanism of the gallery is dragged, with its FMU: files next to the pages of the site."""
 
 from __future__ import annotations
 

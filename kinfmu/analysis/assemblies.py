@@ -368,10 +368,10 @@ def _value(name: CoordinateName, value: float, unit: str) -> str:
 
 def _start(given: Start, start: Start) -> str:
     """Return the text of a start pose in a file; one coordinate alone where only that changes."""
-    said = {key: f"{value:.6g}" for key, value in (("x", start.x), ("y", start.y)) if value is not None}
+    entries = {key: f"{value:.6g}" for key, value in (("x", start.x), ("y", start.y)) if value is not None}
     if start.phi is not None:
-        said["phi"] = f'"{degrees(start.phi)}"'
-    for key, value in said.items():
+        entries["phi"] = f'"{degrees(start.phi)}"'
+    for key, value in entries.items():
         if start._replace(**{key: getattr(given, key)}) == given:
             return f".{key} = {value}"
-    return f" = {{ {listed(f'{key} = {value}' for key, value in said.items())} }}"
+    return f" = {{ {listed(f'{key} = {value}' for key, value in entries.items())} }}"

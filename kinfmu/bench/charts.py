@@ -82,7 +82,7 @@ def draw(folder: Path, measured: Sequence[Measured], near: Sequence[Near]) -> tu
 
 
 def work_precision(measured: Sequence[Measured]) -> Figure:
-    """Draw times against errors, one panel a mechanism, and how to read them beside the last one.
+    """Draw times against errors, one panel a mechanism, and how to read them next to the last one.
 
     A curve is one engine with one predictor: its fixed numbers of corrections, or tolerances if it has none.
     """

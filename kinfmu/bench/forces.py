@@ -53,7 +53,7 @@ def run(rounds: int = ROUNDS) -> str:
 
 
 def with_masses(mechanism: Mechanism) -> Mechanism:
-    """Return the mechanism with masses beside the origins of its bodies, and gravity."""
+    """Return the mechanism with masses away from the origins of its bodies, and gravity."""
     metre = METRES[mechanism.length_unit]
     size = max(abs(value) for body in mechanism.bodies for point in body.points.values() for value in point)
     bodies = [

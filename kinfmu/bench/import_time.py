@@ -24,5 +24,5 @@ def run(rounds: int = ROUNDS) -> str:
 
 
 def _process(statement: str) -> Callable[[], object]:
-    beside = Path(kinfmu.__file__).parents[1]  # where it is found, installed or not
-    return lambda: subprocess.run([sys.executable, "-c", statement], check=True, cwd=beside)
+    folder = Path(kinfmu.__file__).parents[1]  # where it is found, installed or not
+    return lambda: subprocess.run([sys.executable, "-c", statement], check=True, cwd=folder)

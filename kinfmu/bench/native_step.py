@@ -56,7 +56,7 @@ def _row(name: str, ns: Sequence[float], others: Sequence[float]) -> tuple[str, 
 
 
 def with_masses(mechanism: Mechanism) -> Mechanism:
-    """The mechanism with gravity, and bodies of 1 kg whose centres of mass are beside their origins."""
+    """The mechanism with gravity, and bodies of 1 kg whose centres of mass are away from their origins."""
     bodies = [
         body if body.is_ground else replace(body, mass=1.0, center_of_mass=Point(0.3, 0.1), inertia=0.1)
         for body in mechanism.bodies

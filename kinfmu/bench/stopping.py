@@ -34,7 +34,7 @@ def model_with(plan: SolvePlan, setting: EngineSetting) -> Any:
     if not rewriter.loops and any(block.unknowns for block in plan.blocks):
         raise KinfmuError(f"{plan.mechanism.name}: the generated code has no loop `for iteration in range(...)`")
     module = ModuleType(f"kinfmu.solver.python.model_{plan.mechanism.name}")
-    module.__package__ = "kinfmu.solver.python"  # beside `linear`, as in an FMU
+    module.__package__ = "kinfmu.solver.python"  # next to `linear`, as in an FMU
     exec(compile(ast.fix_missing_locations(tree), module.__name__, "exec"), module.__dict__)  # noqa: S102  our own
     return module.bound(tuple(value for _, value in module.PARAMETERS)) if plan.parameters else module
 

@@ -71,7 +71,7 @@ if TYPE_CHECKING:
 @click.option(
     "--osp",
     is_flag=True,
-    help="Write also <name>_OspModelDescription.xml beside the FMU: groups of variables, for libcosim.",
+    help="Write also <name>_OspModelDescription.xml next to the FMU: groups of variables, for libcosim.",
 )
 @outputs_option
 @click.option("--author", help="Author, stated in the FMU.")

@@ -17,7 +17,7 @@ from kinfmu.errors import AssemblyError, listed
 SINGULAR = 1e-6  # margin below which a start pose counts as singular: double roots are known to half the digits
 COMFORTABLE = 0.03  # margin below which a pose near the start is a better anchor
 COMFORTABLE_WITHOUT_BRIDGES = 1e-3  # the same with several drivers: solved to round-off over the margin
-BESIDE = 0.1  # [rad, sizes]; distance from a singular start pose at which the anchor is sought
+OFFSET = 0.1  # [rad, sizes]; distance from a singular start pose at which the anchor is sought
 MOST_DENSE = 900  # coordinates; with more, methods on all rows at once take minutes
 NEAR = 0.5  # [rad, sizes]; a pose within this distance of the start poses is accepted
 RESTARTS = 60  # random values of open start poses; blocks that close in two ways need a few each
@@ -25,7 +25,7 @@ RESTARTS_TO_COME_NEARER = 15  # if the first pose is regular and only not near t
 DENSE_RESTARTS = 8
 _LOOKS = 4  # random poses at which the structure of the rows is determined
 _TRUST = 10.0  # a correction of a prediction must be this much smaller than the margin: other branches are farther away
-_PARTS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of BESIDE, at which branches near a singular start pose are sought
+_PARTS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of OFFSET, at which branches near a singular start pose are sought
 _NEARBY_STARTS = 6  # poses tried near a start that almost closes
 _SPREAD = 0.3  # [rad, sizes]; their distance from the start pose
 _NEARLY = 0.01  # residual of a pose that almost closes
@@ -115,54 +115,54 @@ def _assembled(system: System, start: StartValues) -> Assembled | None:
         )
     q, gap = close(system, start.q, u)
     if gap > CLOSED:
-        found = _assembled_beside(system, start) if gap < _NEARLY else None
+        found = _assembled_nearby(system, start) if gap < _NEARLY else None
         return found if found or order.blocks else assemble_from_random_starts(system, start, None, order)
     found = _without_spare_rows(system, q, u) or Assembled(q, u, margin(system, q))
     if found.margin > comfortable(system):
         return found
-    beside = []
+    nearby = []
     for side in (1.0, -1.0):
         if found.margin > SINGULAR:
-            there, at = followed(system, q, u, u + side * BESIDE * reaches(system), trust=_TRUST)
-            beside.append(Assembled(there, at, margin(system, there)))
+            there, at = followed(system, q, u, u + side * OFFSET * reaches(system), trust=_TRUST)
+            nearby.append(Assembled(there, at, margin(system, there)))
             continue
-        near = _beside(system, found, side)
-        beside += [] if near is None else [near]
-    return max([found, *beside], key=lambda pose: pose.margin)
+        near = _nearby(system, found, side)
+        nearby += [] if near is None else [near]
+    return max([found, *nearby], key=lambda pose: pose.margin)
 
 
-def closes_beside(system: System, singular: Assembled) -> bool:
+def closes_nearby(system: System, singular: Assembled) -> bool:
     """Return True if a mechanism closes near a singular pose."""
-    return any(_beside(system, singular, side) is not None for side in (1.0, -1.0))
+    return any(_nearby(system, singular, side) is not None for side in (1.0, -1.0))
 
 
-def _beside(system: System, singular: Assembled, side: float) -> Assembled | None:
+def _nearby(system: System, singular: Assembled, side: float) -> Assembled | None:
     """Return a closed pose on one side of a singular one, at the first distance of _PARTS that has one."""
     for part in _PARTS:
-        u = singular.u + side * part * BESIDE * reaches(system)
+        u = singular.u + side * part * OFFSET * reaches(system)
         near = next(iter(branches(system, singular.q, u)), None)
         if near is not None:
             return Assembled(near, u, margin(system, near))
     return None
 
 
-def _assembled_beside(system: System, start: StartValues) -> Assembled | None:
+def _assembled_nearby(system: System, start: StartValues) -> Assembled | None:
     """Return the pose nearest to the start poses, at slightly other driver values, that leads to the start, if any.
 
     Near a change point a rough pose may lie between the branches, where no row closes by a small gap; with redundant
     rows poses near it are tried too.
     """
     rng = np.random.default_rng(1989)
-    beside: list[tuple[float, Assembled]] = []
+    nearby: list[tuple[float, Assembled]] = []
     for trial in range(_NEARBY_STARTS if len(system.rows) > len(system.coordinates) else 1):
         spread = _SPREAD * system.column_scales * rng.uniform(-1.0, 1.0, len(start.q)) if trial else 0.0
         for side in (1.0, -1.0):
-            u = start.u + side * BESIDE * reaches(system)
+            u = start.u + side * OFFSET * reaches(system)
             q, gap = close(system, start.q + spread, u)
             near = Assembled(q, u, margin(system, q) if gap <= CLOSED else 0.0)
             if near.margin > SINGULAR and np.array_equal(followed(system, q, u, start.u)[1], start.u):
-                beside.append((distance_from_start(system, start, near.q), near))
-    return min(beside, key=lambda pose: pose[0])[1] if beside else None
+                nearby.append((distance_from_start(system, start, near.q), near))
+    return min(nearby, key=lambda pose: pose[0])[1] if nearby else None
 
 
 def comfortable(system: System) -> float:

@@ -1,7 +1,7 @@
 """OspModelDescription.xml of an FMU, for libcosim and other tools of the Open Simulation Platform.
 
 It names groups of variables that belong together, so that a system structure connects groups, by name, in place of
-variables. libcosim reads the file beside the FMU, by the name of the model: fourbar_OspModelDescription.xml.
+variables. libcosim reads the file next to the FMU, by the name of the model: fourbar_OspModelDescription.xml.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def osp_text(interface: Interface) -> str:
 
 
 def write_osp(fmu: Path) -> Path:
-    """Write <model>_OspModelDescription.xml beside an FMU of kinfmu and return its path.
+    """Write <model>_OspModelDescription.xml next to an FMU of kinfmu and return its path.
 
     Raises:
         FmuError: The FMU cannot be read, or the file cannot be written.

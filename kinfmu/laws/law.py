@@ -110,7 +110,7 @@ class Law(ABC):
 
     def numbers(self) -> dict[ConstantPath, Constant]:
         """Return every number of the law, by its path in the law's table; here the fields that are numbers."""
-        return {(key,): Constant(getattr(self, key), said) for key, said in number_fields(type(self)).items()}
+        return {(key,): Constant(getattr(self, key), measured) for key, measured in number_fields(type(self)).items()}
 
     def with_numbers(self, values: Mapping[ConstantPath, Any]) -> Law:
         """Return the law with other values of some numbers."""
@@ -151,5 +151,5 @@ class Law(ABC):
 def number_fields(cls: type[Law]) -> Mapping[str, LawQuantity]:
     """Return the fields of a law class that are numbers, with what they measure."""
     hints = get_type_hints(cls, include_extras=True)
-    said = {key.name: getattr(hints[key.name], "__metadata__", ()) for key in fields(cls)}  # type: ignore[arg-type]
-    return {key: found for key, all_said in said.items() for found in all_said if isinstance(found, LawQuantity)}
+    metadata = {key.name: getattr(hints[key.name], "__metadata__", ()) for key in fields(cls)}  # type: ignore[arg-type]
+    return {key: found for key, entries in metadata.items() for found in entries if isinstance(found, LawQuantity)}

@@ -45,9 +45,9 @@ class Spline(Law):
 
     def numbers(self) -> dict[ConstantPath, Constant]:
         return {
-            ("points", k, i): Constant(point[i], said)
+            ("points", k, i): Constant(point[i], measured)
             for k, point in enumerate(self.points)
-            for i, said in enumerate((_X, _U))
+            for i, measured in enumerate((_X, _U))
         }
 
     def with_numbers(self, values: Mapping[ConstantPath, Any]) -> Spline:

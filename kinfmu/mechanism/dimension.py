@@ -57,7 +57,7 @@ class Dimension:
     @property
     def _kinds(self) -> list[str]:
         """The quantities with a mass in them that have this dimension."""
-        return [kind for kind, said in KINDS.items() if tuple(map(Fraction, said.powers)) == self.powers]
+        return [kind for kind, measured in KINDS.items() if tuple(map(Fraction, measured.powers)) == self.powers]
 
     @property
     def quantity(self) -> Quantity | None:

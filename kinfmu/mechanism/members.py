@@ -171,7 +171,7 @@ def kind_of_measured(of: object) -> str:
 
 def _law(law: Law, kinds: tuple[str, str], place: NumberPath, change: Change) -> Law:
     old = law.numbers()
-    new = {path: change((*place, *path), value, said.quantity(*kinds)) for path, (value, said) in old.items()}
+    new = {path: change((*place, *path), value, measured.quantity(*kinds)) for path, (value, measured) in old.items()}
     return law if all(new[path] is old[path].value for path in old) else law.with_numbers(new)
 
 

@@ -75,7 +75,7 @@ def read_number(where: str, value: object, quantity: Quantity | None, length_uni
         valid = f"a number or text such as '{_example(quantity, length_unit)}'"
         raise MechanismError(f"{where} = {quoted(value)} must be {valid}")
     check_number(where, value)
-    return float(value)  # type: ignore[arg-type]  # is_number said so
+    return float(value)  # type: ignore[arg-type]  # is_number has checked it
 
 
 def read_constant(where: str, value: object, quantity: Quantity, length_unit: str) -> float:
@@ -93,7 +93,7 @@ def read_constant(where: str, value: object, quantity: Quantity, length_unit: st
             raise MechanismError(f"{where} = {quoted(value)} must be {valid}")
         return number
     check_number(where, value)
-    return float(value)  # type: ignore[arg-type]  # check_number said so
+    return float(value)  # type: ignore[arg-type]  # check_number has checked it
 
 
 def expression_error(

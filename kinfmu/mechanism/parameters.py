@@ -93,7 +93,7 @@ def resolve_parameters(parameters: Mapping[str, Parameter], alone: Mapping[str, 
     values: dict[str, float] = {}
     dimensions: dict[str, Dimension] = {}
     for name in order:
-        said, quantity = parameters[name], quantities[name]
+        parameter, quantity = parameters[name], quantities[name]
         dimensions[name] = Dimension.of(quantity) if quantity and quantity != NUMBER else UNKNOWN
         if name in expressions:
             where, expression = f"[parameters] {name}", expressions[name]
@@ -106,9 +106,9 @@ def resolve_parameters(parameters: Mapping[str, Parameter], alone: Mapping[str, 
                 (quantity,) = wanted[name]
                 dimensions[name] = Dimension.of(quantity)
             expression = converted(where, expression, quantities, dimensions, quantity)
-            done[name] = Parameter(compute(where, expression, values), quantity or NUMBER, said.description)
+            done[name] = Parameter(compute(where, expression, values), quantity or NUMBER, parameter.description)
         else:
-            done[name] = Parameter(said.value, quantity or NUMBER, said.description)
+            done[name] = Parameter(parameter.value, quantity or NUMBER, parameter.description)
         quantities[name] = done[name].quantity
         values[name] = float(done[name].value)
     return {name: done[name] for name in parameters}

@@ -46,7 +46,7 @@ def resolve(members: Members, given: Mapping[str, Parameter], unit: str) -> Reso
     """
     if len(given) > MOST_PARAMETERS:
         raise MechanismError(f"[parameters] holds {len(given)} parameters; {MOST_PARAMETERS} at most")
-    said = {name: read_parameter(name, parameter, unit) for name, parameter in given.items()}
+    read = {name: read_parameter(name, parameter, unit) for name, parameter in given.items()}
     expressions: dict[NumberPath, Expression] = {}
     alone: dict[str, set[Quantity]] = {}
 
@@ -59,7 +59,7 @@ def resolve(members: Members, given: Mapping[str, Parameter], unit: str) -> Reso
         return number
 
     members = members.changed(as_written)
-    parameters = resolve_parameters(said, alone)
+    parameters = resolve_parameters(read, alone)
     values = {name: float(parameter.value) for name, parameter in parameters.items()}
     dimensions = dimensions_of(parameters)
     quantities = {name: parameter.quantity for name, parameter in parameters.items()}

@@ -46,9 +46,11 @@ def law_constants(owners: Sequence[Driver | Load], computed: Collection[NumberPa
     for owner in owners:
         if isinstance(owner, Driver) or (isinstance(owner, Following) and not owner.inputs()):
             table = "drivers" if isinstance(owner, Driver) else "loads"
-            for key, (value, said) in owner.law.constants().items():
+            for key, (value, measured) in owner.law.constants().items():
                 if (table, owner.name, "law", key) not in computed:
-                    yield LawConstant(owner.name, key, float(value), said.quantity(*owner.law_kinds), said.is_positive)
+                    yield LawConstant(
+                        owner.name, key, float(value), measured.quantity(*owner.law_kinds), measured.is_positive
+                    )
 
 
 Owner = TypeVar("Owner", bound=Driver | Load)

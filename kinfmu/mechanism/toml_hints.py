@@ -40,9 +40,9 @@ def explained(text: str, error: ValueError) -> str:
     for pattern, rule, cure in _HINTS:
         wrong = re.search(pattern, line)
         if wrong and not _is_quoted(line, wrong.start("value")):
-            said = {"key": wrong["key"], "value": wrong["value"].strip(), "small": wrong["value"].lower()}
-            said["point"] = said["value"].replace(",", ".")
-            return f"line {number}: {_shown(wrong[0].strip())}: {rule}: {cure.format(**said)}"
+            blanks = {"key": wrong["key"], "value": wrong["value"].strip(), "small": wrong["value"].lower()}
+            blanks["point"] = blanks["value"].replace(",", ".")
+            return f"line {number}: {_shown(wrong[0].strip())}: {rule}: {cure.format(**blanks)}"
     return str(error)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kinfmu.equations.assembly import SINGULAR, Assembled, AssembledStart, closes_beside
+from kinfmu.equations.assembly import SINGULAR, Assembled, AssembledStart, closes_nearby
 from kinfmu.equations.closing import branches, close, margin
 from kinfmu.equations.start_poses import StartValues
 from kinfmu.equations.system import FloatArray, System
@@ -37,7 +37,7 @@ def find_anchor(system: System, assembly: AssembledStart, kept: Sequence[int]) -
         raise _does_not_close(system, start, kept)
     if found.margin <= SINGULAR:
         names = listed(driver.name for driver in system.mechanism.drivers)
-        if not closes_beside(system, found):
+        if not closes_nearby(system, found):
             raise AssemblyError(
                 f"the start pose is singular ({_at(system, found.u)}), and the mechanism does not close on either side "
                 f"of it: start {names} elsewhere, or check the lengths"

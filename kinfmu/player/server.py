@@ -115,7 +115,7 @@ class PlayServer:
             return build(mechanism, folder, fmi=fmi).read_bytes()
 
     def saved(self, text: str) -> Path:
-        """Write a mechanism file beside that of the source, under a name that is not in use, and return its path.
+        """Write a mechanism file next to that of the source, under a name that is not in use, and return its path.
 
         Raises:
             KinfmuError: It cannot be written.

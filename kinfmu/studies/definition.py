@@ -115,8 +115,8 @@ class Study:
     @cached_property
     def fingerprint(self) -> str:
         """Hash of the definition, the mechanism and the version: equal ones give equal rows."""
-        said = json.dumps(self.definition, sort_keys=True)
-        return hashlib.sha256("\n".join((VERSION, said, self.mechanism_text)).encode()).hexdigest()
+        content = json.dumps(self.definition, sort_keys=True)
+        return hashlib.sha256("\n".join((VERSION, content, self.mechanism_text)).encode()).hexdigest()
 
     @property
     def part_size(self) -> int:

@@ -36,12 +36,12 @@ def failures(result: StudyRows) -> str:
 
 def about(result: StudyRows) -> str:
     """Return what was studied, as a line."""
-    said = result.definition
-    how = {"grid": "on a grid", "sobol": "Sobol points", "latin_hypercube": "a Latin hypercube"}[said["sampling"]]
-    seed = "" if said["sampling"] == "grid" else f", seed {said['seed']}"
+    definition = result.definition
+    how = {"grid": "on a grid", "sobol": "Sobol points", "latin_hypercube": "a Latin hypercube"}[definition["sampling"]]
+    seed = "" if definition["sampling"] == "grid" else f", seed {definition['seed']}"
     varied = ", ".join(result.parameters)
     count = f"{len(result)} design{'' if len(result) == 1 else 's'}"
-    return f"{result.mechanism.name}: {count} ({how}{seed}) over {varied}; {said['motion']['over']}"
+    return f"{result.mechanism.name}: {count} ({how}{seed}) over {varied}; {definition['motion']['over']}"
 
 
 def measure_rows(result: StudyRows) -> list[tuple[str, ...]]:

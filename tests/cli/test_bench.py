@@ -196,8 +196,8 @@ def test_wrong_words_are_refused_with_what_would_be_right(
 
 
 def test_the_help_has_a_line_for_every_measurement(command: Command) -> None:
-    said = command("bench", "--help").stdout
-    assert re.findall(r"^  (\w+) {2,}[\w`]", said, re.MULTILINE) == [*MEASUREMENTS, ALL]
+    printed = command("bench", "--help").stdout
+    assert re.findall(r"^  (\w+) {2,}[\w`]", printed, re.MULTILINE) == [*MEASUREMENTS, ALL]
 
 
 @pytest.mark.parametrize(

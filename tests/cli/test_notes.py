@@ -163,6 +163,6 @@ def test_only_the_first_page_is_announced_to_take_a_minute(
         (tmp_path / "key-digest.wasm").touch()
     with patience(seconds=0.0):
         time.sleep(0.2)
-    said = capsys.readouterr().err
-    assert said.startswith("kinfmu: note: compiling the page")
-    assert ("takes a minute" in said) is is_first
+    printed = capsys.readouterr().err
+    assert printed.startswith("kinfmu: note: compiling the page")
+    assert ("takes a minute" in printed) is is_first

@@ -15,10 +15,10 @@ def executed(path: Path) -> str:
     names: dict[str, object] = {}
 
     def run(block: re.Match[str]) -> str:
-        said = StringIO()
-        with redirect_stdout(said):
+        printed = StringIO()
+        with redirect_stdout(printed):
             exec(compile(block[1], path.name, "exec"), names)  # noqa: S102  our own page
-        assert (block[2] is None) == (said.getvalue() == ""), f"{path.name}: what this prints is shown:\n{block[1]}"
-        return block[0] if block[2] is None else f"```python\n{block[1]}```\n\n```text\n{said.getvalue()}```\n"
+        assert (block[2] is None) == (printed.getvalue() == ""), f"{path.name}: what this prints is shown:\n{block[1]}"
+        return block[0] if block[2] is None else f"```python\n{block[1]}```\n\n```text\n{printed.getvalue()}```\n"
 
     return BLOCK.sub(run, path.read_text(encoding="utf-8"))

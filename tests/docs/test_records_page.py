@@ -42,8 +42,8 @@ def test_the_code_runs_and_its_comments_are_true(
     monkeypatch.chdir(tmp_path)
     exec(compile(CODE, "records.md", "exec"), {})  # noqa: S102  our own page
     promised = [line.partition("  # ")[2] for line in CODE.splitlines() if line.startswith("print")]
-    for said, comment in zip(capsys.readouterr().out.splitlines(), promised, strict=True):
-        assert comment.startswith(said)
+    for printed, comment in zip(capsys.readouterr().out.splitlines(), promised, strict=True):
+        assert comment.startswith(printed)
 
 
 def test_topics_and_metadata_are_those_of_a_file(record: Path) -> None:

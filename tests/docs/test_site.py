@@ -80,7 +80,7 @@ def test_links_to_folders_of_the_gallery_lead_to_its_pages(site: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("html", "said"),
+    ("html", "fault"),
     [
         ('<a href="other.html">x</a>', "other.html does not exist"),
         ('<a href="#there">x</a>', "#there: no such place in the page"),
@@ -91,12 +91,12 @@ def test_links_to_folders_of_the_gallery_lead_to_its_pages(site: Any) -> None:
     ],
 )
 def test_the_check_of_links_finds_what_is_wrong(
-    html: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    html: str, fault: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "index.html").write_text(html, encoding="utf-8")
     check = runpy.run_path(str(DOCS / "_site" / "links.py"))["main"]
-    assert check(tmp_path) == (1 if said else 0)
-    assert (f"index.html: {said}\n" in capsys.readouterr().err) == bool(said)
+    assert check(tmp_path) == (1 if fault else 0)
+    assert (f"index.html: {fault}\n" in capsys.readouterr().err) == bool(fault)
 
 
 def test_the_check_of_links_finds_fonts_from_the_net(tmp_path: Path) -> None:

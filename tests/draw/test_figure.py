@@ -34,16 +34,16 @@ def test_a_mechanism_of_the_gallery_is_drawn_with_all_its_names(
     name: str, gallery_figure: Callable[[str], Path]
 ) -> None:
     mechanism = gallery.load(name)
-    said = texts_in(gallery_figure(name))
-    assert mechanism.title in said
-    assert f"x [{mechanism.length_unit}]" in said
-    words = said.replace(",", " ").split()
+    texts = texts_in(gallery_figure(name))
+    assert mechanism.title in texts
+    assert f"x [{mechanism.length_unit}]" in texts
+    words = texts.replace(",", " ").split()
     for body in mechanism.moving_bodies:
         assert body.name in words
     for pin in (joint for joint in mechanism.joints if isinstance(joint, Revolute)):
         assert pin.name in words
     for driver in mechanism.drivers:
-        assert f"{driver.name} = " in said
+        assert f"{driver.name} = " in texts
     for point in mechanism.points:
         assert point in words
 

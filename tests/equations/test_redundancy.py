@@ -31,7 +31,7 @@ def test_the_finding_does_not_depend_on_the_start_pose(degrees: float) -> None:
 
 @pytest.mark.parametrize("seed", [4030, 4591, 6451, 7032])
 def test_motion_is_judged_on_its_own_branch_when_a_change_point_is_near(seed: int) -> None:
-    """Steps from these starts end beside a change point, from where the other branch is as near."""
+    """Steps from these starts end near a change point, from where the other branch is as near."""
     redundancy = find_redundancy(System(trial(seed, "redundant parallelograms").drawn.mechanism))
     assert redundancy.mobility == 1
     assert len(redundancy.redundant) == 1

@@ -75,8 +75,8 @@ def test_the_dense_solution_is_the_oracles(mechanism: Mechanism, motion: MotionO
     rows = WITHOUT_AB if mechanism is FOURBAR else range(6)
     ud, udd = RATES
     exact = motion(u, ud, udd)
-    beside = motion(u + 0.01)[0]
-    found = solve_reference(system, rows, beside, *(np.array([value]) for value in (u, ud, udd)))
+    nearby = motion(u + 0.01)[0]
+    found = solve_reference(system, rows, nearby, *(np.array([value]) for value in (u, ud, udd)))
     for table, expected in zip(found[:3], exact, strict=True):
         np.testing.assert_allclose(table, expected, rtol=0.0, atol=2e-13)
     assert 2 <= found.iterations <= 6

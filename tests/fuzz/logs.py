@@ -80,8 +80,8 @@ def motion() -> Run:
     return kinfmu.solve(kinfmu.load("fourbar"), np.linspace(0.0, 60.0, 3000), engine="python")
 
 
-def _motion_beside(path: Path) -> Run:
-    """The same run in a process of a trial, whose folder is beside the file that holds it."""
+def _recorded_next_to(path: Path) -> Run:
+    """The same run in a process of a trial, whose folder is next to the file that holds it."""
     return read(next(folder / MOTION for folder in path.parents if (folder / MOTION).exists()))
 
 
@@ -118,7 +118,7 @@ def _hidden(folder: Path) -> list[str]:
 
 def _grow(pipe: Connection, path: Path, seed: float, pause: float) -> None:
     """Write the run piece by piece; send how many samples were passed on, in the end "whole" or the error."""
-    draw, whole, done = random.Random(seed), _motion_beside(path), 0  # noqa: S311
+    draw, whole, done = random.Random(seed), _recorded_next_to(path), 0  # noqa: S311
     sink = McapLog(path, drawn=draw.random() < 0.5)
     try:
         sink.begin(whole.part(slice(0, 0)))
@@ -167,7 +167,7 @@ def _killed(draw: random.Random, folder: Path, _fmu: Path) -> Iterator[str]:
 
 def _fill_disk(pipe: Connection, path: Path, limit: int, seed: float) -> None:
     """Write the run in several ways where files may have so many bytes; say what went wrong."""
-    whole = _motion_beside(path)
+    whole = _recorded_next_to(path)
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
     for name, write in _WRITERS.items():
@@ -223,7 +223,7 @@ def _full_disk(draw: random.Random, folder: Path, _fmu: Path) -> Iterator[str]:
 
 
 def _without_rights(pipe: Connection, path: Path) -> None:
-    whole = _motion_beside(path)
+    whole = _recorded_next_to(path)
     for name, write in _WRITERS.items():  # imports what it needs, which the user without rights may not
         write(whole, path.parents[1] / f"open{name}")
     if os.geteuid() == 0:
@@ -343,7 +343,7 @@ def _descriptors(draw: random.Random, folder: Path, _fmu: Path) -> Iterator[str]
 
 
 def _long(pipe: Connection, path: Path, samples: int) -> None:
-    piece = _motion_beside(path).part(slice(0, PIECE))
+    piece = _recorded_next_to(path).part(slice(0, PIECE))
     sink = McapLog(path, drawn=False)
     sink.begin(piece.part(slice(0, 0)))
     sizes = []

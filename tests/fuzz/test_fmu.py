@@ -1,4 +1,4 @@
-"""The random host of FMUs: two instances in two threads, and FMI 3.0, beside what test_fuzz.py tries."""
+"""The random host of FMUs: two instances in two threads, and FMI 3.0, in addition to what test_fuzz.py tries."""
 
 from __future__ import annotations
 

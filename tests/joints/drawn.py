@@ -76,7 +76,7 @@ def _references(reference: Reference, *, is_pair: bool, third: bool) -> st.Searc
 @cache
 def laws(cls: type[Law]) -> st.SearchStrategy[Law]:
     """Laws of a class with drawn constants."""
-    numbers = {key: lengths if said.is_positive else coordinates for key, said in number_fields(cls).items()}
+    numbers = {key: lengths if quantity.is_positive else coordinates for key, quantity in number_fields(cls).items()}
     if cls is Polynomial:
         return st.builds(cls, st.lists(coordinates, min_size=1, max_size=5).map(tuple))
     if cls is MotionSequence:

@@ -355,7 +355,7 @@ def test_two_joints_with_the_same_name_are_reported_with_the_line() -> None:
 
 
 @pytest.mark.parametrize(
-    ("line", "said"),
+    ("line", "expected"),
     [
         ("link = 127,5", "link = 127,5: a decimal has a point, not a comma: link = 127.5"),
         ("start = { x = -1,5, y = 0 }", "x = -1,5: a decimal has a point, not a comma: x = -1.5"),
@@ -369,17 +369,21 @@ def test_two_joints_with_the_same_name_are_reported_with_the_line() -> None:
         ('a = "b = c, 1,5" + 1', None),  # what is in quotes is no mistake
     ],
 )
-def test_a_slip_in_toml_is_reported_with_its_line_and_what_to_write(line: str, said: str | None) -> None:
+def test_a_slip_in_toml_is_reported_with_its_line_and_what_to_write(line: str, expected: str | None) -> None:
     text = f'name = "a"\n\n[run]\n{line}\nstop = 1\n'
     found = message(text)
-    assert found == f"not valid TOML: line 4: {said}" if said else found.startswith("not valid TOML: Expected newline")
+    assert (
+        found == f"not valid TOML: line 4: {expected}"
+        if expected
+        else found.startswith("not valid TOML: Expected newline")
+    )
 
 
 def test_a_key_written_twice_is_named_with_both_lines() -> None:
     text = 'name = "a"\n[joints]\nA = { type = "revolute" }\n[drivers]\nA = 1\n[joints.B]\n[bodies]\nx.y = 1\n'
     for twice, name, lines in (("[joints]\n", "joints", (9, 2)), ("x.y = 2\n", "bodies.x.y", (9, 8))):
-        said = f"line {lines[0]}: '{name}' is written twice, first in line {lines[1]}; keep one"
-        assert message(text + twice) == f"not valid TOML: {said}"
+        expected = f"line {lines[0]}: '{name}' is written twice, first in line {lines[1]}; keep one"
+        assert message(text + twice) == f"not valid TOML: {expected}"
 
 
 def test_a_decimal_comma_in_text_is_named() -> None:

@@ -18,7 +18,7 @@ from tests.sweep.test_forces import loaded
 
 
 def test_extremes_of_a_torque_lie_between_the_samples() -> None:
-    """Torque 6 cos(phi) N m, with samples beside its extremes; reaction 29.6 N at the lowest point."""
+    """Torque 6 cos(phi) N m, with samples on both sides of its extremes; reaction 29.6 N at the lowest point."""
     arm = parse(ARM, "arm.toml")
     run = kinfmu.solve(arm, arm_angle=0.003 + np.linspace(0.0, math.tau, 361), arm_speed=4.0)
     asked = [Maximum("high", "arm.torque"), Minimum("low", "arm.torque"), Range("span", "arm.torque"),

@@ -248,11 +248,11 @@ def test_a_start_where_branches_cross_is_refused_as_ambiguous(lengths: tuple[flo
         compile_plan(fourbar(*lengths, start=start))
 
 
-@pytest.mark.parametrize("beside", [0.1, 1e-2, 1e-4, -1e-3])
+@pytest.mark.parametrize("distance", [0.1, 1e-2, 1e-4, -1e-3])
 @pytest.mark.parametrize("branch", [1, -1])
-def test_a_start_beside_a_crossing_keeps_its_branch(beside: float, branch: int) -> None:
-    start = np.pi + beside
-    u = [start + step * np.sign(beside) for step in (0.2, 0.8, 1.5)]  # away from the crossing
+def test_a_start_near_a_crossing_keeps_its_branch(distance: float, branch: int) -> None:
+    start = np.pi + distance
+    u = [start + step * np.sign(distance) for step in (0.2, 0.8, 1.5)]  # away from the crossing
     run = solve(fourbar(2, 1, 2, 1, start=start, branch=branch), crank_angle=u)
     exact = exact_fourbar(2, 1, 2, 1, u, branch=branch)
     assert largest_error(run["rocker.phi"], exact.q[:, 2], modulo_turns=True) < 1e-13

@@ -44,7 +44,7 @@ def test_groups_are_the_columns_that_they_say() -> None:
     ]
 
 
-def test_all_is_everything_and_so_is_nothing_said() -> None:
+def test_all_means_every_column_as_does_no_choice() -> None:
     everything = [column.name for column in run().columns()]
     assert kept("all") == everything == [column.name for column in select(run()).columns()]
 

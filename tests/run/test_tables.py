@@ -1,4 +1,4 @@
-"""A run as a table of Arrow, pandas and polars: every column by its name, numbers to the bit, units beside."""
+"""A run as a table of Arrow, pandas and polars: every column by its name, numbers to the bit, units as metadata."""
 
 from __future__ import annotations
 

@@ -23,8 +23,8 @@ from tests.fmu.host import OK, Host
 from tests.mechanisms import (
     ROBOT_LENGTHS,
     ROBOT_PIVOT,
-    beside,
     folding_robot,
+    side_by_side,
     tight_jaw,
     with_arm,
     with_robot,
@@ -118,8 +118,8 @@ def test_an_anchor_near_a_change_point_is_bridged_and_stays_unchanged() -> None:
     model = load_model(compile_plan(fourbar("4", "1", "3", "2").mechanism))
     far = Solver(model)
     near = far.solve(far.anchor, (math.pi - 0.04,))
-    beside = far.solve(near, (math.pi - 0.02,))
-    solver = Solver(model, anchor=Pose(beside.u, beside.found()))
+    closer = far.solve(near, (math.pi - 0.02,))
+    solver = Solver(model, anchor=Pose(closer.u, closer.found()))
     first = solver.solve(solver.anchor, solver.anchor.u)
     assert first.status == Status.BRIDGED
     assert solver.anchor.status == Status.OK
@@ -352,7 +352,7 @@ def test_only_a_crossing_that_depends_on_several_drivers_is_reported_as_a_limit(
     robot = kinfmu.solve(folding_robot(), engine=engine, **ways)
     assert robot.status.tolist() == [Status.OK, Status.OUTSIDE]
     assert robot.events[0].text.endswith(reason)
-    both = beside(folding_robot(), fourbar("4", "1", "3", "2").mechanism)
+    both = side_by_side(folding_robot(), fourbar("4", "1", "3", "2").mechanism)
     run = kinfmu.solve(both, engine=engine, crank2_angle=[2.0, 4.0], **ways)
     assert run.status.tolist() == [Status.OK, Status.OUTSIDE]
     assert run.events[0].text.endswith(reason)
@@ -366,7 +366,7 @@ def test_only_a_crossing_that_depends_on_several_drivers_is_reported_as_a_limit(
 def test_a_limit_of_one_driver_gives_no_such_reason_where_others_are_mixed() -> None:
     """A dead centre, and a crossing too narrow for a bridge, while blocks of several drivers move."""
     limited = fourbar("2", "1", "1.5", "1").mechanism
-    run = kinfmu.solve(beside(folding_robot(), limited), crank2_angle=[1.0, 2.5], left_angle=0.5, right_angle=3.6)
+    run = kinfmu.solve(side_by_side(folding_robot(), limited), crank2_angle=[1.0, 2.5], left_angle=0.5, right_angle=3.6)
     assert run.status.tolist() == [Status.OK, Status.OUTSIDE]
     assert run.events[0].text.startswith("crank2 = 2.5 rad")
     assert "left" not in run.events[0].text
@@ -393,7 +393,7 @@ def test_there_and_back_beside_a_machine_ends_where_it_began(engine: Engine) -> 
     there_and_back = np.array([*gaps, *gaps[-2::-1]])
     crank = math.pi + 0.02 * np.sign(there_and_back - 5e-3)
     run = kinfmu.solve(
-        beside(folding_robot(), fourbar("4", "1", "3", "2").mechanism),
+        side_by_side(folding_robot(), fourbar("4", "1", "3", "2").mechanism),
         engine=engine,
         left_angle=there_and_back,
         right_angle=math.pi + there_and_back,
@@ -409,7 +409,7 @@ def test_there_and_back_beside_a_machine_ends_where_it_began(engine: Engine) -> 
 @pytest.mark.parametrize("gap", [0.3, 1e-4])
 def test_a_pose_of_bridges_and_mixed_blocks_comes_back_from_its_numbers_to_the_bit(gap: float) -> None:
     """With its base, where it has one."""
-    both = beside(folding_robot(), fourbar("4", "1", "3", "2").mechanism)
+    both = side_by_side(folding_robot(), fourbar("4", "1", "3", "2").mechanism)
     solver = Solver(load_model(compile_plan(both)))
     regular = solver.solve(solver.anchor, (0.3, math.pi + 0.3, 2.9))
     pose = solver.solve(regular, (gap, math.pi + gap, math.pi + 0.01))

@@ -161,9 +161,9 @@ def interval(drawn: Drawn) -> Interval:
     else:
         ends = sketch.reach[0] * scale, sketch.reach[1] * scale
         marks = [mark * scale for mark in sketch.marks]
-    beside = [mark + side * depth * scale for mark in marks for depth in DEPTHS for side in (1, -1)]
+    near = [mark + side * depth * scale for mark in marks for depth in DEPTHS for side in (1, -1)]
     count = 2 * FINE + 1 if sketch.period else COARSE
-    u = np.unique(np.concatenate([np.linspace(*ends, count), beside, [start]]))
+    u = np.unique(np.concatenate([np.linspace(*ends, count), near, [start]]))
     u = u[(u >= ends[0]) & (u <= ends[1])]
     with np.errstate(all="ignore"):
         exact = drawn.positions(u[:, None])
@@ -231,8 +231,8 @@ def _with_dips(drawn: Drawn, u: Floats, lowest: Any) -> tuple[Any, dict[float, f
     lowest = lowest.copy()
     dips: dict[float, float] = {}
     for k in range(1, len(u) - 1):
-        beside = lowest[k - 1], lowest[k + 1]
-        if 0.0 < lowest[k] < DIP and lowest[k] <= min(beside) and max(beside) > FLAT * lowest[k]:
+        neighbours = lowest[k - 1], lowest[k + 1]
+        if 0.0 < lowest[k] < DIP and lowest[k] <= min(neighbours) and max(neighbours) > FLAT * lowest[k]:
             left, right = np.longdouble(u[k - 1]), np.longdouble(u[k + 1])
             for _ in range(PASSES):
                 between = left + (right - left) * np.arange(PIECES + 1) / PIECES
@@ -313,12 +313,12 @@ class BranchPath:
         return float(part[0])
 
     def _places(self, here: Floats, target: Floats, count: int) -> Any:
-        """Parts of a way to look at: equal ones, and beside marks of a driver, where angles change quickly."""
+        """Parts of a way to look at: equal ones, and close to marks of a driver, where angles change quickly."""
         found = [np.linspace(np.longdouble(0.0), np.longdouble(1.0), count + 1)]
         for a, b, kind in zip(here, target, self.drawn.sketch.kinds, strict=True):
             if kind == "angle" and a != b:
-                beside = [mark + side * CLOSE for mark in self.marks for side in (1, -1)]
-                found += [(np.asarray(places, dtype=np.longdouble) - a) / (np.longdouble(b) - a) for places in beside]
+                near = [mark + side * CLOSE for mark in self.marks for side in (1, -1)]
+                found += [(np.asarray(places, dtype=np.longdouble) - a) / (np.longdouble(b) - a) for places in near]
         parts = np.unique(np.concatenate(found))
         return parts[(parts >= 0.0) & (parts <= 1.0)]
 
@@ -328,8 +328,8 @@ class BranchPath:
         if least <= 0.0:
             return least
         for number, values in enumerate(limits):
-            beside = np.pad(values, 1, constant_values=np.inf)
-            for k in np.flatnonzero((values < DIP) & (values <= beside[:-2]) & (values <= beside[2:])):
+            padded = np.pad(values, 1, constant_values=np.inf)
+            for k in np.flatnonzero((values < DIP) & (values <= padded[:-2]) & (values <= padded[2:])):
                 left, right = parts[max(k - 1, 0)], parts[min(k + 1, last)]
                 for _ in range(PASSES):
                     part = left + (right - left) * np.arange(PIECES + 1) / PIECES

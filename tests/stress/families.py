@@ -437,7 +437,7 @@ def geared_five_bars(rng: Draw) -> Sketch:
 def redundant_parallelograms(rng: Draw) -> Sketch:
     """Parallel cranks with a third bar, as a distance or as a body, that adds no freedom and takes none.
 
-    Beside the line of the cranks it carries the coupler where they are stretched: no branches cross.
+    Away from the line of the cranks it carries the coupler where they are stretched: no branches cross.
     """
     g, a = drawn_length(rng, 0.3, 2.0), drawn_length(rng, 0.3, 2.0)
     third = (drawn_length(rng, -2.0, 3.0), Fraction(0) if rng.random() < 0.6 else drawn_length(rng, -1.0, 1.0))

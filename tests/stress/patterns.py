@@ -192,12 +192,12 @@ def _over_marks(rng: Random, branch: BranchPath) -> Floats:
     ahead = start + steps * np.arange(1, 25)[:, None]
     if generator.uniform() < 0.3:
         generator.shuffle(ahead)
-    beside = []
+    near = []
     for _ in range(8):
         place = start + generator.uniform(-0.5, 0.5, len(start))
         for k in range(len(start)):
             if generator.uniform() < 0.6:
                 off = generator.choice((-1.0, 0.0, 1.0)) * 10.0 ** -generator.uniform(1.0, 12.0)
                 place[k] = generator.choice(branch.marks) + off
-        beside.append(place)
-    return np.concatenate([ahead, ahead[::-2], np.array(beside), [start]])
+        near.append(place)
+    return np.concatenate([ahead, ahead[::-2], np.array(near), [start]])

@@ -240,7 +240,7 @@ def test_what_is_raised_is_a_fault_of_its_mechanism(monkeypatch: pytest.MonkeyPa
 
 
 def test_command_counts_and_reproduces_one_mechanism() -> None:
-    def said(*arguments: str) -> str:
+    def printed(*arguments: str) -> str:
         return subprocess.run(
             [sys.executable, "-m", "tests.stress", *arguments],
             cwd=ROOT,
@@ -250,10 +250,10 @@ def test_command_counts_and_reproduces_one_mechanism() -> None:
             check=True,
         ).stdout
 
-    many = said("--seed", "20", "--count", "4", "--jobs", "2")
+    many = printed("--seed", "20", "--count", "4", "--jobs", "2")
     assert "4 mechanisms in" in many
     assert "nothing is wrong" in many
     assert "scripts/stress --seed 2" in many
-    one = said("--seed", "20", "--family", "four-bars")
+    one = printed("--seed", "20", "--family", "four-bars")
     assert one.startswith('name = "drawn"')
     assert "seed 20, four-bars" in one

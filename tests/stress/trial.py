@@ -34,7 +34,7 @@ SINGULAR = 1e-6  # product of what must stay positive; below, long doubles lose 
 AGREED = 0.1  # the two oracles may differ by this part of the error, or of what counts as wrong
 STARTS = 64
 MANY = 400  # least number of samples for the native engine, which solves many at once
-FAR_SHARE, BESIDE_SHARE = 0.05, 0.2  # of the mechanisms are a million lengths, or a few, from the origin
+FAR_SHARE, OFF_ORIGIN_SHARE = 0.05, 0.2  # of the mechanisms are a million lengths, or a few, from the origin
 AMBIGUOUS = 1e-4  # sine at the start of a law below which AmbiguousStartError is accepted
 SAME = 1e-3  # [rad, lengths]; a pose at a larger distance is another assembly
 CLEAR = 0.1  # least sine of the angle between bars where assemblies are distinguished
@@ -271,12 +271,12 @@ class Trial:
                 if error <= WRONG:
                     continue
                 estimate = run.error[k, order]
-                said = f"{name} wrong by {error:.2g} (estimate {estimate:.2g}, true {absolute:.2g})"
+                finding = f"{name} wrong by {error:.2g} (estimate {estimate:.2g}, true {absolute:.2g})"
                 if run.status[k] == 0:
-                    verdict.faults.append(Fault("wrong with status ok", int(k), said))
+                    verdict.faults.append(Fault("wrong with status ok", int(k), finding))
                     break
                 if not absolute <= BEYOND * estimate:
-                    verdict.faults.append(Fault("beyond its estimate", int(k), f"status {run.status[k]}, {said}"))
+                    verdict.faults.append(Fault("beyond its estimate", int(k), f"status {run.status[k]}, {finding}"))
                     break
 
 
@@ -316,7 +316,7 @@ def _drawn(rng: Draw, family: str) -> Drawn:
     if chance < FAR_SHARE:  # as decimal numbers, which kinfmu takes them for
         scale, direction = Fraction(1), DIRECTIONS[0]
         at = (Fraction(rng.randint(-2_000_000, 2_000_000)), Fraction(rng.randint(-1_000_000, 1_000_000)))
-    elif chance < BESIDE_SHARE:
+    elif chance < OFF_ORIGIN_SHARE:
         at = (scale * Fraction(rng.randint(-2000, 2000), 1000), scale * Fraction(rng.randint(-9, 9), 8))
     frame = Frame(scale, (Fraction(direction[0]), Fraction(direction[1])), at)
     low, high = sketch.reach

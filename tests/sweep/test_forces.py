@@ -27,7 +27,7 @@ FREE_BODIES = (Revolute, Translational, Fixed, Distance, PointOnLine)  # joints 
 
 @cache
 def loaded(name: str) -> Mechanism:
-    """A mechanism of the gallery whose bodies have masses beside their origins, without its own loads."""
+    """A mechanism of the gallery whose bodies have masses away from their origins, without its own loads."""
     mechanism = gallery.load(name)
     metre = METRES[mechanism.length_unit]
     size = max(abs(value) for body in mechanism.bodies for point in body.points.values() for value in point)

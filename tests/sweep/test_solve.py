@@ -110,7 +110,7 @@ def test_wrong_arguments_are_told_in_one_line(arguments: dict[str, object], mess
     assert "\n" not in str(caught.value)
 
 
-def test_the_files_own_run_is_solved_if_nothing_is_said() -> None:
+def test_the_files_own_run_is_solved_by_default() -> None:
     run = kinfmu.solve(kinfmu.load("double_pendulum"))
     assert (run.t[0], run.t[-1], len(run)) == (0.0, 1.5, 151)
     assert repr(run).startswith("<Run of double_pendulum: 151 samples, t = 0 to 1.5 s, 0 without numbers; upper.x")

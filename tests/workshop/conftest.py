@@ -1,4 +1,4 @@
-"""A checkout in miniature: the real scripts beside a stand-in for Python that writes down what it is asked to do."""
+"""A checkout in miniature: the real scripts, with a program in place of Python that records what it is asked to do."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Miniature:
         self.python.chmod(0o755)
 
     def run(self, script: str, *arguments: str, cwd: Path | None = None, **environment: str) -> tuple[int, str]:
-        """Exit status of a script, and what it said on either channel."""
+        """Exit status of a script, and what it printed on either channel."""
         self.asked_file.unlink(missing_ok=True)
         done = subprocess.run(
             [self.root / "scripts" / script, *arguments],

@@ -18,8 +18,8 @@ INSTALL = "python -m pip install --quiet --config-settings editable_mode=compat 
 
 
 def test_a_first_call_makes_the_environment_installs_and_runs(miniature: Miniature) -> None:
-    status, said = miniature.run("demo")
-    assert status == 0, said
+    status, printed = miniature.run("demo")
+    assert status == 0, printed
     assert miniature.asked == [
         f"python3 -m venv {miniature.root}/.venv",
         f"{INSTALL}.[figures]",
@@ -58,9 +58,9 @@ def test_a_moved_checkout_gets_a_new_environment(miniature: Miniature) -> None:
 
 
 def test_a_failed_installation_is_reported_and_started_again(miniature: Miniature) -> None:
-    status, said = miniature.run("demo", PIP_FAILS="1")
+    status, printed = miniature.run("demo", PIP_FAILS="1")
     assert status == 1
-    assert said.splitlines()[-1] == "kinfmu: installing into .venv failed, see above"
+    assert printed.splitlines()[-1] == "kinfmu: installing into .venv failed, see above"
     assert miniature.asked[-1] == f"{INSTALL}.[figures]"
     assert miniature.run("demo")[0] == 0
     assert miniature.asked == [
@@ -102,36 +102,38 @@ def test_a_copy_installed_by_hand_is_replaced_with_a_word(miniature: Miniature) 
     tools = miniature.root / ".venv" / "bin"
     tools.mkdir(parents=True)
     shutil.copy(miniature.python, tools / "python")
-    said = "kinfmu: .venv has kinfmu as pip installed it; this checkout itself, which later edits change, replaces it"
+    printed = (
+        "kinfmu: .venv has kinfmu as pip installed it; this checkout itself, which later edits change, replaces it"
+    )
     shown = "Name: kinfmu\\nVersion: 1.0\\n"
-    assert said in miniature.run("demo", PIP_SHOWS=shown)[1].splitlines()
+    assert printed in miniature.run("demo", PIP_SHOWS=shown)[1].splitlines()
     assert miniature.asked == [f"{INSTALL}.[figures]", "python -m kinfmu.cli.demo"]
     (miniature.root / ".venv" / "installed").unlink()
     for other in (shown + "Editable project location: /here\\n", ""):
-        assert said not in miniature.run("demo", PIP_SHOWS=other)[1]
+        assert printed not in miniature.run("demo", PIP_SHOWS=other)[1]
 
 
 def test_no_python_at_all_is_reported_in_one_line(miniature: Miniature) -> None:
     miniature.python.unlink()
-    status, said = miniature.run("demo")
+    status, printed = miniature.run("demo")
     assert status == 1
-    assert said == (
+    assert printed == (
         "kinfmu: needs Python 3.11 or newer with venv and pip; "
         "looked for python3, python3.11 to python3.14; found none\n"
     )
 
 
 def test_a_python_that_is_too_old_is_named(miniature: Miniature) -> None:
-    status, said = miniature.run("demo", PYTHON_VERSION="3.9")
+    status, printed = miniature.run("demo", PYTHON_VERSION="3.9")
     assert status == 1
-    assert said.endswith("python3.11 to python3.14; python3 is 3.9\n")
+    assert printed.endswith("python3.11 to python3.14; python3 is 3.9\n")
     assert miniature.asked == []
 
 
 def test_a_python_without_venv_is_reported_with_what_to_install(miniature: Miniature) -> None:
-    status, said = miniature.run("demo", NO_VENV="1")
+    status, printed = miniature.run("demo", NO_VENV="1")
     assert status == 1
-    assert said.endswith("python3 is 3.11 without venv (Debian: apt-get install python3.11-venv)\n")
+    assert printed.endswith("python3 is 3.11 without venv (Debian: apt-get install python3.11-venv)\n")
 
 
 def test_a_newer_python_beside_an_old_one_is_found(miniature: Miniature) -> None:
@@ -164,10 +166,10 @@ def test_tests_run_in_the_checkout_from_any_folder(miniature: Miniature, tmp_pat
 
 @pytest.mark.parametrize("script", ["setup", "demo", "check", "docs", "graphics", "browser"])
 def test_help_is_printed_without_setting_anything_up(miniature: Miniature, script: str) -> None:
-    status, said = miniature.run(script, "--help")
+    status, printed = miniature.run(script, "--help")
     assert status == 0
-    assert said.startswith(f"scripts/{script}")
-    assert "set -euo" not in said
+    assert printed.startswith(f"scripts/{script}")
+    assert "set -euo" not in printed
     assert miniature.asked == []
 
 
@@ -178,9 +180,9 @@ def test_an_argument_that_means_nothing_is_wrong_usage(miniature: Miniature, scr
 
 
 def test_check_names_the_checks_it_knows(miniature: Miniature) -> None:
-    status, said = miniature.run("check", "lint", "spelling")
+    status, printed = miniature.run("check", "lint", "spelling")
     assert status == 2
-    assert said == "kinfmu: scripts/check does not know 'spelling'; checks: lint, format, types, imports, words\n"
+    assert printed == "kinfmu: scripts/check does not know 'spelling'; checks: lint, format, types, imports, words\n"
 
 
 def test_check_goes_on_after_a_failure_and_fails_in_the_end(miniature: Miniature) -> None:
@@ -195,9 +197,9 @@ def test_check_goes_on_after_a_failure_and_fails_in_the_end(miniature: Miniature
 
 
 def test_graphics_without_apt_says_what_to_install(miniature: Miniature) -> None:
-    status, said = miniature.run("graphics")
+    status, printed = miniature.run("graphics")
     assert status == 1
-    assert said == (
+    assert printed == (
         "kinfmu: no apt-get here; install a Vulkan driver another way "
         "(Debian calls it mesa-vulkan-drivers libvulkan1)\n"
     )

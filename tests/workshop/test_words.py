@@ -25,6 +25,8 @@ RULES = [line for line in (ROOT / "scripts" / "words.txt").read_text("utf-8").sp
         "both sides are alike",
         "1e-13 (fine)",
         "class Road:",
+        "def _close_beside(pose):",
+        "is_number said so",
     ],
 )
 def test_an_archaic_phrase_is_found(text: str) -> None:

@@ -69,7 +69,7 @@ def load_module(plan: SolvePlan) -> ModuleType:
 
 def _compiled(plan: SolvePlan) -> ModuleType:
     source = emit(plan)
-    name = f"kinfmu.solver.python.model_{plan.mechanism.name}"  # beside `linear`, as in an FMU
+    name = f"kinfmu.solver.python.model_{plan.mechanism.name}"  # next to `linear`, as in an FMU
     model = ModuleType(name)
     model.__package__ = "kinfmu.solver.python"
     model.__file__ = f"<{name}>"

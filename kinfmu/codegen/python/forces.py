@@ -1,4 +1,4 @@
-"""A force stage of an FMU as Python source: a module of the standard library, beside the model of a Solver.
+"""A force stage of an FMU as Python source: a module of the standard library, next to the model of a Solver.
 
 It holds one function, which gives efforts, inertias and energies of one sample, or reactions:
 

@@ -1,4 +1,4 @@
-"""The times at which laws of loads jump as Python source: a module of an FMU, beside the model of a Solver."""
+"""The times at which laws of loads jump as Python source: a module of an FMU, next to the model of a Solver."""
 
 from __future__ import annotations
 

@@ -97,10 +97,10 @@ def read(data: bytes, where: str) -> Description:
         root = ET.fromstring(data)  # noqa: S314  # the stdlib parser loads no external entities
     except ET.ParseError as error:
         raise FmuError(f"{where}: modelDescription.xml is not XML ({error})") from None
-    said = root.get("fmiVersion", "unknown")
-    if said not in _VERSIONS:
-        raise FmuError(f"{where}: FMI version {quoted(said)[1:-1]}; kinfmu simulates FMI 2.0 and 3.0")
-    version = _VERSIONS[said]
+    declared = root.get("fmiVersion", "unknown")
+    if declared not in _VERSIONS:
+        raise FmuError(f"{where}: FMI version {quoted(declared)[1:-1]}; kinfmu simulates FMI 2.0 and 3.0")
+    version = _VERSIONS[declared]
     parts = version.parts(root)
     simulation = root.find("CoSimulation")
     if parts is None or simulation is None:
@@ -113,7 +113,7 @@ def read(data: bytes, where: str) -> Description:
             token=root.get(version.TOKEN, ""),
             model_identifier=simulation.get("modelIdentifier", ""),
             generation_tool=root.get("generationTool", ""),
-            version=said,
+            version=declared,
             sources=tuple(file.get("name", "") for file in simulation.iterfind("SourceFiles/File")),
         )
         check_name("modelName", interface.name)

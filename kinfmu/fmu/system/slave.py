@@ -111,8 +111,8 @@ def foreign_slave(name: str, about: Any, folder: Path, log: Log) -> Iterator[Any
     try:
         slave = _instance(name, about, folder, is_fmi3, logged)
     except Exception as error:  # fmpy raises bare exceptions
-        said = " ".join([*messages, *str(error).split()])
-        raise FmuError(f"FMU '{name}' does not load: {said}") from None
+        reason = " ".join([*messages, *str(error).split()])
+        raise FmuError(f"FMU '{name}' does not load: {reason}") from None
     try:
         yield AnySlave(name, slave, is_fmi3)
     finally:

@@ -17,7 +17,7 @@
 #define DESERIALIZE fmi2DeSerializeFMUstate
 typedef fmi2Component instance;
 
-static void say(fmi2ComponentEnvironment e, fmi2String n, fmi2Status s, fmi2String c, fmi2String m, ...)
+static void print_message(fmi2ComponentEnvironment e, fmi2String n, fmi2Status s, fmi2String c, fmi2String m, ...)
 {
     (void)e;
     (void)n;
@@ -29,7 +29,7 @@ static void say(fmi2ComponentEnvironment e, fmi2String n, fmi2Status s, fmi2Stri
 static instance start(const char *token)
 {
     static fmi2CallbackFunctions callbacks;
-    callbacks.logger = say;
+    callbacks.logger = print_message;
     return fmi2Instantiate("it", fmi2CoSimulation, token, NULL, &callbacks, 0, 1);
 }
 
@@ -53,7 +53,7 @@ static int step(instance c, double t, double h)
 #define DESERIALIZE fmi3DeserializeFMUState
 typedef fmi3Instance instance;
 
-static void say(fmi3InstanceEnvironment e, fmi3Status s, fmi3String c, fmi3String m)
+static void print_message(fmi3InstanceEnvironment e, fmi3Status s, fmi3String c, fmi3String m)
 {
     (void)e;
     (void)s;
@@ -63,7 +63,7 @@ static void say(fmi3InstanceEnvironment e, fmi3Status s, fmi3String c, fmi3Strin
 
 static instance start(const char *token)
 {
-    return fmi3InstantiateCoSimulation("it", token, NULL, 0, 1, 0, 0, NULL, 0, NULL, say, NULL);
+    return fmi3InstantiateCoSimulation("it", token, NULL, 0, 1, 0, 0, NULL, 0, NULL, print_message, NULL);
 }
 
 static int enter(instance c)

@@ -438,16 +438,18 @@ def test_wrong_token_gives_null_and_a_message(library: Any, token: bytes | None)
     from kinfmu.fmu.slaves import fmi2_callbacks
 
     dll, host = library
-    said: list[tuple[int, str]] = []
+    logged: list[tuple[int, str]] = []
     if host.fmi == 2:
-        callbacks = fmi2_callbacks(lambda *message: said.append(message))
+        callbacks = fmi2_callbacks(lambda *message: logged.append(message))
         given = ctypes.byref(callbacks)
     else:
-        callbacks = fmi3LogMessageCallback(lambda _host, status, _category, text: said.append((status, text.decode())))
+        callbacks = fmi3LogMessageCallback(
+            lambda _host, status, _category, text: logged.append((status, text.decode()))
+        )
         given = ctypes.cast(callbacks, ctypes.c_void_p)
     assert _instantiate(dll, host, token, given) is None
-    assert said[0][0] == ERROR
-    assert host.about.token in said[0][1]
+    assert logged[0][0] == ERROR
+    assert host.about.token in logged[0][1]
     assert _instantiate(dll, host, token) is None  # and no callback for the message
 
 

@@ -1,4 +1,4 @@
-"""The Windows library of a native FMU, stepped under wine beside that of Linux: `scripts/wine` runs it."""
+"""The Windows library of a native FMU, stepped under wine in parallel with that of Linux: `scripts/wine` runs it."""
 
 from __future__ import annotations
 

@@ -32,10 +32,10 @@ from tests.fmu.test_parameters import geared, linkage
 from tests.gallery_members import every_member, mostly_long
 from tests.mechanisms import (
     bar_as_body,
-    beside,
     folding_robot,
     fourbar,
     reference_fourbar,
+    side_by_side,
     six_bar,
     slider_crank,
     tight_jaw,
@@ -130,7 +130,7 @@ def test_c_and_python_are_the_same_over_the_run_of_a_gallery_mechanism(name: str
 
 
 def wander(middle: float, reach: float, special: Sequence[float], seed: int) -> Samples:
-    """Short steps and jumps, back and forth, on and beside special places."""
+    """Short steps and jumps, back and forth, at special places and near them."""
     rng = random.Random(seed)  # noqa: S311  # samples, not secrets
     samples, u = [], middle
     for _ in range(200):
@@ -154,7 +154,7 @@ SINGULAR: dict[str, tuple[Callable[[], Mechanism], Samples, set[Status]]] = {
     "2-1-2-1": (lambda: fourbar(2, 1, 2, 1), wander(1.0, 3.0, QUARTERS, 4), {Status.OK, Status.BRIDGED}),
     "antiparallelogram": (
         lambda: fourbar(2, 1, 2, 1, branch=-1), wander(1.0, 3.0, QUARTERS, 5), {Status.OK, Status.BRIDGED}),
-    "beside a change point": (
+    "near a change point": (
         lambda: fourbar(4, 1, 3, 2 + 1e-7), wander(1.0, 3.0, QUARTERS, 6), {Status.OK}),
     "slider-crank, crank = rod": (lambda: slider_crank(1.0, 1.0), wander(1.0, 3.0, QUARTERS, 7), {Status.OK}),
     "two loops": (lambda: two_loops(0.12).mechanism, wander(1.0, 3.0, QUARTERS, 14), {Status.OK, Status.BRIDGED}),
@@ -226,7 +226,7 @@ def test_c_and_python_are_the_same_where_each_driver_has_singular_points_of_its_
 def test_c_and_python_are_the_same_where_blocks_of_one_driver_and_of_several_are_mixed(carried: bool) -> None:
     """Over crossings of one driver, and to crossings of several."""
     machine = change_point_fourbar("4", "1", "3", "2").mechanism
-    mechanism = with_robot(machine) if carried else beside(folding_robot(), machine)
+    mechanism = with_robot(machine) if carried else side_by_side(folding_robot(), machine)
     marks = [[0.0, math.pi]] * 3 if carried else [[0.0], [math.pi], [0.0, math.pi]]
     ways = [wander(driver.law.start, 2.0, marks[k], k) for k, driver in enumerate(mechanism.drivers)]
     samples = [tuple(u for (u,) in each) for each in zip(*ways, strict=True)]
