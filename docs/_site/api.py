@@ -10,6 +10,7 @@ from pathlib import Path
 import kinfmu
 from _site.docstrings import DECLARING
 from _site.pages import Pages
+from kinfmu.run.tables import Tabular
 
 GROUPS = {  # the package of a public name, as the stub imports it: title of its page, what it is for
     "gallery": ("Loading and saving", "Mechanisms by the name of a gallery entry or a file."),
@@ -77,6 +78,7 @@ def _directive(name: str) -> str:
     thing = getattr(import_module(module), last)
     if inspect.isclass(thing):
         members = "" if thing.__module__.split(".")[1] in DECLARING else "   :members:\n"
+        members += "   :inherited-members:\n" if issubclass(thing, Tabular) else ""
         return f".. autoclass:: {name}\n{members}\n"
     return f".. autofunction:: {name}\n\n" if callable(thing) else f".. autodata:: {name}\n\n"
 

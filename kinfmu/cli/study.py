@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-import time
 from pathlib import Path
 from shlex import quote
 
@@ -12,7 +10,7 @@ import click
 from kinfmu.cli.arguments import InputFile, OutputFile, names_in
 from kinfmu.cli.check import FIGURES
 from kinfmu.cli.group import main
-from kinfmu.cli.messages import printable
+from kinfmu.cli.messages import Progress, note
 from kinfmu.errors import KinfmuError
 
 
@@ -63,18 +61,22 @@ def study(
         raise click.UsageError("--workers is for this machine; the Dask cluster has its own")
     defined = read_study(file, engine=engine)
     target = output or Path(f"{file.stem}.parquet")
-    shown = _Shown(f"kinfmu study {quote(str(file))}")
+    designs = _Designs()
     try:
-        result = run_study(defined, target, workers=workers, dask=dask, restart=restart, progress=shown)
+        with Progress(f"kinfmu study {quote(str(file))}", least=1) as show:
+            result = run_study(
+                defined,
+                target,
+                workers=workers,
+                dask=dask,
+                restart=restart,
+                progress=lambda done, count: show(*designs.of_this_call(done, count)),
+            )
     except KeyboardInterrupt:
-        shown.end()
-        raise KinfmuError(f"stopped; {_kept(shown, folder_of(target))}") from None
+        raise KinfmuError(f"stopped; {designs.kept_in(folder_of(target))}") from None
     except SystemExit:  # a signal
-        shown.end()
-        click.echo(f"kinfmu: {printable(_kept(shown, folder_of(target)))}", err=True)
+        note(designs.kept_in(folder_of(target)))
         raise
-    finally:
-        shown.end()
     click.echo(str(result))
     click.echo(f"\nresults: {target}")
     if picture is not None:
@@ -82,44 +84,20 @@ def study(
         click.echo(f"figure: {picture}")
 
 
-def _kept(shown: _Shown, folder: Path) -> str:
-    return f"{shown.done} of {shown.count} designs are kept in {folder}: the same command goes on from there"
+class _Designs:
+    """The designs that are done, of all, and those that an earlier call left."""
 
-
-class _Shown:
-    """A line of progress with the time left on stderr, if that is a terminal."""
-
-    def __init__(self, label: str) -> None:
-        self.label = label
+    def __init__(self) -> None:
         self.done = self.count = 0
-        self._kept = 0
-        self._begin = 0.0
-        self._is_open = False
+        self._before = 0
 
-    def __call__(self, done: int, count: int) -> None:
+    def of_this_call(self, done: int, count: int) -> tuple[int, int]:
+        """Note how many designs are done; return how many of this call are, and how many it measures."""
         if not self.count:
-            self._kept, self._begin = done, time.monotonic()
+            self._before = done
         self.done, self.count = done, count
-        if not sys.stderr.isatty():
-            return
-        self._is_open = True
-        spent, fresh = time.monotonic() - self._begin, done - self._kept
-        left = f", {duration(spent * (count - done) / fresh)} left" if fresh and done < count else ""
-        click.echo(f"\r{self.label}: {done} of {count} designs{left}\x1b[K", nl=False, err=True)
+        return done - self._before, count - self._before
 
-    def end(self) -> None:
-        """End the line."""
-        if self._is_open:
-            click.echo(err=True)
-        self._is_open = False
-
-
-def duration(seconds: float) -> str:
-    """Return '45 s', '3 min 20 s' or '2 h 5 min'."""
-    whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    minutes, rest = divmod(whole, 60)
-    if minutes < 60:
-        return f"{minutes} min {rest} s"
-    return f"{minutes // 60} h {minutes % 60} min"
+    def kept_in(self, folder: Path) -> str:
+        """Return the note on an interrupted study."""
+        return f"{self.done} of {self.count} designs are kept in {folder}: the same command goes on from there"

@@ -6,13 +6,10 @@ loop sets at t_k, gets, records, then steps.
 
 from __future__ import annotations
 
-import signal
-import threading
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 from zipfile import BadZipFile, ZipFile
 
@@ -25,6 +22,7 @@ from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.fmu_settings import fmu_settings
 from kinfmu.fmu.input_table import InputTable, input_notes, input_table, undriven
 from kinfmu.fmu.interface import Interface
+from kinfmu.fmu.interruption import Interruption
 from kinfmu.fmu.samples import DISCARD, ERROR, Samples
 from kinfmu.fmu.slaves import LoadedSlave, slave
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, MECHANISM, text_in, unpacked
@@ -359,46 +357,3 @@ def _step_through(
             if slave.counts()[0] > Status.BRIDGED:  # the step goes to an unreachable pose
                 samples.read(end, slave)
             return
-
-
-ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))  # no SIGHUP on Windows
-
-
-class Interruption:
-    """Record of Ctrl-C, SIGTERM and SIGHUP during a `with` block; true once one came.
-
-    A KeyboardInterrupt inside an FMU's Python would reach the host as fmi2Fatal. Ignored signals stay ignored. Outside
-    the main thread, where Python does not deliver signals, it has no effect.
-    """
-
-    def __init__(self) -> None:
-        self.came: list[int] = []  # signals, in order
-        self._before: dict[int, Any] = {}
-
-    def __bool__(self) -> bool:
-        return bool(self.came)
-
-    def __enter__(self) -> Interruption:
-        if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, *ENDING):
-                before = signal.getsignal(number)
-                if number == signal.SIGINT or before not in (signal.SIG_IGN, None):
-                    self._before[number] = before
-                    signal.signal(number, self._note)
-        return self
-
-    def __exit__(
-        self, _kind: type[BaseException] | None, _error: BaseException | None, _traceback: TracebackType | None
-    ) -> None:
-        for number, before in self._before.items():
-            signal.signal(number, before)
-        self._before = {}
-
-    def _note(self, number: int, _frame: Any) -> None:
-        self.came.append(number)
-
-    def deliver(self) -> None:
-        """Raise SIGTERM or SIGHUP again, if one came: by default it ends the process."""
-        for number in self.came:
-            if number in ENDING:
-                signal.raise_signal(number)

@@ -14,7 +14,7 @@ from kinfmu.log.record import description, ending
 from kinfmu.log.target import replacing
 from kinfmu.run import Column, Run
 from kinfmu.run.channels import select
-from kinfmu.run.run import arrow_table
+from kinfmu.run.tables import arrow_table
 
 ROWS = 4096  # of a CSV file converted at once: Python's numbers take four times the memory
 

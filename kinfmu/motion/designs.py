@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,13 +15,13 @@ from kinfmu.motion.batch_reading import BatchReading
 from kinfmu.processes import require_workers
 from kinfmu.readings import Reading
 from kinfmu.run import Column, FloatArray
-from kinfmu.run.run import arrow_table, data_frame
+from kinfmu.run.tables import Tabular
 from kinfmu.solver.python.solver import TOLERANCE
 from kinfmu.sweep import Model
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class DesignMeasures(Displayed):
+class DesignMeasures(Tabular, Displayed):
     """The measures of m designs, as columns of a table.
 
     Attributes:
@@ -79,24 +78,6 @@ class DesignMeasures(Displayed):
             for k, at in enumerate(self.at[name].T if name in self.at else ()):
                 yield Column(f"{name}.at{k + 1 if k else ''}", self.at_unit, at)
         yield Column("solver.status", "1", self.status)
-
-    def to_arrow(self) -> Any:
-        """Return the columns as a pyarrow.Table, with the unit of each in the metadata of its field.
-
-        Raises:
-            MissingPackageError: pyarrow is not installed.
-
-        """
-        return arrow_table(self.columns())
-
-    def to_pandas(self) -> Any:
-        """Return the columns as a pandas.DataFrame, with the units by column in `attrs["units"]`.
-
-        Raises:
-            MissingPackageError: pandas is not installed.
-
-        """
-        return data_frame(self.columns())
 
 
 def measure_designs(

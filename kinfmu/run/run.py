@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, replace
 from dataclasses import fields as fields_of
 from functools import cached_property
-from importlib import import_module
 from itertools import groupby
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
@@ -14,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.display import Displayed
-from kinfmu.errors import KinfmuError, MissingPackageError, listed, suggestion
+from kinfmu.errors import KinfmuError, listed, suggestion
 from kinfmu.run.axis import TIME, axis_of, rates_per
+from kinfmu.run.tables import Column, Tabular
 from kinfmu.solver.python.status import Status
 from kinfmu.units import CoordinateName, ForceName, InputName, SignalName, read_coordinate, read_inputs, unit_of
 
@@ -57,14 +57,6 @@ class Lazy(Generic[T]):
         run.__dict__[self._name] = value
 
 
-class Column(NamedTuple):
-    """One column of a run."""
-
-    name: str
-    unit: str
-    values: NDArray[Any]  # (n,)
-
-
 class ColumnPlace(NamedTuple):
     """The place of a column: a table of the run, by the name of the field, and the number of its column."""
 
@@ -83,7 +75,7 @@ class Event(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Run(Displayed):
+class Run(Tabular, Displayed):
     """The motion of a mechanism at n samples.
 
     Samples of status 3 to 5 are NaN in values, rates and accelerations, and in the diagnostics. Fields declared as
@@ -329,33 +321,6 @@ class Run(Displayed):
         table: NDArray[Any] = getattr(self, place.table)
         return table if place.column is None else table[:, place.column]
 
-    def to_arrow(self) -> Any:
-        """Return the columns as a pyarrow.Table, with the unit of each in the metadata of its field.
-
-        Raises:
-            MissingPackageError: pyarrow is not installed.
-
-        """
-        return arrow_table(self.columns())
-
-    def to_pandas(self) -> Any:
-        """Return the columns as a pandas.DataFrame, with the units by column in `attrs["units"]`.
-
-        Raises:
-            MissingPackageError: pandas is not installed.
-
-        """
-        return data_frame(self.columns())
-
-    def to_polars(self) -> Any:
-        """Return the columns as a polars.DataFrame.
-
-        Raises:
-            MissingPackageError: polars is not installed.
-
-        """
-        return _optional("polars").DataFrame({column.name: column.values for column in self.columns()})
-
     def __getitem__(self, name: str) -> NDArray[Any]:
         """Return the column of a name, (n,); of a fixed coordinate its constant, with rates of zero.
 
@@ -387,32 +352,6 @@ _DEFAULTS = {field.name: field.default for field in fields_of(Run) if field.defa
 _LAZY = tuple(name for name, value in vars(Run).items() if isinstance(value, Lazy))
 _TABLES = ("t", "values", "rates", "accelerations", "inputs", "status", "iterations", "residual", "margin", "error",
            "watch", "forces", "reactions", "shaking", "signals")  # fmt: skip
-
-
-def arrow_table(columns: Iterable[Column]) -> Any:
-    """Return columns as a pyarrow.Table, without nulls, with the unit of each in the metadata of its field."""
-    pa = _optional("pyarrow")
-    arrays, fields = [], []
-    for column in columns:
-        arrays.append(pa.array(column.values))
-        fields.append(pa.field(column.name, arrays[-1].type, False, {"unit": column.unit}))
-    return pa.table(arrays, schema=pa.schema(fields))
-
-
-def data_frame(columns: Iterable[Column]) -> Any:
-    """Return columns as a pandas.DataFrame, with the units by column in `attrs["units"]`."""
-    columns = list(columns)
-    frame = _optional("pandas").DataFrame({column.name: column.values for column in columns})
-    frame.attrs["units"] = {column.name: column.unit for column in columns}
-    return frame
-
-
-def _optional(package: str) -> Any:
-    """Import a package that is not installed with kinfmu."""
-    try:
-        return import_module(package)
-    except ImportError:
-        raise MissingPackageError(f"a run as a table of {package} needs it: pip install {package}") from None
 
 
 class Sink(Protocol):

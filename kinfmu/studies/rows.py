@@ -16,6 +16,7 @@ from kinfmu.errors import MissingPackageError, StudyError, suggestion
 from kinfmu.mechanism import Mechanism, toml_file
 from kinfmu.mechanism.valid import quoted
 from kinfmu.run import FloatArray
+from kinfmu.run.tables import table_package
 from kinfmu.studies.definition import DESIGN, REASON, Study
 from kinfmu.studies.nominal import Nominal
 from kinfmu.studies.statistics import Moments, Statistics
@@ -142,10 +143,7 @@ class StudyRows:
             MissingPackageError: pandas is not installed.
 
         """
-        try:
-            import pandas  # noqa: ICN001, F401
-        except ImportError:
-            raise MissingPackageError("a study as a table of pandas needs it: pip install pandas") from None
+        table_package("pandas")
         frame = self.to_arrow().replace_schema_metadata().to_pandas()
         frame.attrs["units"] = dict(self.units)
         return frame
@@ -157,11 +155,7 @@ class StudyRows:
             MissingPackageError: polars is not installed.
 
         """
-        try:
-            import polars as pl
-        except ImportError:
-            raise MissingPackageError("a study as a table of polars needs it: pip install polars") from None
-        return pl.from_arrow(self.to_arrow())
+        return table_package("polars").from_arrow(self.to_arrow())
 
     def _batches(self, columns: list[str]) -> Iterator[Any]:
         """Yield row groups of columns, so that memory holds one of them."""

@@ -12,7 +12,6 @@ import pytest
 from click.testing import CliRunner
 
 from kinfmu.cli import main
-from kinfmu.cli.study import duration
 from tests.studies.linkage import write
 
 GRID = 'mechanism = "hoeken.toml"\nparameters.base = { from = 40, to = 300, count = 3 }\n'
@@ -79,7 +78,3 @@ def test_an_interrupted_study_says_how_to_go_on(number: int, status: int, tmp_pa
     last = stderr.splitlines()[-1]
     assert "of 5000 designs are kept in study.parquet.parts: the same command goes on from there" in last
     assert len(stderr.splitlines()) == (1 if number == signal.SIGINT else 2)
-
-
-def test_durations_are_short() -> None:
-    assert [duration(seconds) for seconds in (0.4, 59.4, 200.0, 7500.0)] == ["0 s", "59 s", "3 min 20 s", "2 h 5 min"]

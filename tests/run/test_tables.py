@@ -50,8 +50,8 @@ def test_columns_that_were_not_kept_are_not_in_a_table() -> None:
 
 
 @pytest.mark.parametrize("package", ["pyarrow", "pandas", "polars"])
-def test_a_package_that_is_missing_is_told(package: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_package_that_is_missing_is_named(package: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, package, None)
     call = {"pyarrow": RUN.to_arrow, "pandas": RUN.to_pandas, "polars": RUN.to_polars}[package]
-    with pytest.raises(MissingPackageError, match=f"^a run as a table of {package} needs it: pip install {package}$"):
+    with pytest.raises(MissingPackageError, match=f"^a table of {package} needs this package: pip install {package}$"):
         call()

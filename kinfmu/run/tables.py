@@ -1,0 +1,83 @@
+"""Columns with units as tables of Arrow, pandas and polars."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator
+from importlib import import_module
+from typing import Any, NamedTuple
+
+from numpy.typing import NDArray
+
+from kinfmu.errors import MissingPackageError
+
+
+class Column(NamedTuple):
+    """One column of a table."""
+
+    name: str
+    unit: str
+    values: NDArray[Any]  # (n,)
+
+
+class Tabular(ABC):
+    """A value that has columns of one length, and so can be a table of other packages."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def columns(self) -> Iterator[Column]:
+        """Yield the columns in their order."""
+
+    def to_arrow(self) -> Any:
+        """Return the columns as a pyarrow.Table, with the unit of each in the metadata of its field.
+
+        Raises:
+            MissingPackageError: pyarrow is not installed.
+
+        """
+        return arrow_table(self.columns())
+
+    def to_pandas(self) -> Any:
+        """Return the columns as a pandas.DataFrame, with the units by column in `attrs["units"]`.
+
+        Raises:
+            MissingPackageError: pandas is not installed.
+
+        """
+        columns = list(self.columns())
+        frame = table_package("pandas").DataFrame({column.name: column.values for column in columns})
+        frame.attrs["units"] = {column.name: column.unit for column in columns}
+        return frame
+
+    def to_polars(self) -> Any:
+        """Return the columns as a polars.DataFrame, which has no place for units.
+
+        Raises:
+            MissingPackageError: polars is not installed.
+
+        """
+        return table_package("polars").DataFrame({column.name: column.values for column in self.columns()})
+
+
+def arrow_table(columns: Iterable[Column]) -> Any:
+    """Return columns as a pyarrow.Table, without nulls, with the unit of each in the metadata of its field."""
+    pa = table_package("pyarrow")
+    arrays, fields = [], []
+    for column in columns:
+        arrays.append(pa.array(column.values))
+        fields.append(pa.field(column.name, arrays[-1].type, False, {"unit": column.unit}))
+    return pa.table(arrays, schema=pa.schema(fields))
+
+
+def table_package(name: str) -> Any:
+    """Import a package of tables, which is not installed with kinfmu.
+
+    Raises:
+        MissingPackageError: It is not installed.
+
+    """
+    try:
+        return import_module(name)
+    except ImportError:
+        raise MissingPackageError(f"a table of {name} needs this package: pip install {name}") from None
