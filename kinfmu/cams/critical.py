@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
 
 from kinfmu.cams.placed import PlacedCam
 from kinfmu.cams.profile import TURN, envelope
@@ -148,6 +147,8 @@ class _Search:
         a, b = next(part for part in self.parts if part[0] <= at <= part[1])
         low, high = max(a, self.s[max(k - 1, 0)]), min(b, self.s[min(k + 1, len(self.s) - 1)])
         if low < high:
+            from scipy.optimize import minimize_scalar
+
             refined = minimize_scalar(
                 lambda x: float(of(self._at(x))[0]), bounds=(low, high), method="bounded", options={"xatol": 1e-10}
             )
@@ -160,6 +161,10 @@ class _Search:
         negative = of(self.found) < 0.0
         if negative.all():
             return (Cut(0.0, TURN),)
+        if not negative.any():
+            return ()
+        from scipy.optimize import brentq
+
         ends: list[tuple[float, bool]] = []
         for k in np.flatnonzero(negative[1:] != negative[:-1]):
             low, high = float(self.s[k]), float(self.s[k + 1])

@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 
 _PLACE = re.compile(r"^(?P<what>.*?) ?\(at line (?P<line>\d+), column (?P<column>\d+)\)$", re.DOTALL)
-_KEY = r"""(?P<key>[\w."'-]+)[ \t]*="""
+_KEY = r"""(?P<key>[A-Za-z0-9_."'-]+)[ \t]*="""
 _TEXT = r"""(?P<value>(?:[+-]?[\d.]+[ \t]*(?:[*/+-][ \t]*)?)?[^\W\d][^,}\]#"'=]*)"""
 _HINTS = (  # what is found in the wrong line, and what to say; the first that is found counts
-    (rf"{_KEY}[ \t]*(?P<value>[+-]?\d+,\d+)(?![\w.]|,\d)", "a decimal has a point, not a comma", "{key} = {point}"),
+    (rf"{_KEY}[ \t]*(?P<value>[+-]?[0-9]+,[0-9]+)(?![\w.]|,\d)", "a decimal has a point, not a comma", "{key} = {point}"),
     (rf"{_KEY}[ \t]*\((?P<value>[^()]*)\)", "a list has brackets, not parentheses", "{key} = [{value}]"),
     (rf"{_KEY}[ \t]*(?P<value>True|TRUE|False|FALSE)\b", "written in small letters", "{key} = {small}"),
     (rf"{_KEY}[ \t]*{_TEXT}", "text, also a number with a unit, needs quotes", '{key} = "{value}"'),
@@ -30,11 +30,13 @@ def explained(text: str, error: ValueError) -> str:
 
     """
     found = _PLACE.match(str(error))
-    lines = text.splitlines()
+    lines = text.replace("\t", " ").split("\n")
     if found is None or not 0 < int(found["line"]) <= len(lines):
         return str(error)
     number = int(found["line"])
     line = lines[number - 1].strip()
+    if not "".join(lines[:number]).isprintable():  # a control character, whose code tomllib states
+        return str(error)
     if _TWICE.match(found["what"]):
         return f"line {number}: {_twice(lines, number)}"
     for pattern, rule, cure in _HINTS:

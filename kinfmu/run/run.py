@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from kinfmu.display import Displayed
 from kinfmu.errors import KinfmuError, listed, suggestion
 from kinfmu.run.axis import TIME, axis_of, rates_per
+from kinfmu.run.places import NAMES, Place, index_of, tables_of
 from kinfmu.run.tables import Column, Tabular
 from kinfmu.solver.python.status import Status
 from kinfmu.units import CoordinateName, ForceName, InputName, SignalName, read_coordinate, read_inputs, unit_of
@@ -230,7 +231,7 @@ class Run(Tabular, Displayed):
     def __getstate__(self) -> dict[str, Any]:
         """Return all tables as numbers and the mechanism as text, for copies and for other processes."""
         fields = {name: getattr(self, name) for name in _LAZY} | {"mechanism_source": self.mechanism_text}
-        kept = {name: value for name, value in self.__dict__.items() if name not in ("mechanism", "_index")}
+        kept = {name: value for name, value in self.__dict__.items() if name != "mechanism"}
         return kept | fields  # a mechanism has views of its tables, which cannot be sent
 
     def __repr__(self) -> str:
@@ -284,7 +285,7 @@ class Run(Tabular, Displayed):
     def columns(self) -> Iterator[Column]:
         """Yield every column that was kept: time, inputs, values, rates, accelerations, diagnostics, watches."""
         for place in self.places():
-            yield Column(place.name, place.unit, self._column(place))
+            yield Column(place.name, place.unit, self._column(place.table, place.column))
 
     def places(self, *, kept: bool = True) -> Iterator[ColumnPlace]:
         """Yield names, units and places of the columns, in their order; kept=False: also those that were not kept."""
@@ -294,32 +295,26 @@ class Run(Tabular, Displayed):
 
     def _places(self) -> Iterator[ColumnPlace]:
         per = rates_per(self)
-        yield ColumnPlace("time", "s" if self.axis == TIME else "1", "t", None)
-        for k, given in enumerate(self.input_names):
-            yield ColumnPlace(given, unit_of(given.quantity, self.length_unit), "inputs", k)
-        for order, table in enumerate(("values", "rates", "accelerations")):
-            for k, name in enumerate(self.outputs):
-                unit = unit_of(name.quantity(order, per), self.length_unit)
-                yield ColumnPlace(name.derivative(order), unit, table, k)
-        for table, names in (("forces", self.force_names), ("reactions", self.reaction_names)):
-            for k, force in enumerate(names):
-                yield ColumnPlace(force, unit_of(force.quantity, self.length_unit), table, k)
-        for k, signal in enumerate(self.signal_names):
-            yield ColumnPlace(signal, signal.unit, "signals", k)
-        for table in ("status", "residual", "iterations", "margin"):
-            yield ColumnPlace(f"solver.{table}", "1", table, None)
-        for k, error in enumerate(("solver.error_q", "solver.error_qd", "solver.error_qdd")):
-            yield ColumnPlace(error, "1", "error", k)
-        for k, watch in enumerate(self.watch_names):
-            yield ColumnPlace(f"watch.{watch}", "1", "watch", k)
+        quantities = [given.quantity for given in self.input_names]
+        quantities += [name.quantity(order, per) for order in range(3) for name in self.outputs]
+        quantities += [force.quantity for force in (*self.force_names, *self.reaction_names)]
+        units = ["s" if self.axis == TIME else "1", *(unit_of(quantity, self.length_unit) for quantity in quantities)]
+        units += [signal.unit for signal in self.signal_names]
+        units += ["1"] * (len(self._tables) - len(units))
+        for (name, table, column), unit in zip(self._tables, units, strict=True):
+            yield ColumnPlace(name, unit, table, column)
 
-    def _column(self, place: ColumnPlace) -> NDArray[Any]:
-        if place.table == "reactions" and place.column is not None and callable(self.__dict__["reactions"]):
-            of_shaking = place.column - len(self.reaction_names) + _SHAKING
+    @property
+    def _tables(self) -> tuple[Place, ...]:
+        return tables_of(*(getattr(self, names) for names in NAMES))
+
+    def _column(self, table: str, column: int | None) -> NDArray[Any]:
+        if table == "reactions" and column is not None and callable(self.__dict__["reactions"]):
+            of_shaking = column - len(self.reaction_names) + _SHAKING
             if of_shaking >= 0 and self.shaking is not None:
                 return self.shaking[:, of_shaking]
-        table: NDArray[Any] = getattr(self, place.table)
-        return table if place.column is None else table[:, place.column]
+        numbers: NDArray[Any] = getattr(self, table)
+        return numbers if column is None else numbers[:, column]
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         """Return the column of a name, (n,); of a fixed coordinate its constant, with rates of zero.
@@ -329,23 +324,20 @@ class Run(Tabular, Displayed):
 
         """
         if not isinstance(name, str):
-            raise KinfmuError(f"columns of a run have names such as '{next(iter(self._index))}', not {name!r}")
-        place = self._index.get(name)
-        if isinstance(place, float):
-            return np.full(len(self.t), place)
-        if place is None:
-            raise KinfmuError(f"the run has no column '{name}'{suggestion(name, self._index)}")
-        if name in self.absent:
-            raise KinfmuError(f"the run does not hold '{name}': it was not among the channels to keep")
-        return self._column(place)
-
-    @cached_property
-    def _index(self) -> dict[str, ColumnPlace | float]:
-        """The place of each column, and the numbers of the coordinates that never move, by name."""
-        index: dict[str, ColumnPlace | float] = {place.name: place for place in self.places(kept=False)}
-        for name, value in self.fixed.items():
-            index |= {name: value, name.derivative(1): 0.0, name.derivative(2): 0.0}
-        return index
+            raise KinfmuError(f"columns of a run have names such as 'time', not {name!r}")
+        index = index_of(*(getattr(self, names) for names in NAMES))
+        if name in index:
+            if name in self.absent:
+                raise KinfmuError(f"the run does not hold '{name}': it was not among the channels to keep")
+            return self._column(*index[name])
+        still = {
+            fixed.derivative(order): 0.0 if order else value
+            for fixed, value in self.fixed.items()
+            for order in range(3)
+        }
+        if name not in still:
+            raise KinfmuError(f"the run has no column '{name}'{suggestion(name, [*index, *still])}")
+        return np.full(len(self.t), still[name])
 
 
 _DEFAULTS = {field.name: field.default for field in fields_of(Run) if field.default is not MISSING}

@@ -367,4 +367,4 @@ def test_the_table_holds_what_the_profile_holds(tmp_path: Any) -> None:
     table = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
     np.testing.assert_array_equal(table[:, 1:3], profile.profile)
     with pytest.raises(KinfmuError, match="cannot be written"):
-        profile.write_csv(tmp_path / "none" / "cam.csv")
+        profile.write_csv(tmp_path / "cam.csv" / "below_a_file.csv")

@@ -136,6 +136,7 @@ def test_what_cannot_be_drawn_is_reported(tmp_path: Path) -> None:
         FigureError, match=r"run\.avi: '\.avi' is not a known format of animations; known: \.gif, \.mp4"
     ):
         animate(run, tmp_path / "run.avi")
+    (tmp_path / "a_file").touch()
     with pytest.raises(FigureError, match=r"run\.gif: cannot be written"):
-        animate(fourbar(np.arange(0.0, 181.0, 60.0)), tmp_path / "nowhere" / "run.gif")
-    assert not list(tmp_path.iterdir())
+        animate(fourbar(np.arange(0.0, 181.0, 60.0)), tmp_path / "a_file" / "run.gif")
+    assert [path.name for path in tmp_path.iterdir()] == ["a_file"]

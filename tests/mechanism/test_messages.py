@@ -366,6 +366,7 @@ def test_two_joints_with_the_same_name_are_reported_with_the_line() -> None:
         ("length = 2*a", 'length = 2*a: text, also a number with a unit, needs quotes: length = "2*a"'),
         ("repeat = True", "repeat = True: written in small letters: repeat = true"),
         ("A = (28, 21)", "A = (28, 21): a list has brackets, not parentheses: A = [28, 21]"),
+        ("of\t=\tcrank", 'of = crank: text, also a number with a unit, needs quotes: of = "crank"'),
         ('a = "b = c, 1,5" + 1', None),  # what is in quotes is no mistake
     ],
 )
@@ -377,6 +378,11 @@ def test_a_slip_in_toml_is_reported_with_its_line_and_what_to_write(line: str, e
         if expected
         else found.startswith("not valid TOML: Expected newline")
     )
+
+
+def test_a_control_character_is_reported_by_its_code() -> None:
+    assert message("of = crank\b\n").startswith("not valid TOML: Invalid value (at line 1, column 6)")
+    assert message('["a\b"]\n["a\b"]\n').startswith("not valid TOML: Illegal character '\\x08'")
 
 
 def test_a_key_written_twice_is_named_with_both_lines() -> None:

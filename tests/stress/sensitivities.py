@@ -59,6 +59,13 @@ def turn(phi: Any) -> tuple[Any, Any]:
     return cosine, sine
 
 
+def harmonic(law: Mapping[str, Any], x: Any) -> Any:
+    """Output of a harmonic law with its keys in a file."""
+    if law["law"] != "harmonic":
+        raise NotImplementedError(law["law"])
+    return law["start"] + law["amplitude"] * turn(x * law["frequency"] + law["phase"])[1]
+
+
 class Rows:
     """The rows of a mechanism file for numbers of any kind, written here by hand."""
 
@@ -126,6 +133,10 @@ class Rows:
             elif kind == "gear":
                 first, second = (angles[body] - angles[joint["carrier"]] for body in joint["between"])
                 rows.append(second - first * joint["ratio"] - joint["offset"])
+            elif kind == "cam_flat_face":
+                cam, follower = (angles[point.split(".")[0]] for point in joint["between"])
+                (dx, dy), (mx, my) = between(joint), turn(follower + joint["normal"])
+                rows.append(mx * dx + my * dy - harmonic(joint, follower + joint["normal"] - cam))
             else:
                 raise NotImplementedError(kind)
         for target, driver in zip(u, self._file["drivers"].values(), strict=True):
