@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.cams.placed import PlacedCam
+from kinfmu.equations.jets import Jet
 from kinfmu.errors import MechanismError
 from kinfmu.joints import CamFlatFace, CamRoller
 from kinfmu.laws import Law
-from kinfmu.motion.jets import Jet
 from kinfmu.run import FloatArray
 
 ComplexArray = NDArray[np.complex128]

@@ -5,16 +5,16 @@ from __future__ import annotations
 import re
 
 _PLACE = re.compile(r"^(?P<what>.*?) ?\(at line (?P<line>\d+), column (?P<column>\d+)\)$", re.DOTALL)
-_KEY = r"""(?P<key>[A-Za-z0-9_."'-]+)[ \t]*="""
-_TEXT = r"""(?P<value>(?:[+-]?[\d.]+[ \t]*(?:[*/+-][ \t]*)?)?[^\W\d][^,}\]#"'=]*)"""
+_KEY = r"""(?P<key>[A-Za-z0-9_."'-]+) *="""
+_TEXT = r"""(?P<value>(?:[+-]?[\d.]+ *(?:[*/+-] *)?)?[^\W\d][^,}\]#"'=]*)"""
 _HINTS = (  # what is found in the wrong line, and what to say; the first that is found counts
-    (rf"{_KEY}[ \t]*(?P<value>[+-]?[0-9]+,[0-9]+)(?![\w.]|,\d)", "a decimal has a point, not a comma", "{key} = {point}"),
-    (rf"{_KEY}[ \t]*\((?P<value>[^()]*)\)", "a list has brackets, not parentheses", "{key} = [{value}]"),
-    (rf"{_KEY}[ \t]*(?P<value>True|TRUE|False|FALSE)\b", "written in small letters", "{key} = {small}"),
-    (rf"{_KEY}[ \t]*{_TEXT}", "text, also a number with a unit, needs quotes", '{key} = "{value}"'),
+    (rf"{_KEY} *(?P<value>[+-]?[0-9]+,[0-9]+)(?![\w.]|,\d)", "a decimal has a point, not a comma", "{key} = {point}"),
+    (rf"{_KEY} *\((?P<value>[^()]*)\)", "a list has brackets, not parentheses", "{key} = [{value}]"),
+    (rf"{_KEY} *(?P<value>True|TRUE|False|FALSE)\b", "written in small letters", "{key} = {small}"),
+    (rf"{_KEY} *{_TEXT}", "text, also a number with a unit, needs quotes", '{key} = "{value}"'),
 )
 _TWICE = re.compile(r"^Cannot (?:overwrite a value|declare .* twice|mutate immutable namespace)")
-_HEADER = re.compile(r"^[ \t]*\[+[ \t]*(?P<name>[^\[\]#]+?)[ \t]*\]")
+_HEADER = re.compile(r"^ *\[+ *(?P<name>[^\[\]#]+?) *\]")
 _LONGEST = 80  # characters of a line in a message
 
 
@@ -63,7 +63,7 @@ def _written(lines: list[str], number: int) -> tuple[str, str]:
     header = _HEADER.match(lines[number - 1])
     if header:
         return "", header["name"]
-    key = re.match(rf"[ \t]*{_KEY}", lines[number - 1])
+    key = re.match(rf" *{_KEY}", lines[number - 1])
     above = (_HEADER.match(line) for line in reversed(lines[: number - 1]))
     table = next((found["name"] for found in above if found), "")
     return table, key["key"] if key else ""

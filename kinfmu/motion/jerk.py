@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from kinfmu.equations.jets import Jet
 from kinfmu.equations.system import System, placement
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.joints.cam import Cam
@@ -14,7 +15,6 @@ from kinfmu.joints.cam_roller import CamRoller
 from kinfmu.laws import External
 from kinfmu.measures.placement import Placement
 from kinfmu.mechanism import Mechanism
-from kinfmu.motion.jets import Jet
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import TIME
 from kinfmu.solver.python.status import Status

@@ -288,7 +288,9 @@ def test_a_roller_that_starts_on_the_pole_is_reported() -> None:
     mechanism = lifted(CamRoller("roller", ("cam.O", "follower.R"), Harmonic(0.25, 1.0, 1.25)))
     bodies = (*mechanism.bodies[:2], Body("follower", {"R": (0, 0)}, (0, 0, 0)))  # type: ignore[dict-item,arg-type]
     at_pole = Mechanism("cam", bodies, mechanism.joints, mechanism.drivers)
-    with pytest.raises(AssemblyError, match=r"does not close: gap 1.25 m at 'roller' with the others closed; check start poses"):
+    with pytest.raises(
+        AssemblyError, match=r"does not close: gap 1.25 m at 'roller' with the others closed; check start poses"
+    ):
         kinfmu.solve(at_pole)
 
 
