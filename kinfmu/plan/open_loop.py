@@ -12,7 +12,7 @@ from kinfmu.equations.assembly import in_order
 from kinfmu.equations.closing import CLOSED, close
 from kinfmu.equations.part import Part
 from kinfmu.equations.start_poses import StartValues
-from kinfmu.equations.system import FloatArray, System
+from kinfmu.equations.system import FloatArray, Member, System
 from kinfmu.errors import listed
 
 _RESTARTS = 12  # random poses of the bodies of a loop from which it may still close
@@ -24,9 +24,10 @@ class OpenLoop(NamedTuple):
     """Bodies and rows that do not close although everything before them in the solving order does.
 
     bodies: names of the bodies that these rows place; owners: names of the joints and drivers that place them;
-    joint: the one with the widest gap; gap: that of this joint with the others of the loop closed, as a length or in
-    radians; unit: of the gap; pose: (n,) coordinates with that gap, in which everything after the loop is closed as far
-    as possible; closes_elsewhere: True if the loop closes from other poses of its bodies.
+    joint: the one with the widest gap, the driver if the rows are drivers' alone; gap: that of this joint with the
+    others of the loop closed, as a length or in radians; unit: of the gap; pose: (n,) coordinates with that gap, in
+    which everything after the loop is closed as far as possible; closes_elsewhere: True if the loop closes from other
+    poses of its bodies.
     """
 
     bodies: tuple[str, ...]
@@ -82,22 +83,26 @@ def find_open_loop(system: System, start: StartValues, kept: Sequence[int]) -> O
         member.owner.name for member in map(system.members.__getitem__, members) if {*bodies} & {*member.bodies}
     ]
     gap, unit = _gap(system, q, start.u, joint)
-    return OpenLoop(bodies, tuple(touching), joint, gap, unit, q, closes_elsewhere)
+    return OpenLoop(bodies, tuple(touching), joint.owner.name, gap, unit, q, closes_elsewhere)
 
 
 def _with_one_gap(
     system: System, u: FloatArray, rows: Sequence[int], columns: Sequence[int], q: FloatArray
-) -> tuple[str, FloatArray]:
-    """Return the joint of a loop with the widest gap, and the pose with the smallest gap there, the others closed."""
-    relative = system.relative_gaps(system.residual(q, u))
-    widest = system.rows[max((k for k in rows if k < system.joint_row_count), key=lambda k: relative[k])].owner
-    is_open = np.array([system.rows[k].owner == widest for k in rows])
+) -> tuple[Member, FloatArray]:
+    """Return the joint of a loop with the widest gap, and the pose with the smallest gap there, the others closed.
+
+    A loop without a joint's row, such as a bar set by a driver that cannot reach, gives the driver.
+    """
+    _, relative = _gaps(system, q, u)
+    of_joints = [k for k in rows if k < system.joint_row_count]
+    widest = system.members[system.member_of[max(of_joints or rows, key=lambda k: relative[k])]]
+    is_open = np.array([k in widest.rows for k in rows])
     loop = Part(system, rows, columns, q)
     loop.row_scales = np.where(is_open, _LESS_WEIGHT, 1.0) * loop.row_scales
     near, _ = close(loop, q[list(columns)], u)
     others = [k for k, opened in zip(rows, is_open, strict=True) if not opened]
     q = q.copy()
-    q[list(columns)], _ = close(Part(system, others, columns, q), near, u)
+    q[list(columns)] = close(Part(system, others, columns, q), near, u)[0] if others else near
     return widest, q
 
 
@@ -111,14 +116,19 @@ def _closes_elsewhere(
     return any(close(part, rough, u)[1] <= CLOSED for rough in starts)
 
 
-def _gap(system: System, q: FloatArray, u: FloatArray, owner: str) -> tuple[float, str]:
-    """Return the gap of a joint and its unit: of its rows of the kind of the widest one."""
-    phi = system.residual(q, u)
-    gaps, relative = system.gaps(phi), system.relative_gaps(phi)
-    of_owner = [k for k, row in enumerate(system.rows[: system.joint_row_count]) if row.owner == owner]
-    worst = max(of_owner, key=lambda k: relative[k])
-    same = [k for k in of_owner if system.rows[k].kind == system.rows[worst].kind]
+def _gap(system: System, q: FloatArray, u: FloatArray, member: Member) -> tuple[float, str]:
+    """Return the gap of a joint or driver and its unit: of its rows of the kind of the widest one."""
+    gaps, relative = _gaps(system, q, u)
+    worst = max(member.rows, key=lambda k: relative[k])
+    same = [k for k in member.rows if system.rows[k].kind == system.rows[worst].kind]
     return math.hypot(*(gaps[k] for k in same)), system.gap_unit(system.rows[worst])
+
+
+def _gaps(system: System, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the gap of each row as a length or in radians, (m,), and its absolute value, lengths over the size."""
+    gaps = np.concatenate((system.gaps(system.residual(q, u)), system.measure(q) - u))
+    sizes = np.array([1.0 if row.kind == "angle" else system.size for row in system.rows])
+    return gaps, np.abs(gaps) / sizes
 
 
 def _some(names: Sequence[str]) -> str:

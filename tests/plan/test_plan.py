@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Point, Revolute, load, solve
+from kinfmu import AngleDriver, Body, ConstantSpeed, DistanceDriver, Mechanism, Point, Revolute, load, solve
 from kinfmu.errors import AmbiguousStartError, AssemblyError, MobilityError, RequestError
 from kinfmu.plan import compile_plan, determinant_formula
 from tests.mechanisms import bar_as_body, bar_linkage, five_bar, fourbar, reference_fourbar, six_bar, slider_crank
@@ -198,6 +198,21 @@ def test_the_loop_that_does_not_close_is_named_with_the_distance_that_its_links_
     with pytest.raises(AssemblyError, match=rf"\(crank = 1 rad .*\): {loop} with the others closed") as caught:
         compile_plan(mechanism)
     assert caught.value.gap == pytest.approx(math.dist((math.cos(1.0), math.sin(1.0)), (9.0, 0.0)) - 5.0, rel=1e-4)
+
+
+def test_a_driver_that_cannot_reach_is_named_where_it_alone_sets_a_bar() -> None:
+    """From C = (3, 0) to the end of a bar of length 1 about the origin it is 4 at most."""
+    mechanism = Mechanism(
+        "bar",
+        [
+            Body("ground", {"O": (0, 0), "C": (3, 0)}),
+            Body("bar", {"O": (0, 0), "P": (1, 0)}, (0, 0, 2.0)),
+        ],
+        [Revolute("O", ("ground.O", "bar.O"))],
+        [DistanceDriver("cylinder", ("ground.C", "bar.P"), ConstantSpeed(5.0, 0.1))],
+    )
+    with pytest.raises(AssemblyError, match=r"body bar with joints O, cylinder does not close: gap 1 m at 'cylinder'"):
+        compile_plan(mechanism)
 
 
 def test_a_loop_of_possible_lengths_that_no_step_closes_from_its_start_poses_blames_these() -> None:

@@ -1,31 +1,45 @@
-"""Random designs of the gallery: batches against files with the same numbers; see `--help`."""
+"""Random designs of the gallery: batches against files with the same numbers; see `--help`.
+
+Batches of both engines are compared with Python's `solve` of a file for each design, whose numbers are numbers in the
+generated code; some files are solved in C too. A mechanism whose comparison is done is kept in `--results`, and
+skipped by the next call.
+"""
 
 from __future__ import annotations
 
 import argparse
 import gc
+import json
 import sys
 import time
 from collections import Counter
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
+import pytest
 
 import kinfmu
 from kinfmu import Designs, Mechanism, Run
 from kinfmu.errors import KinfmuError
 from kinfmu.gallery import names
+from kinfmu.plan import SolvePlan
 from kinfmu.processes import cores, processes, without_main
 from kinfmu.solver.python.status import Status
+from kinfmu.sweep import model
 from kinfmu.sweep.continued import continued
+from kinfmu.units import CoordinateName
 from tests.open_lengths import with_open_lengths
 
 SAMPLES = 24  # of a design, over the run of the file
 SPREADS = (0.02, 0.2)  # of the logarithm of a length
 CLOSE = (1e-12, 1e-10, 1e-8)  # of the largest of a column: values, rates, accelerations
 ENGINES = ("python", "native")
-PART = 25  # designs of a task
+PART = 50  # designs of a task
+FILES_IN_C = 2  # of a mechanism: each is compiled
 
 
 def drawn(mechanism: Mechanism, count: int, seed: int) -> dict[str, np.ndarray]:
@@ -65,20 +79,47 @@ def compared(name: str, count: int, seed: int, engines: Sequence[str] = ENGINES,
     t = np.linspace(mechanism.run.start, mechanism.run.stop, SAMPLES)
     places = range(count)[part or slice(None)]
     values = {key: array[places.start : places.stop] for key, array in drawn(mechanism, count, seed).items()}
-    batches = {engine: kinfmu.compile(mechanism, engine=engine).solve_designs(values, t) for engine in engines}
     found, samples, worst, unsolvable = [], Counter[str](), np.zeros(3), 0
-    for k, place in enumerate(places):
-        numbers = {key: float(array[k]) for key, array in values.items()}
-        try:
-            run = kinfmu.solve(continued(mechanism, numbers).mechanism, t, engine="python")
-            samples.update(Status(status).name.lower() for status in run.status.tolist())
-        except KinfmuError:
-            run, unsolvable = None, unsolvable + 1
-        for engine, designs in batches.items():
-            apart, differences = _differences(designs, k, run)
-            worst = np.maximum(worst, apart)
-            found += [f"{name}, seed {seed}, design {place}, {engine}: {fault}" for fault in differences]
+    with _failures_planned_once():
+        batches = {engine: kinfmu.compile(mechanism, engine=engine).solve_designs(values, t) for engine in engines}
+        for k, place in enumerate(places):
+            file = continued(mechanism, {key: float(array[k]) for key, array in values.items()}).mechanism
+            runs: dict[str, Run | None] = {}
+            for engine in ("python", "native") if "native" in engines and place < FILES_IN_C else ("python",):
+                try:
+                    runs[engine] = kinfmu.compile(file, parameters=(), engine=engine).solve(t)
+                except KinfmuError:
+                    runs[engine] = None
+            run = runs["python"]
+            samples.update(Status(status).name.lower() for status in ([] if run is None else run.status.tolist()))
+            unsolvable += run is None
+            for engine, designs in batches.items():
+                for of_file, wanted in runs.items():
+                    apart, differences = _differences(designs, k, wanted)
+                    worst = np.maximum(worst, apart)
+                    where = f"{name}, seed {seed}, design {place}, {engine}, file {of_file}"
+                    found += [f"{where}: {fault}" for fault in differences]
     return Compared(found, samples, tuple(worst.tolist()), unsolvable)
+
+
+@contextmanager
+def _failures_planned_once() -> Iterator[None]:
+    """Plan a mechanism that does not close once: batches of both engines and the file plan the very same one."""
+    failures: dict[Mechanism, KinfmuError] = {}
+    plan = model.compile_plan
+
+    def once(mechanism: Mechanism, *arguments: Any) -> SolvePlan:
+        if mechanism in failures:
+            raise failures[mechanism]
+        try:
+            return plan(mechanism, *arguments)
+        except KinfmuError as error:
+            failures[mechanism] = error
+            raise
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(model, "compile_plan", once)
+        yield
 
 
 def _differences(designs: Designs, k: int, run: Run | None) -> tuple[np.ndarray, list[str]]:
@@ -93,10 +134,10 @@ def _differences(designs: Designs, k: int, run: Run | None) -> tuple[np.ndarray,
         sample = int(np.flatnonzero(designs.status[k] != run.status)[0])
         return worst, [f"status {designs.status[k, sample]} at sample {sample}, of its file {run.status[sample]}"]
     found = []
-    tables = ((designs.values, run.values), (designs.rates, run.rates), (designs.accelerations, run.accelerations))
-    for order, (table, wanted) in enumerate(tables):
+    for order, table in enumerate((designs.values, designs.rates, designs.accelerations)):
         if table is None or not run.good.any():
             continue
+        wanted = np.column_stack([_column(run, output, order) for output in designs.outputs])
         size = np.maximum(np.nanmax(np.abs(wanted), axis=0), 1.0)
         is_equal = (table[k] == wanted) | (np.isnan(table[k]) & np.isnan(wanted))
         apart = np.where(is_equal, 0.0, np.abs(table[k] - wanted) / size)
@@ -104,9 +145,16 @@ def _differences(designs: Designs, k: int, run: Run | None) -> tuple[np.ndarray,
         worst[order] = apart.max()
         if worst[order] > CLOSE[order]:
             row, column = np.unravel_index(int(apart.argmax()), apart.shape)
-            output = run.outputs[column].derivative(order)
+            output = designs.outputs[column].derivative(order)
             found.append(f"{output} differs by {worst[order]:.1e} at sample {row} of status {run.status[row]}")
     return worst, found
+
+
+def _column(run: Run, output: CoordinateName, order: int) -> np.ndarray:
+    """Return the column of an output, or of its rate or acceleration; one that the file's numbers fix is constant."""
+    if output in run.outputs:
+        return np.asarray((run.values, run.rates, run.accelerations)[order][:, run.outputs.index(output)])
+    return np.where(run.good, 0.0 if order else run.fixed[output], np.nan)
 
 
 def main() -> int:
@@ -115,30 +163,44 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=1000, help="designs of each mechanism; 1000")
     parser.add_argument("--seed", type=int, default=0, help="of the designs; 0")
     parser.add_argument("names", nargs="*", help="mechanisms of the gallery; all")
-    parser.add_argument("--workers", type=int, default=cores(), help="processes; as many as cores")
+    parser.add_argument("--jobs", type=int, default=cores(), help="processes; as many as cores")
+    parser.add_argument("--results", type=Path, help="file of the mechanisms that are done, which are skipped")
     given = parser.parse_args()
+    results = given.results.read_text().splitlines() if given.results and given.results.exists() else []
+    done = [json.loads(line) for line in results]
     wrong = 0
-    with processes(given.workers, gc.disable) as pool:
+    with processes(given.jobs, gc.disable) as pool:
         for name in given.names or names():
+            asked = {"name": name, "count": given.count, "seed": given.seed}
+            known = [result for result in done if asked.items() <= result.items()]
             begun = time.monotonic()
-            kinfmu.compile(with_open_lengths(kinfmu.load(name)), engine="native")  # once, for the cache of libraries
-            parts = [slice(k, k + PART) for k in range(0, given.count, PART)]
-            with without_main():
-                waiting = [pool.submit(_part, name, given.count, given.seed, part) for part in parts]
-            whole = [future.result() for future in waiting]
-            found = [fault for one in whole for fault in one.faults]
-            samples = sum((one.samples for one in whole), Counter[str]())
-            values, rates, accelerations = np.max([one.worst for one in whole], axis=0)
-            statuses = ", ".join(f"{number} {status}" for status, number in samples.most_common())
-            print(
-                f"{name}: {given.count} designs in {time.monotonic() - begun:.0f} s, {len(found)} differences; "
-                f"{sum(one.unsolvable for one in whole)} files without solution; samples: {statuses}; largest "
-                f"difference: {values:.1e}, {rates:.1e}, {accelerations:.1e}",
-                flush=True,
-            )
-            print("".join(f"  {fault}\n" for fault in found), end="", flush=True)
+            if known:
+                line, found = known[-1]["line"], known[-1]["differences"]
+            else:
+                found, line = _in_parts(pool, name, given.count, given.seed)
+                line = f"{line}; {time.monotonic() - begun:.0f} s"
+                if given.results:
+                    with given.results.open("a") as file:
+                        file.write(json.dumps({**asked, "line": line, "differences": found}) + "\n")
+            print(line, *found, sep="\n  ", flush=True)
             wrong += len(found)
     return 1 if wrong else 0
+
+
+def _in_parts(pool: Executor, name: str, count: int, seed: int) -> tuple[list[str], str]:
+    """Compare the designs of a mechanism in parts; return what differs, and a line about all of them."""
+    kinfmu.compile(with_open_lengths(kinfmu.load(name)), engine="native")  # once, for the cache of libraries
+    with without_main():
+        waiting = [pool.submit(_part, name, count, seed, slice(k, k + PART)) for k in range(0, count, PART)]
+    whole = [future.result() for future in waiting]
+    found = [fault for one in whole for fault in one.faults]
+    samples = sum((one.samples for one in whole), Counter[str]())
+    values, rates, accelerations = np.max([one.worst for one in whole], axis=0)
+    statuses = ", ".join(f"{number} {status}" for status, number in samples.most_common())
+    return found, (
+        f"{name}: {count} designs, {len(found)} differences; {sum(one.unsolvable for one in whole)} files without "
+        f"solution; samples: {statuses}; largest difference: {values:.1e}, {rates:.1e}, {accelerations:.1e}"
+    )
 
 
 def _part(name: str, count: int, seed: int, part: slice) -> Compared:
