@@ -25,6 +25,7 @@ FUNCTIONS = {"sin": "kf_sin_lane", "cos": "kf_cos_lane", "atan2": "kf_atan2"}
 LINE = 8  # numbers in a line of the caches
 ITEM = 8  # [bytes] of a number
 LARGE = 1 << 20  # numbers; larger tables are written past the caches
+_Byte = ctypes.c_char
 _UNEVEN = 512  # numbers; rows whose pitch is a multiple of it would share few places of the caches
 
 
@@ -50,6 +51,10 @@ class _Solve(NamedTuple):
     jacobian: list[str]
     right: list[str]
     names: Sequence[str]
+
+
+Strided = tuple[int, int]  # numbers that the caller keeps: address of the first, and the step to the next in numbers
+Given = FloatArray | Strided | float  # of all samples
 
 
 def is_printable(stage: CompiledStage) -> bool:
@@ -162,7 +167,7 @@ def _words(lines: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(re.findall(r"\b[A-Za-z_]\w*", "\n".join(lines))))
 
 
-def load_native_stage(stage: CompiledStage) -> Callable[[Sequence[FloatArray | float], FloatArray, bool], bool]:
+def load_native_stage(stage: CompiledStage) -> Callable[[Sequence[Given], FloatArray, bool], bool]:
     """Return the compiled stage.
 
     It fills the rows of `empty_results` that are not 0, from arrays (n,) or single numbers. The last argument: whether
@@ -179,13 +184,14 @@ def load_native_stage(stage: CompiledStage) -> Callable[[Sequence[FloatArray | f
     evaluate = compiler.load(files, compiler.VECTORIZED).kf_evaluate
     numbers, places, counts = (kind * len(stage.given) for kind in (ctypes.c_double, ctypes.c_size_t, ctypes.c_int64))
 
-    def fill(given: Sequence[FloatArray | float], results: FloatArray, is_checked: bool) -> bool:
-        single = numbers()
-        starts, steps = places(), counts()
+    def fill(given: Sequence[Given], results: FloatArray, is_checked: bool) -> bool:
+        single, starts, steps = numbers(), places(), counts()
         first = ctypes.addressof(single)
         for k, number in enumerate(given):
-            if isinstance(number, np.ndarray):
-                starts[k], steps[k] = number.__array_interface__["data"][0], number.strides[0] // ITEM
+            if isinstance(number, tuple):
+                starts[k], steps[k] = number
+            elif isinstance(number, np.ndarray):
+                starts[k], steps[k] = address_of(number), number.strides[0] // ITEM
             else:
                 single[k] = number
                 starts[k] = first + k * ITEM
@@ -193,7 +199,7 @@ def load_native_stage(stage: CompiledStage) -> Callable[[Sequence[FloatArray | f
             results.shape[1],
             ctypes.addressof(starts),
             ctypes.addressof(steps),
-            results.__array_interface__["data"][0],
+            address_of(results),
             results.strides[0] // ITEM,
             results.size > LARGE,
             is_checked,
@@ -206,13 +212,49 @@ def load_native_stage(stage: CompiledStage) -> Callable[[Sequence[FloatArray | f
     return fill
 
 
+def strided_columns(tables: Sequence[FloatArray], places: Sequence[tuple[int, int]]) -> list[Given]:
+    """Return columns of tables (n, m) with at least one sample, by table and column, without a view for each.
+
+    Of a table whose rows repeat, a column is one number.
+    """
+    starts: dict[int, int] = {}
+    found: list[Given] = []
+    for table, column in places:
+        row, pitch = tables[table].strides
+        if row == 0:
+            found.append(float(tables[table][0, column]))
+            continue
+        if table not in starts:
+            starts[table] = address_of(tables[table].T)  # often by outputs
+        found.append((starts[table] + column * pitch, row // ITEM))
+    return found
+
+
+def address_of(array: NDArray[Any]) -> int:
+    """Return the address of an array's first number."""
+    try:
+        return ctypes.addressof(_Byte.from_buffer(array))  # type: ignore[arg-type]  # an array is a buffer
+    except (TypeError, ValueError):  # read-only, empty, or with gaps between its numbers
+        address: int = array.__array_interface__["data"][0]
+        return address
+
+
 def empty_results(rows: int, n: int) -> FloatArray:
     """Return an array (rows, n) without values, whose rows begin at lines of the caches."""
     pitch = -(-n // LINE) * LINE
     pitch += LINE if pitch % _UNEVEN == 0 else 0
     whole = np.empty(rows * pitch + LINE)
-    first = -whole.__array_interface__["data"][0] // ITEM % LINE
+    first = -address_of(whole) // ITEM % LINE
     return whole[first : first + rows * pitch].reshape(rows, pitch)[:, :n]
 
 
-__all__ = ["empty_results", "is_printable", "load_native_stage", "stage_source"]
+__all__ = [
+    "Given",
+    "Strided",
+    "address_of",
+    "empty_results",
+    "is_printable",
+    "load_native_stage",
+    "stage_source",
+    "strided_columns",
+]

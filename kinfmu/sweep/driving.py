@@ -21,6 +21,7 @@ LARGEST_RATE = 1e100  # of drivers; squares of much larger numbers are infinite
 _LARGEST_KEPT = 1_000_000  # numbers
 _FEW = 50  # numbers that are checked sooner one by one
 _DOUBLE = np.dtype(np.float64)
+_NUMBER = (float, int)
 _DEFAULTS = (0.0, 1.0, 0.0)  # of value (which must be given), speed and acceleration
 
 
@@ -132,12 +133,13 @@ def with_constants(drivers: Sequence[DriverInfo], driven: Driven, inputs: Mappin
     """Return the same driver values; tables of single numbers repeat one row, which costs no memory to read."""
     if not inputs or not len(driven[0]):
         return driven
-    u, ud, udd = (
-        np.ndarray(table.shape, float, table, strides=(0, table.strides[1]))  # np.broadcast_to takes 10 us
-        if all(isinstance(inputs.get(driver.inputs[order], 0.0), float | int) for driver in drivers)
-        else table
-        for order, table in enumerate(driven)
-    )
+    tables = []
+    for order, table in enumerate(driven):
+        is_constant = all(isinstance(inputs.get(driver.inputs[order], 0.0), _NUMBER) for driver in drivers)
+        if is_constant:  # np.broadcast_to takes 10 us
+            table = np.ndarray(table.shape, float, table, strides=(0, table.strides[1]))
+        tables.append(table)
+    u, ud, udd = tables
     return u, ud, udd
 
 

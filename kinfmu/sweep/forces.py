@@ -21,12 +21,13 @@ from kinfmu.plan.shaking import shaking_steps
 from kinfmu.plan.steps import derivative_name, law_symbol
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.run import FloatArray, Run
+from kinfmu.simd.stage import strided_columns
 from kinfmu.solver.python.status import Status
 from kinfmu.sweep.arguments import Setting
 from kinfmu.sweep.designs import Solvable
 from kinfmu.sweep.driving import column_of
 from kinfmu.sweep.engine import Driven
-from kinfmu.sweep.stages import native_stage, stage_results
+from kinfmu.sweep.stages import native_results, native_stage, stage_results
 
 LEAST_SPEED = 1e-100  # [rad/s, ...] of a driver; products with smaller ones lose digits
 _STAGES = 5  # forces by each kind of coefficients, reactions, those on the ground alone
@@ -132,8 +133,9 @@ class ForceModel:
         speeds = run.driven[1]
         if speeds.shape[1] > 1:
             return False
-        different = speeds[:1] if speeds.strides[0] == 0 else speeds
-        return bool(different.min(initial=np.inf) > LEAST_SPEED or different.max(initial=-np.inf) < -LEAST_SPEED)
+        if speeds.strides[0] == 0 and len(speeds):  # they are all the same
+            return abs(float(speeds[0, 0])) > LEAST_SPEED
+        return bool(speeds.min(initial=np.inf) > LEAST_SPEED or speeds.max(initial=-np.inf) < -LEAST_SPEED)
 
     @cached_property
     def _stage(self) -> CompiledStage:
@@ -209,13 +211,15 @@ class ForceModel:
         self, stage: CompiledStage, run: LoadedRun, samples: Any, n: int, coefficients: Given | None = None
     ) -> FloatArray:
         """Return the results of a stage at n samples, (n, results)."""
-        poses, columns = run.poses, self._columns
-        tables = (poses.values, poses.rates, poses.accelerations, *run.driven)
-        given = self._given(run, samples) | (coefficients or {})
+        tables = (run.poses.values, run.poses.rates, run.poses.accelerations, *run.driven)
+        shape, columns = (len(stage.steps.results), n), self._columns
         native = self._native(stage) if self.poses.is_native(n) else None
+        if native is not None and n and isinstance(samples, slice) and all(map(columns.__contains__, stage.given)):
+            whole = strided_columns(tables, [columns[name] for name in stage.given])
+            return native_results(stage, native, whole, shape, is_checked=False)[0].T
+        given = self._given(run, samples) | (coefficients or {})
         numbers = [given[name] if name in given else _column(tables, columns[name], samples) for name in stage.given]
-        results, _ = stage_results(stage, native, numbers, (len(stage.steps.results), n), is_checked=False)
-        return results.T
+        return stage_results(stage, native, numbers, shape, is_checked=False)[0].T
 
 
 def _column(tables: Sequence[FloatArray], place: tuple[int, int], samples: Any) -> FloatArray:

@@ -16,6 +16,7 @@ from kinfmu.codegen.c.model import emit
 from kinfmu.errors import KinfmuError
 from kinfmu.plan import SolvePlan
 from kinfmu.simd import sources
+from kinfmu.simd.stage import address_of as _start
 from kinfmu.solver.python.solver import TOLERANCE
 from kinfmu.solver.python.status import Status
 from kinfmu.sweep.engine import Driven, UnreachedError
@@ -33,7 +34,6 @@ MOST_FAILURES = 1000  # intervals without numbers whose reasons are kept
 
 MOST_KEPT = 100_000  # samples; memory that served longer sweeps goes back to the system
 
-_Byte = ctypes.c_char
 _Place = ctypes.c_void_p  # of an array's first number
 
 
@@ -348,15 +348,6 @@ class _Memory:
         """Return first samples and messages of so many intervals without numbers, as far as they are kept."""
         samples = self._samples[: min(count, MOST_FAILURES)].tolist()
         return [(sample, _text(self.messages + k * MESSAGE)) for k, sample in enumerate(samples)]
-
-
-def _start(array: NDArray[Any]) -> int:
-    """Return the place of an array's first number."""
-    try:
-        return ctypes.addressof(_Byte.from_buffer(array))  # type: ignore[arg-type]  # an array is a buffer
-    except (TypeError, ValueError):  # read-only, empty, or with gaps between its numbers
-        place: int = array.__array_interface__["data"][0]
-        return place
 
 
 def _text(place: int) -> str:

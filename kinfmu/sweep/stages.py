@@ -9,11 +9,11 @@ import numpy as np
 from kinfmu.codegen.python.stage import CompiledStage
 from kinfmu.errors import CompilerError
 from kinfmu.run import FloatArray
-from kinfmu.simd.stage import empty_results, is_printable, load_native_stage
+from kinfmu.simd.stage import Given, empty_results, is_printable, load_native_stage
 
 AT_ONCE = 512  # samples; the arrays of a stage then stay in the processor's cache
 
-Native = Callable[[Sequence[FloatArray | float], FloatArray, bool], bool]  # fills results (rows, n) from arrays (n,)
+Native = Callable[[Sequence[Given], FloatArray, bool], bool]  # fills results (rows, n) from arrays (n,)
 
 
 def native_stage(stage: CompiledStage) -> Native | None:
@@ -24,6 +24,22 @@ def native_stage(stage: CompiledStage) -> Native | None:
         return load_native_stage(stage)
     except CompilerError:  # the library of the model was found in the cache
         return None
+
+
+def native_results(
+    stage: CompiledStage, native: Native, numbers: Sequence[Given], shape: tuple[int, int], *, is_checked: bool
+) -> tuple[FloatArray, bool]:
+    """Return what `stage_results` returns, by compiled C; numbers may also be given by where they are in memory."""
+    results = _empty(stage, shape)
+    return results, native(numbers, results, is_checked)
+
+
+def _empty(stage: CompiledStage, shape: tuple[int, int]) -> FloatArray:
+    """Return an array of results without values, except for those that are always 0."""
+    results = empty_results(*shape)
+    for rows_at_zero in stage.zeros:
+        results[rows_at_zero] = 0.0
+    return results
 
 
 def stage_results(
@@ -39,11 +55,9 @@ def stage_results(
     numbers: arrays (n,), or one number each. Without `is_checked` results pass as finite.
     """
     n = shape[1]
-    results = empty_results(*shape)
-    for rows_at_zero in stage.zeros:
-        results[rows_at_zero] = 0.0
     if native is not None:
-        return results, native(numbers, results, is_checked)
+        return native_results(stage, native, numbers, shape, is_checked=is_checked)
+    results = _empty(stage, shape)
     if n <= stage.few:
         columns = [number.tolist() if isinstance(number, np.ndarray) else [number] * n for number in numbers]
         rows = []

@@ -270,3 +270,16 @@ def test_what_presses_from_outside_reaches_the_ground_and_what_is_held_by_it_doe
         (pytest.approx(20.0), "N"),
         (pytest.approx(50.0, rel=1e-2), "N m"),
     ]
+
+
+@pytest.mark.parametrize("count", [1, 130])  # of samples; whole blocks and a rest
+def test_native_forces_of_repeated_numbers_equal_those_of_arrays(count: int) -> None:
+    model = kinfmu.compile(kinfmu.load("fourbar"), engine="native")
+    angles = np.linspace(0.1, 6.0, count)
+    single = model.solve(crank_angle=angles, crank_speed=2.0, crank_acceleration=0.5)
+    whole = {"crank_speed": np.full(count, 2.0), "crank_acceleration": np.full(count, 0.5)}
+    arrays = model.solve(crank_angle=angles, **whole)
+    again = kinfmu.compile(kinfmu.load("fourbar"), engine="python").solve(crank_angle=angles, **whole)
+    assert single.forces.tobytes() == arrays.forces.tobytes()
+    assert np.allclose(single.forces, again.forces, rtol=1e-12, atol=1e-12)
+    assert np.allclose(single.reactions, again.reactions, rtol=1e-9, atol=1e-9, equal_nan=True)
