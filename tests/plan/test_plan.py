@@ -206,7 +206,7 @@ def test_a_driver_that_cannot_reach_is_named_where_it_alone_sets_a_bar() -> None
         "bar",
         [
             Body("ground", {"O": (0, 0), "C": (3, 0)}),
-            Body("bar", {"O": (0, 0), "P": (1, 0)}, (0, 0, 2.0)),
+            Body("bar", {"O": (0, 0), "P": (0.8, 0.6)}),
         ],
         [Revolute("O", ("ground.O", "bar.O"))],
         [DistanceDriver("cylinder", ("ground.C", "bar.P"), ConstantSpeed(5.0, 0.1))],
