@@ -113,6 +113,6 @@ def draw(sheet: Sheet, found: Sequence[Shape], tracks: Sequence[Mark], above: Se
 
 def _not_drawn(mechanism: Mechanism, found: Sequence[Shape]) -> list[str]:
     """Return the names of joints that are not drawn, such as a held angle, or wheels without pins."""
-    drawn = {shape.name for shape in found if shape.kind == "contact"}
+    drawn = {shape.name for shape in found if shape.kind in ("contact", "pitch")}
     joints = [joint for joint in mechanism.joints if not isinstance(joint, _ALWAYS_DRAWN)]
     return [joint.name for joint in joints if joint.name not in drawn]

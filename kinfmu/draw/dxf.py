@@ -25,7 +25,7 @@ from kinfmu.scene.shapes import shapes
 
 DXF_UNITS = {"in": 1, "ft": 2, "mm": 4, "cm": 5, "m": 6, "km": 7, "um": 13}  # $INSUNITS
 _DRAWN = (  # what has true dimensions
-    *("link", "rod", "bar", "slot", "rail", "rack", "wheel", "barrel", "shaft"),
+    *("link", "rod", "face", "bar", "slot", "rail", "rack", "wheel", "barrel", "shaft"),
     *("cam", "pitch", "roller"),
 )
 POINT_STYLE = 34  # $PDMODE: a cross in a circle

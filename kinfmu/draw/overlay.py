@@ -273,11 +273,12 @@ def _legend(axes: Axes, shown: Shown, panel: Sequence[str]) -> None:
 
 
 def curve_colour(index: int) -> palette.Colour:
-    """Return the colour of a curve by its number; those of the palette that are visible on white come first."""
+    """Return the colour of a curve by its number, visible on white paper."""
     order = (5, 4, 2, 3, 0, 1)
     turn, place = divmod(index, len(order))
-    colour = palette.BODIES[order[place]]
-    return (colour, palette.darker(colour), palette.lighter(colour), palette.GROUND)[min(turn, 3)]
+    colour = palette.on_white(palette.BODIES[order[place]])
+    paler = palette.on_white(palette.body(2 * len(palette.BODIES) + order[place]))
+    return (colour, palette.darker(colour), paler)[min(turn, 2)]
 
 
 def values_of(run: Run, column: str) -> FloatArray:

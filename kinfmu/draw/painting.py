@@ -145,7 +145,10 @@ class Painter:
         clearance = width / 2.0 + 1.5
         edge, fill = palette.darker(link.colour), palette.lighter(link.colour)
         routes = [(link.points, link.is_closed)] if len(link.points) > 1 else []
-        routes += [(rod.points, False) for rod in self._all("rod") if rod.frame == link.frame]
+        routes += [(rod.points, False) for rod in self._all("rod", "face") if rod.frame == link.frame]
+        for face in self._all("face"):
+            if face.frame == link.frame:
+                routes = [(details.on_face(route, face, width / 2.0 * sheet.point), closed) for route, closed in routes]
         if not routes:
             self.names.append(Name(link.name, link.points, 2.0 * clearance, edge, italic=True, rank=3))
             return

@@ -11,7 +11,16 @@ import numpy as np
 from kinfmu.draw.abscissa import TICK_STEPS, degrees_of, labelled
 from kinfmu.draw.chart import SMALL, dress, powers_of_ten
 from kinfmu.draw.curves import LOST, curves, gaps, rows_of
-from kinfmu.draw.overlay import LEAST, check_comparable, is_logarithmic, overlay, overlay_sheet, sheet_title, values_of
+from kinfmu.draw.overlay import (
+    LEAST,
+    check_comparable,
+    curve_colour,
+    is_logarithmic,
+    overlay,
+    overlay_sheet,
+    sheet_title,
+    values_of,
+)
 from kinfmu.draw.sheet import FONT, GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
 from kinfmu.draw.writing import check_suffix, check_target, write
 from kinfmu.errors import FigureError, RequestError
@@ -299,7 +308,7 @@ def _panel(axes: Axes, runs: Sequence[Run], panel: Panel, *, degrees: bool) -> N
     is_force = isinstance(panel.name, (ForceName, SignalName))
     is_log = is_logarithmic(panel.column)
     unit, factor = degrees_of(panel.unit) if degrees else (panel.unit, 1.0)
-    colour = _FORCES if is_force else (palette.BODIES[5], palette.BODIES[2], palette.BODIES[4])[panel.order]
+    colour = _FORCES if is_force else curve_colour((0, 2, 1)[panel.order])
     everything = []
     for number, run in enumerate(runs):
         is_wide = number + 1 < len(runs)

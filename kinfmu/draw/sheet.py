@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kinfmu.run import FloatArray
-from kinfmu.scene.palette import Colour
+from kinfmu.scene.palette import Colour, on_white
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -152,7 +152,9 @@ class Sheet:
 
     def track(self, points: FloatArray, width: float, colour: Colour) -> None:
         """Draw a thin line through points (n, 2) with gaps where they are NaN."""
-        self.axes.plot(*points.T, linewidth=width, color=ink(colour), zorder=self._next(), solid_capstyle="round")
+        self.axes.plot(
+            *points.T, linewidth=width, color=ink(on_white(colour)), zorder=self._next(), solid_capstyle="round"
+        )
         known = points[np.isfinite(points).all(axis=1)]
         if len(known) > 1:
             self.cover(known, 0.35, width)

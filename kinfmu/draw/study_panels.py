@@ -85,7 +85,7 @@ def titled(axes: Axes, text: str) -> None:
 def colour_of(index: int) -> palette.Colour:
     """Return the colour of a measure by its place."""
     order = (5, 4, 2, 3, 0, 1)
-    return palette.BODIES[order[index % len(order)]]
+    return palette.on_white(palette.BODIES[order[index % len(order)]])
 
 
 def few_ticks(axes: Axes, x: int | None, y: int | None) -> None:

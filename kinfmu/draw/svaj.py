@@ -10,21 +10,20 @@ import numpy as np
 from kinfmu.draw.abscissa import TICK_STEPS, Abscissa, abscissa, degrees_of, labelled
 from kinfmu.draw.chart import SMALL, dress
 from kinfmu.draw.curves import rows_of
-from kinfmu.draw.overlay import range_of, sheet_title
+from kinfmu.draw.overlay import curve_colour, range_of, sheet_title
 from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
 from kinfmu.draw.writing import check_suffix, write
 from kinfmu.errors import FigureError, RequestError
 from kinfmu.motion.jerk import motion_of
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import rates_per
-from kinfmu.scene import palette
 from kinfmu.units import Quantity, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LETTERS = ("s", "v", "a", "j")
-_COLOURS = (5, 2, 4, 3)  # of the palette
+_COLOURS = (0, 2, 1, 3)  # of curves
 _WIDTH, _HEIGHT = 420.0, 104.0  # [pt] of a panel
 _LEFT, _RIGHT, _TOP, _BOTTOM, _GAP, _EDGE = 70.0, 24.0, 34.0, 34.0, 12.0, 8.0  # [pt]
 
@@ -85,7 +84,7 @@ def _sheet(run: Run, across: Abscissa, name: str, table: FloatArray, units: list
         unit, factor = degrees_of(units[order]) if degrees else (units[order], 1.0)
         values = table[:, order] * factor
         rows = rows_of(values)
-        axes.plot(across.values[rows], values[rows], linewidth=1.2, color=ink(palette.BODIES[_COLOURS[order]]))
+        axes.plot(across.values[rows], values[rows], linewidth=1.2, color=ink(curve_colour(_COLOURS[order])))
         dress(axes, "")
         limits = range_of(values)
         if limits:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,16 @@ from kinfmu.scene.shape import Shape
 WIDTH, ICON = 640, 100  # [px]
 _EDGE = 30.0  # [px] around everything
 _DETAIL = 1.1  # [px] of a unit of details
-_STROKES = {"link": 5.0, "rib": 3.0, "bar": 4.0, "rod": 3.0, "barrel": 9.0, "shaft": 4.0, "pitch": 0.8}  # [px]
+_STROKES = {
+    "link": 5.0,
+    "rib": 3.0,
+    "bar": 4.0,
+    "rod": 3.0,
+    "face": 5.0,
+    "barrel": 9.0,
+    "shaft": 4.0,
+    "pitch": 0.8,
+}  # [px]
 _AREAS = ("cam", "wheel", "rack", "block", "die")
 _PIN = 3.5  # [px], radius
 _ROUND = np.linspace(0.0, 2.0 * np.pi, 25)
@@ -122,7 +131,12 @@ def _lines(found: Scene, row: int, size: float) -> Iterator[Line]:
     shapes = sorted(found.shapes, key=lambda shape: shape.kind not in order)
     for shape in shapes:
         if shape.kind != "pitch" and shape.frame in frames:
-            yield from _of_shape(shape.placed(frames[shape.frame]), size)
+            drawn = shape.placed(frames[shape.frame])
+            for face in shapes:
+                if face.kind == "face" and face.frame == shape.frame and shape.kind in ("link", "rib", "rod", "face"):
+                    half = 0.5 * _STROKES["link"] * size / _DETAIL
+                    drawn = replace(drawn, points=details.on_face(drawn.points, face.placed(frames[face.frame]), half))
+            yield from _of_shape(drawn, size)
     for frame, pins in found.pins.items():
         if frame in frames:
             for _, point in pins:

@@ -39,7 +39,7 @@ from kinfmu.units import Quantity, unit_of
 from kinfmu.version import VERSION
 
 _DIGITS = 7  # of numbers that are only drawn
-_NOT_DRAWN = ("rib", "pitch", "contact")  # the page finds corners and ribs of a link from its points
+_NOT_DRAWN = ("rib", "contact")  # the page finds corners and ribs of a link from its points
 _ON_LINES = ("rail", "bed", "slot", "rod", "block", "die")
 
 
@@ -58,8 +58,7 @@ def describe(mechanism: Mechanism, report: Report) -> dict[str, Any]:
     lines = {slide.name: slide for slide in sliding}
     found = []
     for shape in shapes(shown):
-        is_rod = shape.kind == "rod" and shape.name == shape.frame  # not the flat face on a cam
-        slide = next(along[shape.frame]) if is_rod else lines.get(shape.name)
+        slide = next(along[shape.frame]) if shape.kind == "rod" else lines.get(shape.name)
         found.append(_shape(shown, shape, numbers) | _line(shape, slide, numbers))
     bodies = [GROUND_NAME, *(body.name for body in mechanism.moving_bodies)]
     return {
@@ -306,7 +305,7 @@ def _shape(shown: Instant, shape: Shape, numbers: Mapping[str, int]) -> dict[str
         anchor = _nearest(shown, shape, numbers)
         if anchor is not None:
             found["anchor"] = anchor
-    if shape.kind == "cam":
+    if shape.kind in ("cam", "pitch"):
         pole = next(
             (
                 joint.between[0]

@@ -13,7 +13,7 @@ from kinfmu.cams.placed import members_of
 from kinfmu.cams.traced import ComplexArray, given_curve, traced
 from kinfmu.errors import MechanismError
 from kinfmu.joints import CamFlatFace, CamRoller
-from kinfmu.measures.placement import body_of
+from kinfmu.measures.placement import body_of, unit_vector
 from kinfmu.run import FloatArray
 from kinfmu.scene.instant import Instant
 
@@ -27,8 +27,8 @@ class CamShape:
 
     joint, cam, follower: names of the joint and the two bodies; profile: the real one (k, 2), None where the follower
     is unknown or would be undercut; pitch: the pitch curve (k, 2), None under a flat face; roller: its centre (2,);
-    radius: of the roller [length], 0 where there is none; face: ends of the flat face (2, 2); contact: where both touch
-    (2,), None without a profile.
+    radius: of the roller [length], 0 where there is none; face: ends of the flat face (2, 2); away: unit vector (2,)
+    from the cam through the face; contact: where both touch (2,), None without a profile.
     """
 
     joint: str
@@ -39,6 +39,7 @@ class CamShape:
     roller: FloatArray
     radius: float
     face: FloatArray | None
+    away: FloatArray | None
     contact: FloatArray | None
 
 
@@ -94,6 +95,7 @@ def _shape(shown: Instant, joint: CamJoint) -> CamShape | None:
         roller=shown.point(touching),
         radius=size,
         face=None if normal is None else _face(shown, joint, touching, normal, around),
+        away=None if normal is None else np.array(unit_vector(shown.angle(follower) + normal)),
         contact=drawn(contact)[0] if is_real else None,
     )
 

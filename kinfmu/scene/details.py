@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from kinfmu.run import FloatArray
+from kinfmu.scene.outline import FLAT
 from kinfmu.scene.shape import Shape
 
 BLOCK, BLOCK_WIDTH = 11.0, 7.0  # half length and half width of a block
@@ -77,6 +78,16 @@ def teeth(rack: Shape, size: float) -> FloatArray:
     ]
     back = (TOOTH + RACK_BACK) * size * towards
     return np.array([*profile, last + TOOTH * size * towards, last + back, first + back])
+
+
+def on_face(points: FloatArray, face: Shape, by: float) -> FloatArray:
+    """Return points (k, 2) of a body, those on the line of its flat face shifted away from the cam by a length.
+
+    A stroke of twice this width through them then touches the line of the face, and with it the cam.
+    """
+    off = np.abs((points - face.points[0]) @ face.towards)
+    is_on = off <= FLAT * np.hypot(*(face.points[1] - face.points[0]))
+    return np.asarray(points + by * is_on[:, None] * face.towards)
 
 
 def core(block: Shape, size: float) -> FloatArray:

@@ -29,6 +29,9 @@ STATUS: tuple[Colour, ...] = (
 )  # by kinfmu.solver.python.Status
 
 
+LEAST_CONTRAST = 3.0  # of lines to their background, WCAG 2.2, 1.4.11
+
+
 def body(index: int) -> Colour:
     """Return the colour of a body by its index in the mechanism file; points of interest follow after the bodies.
 
@@ -55,3 +58,23 @@ def darker(colour: Colour) -> Colour:
     """Return the colour for edges and names on white paper."""
     red, green, blue = ((11 * value) // 20 for value in colour)
     return red, green, blue
+
+
+def on_white(colour: Colour) -> Colour:
+    """Return the colour for lines on white paper: as it is or, below the least contrast, darker."""
+    found = colour
+    while contrast(found, (255, 255, 255)) < LEAST_CONTRAST:
+        found = _mixed(found, (0, 0, 0), 0.04)
+    return found
+
+
+def contrast(a: Colour, b: Colour) -> float:
+    """Return the contrast of two colours, 1 to 21, as WCAG 2.2 defines it."""
+    high, low = sorted(map(_luminance, (a, b)), reverse=True)
+    return (high + 0.05) / (low + 0.05)
+
+
+def _luminance(colour: Colour) -> float:
+    parts = [value / 255.0 for value in colour]
+    red, green, blue = (x / 12.92 if x <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4 for x in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue

@@ -9,6 +9,7 @@ of `frames`: bars, cylinders, and the blocks of pins.
     rail, bed        a line of the ground under blocks, and under a rack; direction: into the ground
     support          a pin of the ground; direction: into the ground
     cam, pitch       the profile, and the curve of the roller's centre; roller: its circle
+    face             the line of a flat face on a cam; direction: away from the cam, the side on which the body is
     wheel, spoke     a pitch circle, and a radius that shows its rotation; belt: a straight part of one
     rack             the pitch line; direction: from the teeth to the back
     contact          the point where the bodies of a cam, gear or rack touch

@@ -96,7 +96,7 @@ def _cams(shown: Instant) -> Iterator[Shape]:
         if cam.radius:
             yield Shape("roller", cam.joint, cam.follower, cam.roller[None], radius=cam.radius)
         if cam.face is not None:
-            yield Shape("rod", cam.joint, cam.follower, cam.face, shown.colour(cam.follower))
+            yield Shape("face", cam.joint, cam.follower, cam.face, shown.colour(cam.follower), direction=cam.away)
         if cam.contact is not None:
             yield Shape("contact", cam.joint, cam.follower, cam.contact[None])
 

@@ -6,13 +6,19 @@ import math
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
+import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, RunSettings, Translational
 from kinfmu.draw.instant import instant
+from kinfmu.draw.sheet import ink
 from kinfmu.joints import CamFlatFace, CamOscillating, CamRoller, CamTranslating
 from kinfmu.joints.joint import Joint
 from kinfmu.laws import Harmonic, Law, MotionSequence, Segment
+from kinfmu.scene import palette
 from kinfmu.scene.cams import CamShape, cam_shapes
+from kinfmu.scene.details import on_face
+from kinfmu.scene.shape import Shape
 
 QUARTER = 0.5 * math.pi
 RADIUS = 6.0  # of the roller
@@ -127,3 +133,37 @@ def test_a_profile_that_is_not_known_or_not_possible_is_not_drawn(radius: float 
     assert disc.contact is None
     assert disc.radius == 0.0
     assert disc.pitch is not None
+
+
+def test_the_drawn_bar_of_a_flat_face_touches_its_cam() -> None:
+    """Its edge lies on the line of the face: the middle of the bar is half of its width away from the profile."""
+    axes = Figure(figsize=(8.0, 6.0)).subplots()
+    mechanism = kinfmu.load("flat_face_lever")
+    for value in (0.0, 1.0, 2.5, 4.0):
+        axes.clear()
+        kinfmu.draw.figure(mechanism, at=value, ax=axes)
+        low, high = axes.get_xlim()
+        point = (high - low) / (axes.get_window_extent().width * 72.0 / axes.figure.dpi)  # of a printer [length]
+        outlines = {patch.get_edgecolor(): patch for patch in axes.patches if len(patch.get_path().vertices) > 300}
+        (profile,) = (patch.get_path().vertices for patch in outlines.values())
+        edge = ink(palette.darker(palette.body(1)))
+        bars = [patch for patch in axes.patches if patch.get_edgecolor()[:3] == edge]
+        assert len(bars) == 2  # the lever's link, and the line of its face
+        for bar in bars:
+            gap = min(distance_to(bar.get_path().vertices, corner) for corner in profile[::4])
+            assert gap == pytest.approx(bar.get_linewidth() / 2.0 * point, rel=0.15)
+
+
+def test_a_stem_ends_at_the_face_and_other_points_stay() -> None:
+    face = Shape("face", "contact", "follower", np.array([[-4.0, 1.0], [4.0, 1.0]]), direction=np.array([0.0, 1.0]))
+    points = np.array([[0.0, 1.0], [0.0, 9.0], [2.0, 1.001]])
+    np.testing.assert_array_equal(on_face(points, face, 0.5), [[0.0, 1.5], [0.0, 9.0], [2.0, 1.001]])
+    np.testing.assert_array_equal(on_face(face.points, face, 0.5)[:, 1], 1.5)
+
+
+def test_a_pitch_curve_without_a_profile_counts_as_drawn() -> None:
+    contact = CamTranslating("contact", ("ground.O", "follower.tip"), "cam", lift(12.0), QUARTER, 30.0)
+    follower = Body("follower", {"tip": (0, 0), "stem": (0, 45)}, (5, 30, 0))
+    mechanism = cam(follower, Translational("guide", ("ground.G", "follower.stem"), QUARTER), contact, 0.4)
+    axes = kinfmu.draw.figure(mechanism, ax=Figure().subplots())
+    assert not [text.get_text() for text in axes.texts if "not drawn" in text.get_text()]

@@ -220,6 +220,39 @@ def test_slides_and_wheels_follow_new_lengths(chromium: Browser) -> None:
         assert page.errors == []
 
 
+def test_flat_face_touches_its_cam_and_a_roller_runs_on_its_pitch_curve(chromium: Browser) -> None:
+    with chromium.open(text_of("flat_face_lever")) as page:
+        page.move(0.7)
+        page.tab.click("#tab-files")
+        with page.tab.expect_download() as saved:
+            page.tab.click("#save-svg")
+        text = Path(saved.value.path()).read_text("utf-8")
+        assert page.errors == []
+    found = [
+        (np.array([float(x) for x in re.findall(r"-?[0-9.]+", path)]).reshape(-1, 2), float(width))
+        for path, width in re.findall(r'<path d="([^"]+)"[^>]* stroke-width="([^"]+)"', text)
+    ]
+    (cam,) = (line for line, _ in found if len(line) == 360)
+    width = max(width for _, width in found)  # of the edges of links
+    bars = [line for line, own in found if own == width]
+    assert len(bars) == 2  # the lever's link, and the line of its face
+    for (ax, ay), (bx, by) in bars:
+        along = np.array([bx - ax, by - ay]) / math.hypot(bx - ax, by - ay)
+        gaps = np.abs((cam - [ax, ay]) @ [-along[1], along[0]])
+        assert gaps.min() == pytest.approx(0.5 * width, abs=1.0)  # [px], with the width of the edge
+    with chromium.open(text_of("cam_roller")) as page:
+        kinds = page.get("k.linkage.shapes.map(one => one.kind)")
+        assert {"cam", "pitch", "roller"} <= set(kinds)
+        (pitch,) = page.get("k.linkage.shapes.filter(one => one.kind === 'pitch').map(one => one.points)")
+        page.move(2.0)
+        at = page.get("[k.linkage.data.points.findIndex(one => one.body === 'lever' && one.name === 'roller')]")
+        place = page.get(f"k.linkage.point({at[0]})")
+        x, y, phi = page.get("k.linkage.bodyPose(k.linkage.body('cam'))")
+        c, s = math.cos(phi), math.sin(phi)
+        curve = np.array(pitch) @ [[c, s], [-s, c]] + [x, y]
+        assert np.hypot(*(curve - place).T).min() < 0.5 * np.hypot(*(curve[1] - curve[0])) * 1.1
+
+
 def test_change_points_are_found_again_with_new_lengths(chromium: Browser) -> None:
     with chromium.open(text_of("fourbar")) as page:  # its third bar moves along the coupler and stays parallel
         page.get("k.design.set({'bodies.coupler.points.A.x': 0.8, 'bodies.ground.points.B.x': 1.8}) && k.reshape()")

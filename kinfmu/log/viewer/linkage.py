@@ -45,6 +45,7 @@ _PAINT = {
     "spoke": _Paint(0.004, 19.5),
     "rack": _Paint(0.004, 19.5),
     "rod": _Paint(0.012, 19.5),
+    "face": _Paint(0.012, 19.5),
     "bar": _Paint(0.006, 10.0),
     "link": _Paint(0.012, 20.0),
     "rib": _Paint(0.012, 20.0),
@@ -176,6 +177,9 @@ class Linkage:
             own = palette.BACKDROP
         elif shape.kind == "shaft":
             own = self.colour or palette.lighter(shape.colour)
+        for face in self.scene.shapes:
+            if shape.kind in ("link", "rib", "rod", "face") and (face.kind, face.frame) == ("face", shape.frame):
+                line = details.on_face(line, face, paint.radius * self.size)
         order = paint.order + self.scene.bodies.get(shape.frame, 0) / 100.0
         self.frames.line(entity, line, paint.radius, own, order, label, label in self.names)
 

@@ -1,7 +1,7 @@
 // The drawing of a linkage: shapes, pins, names, curves, arrows, marks.
 
 import { edgeOf, fillOf, GREY, paleOf } from "./colours.js";
-import { distance, outline, placed } from "./geometry.js";
+import { distance, isSlim, outline, placed } from "./geometry.js";
 import { marks } from "./marks.js";
 import { grouped, niceStep, number } from "./numbers.js";
 import { BUTTONS } from "./view.js";
@@ -132,6 +132,7 @@ class Painter {
             if (shape.kind === "cam") this.pen.line(points, { ...style, closed: true });
             else this.pen.circle(...points[0], shape.radius * this.view.scale, shape.kind === "wheel" ? { ...style, dash: [7, 3] } : style);
         }
+        for (const shape of this.all("pitch")) this.pen.line(this.at(shape).map((p) => this.dot(p)), { width: 1.1, colour: this.edge(shape.colour), closed: true, dash: [9, 3, 2, 3] });
         for (const shape of this.all("spoke", "belt")) {
             this.pen.line(this.at(shape).map((p) => this.dot(p)), { width: 1.4, colour: this.edge(shape.colour) });
         }
@@ -208,9 +209,11 @@ class Painter {
             for (const rod of rods.get(link.frame) || []) routes.push({ points: this.at(rod).map((p) => this.dot(p)), closed: false });
             const [edge, fill] = [this.edge(link.colour), this.fill(link.colour)];
             const width = this.width * (found.closed ? 0.8 : 1);
+            for (const face of this.all("face")) if (face.frame === link.frame) this.face(face, routes, width);
             if (found.closed) this.pen.line(routes[0].points, { width: 0, fill: paleOf(this.isGhost ? GREY : link.colour, this.theme), closed: true, alpha: 0.85 });
             for (const { points, closed } of routes) this.pen.line(points, { width: width + 1.4, colour: edge, closed });
             for (const { points, closed } of routes) this.pen.line(points, { width: width - 1.4, colour: fill, closed });
+            if (found.closed && isSlim(routes[0].points, width)) this.pen.line(routes[0].points, { width: 0, fill, closed: true });
             for (const { points, closed } of routes) (closed ? [...points, points[0]] : points).slice(1).forEach((b, k) => this.cover(points[k], b, width));
             for (const rib of found.ribs) this.pen.line(rib.map(place), { width: width * 0.5, colour: fill });
             const middles = routes.flatMap(({ points, closed }) => middlesOf(points, closed));
@@ -218,6 +221,17 @@ class Painter {
             if (middles.length) this.name(link.name, middles, edge, found.closed ? 0 : width / 2 + 8, 2);
             else this.name(link.name, [place(found.corners[0] || [0, 0])], edge, 24, 3);
         }
+    }
+
+    // Add the line of a flat face to the routes of its body, all of a width on the side away from the cam, so that their
+    // edge is the line.
+    face(shape, routes, width) {
+        const [a, b] = this.at(shape).map((p) => this.dot(p));
+        const away = this.direction(shape);
+        const isOn = (p) => Math.abs((p[0] - a[0]) * away[0] + (p[1] - a[1]) * away[1]) < 0.1; // [px]
+        routes.push({ points: [a, b], closed: false });
+        this.name(shape.name, [0.5, 0.3, 0.7].map((part) => [0, 1].map((k) => a[k] + part * (b[k] - a[k]))), this.theme.ink, width + 8, 3);
+        for (const route of routes) route.points = route.points.map((p) => (isOn(p) ? [0, 1].map((k) => p[k] + 0.5 * width * away[k]) : p));
     }
 
     get outlines() {
@@ -287,19 +301,21 @@ class Painter {
     pins(held) {
         const { linkage, pen, theme } = this;
         const radius = Math.max(2.4, 0.33 * this.width);
-        const done = new Set();
+        const [done, named] = [new Set(), new Set()]; // places of pins, and names with their places
+        const key = (p) => `${Math.round(p[0])} ${Math.round(p[1])}`;
         const pin = (point, text) => {
             const p = this.dot(linkage.point(point));
-            const place = `${Math.round(p[0])} ${Math.round(p[1])}`;
+            const place = key(p);
             if (!done.has(place)) {
                 done.add(place);
                 pen.circle(...p, radius, { width: 1.6, colour: theme.ink, fill: theme.pin });
                 this.boxes.add([p[0] - radius, p[1] - radius, p[0] + radius, p[1] + radius]);
             }
             if (text) this.name(text, [p], theme.ink, radius + 8, 1);
+            named.add(`${text} ${place}`);
         };
         for (const joint of linkage.data.joints) {
-            if (joint.points && joint.type !== "translational") {
+            if (joint.points && !["translational", "cam_flat_face"].includes(joint.type)) {
                 joint.points.forEach((point, k) => pin(point, k === joint.points.length - 1 ? joint.name : ""));
             }
         }
@@ -307,7 +323,7 @@ class Painter {
         for (const { name, point, colour } of linkage.data.interest) {
             const p = this.dot(linkage.point(point));
             pen.circle(...p, radius + 0.6, { width: 1.6, colour: theme.ink, fill: this.edge(colour) });
-            this.name(name, [p], theme.ink, radius + 8, 0);
+            if (!named.has(`${name} ${key(p)}`)) this.name(name, [p], theme.ink, radius + 8, 0);
         }
         if (held) pen.circle(...this.dot(held), radius + 6, { width: 2.5, colour: theme.accent });
     }

@@ -5,14 +5,15 @@ import { distance, placed, seen } from "./geometry.js";
 const POSES = 120; // that decide how far slides reach
 const BEYOND = 0.35; // of the pinion's radius, additional length at both ends of a rack
 const OF_SHORTEST = 0.9; // of the shortest length of a cylinder, its longest barrel; the rod stays in it by the rest
-const OF_JOINTS = ["wheel", "spoke", "belt", "rack", "cam", "roller"]; // whose size follows from numbers of their joint
+export const CAMS = ["cam", "pitch"]; // closed curves of a cam: its profile, and the path of the roller's centre on it
+const OF_JOINTS = ["wheel", "spoke", "belt", "rack", "cam", "pitch", "roller"]; // whose size follows from numbers of their joint
 
 // Return the shapes to draw with the lengths as set; those of the file if none is changed.
 export function formsOf(linkage) {
     const { shapes } = linkage.data;
     if (!linkage.isChanged) return shapes;
     const tracks = tracksOf(linkage, shapes);
-    const isKnown = (shape) => !OF_JOINTS.includes(shape.kind) || (!isJointChanged(linkage, shape.name) && (shape.kind !== "cam" || shape.hasCurve));
+    const isKnown = (shape) => !OF_JOINTS.includes(shape.kind) || (!isJointChanged(linkage, shape.name) && (!CAMS.includes(shape.kind) || shape.hasCurve));
     return shapes.filter(isKnown).map((shape) => {
         if (shape.line) return ofSlide(linkage, shape, tracks.get(shape));
         if (shape.kind === "rack") return ofRack(linkage, shape, tracks.get(shape));

@@ -1,5 +1,6 @@
 // What the hand moves: driver values while a body is dragged, parameters while a pin is dragged in the mode for lengths.
 
+import { CAMS } from "./forms.js";
 import { distance, distanceToSegment, leastSquares, remainder, seen } from "./geometry.js";
 
 const NO_EFFECT = 1e-5; // of the largest effect of a parameter on a pin; a smaller one is rounding
@@ -28,7 +29,7 @@ export function gripAt(linkage, p, reach) {
     if (best) return best;
     for (const shape of linkage.shapes) {
         const body = linkage.body(shape.frame);
-        if (body < 0 || linkage.triples[body][0] < 0 || !(shape.radius || shape.kind === "cam")) continue;
+        if (body < 0 || linkage.triples[body][0] < 0 || !(shape.radius || CAMS.includes(shape.kind))) continue;
         const local = seen(linkage.bodyPose(body), ...p);
         const [cx, cy] = shape.points.reduce(([x, y], q) => [x + q[0] / shape.points.length, y + q[1] / shape.points.length], [0, 0]);
         const radius = shape.radius || Math.max(...shape.points.map((q) => Math.hypot(q[0] - cx, q[1] - cy)));

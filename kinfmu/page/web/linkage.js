@@ -2,7 +2,7 @@
 
 import { comesTo, partingOf } from "./branches.js";
 import { isGood } from "./engine.js";
-import { axlesOf, formsOf } from "./forms.js";
+import { CAMS, axlesOf, formsOf } from "./forms.js";
 import { TURN, placed, remainder } from "./geometry.js";
 import { grouped } from "./numbers.js";
 import { changePointsOf, rangesOf } from "./ranges.js";
@@ -326,7 +326,7 @@ export class Linkage {
         for (const line of this.curves(all, BOX)) line.forEach(add);
         all.forEach((k) => add(this.point(k)));
         for (const shape of this.shapes) {
-            if (!shape.radius && shape.kind !== "cam") continue;
+            if (!shape.radius && !CAMS.includes(shape.kind)) continue;
             const body = this.body(shape.frame);
             if (body < 0) continue;
             for (const [x, y] of shape.points) {

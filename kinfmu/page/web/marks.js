@@ -1,6 +1,7 @@
 // Marks on the drawing: transmission angles, instant centres, arrows, limits and change points of drivers.
 
 import { css } from "./colours.js";
+import { CAMS } from "./forms.js";
 import { distance, TURN } from "./geometry.js";
 import { centres, transmissions } from "./instants.js";
 import { degrees } from "./numbers.js";
@@ -82,7 +83,7 @@ function arrow(painter, { from, along, colour, text }) {
 
 // Return how far the cam of a body reaches from a place, in pixels: a circle within it would look like its base circle.
 function outerOf(painter, body, centre) {
-    const corners = painter.all("cam").filter((shape) => shape.frame === body).flatMap((shape) => painter.at(shape));
+    const corners = painter.all(...CAMS).filter((shape) => shape.frame === body).flatMap((shape) => painter.at(shape));
     return corners.reduce((most, p) => Math.max(most, distance(painter.dot(p), centre)), 0);
 }
 
