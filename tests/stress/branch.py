@@ -270,8 +270,9 @@ class BranchPath:
     marks: tuple[float, ...] = ()  # of each driver that is an angle
 
     def expected(self, u: Floats, good: NDArray[np.bool_]) -> Expected:
-        """For samples (n, d): each way begins at the sample before that can be reached; good: where kinfmu has numbers,
-        which decides at an edge.
+        """For samples (n, d): each way begins at the last one before that was reached; good: where kinfmu has numbers.
+
+        Samples that kinfmu calls unreachable are judged elsewhere; the next way does not begin there.
         """
         here = np.array(self.drawn.start)
         names = [name for name in self.drawn.places(here[None]).columns if name.endswith(".phi")]
@@ -295,7 +296,7 @@ class BranchPath:
                 for name in names:
                     values = np.asarray(exact.columns[name].d0, dtype=float)
                     angles[name][k] = np.unwrap(np.concatenate([[now[name]], values]))[-1]
-                if side[k] == INSIDE or (side[k] == EDGE and good[k]):
+                if side[k] != OUTSIDE and good[k]:
                     here = target
                     now = {name: angles[name][k] for name in names}
         return Expected(side, angles, tightest)

@@ -257,3 +257,11 @@ def test_command_counts_and_reproduces_one_mechanism() -> None:
     one = printed("--seed", "20", "--family", "four-bars")
     assert one.startswith('name = "drawn"')
     assert "seed 20, four-bars" in one
+
+
+def test_the_next_way_begins_at_the_last_sample_that_was_reached(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A sample behind a place too tight to pass is called unreachable; angles count their turns without it."""
+    monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
+    assert trial(75, "machines with a robot", "native").judged().faults == []
