@@ -15,7 +15,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import redirect_stdout, suppress
+from contextlib import redirect_stdout
 from functools import cache
 from io import StringIO
 from multiprocessing.connection import Connection
@@ -37,7 +37,6 @@ from tests.fuzz.summary import Summary, seeds
 MOTION = "motion.mcap"
 PATIENCE = 60.0  # [s] for a process
 UNPRIVILEGED = 65534  # a user without rights
-CYCLES = 25  # records that are opened and closed
 LONG, PIECE, MOST_GROWTH = 100_000, 2000, 8 * 2**20  # samples, samples of a piece, [bytes] that the memory may grow by
 
 
@@ -319,29 +318,6 @@ def _ended(draw: random.Random, folder: Path, fmu: Path) -> Iterator[str]:
         yield "the record is not whole"
 
 
-def _descriptors(draw: random.Random, folder: Path, _fmu: Path) -> Iterator[str]:
-    """Records opened and closed, whole, damaged and given up: no descriptor is left open."""
-    before = len(list(Path("/proc/self/fd").iterdir()))
-    path, some = folder / "run.mcap", motion().part(slice(0, 3))
-    for _ in range(CYCLES):
-        sink = McapLog(path)
-        sink.begin(some.part(slice(0, 0)))
-        sink.add(some)
-        if draw.random() < 0.5:
-            sink.end(some, "")
-            read(path)
-        else:
-            sink.close()
-        data = bytearray(path.read_bytes())
-        data[draw.randrange(len(data))] ^= 1 << draw.randrange(8)
-        path.write_bytes(data[: draw.randint(1, len(data))])
-        with suppress(LogError):
-            read(path)
-    after = len(list(Path("/proc/self/fd").iterdir()))
-    if after > before:
-        yield f"{after - before} descriptors are open after {CYCLES} records"
-
-
 def _long(pipe: Connection, path: Path, samples: int) -> None:
     piece = _recorded_next_to(path).part(slice(0, PIECE))
     sink = McapLog(path, drawn=False)
@@ -370,6 +346,5 @@ KINDS: dict[str, Callable[[random.Random, Path, Path], Iterator[str]]] = {
     "two at once": _two_at_once,
     "ended": _ended,
     "read-only folder": _read_only,
-    "descriptors": _descriptors,
     "long run": _flat,
 }

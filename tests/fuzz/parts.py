@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import importlib
-from pathlib import Path
 from typing import cast
 
 from tests.fuzz.summary import Summary
 
-PARTS = tuple(
-    name for name in ("mechanisms", "files", "fmu", "cache", "logs") if Path(__file__).with_name(f"{name}.py").is_file()
-)
+PARTS = ("mechanisms", "files", "fmu", "cache", "logs", "opens")
 
 
 def run(part: str, seed: int, seconds: float) -> Summary:
