@@ -7,11 +7,7 @@ every body; and the work of efforts and loads over a stretch has to be the chang
 
 from __future__ import annotations
 
-import argparse
-import multiprocessing
-import os
 import sys
-import time
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -38,6 +34,7 @@ from kinfmu import (
 from kinfmu.errors import AmbiguousStartError
 from kinfmu.mechanism.toml_text import text
 from tests.power_series import mp
+from tests.stress.comparisons import all_compared, command_line
 from tests.stress.families import Draw
 from tests.stress.sensitivities import Floats
 from tests.stress.statics import CONSERVATIVE, STANDING, Balance, Frame, Loads, Statics
@@ -52,7 +49,6 @@ EPS = 2.0**-52
 NATIVE_EVERY = 8  # one mechanism of so many is solved by the native engine
 MARGIN, HALF = 0.1, 0.05  # of a stretch: margin at its middle, half width [rad, sizes]
 NODES = (20, 80, 320)  # of Gauss; more where it does not converge with less, as near a narrow place
-CHUNK = 5
 SHAKING = ("shaking_force_x", "shaking_force_y", "shaking_moment")
 RATES = {"x": "vx", "y": "vy", "phi": "omega"}
 
@@ -347,23 +343,11 @@ def _task(task: tuple[int, str | None, Any]) -> Comparison:
 
 def main() -> int:
     """Compare many mechanisms and print what is found; 1 if anything is wrong."""
-    parser = argparse.ArgumentParser(description="Forces of random mechanisms against 50 digits.")
-    parser.add_argument("--count", type=int, default=2000, help="mechanisms; 2000")
-    parser.add_argument("--seed", type=int, default=0, help="of the first mechanism; 0")
-    parser.add_argument("--family", help="one family alone")
+    parser = command_line("Forces of random mechanisms against 50 digits.", 2000)
     parser.add_argument("--engine", default="", help="one engine for all; default: native for one mechanism of 8")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes; one a core")
     given = parser.parse_args()
-    begun = time.monotonic()
-    found: list[Comparison] = []
     tasks = [(seed, given.family, given.engine) for seed in range(given.seed, given.seed + given.count)]
-    with multiprocessing.get_context("spawn").Pool(given.jobs) as pool:
-        for one in pool.imap_unordered(_task, tasks, CHUNK):
-            found.append(one)
-            for fault in one.faults:
-                print(f"seed {one.seed}, {one.family}: {fault}", flush=True)
-            if len(found) % 50 == 0:
-                print(f"{len(found)} of {len(tasks)}, {time.monotonic() - begun:.0f} s", file=sys.stderr, flush=True)
+    found = all_compared(_task, tasks, given.jobs)
     for what in ("efforts", "inertias", "reactions", "balance", "shaking", "energy"):
         worst = max(found, key=lambda one: float(getattr(one, what)))
         print(f"{what}: worst relative error {getattr(worst, what):.2g} (seed {worst.seed}, {worst.family})")

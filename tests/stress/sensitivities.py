@@ -9,12 +9,8 @@ digits; their central difference has 50 correct ones, since h = 1e-30 of the siz
 
 from __future__ import annotations
 
-import argparse
 import cmath
-import multiprocessing
-import os
 import sys
-import time
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -30,6 +26,7 @@ from kinfmu.gallery import names
 from kinfmu.mechanism.toml_text import text
 from tests.open_lengths import with_open_lengths
 from tests.power_series import Series, mp, sin_cos
+from tests.stress.comparisons import all_compared, command_line
 from tests.stress.families import Draw
 from tests.stress.trial import trial
 
@@ -46,7 +43,6 @@ ROUNDINGS = 20.0  # a larger error than so many times that of rounded lengths an
 CLOSED = mp.mpf("1e-70")
 OPENS = 1e-6  # gap per length of a row that opens; kinfmu refuses such a length
 ELSEWHERE = 10  # more samples at which a row may open
-CHUNK = 5
 
 Floats = NDArray[np.float64]
 
@@ -368,25 +364,13 @@ def _task(task: tuple[int, str | None]) -> Comparison:
 
 def main() -> int:
     """Compare many mechanisms and print what is found; 1 if anything is wrong."""
-    parser = argparse.ArgumentParser(description="Sensitivities of random mechanisms against 50 digits.")
-    parser.add_argument("--count", type=int, default=1000, help="mechanisms; 1000")
-    parser.add_argument("--seed", type=int, default=0, help="of the first mechanism; 0")
-    parser.add_argument("--family", help="one family alone")
+    parser = command_line("Sensitivities of random mechanisms against 50 digits.", 1000)
     parser.add_argument("--gallery", action="store_true", help="the mechanisms of the gallery, and no others")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes; one a core")
     given = parser.parse_args()
-    begun = time.monotonic()
-    found: list[Comparison] = []
     tasks: list[tuple[int, str | None]] = [(seed, given.family) for seed in range(given.seed, given.seed + given.count)]
     if given.gallery:
         tasks = [(GALLERY, name) for name in NAMES]
-    with multiprocessing.get_context("spawn").Pool(given.jobs) as pool:
-        for one in pool.imap_unordered(_task, tasks, CHUNK):
-            found.append(one)
-            for fault in one.faults:
-                print(f"seed {one.seed}, {one.family}: {fault}", flush=True)
-            if len(found) % 50 == 0:
-                print(f"{len(found)} of {len(tasks)}, {time.monotonic() - begun:.0f} s", file=sys.stderr, flush=True)
+    found = all_compared(_task, tasks, given.jobs)
     worst = max(found, key=lambda one: one.worst)
     skipped = [one.skipped for one in found if one.skipped]
     faulty = [one for one in found if one.faults]
