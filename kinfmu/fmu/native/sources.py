@@ -41,6 +41,9 @@ _STEP = (
     "trusted_step.c",
     "solver.c",
     "drive.c",
+    "requested_pose.c",
+    "stepping.c",
+    "time_derivatives.c",
     "instance.c",
     "variables.c",
 )  # the functions that a step calls

@@ -12,6 +12,7 @@
 
 #define KF_SAMPLES 4      /* committed ones: two for rates estimated with the current one, one more for their errors */
 #define KF_LARGEST 1e100  /* of what a host sets and of rates: the squares of larger numbers are infinite */
+#define KF_SAME_TIME 1e-9 /* of a step: hosts add up time with rounding errors, which move no pose */
 #define KF_INPUT_ORDERS 3 /* derivatives of an input that a step may follow */
 
 /* Numbered as fmi2Status and fmi3Status are. */
@@ -235,10 +236,20 @@ void kf_forget_motion(kf_state *state); /* the rates may have changed */
 bool kf_holds(const kf_state *state);    /* discrete variables keep their values */
 kf_status kf_ask_anew(kf_instance *instance);
 kf_pose *kf_shown(kf_state *state);
+KF_RARE kf_answer kf_bind_parameters(kf_instance *instance);
+void kf_solve_at(kf_state *state, const double *u);
+void kf_commit_pose(kf_state *state);
+void kf_commit(kf_state *state, double t, double step);
+kf_answer kf_warn_of_inputs(kf_instance *instance);
+bool kf_is_past_stop(const kf_state *state, double time, double step);
+KF_RARE kf_answer kf_past_stop(const kf_instance *instance, const char *function, double time, double step);
 kf_answer kf_read(kf_instance *instance, unsigned parts);
 void kf_find_drive(kf_state *state);
 /* Times at which drivers jump, and periods after which they jump again, 0 if they do not: events.c. */
 void kf_jumps(const kf_model *model, const double *constants, double *jumps, double *periods);
+#if !KF_TORQUE
+KF_RARE void kf_move_inputs(kf_state *state, double step);
+#endif
 void kf_end_of_step(kf_state *state, double step);
 void kf_drop_input_derivatives(kf_state *state);
 void kf_find_rate_sources(kf_state *state);
