@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -18,41 +17,24 @@ from kinfmu.measures.arithmetic import Value, sqrt
 from kinfmu.measures.placement import GROUND, BodyFrame, Placement, body_of, unit_vector
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
-from kinfmu.mechanism.checks import coordinate_orders
-from kinfmu.mechanism.force_names import measured_forces
 from kinfmu.mechanism.members import kind_of_measured
 from kinfmu.motion.driven_samples import driven_samples
+from kinfmu.motion.driver_values import driven_at, window, within_period
 from kinfmu.motion.fitting import Circle, Line, deviation
 from kinfmu.motion.going_round import goes_round
+from kinfmu.motion.margins import lowest
 from kinfmu.motion.needed import Cosine, PathCoordinate, QuantityRead, cosine_between, is_angle, value_of
+from kinfmu.motion.quantity_names import QuantityNames
 from kinfmu.motion.quintic import FloatArray, IntArray
 from kinfmu.motion.sampled import sampled_track
 from kinfmu.motion.splitting import ORDER, Break, distinct, law_breaks, split_at
 from kinfmu.motion.track import FEWEST, Track
 from kinfmu.run import Run
 from kinfmu.run.axis import TIME
-from kinfmu.units import CoordinateName, ForceName, Quantity
+from kinfmu.units import CoordinateName, Quantity
 
 SHAPES: dict[str, type[Line] | type[Circle]] = {"line": Line, "circle": Circle}
-_SAME = 1e-9  # of the way of the driver; values of it closer than this are equal
 Vector = tuple[Taylor, Taylor]
-
-
-class _Names:
-    """What quantities of a mechanism are called."""
-
-    def __init__(self, mechanism: Mechanism) -> None:
-        self._mechanism = mechanism
-
-    @cached_property
-    def orders(self) -> dict[str, tuple[CoordinateName, int]]:
-        """Each coordinate and its rates, with the coordinate and the order."""
-        return coordinate_orders(self._mechanism)
-
-    @cached_property
-    def forces(self) -> dict[str, tuple[ForceName, ...]]:
-        """Forces that are measured, by name."""
-        return {name: made for name, made in measured_forces(self._mechanism).items() if name not in self.orders}
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +77,7 @@ class Motion:
     computed: Mapping[QuantityRead, CoordinateName] = field(default_factory=dict)
     is_seamed: bool = False
     _tracks: dict[QuantityRead, Track] = field(default_factory=dict, repr=False)
-    _names: _Names | None = field(default=None, repr=False)  # the same object in all parts and all designs
+    _names: QuantityNames | None = field(default=None, repr=False)  # the same object in all parts and all designs
     _windows: dict[tuple[float | None, float | None, bool], tuple[float, float]] = field(
         default_factory=dict, repr=False
     )
@@ -193,10 +175,10 @@ class Motion:
 
     def __post_init__(self) -> None:
         if self._names is None:
-            object.__setattr__(self, "_names", _Names(self.mechanism))
+            object.__setattr__(self, "_names", QuantityNames(self.mechanism))
 
     @property
-    def names(self) -> _Names:
+    def names(self) -> QuantityNames:
         """What quantities are called."""
         assert self._names is not None  # noqa: S101  __post_init__ makes it
         return self._names
@@ -214,26 +196,13 @@ class Motion:
 
     def driven_at(self, x: FloatArray) -> FloatArray:
         """Return values of the driver at arguments (...); the end of a motion that goes round is its begin."""
-        if self.drive is None:
-            return x
-        found, first, last = self._driven(x), self.drive.value[0], self.drive.value[-1]
-        is_end = self.is_closed & (np.abs(found - last) <= _SAME * np.abs(last - first))
-        return np.asarray(np.where(is_end, first, found))
+        return x if self.drive is None else within_period(self.drive, driven_at(self.drive, x))
 
     def driven_between(self, start: FloatArray, stop: FloatArray) -> FloatArray:
         """Return how far the driver moves between arguments (...)."""
-        return np.abs(self._driven(stop) - self._driven(start))
-
-    def _driven(self, x: FloatArray) -> FloatArray:
-        """Return values of the driver at arguments (...), which may be in the period before or after the motion."""
         if self.drive is None:
-            return x
-        if self.drive.is_linear:
-            return np.asarray(self.drive.rate[0] * x + (self.drive.value[0] - self.drive.rate[0] * self.drive.x[0]))
-        span, travel = self.drive.span, self.drive.value[-1] - self.drive.value[0]
-        turns = np.floor((x - self.x[0]) / span) if self.is_closed else np.zeros_like(x)
-        found = self.drive.at((x - turns * span).reshape(-1))[0].reshape(np.shape(x))
-        return np.asarray(np.where(np.isnan(x), np.nan, found + turns * travel))
+            return np.abs(stop - start)
+        return np.abs(driven_at(self.drive, stop) - driven_at(self.drive, start))
 
     def part(self, begin: float | None, end: float | None) -> Motion:
         """Return the part of the motion between two values of the driver; None: its first or last.
@@ -246,32 +215,8 @@ class Motion:
             return self
         key = (begin, end, self.is_closed)
         if key not in self._windows:
-            self._windows[key] = self._window(begin, end)
+            self._windows[key] = window(self.argument if self.drive is None else self.drive, begin, end)
         return replace(self, window=self._windows[key], _tracks=self._tracks)
-
-    def _window(self, begin: float | None, end: float | None) -> tuple[float, float]:
-        """Return the first and last argument between two values of the driver."""
-        drive = self.argument if self.drive is None else self.drive
-        ends = sorted((float(drive.value[0]), float(drive.value[-1])))
-        if not (np.all(drive.rate > 0.0) or np.all(drive.rate < 0.0)):
-            raise RequestError("'begin' and 'end' need a driver that moves in one direction")
-        wanted = [ends[0] if begin is None else begin, ends[1] if end is None else end]
-        if self.is_closed:
-            wanted[0] = ends[0] + (wanted[0] - ends[0]) % (ends[1] - ends[0])
-            wanted[1] = ends[1] - (ends[1] - wanted[1]) % (ends[1] - ends[0])
-        for value in wanted:
-            if not ends[0] <= value <= ends[1]:
-                raise RequestError(
-                    f"the driver does not reach {value:.9g}; the motion goes from {ends[0]:.9g} to {ends[1]:.9g}"
-                )
-        start, stop = (_argument_at(drive, value) for value in wanted)
-        if drive.rate[0] < 0.0:
-            start, stop = stop, start
-        if self.is_closed and stop <= start:
-            stop += drive.span
-        if stop <= start:
-            raise RequestError(f"'begin' {wanted[0]:.9g} must be before 'end' {wanted[1]:.9g}")
-        return start, stop
 
     def require_closed(self, word: str) -> None:
         """Raise a RequestError unless the motion goes round; word: what needs that."""
@@ -361,16 +306,7 @@ class Motion:
         """Return the smallest margin of the samples and where it occurs; margins have no rates."""
         if self.margin is None:
             raise RequestError("the motion has no margins")
-        first, last = self.window or (self.x[0], self.x[-1])
-        shifts = (0.0, self.x[-1] - self.x[0]) if self.is_closed else (0.0,)
-        x = np.concatenate([self.x + shift for shift in shifts])
-        inside = (x >= first) & (x <= last)
-        if not inside.any():
-            raise RequestError("no sample of the motion is between 'begin' and 'end'")
-        margin = np.concatenate([self.margin] * len(shifts), axis=-1)[..., inside]
-        k = np.argmin(margin, axis=-1)
-        value = np.take_along_axis(margin, k[..., None], -1)[..., 0]
-        return value, np.where(np.isnan(value), np.nan, x[inside][k])
+        return lowest(self.x, self.margin, self.window, is_closed=self.is_closed)
 
     def quantity_track(self, quantity: QuantityRead) -> Track:
         """Return a quantity that measures read, without regard to the window."""
@@ -462,11 +398,3 @@ def force_of(run: Run, name: str) -> FloatArray:
 def _derived(track: Track, order: int) -> Track:
     """Return the derivative of an order 0 to 2."""
     return (lambda: track, track.derivative, track.second_derivative)[order]()
-
-
-def _argument_at(drive: Track, value: float) -> float:
-    """Return the argument at which a driver that moves in one direction has a value that it reaches."""
-    for k in (0, -1):
-        if value == drive.value[k]:
-            return float(drive.x[k])
-    return float(drive.crossings(np.asarray(value))[1][0])
