@@ -338,6 +338,22 @@ def test_a_process_killed_while_it_writes_leaves_no_library(cache: Path) -> None
     assert not part.exists()
 
 
+@pytest.mark.usefixtures("cache")
+def test_libraries_that_were_not_used_for_a_day_make_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    old, used = compiler.shared_library(SEVEN), compiler.shared_library(EIGHT)
+    for path in (old, used):
+        os.utime(path, (time.time() - 2 * library_cache.UNUSED,) * 2)
+    assert compiler.shared_library(EIGHT) == used
+    library_cache._remove_unused.cache_clear()
+    library_cache.store("small", ".so", b"")
+    assert old.exists()  # there is room for all
+    monkeypatch.setattr(library_cache, "MOST_KEPT", 1)
+    library_cache._remove_unused.cache_clear()
+    library_cache.store("next", ".so", b"")
+    assert not old.exists()
+    assert used.exists()
+
+
 class Terminal(io.StringIO):
     """A stream that says it is a terminal."""
 
