@@ -239,11 +239,11 @@ def address_of(array: NDArray[Any]) -> int:
         return address
 
 
-def empty_results(rows: int, n: int) -> FloatArray:
-    """Return an array (rows, n) without values, whose rows begin at lines of the caches."""
+def empty_results(rows: int, n: int, of: Callable[[int], FloatArray] = np.empty) -> FloatArray:
+    """Return an array (rows, n) without values, or with those of `of`, whose rows begin at lines of the caches."""
     pitch = -(-n // LINE) * LINE
     pitch += LINE if pitch % _UNEVEN == 0 else 0
-    whole = np.empty(rows * pitch + LINE)
+    whole = of(rows * pitch + LINE)
     first = -address_of(whole) // ITEM % LINE
     return whole[first : first + rows * pitch].reshape(rows, pitch)[:, :n]
 

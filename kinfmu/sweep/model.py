@@ -285,6 +285,7 @@ class Model:
         tolerance: float = TOLERANCE,
         wrap: bool = False,
         anew: bool = True,
+        reuse: Sensitivities | None = None,
         **inputs: ArrayLike,
     ) -> Sensitivities:
         """Return exact derivatives of positions and rates with respect to parameters.
@@ -303,6 +304,9 @@ class Model:
             tolerance: As in `solve`.
             wrap: As in `solve`.
             anew: As in `solve`.
+            reuse: An earlier result of this model that is no longer needed. If the names and the number of samples are
+                the same, its arrays are overwritten, and read-only from then on: fresh memory costs as much as the
+                numbers where there are thousands of samples.
             **inputs: Driver values in place of t, as in `solve`.
 
         Returns:
@@ -316,7 +320,7 @@ class Model:
 
         """
         return self._sensitivity_model.solve(
-            t, outputs, parameters, wrt, tolerance=tolerance, wrap=wrap, anew=anew, inputs=inputs
+            t, outputs, parameters, wrt, tolerance=tolerance, wrap=wrap, anew=anew, reuse=reuse, inputs=inputs
         )
 
     @cached_property

@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +24,7 @@ from kinfmu.solver.python.status import Status
 from kinfmu.sweep.arguments import Settings
 from kinfmu.sweep.designs import Solvable
 from kinfmu.sweep.interpolated import SPACING, Columns, interpolated
-from kinfmu.sweep.stages import Native, native_stage, stage_results
+from kinfmu.sweep.stages import Native, native_stage, set_zeros, stage_results
 
 OPEN = 1e-7  # derivative of a row relative to the size, for a change by the size or by 1, above which it would open
 _STAGES_KEPT = 16
@@ -77,6 +78,17 @@ class Sensitivities(Displayed):
         return self.rates_by[:, self.outputs.index(output), self.parameters.index(parameter)]
 
 
+class _Memory(NamedTuple):
+    """The memory of sensitivities: all results of a stage.
+
+    is_kept: True if nobody could change the results that are always 0.
+    """
+
+    stage: CompiledStage
+    results: FloatArray
+    is_kept: bool
+
+
 class SensitivityModel:
     """Sensitivities of a model; code is printed when it is first needed and kept.
 
@@ -94,6 +106,7 @@ class SensitivityModel:
         self._law_symbols = [law_symbol(constant.name) for constant in model.plan.law_constants]
         self._stage = lru_cache(maxsize=_STAGES_KEPT)(self._new_stage)
         self._native = lru_cache(maxsize=_STAGES_KEPT)(native_stage)
+        self._memories = WeakKeyDictionary[Sensitivities, _Memory]()
 
     def solve(
         self,
@@ -105,15 +118,18 @@ class SensitivityModel:
         tolerance: float,
         wrap: bool,
         anew: bool,
+        reuse: Sensitivities | None,
         inputs: Mapping[str, Any],
     ) -> Sensitivities:
         """Return the sensitivities; arguments and errors as in `Model.sensitivities`."""
         plan, by_law = self._model.plan, not inputs
         names = _names("outputs", outputs, plan.outputs)
         chosen = self._chosen(wrt, by_law=by_law)
+        if not (reuse is None or isinstance(reuse, Sensitivities)):
+            raise RequestError(f"reuse must be a result of sensitivities or None, not {type(reuse).__name__}")
         given = parameters or {}
         run = self._poses.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, anew=anew, **inputs)
-        found = self._found(run, names, given, chosen, by_law=by_law)
+        found = self._found(run, names, given, chosen, by_law=by_law, reuse=reuse)
         if len(plan.drivers) > 1 or not (run.status == Status.BRIDGED).any():
             return found
 
@@ -126,7 +142,14 @@ class SensitivityModel:
         return found
 
     def _found(
-        self, run: Run, names: tuple[str, ...], settings: Settings, chosen: tuple[str, ...], *, by_law: bool
+        self,
+        run: Run,
+        names: tuple[str, ...],
+        settings: Settings,
+        chosen: tuple[str, ...],
+        *,
+        by_law: bool,
+        reuse: Sensitivities | None = None,
     ) -> Sensitivities:
         """Return the sensitivities at the samples of a run; NaN where it is interpolated."""
         plan, setting = self._model.plan, self._model.arguments.setting(settings)
@@ -139,7 +162,11 @@ class SensitivityModel:
         given |= zip(self._law_symbols, setting.constants, strict=True)
         stage, gap_names = self._stage(names, chosen, by_law, frozenset(settings))
         native = self._native(stage) if self._poses.is_native(len(run.t)) else None
-        return _evaluated(plan, stage, native, gap_names, names, chosen, run, given)
+        memory = None if reuse is None else self._memories.pop(reuse, None)
+        found, memory = _evaluated(plan, stage, native, gap_names, names, chosen, run, given, memory)
+        if memory is not None:
+            self._memories[found] = memory
+        return found
 
     def _chosen(self, wrt: Sequence[str] | None, *, by_law: bool) -> tuple[str, ...]:
         """Return the names of the parameters."""
@@ -230,8 +257,12 @@ def _evaluated(
     parameters: tuple[str, ...],
     run: Run,
     given: Mapping[str, FloatArray | float],
-) -> Sensitivities:
-    """Return what a stage gives for the samples of a run that hold numbers and are not interpolated."""
+    memory: _Memory | None,
+) -> tuple[Sensitivities, _Memory | None]:
+    """Return what a stage gives for the samples of a run that hold numbers and are not interpolated, and its memory.
+
+    memory: of sensitivities that are no longer needed; it is used if it fits. None is returned for tables of their own.
+    """
     good = np.flatnonzero(run.status < Status.BRIDGED)
     n, m, p, rows = len(good), len(outputs), len(parameters), len(gap_names)
     shapes = ((m,), (m,), (m, p), (m, p), (p, rows))
@@ -240,7 +271,11 @@ def _evaluated(
     numbers = [given[name] for name in stage.given]
     if not is_whole:
         numbers = [number[good] if isinstance(number, np.ndarray) else number for number in numbers]
-    results, is_finite = stage_results(stage, native, numbers, (int(ends[-1]), n))
+    shape = (int(ends[-1]), n)
+    into = memory.results if memory is not None and memory.stage is stage and memory.results.shape == shape else None
+    if memory is not None and into is not None and not memory.is_kept:
+        set_zeros(stage, into)
+    results, is_finite = stage_results(stage, native, numbers, shape, into=into)
     tables = [
         np.moveaxis(results[a:b].reshape(*shape, n), -1, 0) for a, b, shape in zip(ends, ends[1:], shapes, strict=False)
     ]
@@ -256,8 +291,13 @@ def _evaluated(
         for there, table in zip(whole, tables, strict=True):
             there[good] = table
         tables = whole
+    elif into is not None:
+        for table in tables:
+            table.flags.writeable = False
     values, rates, values_by, rates_by = tables
-    return Sensitivities(outputs, parameters, run.t, values, rates, values_by, rates_by, run.status, refused)
+    found = Sensitivities(outputs, parameters, run.t, values, rates, values_by, rates_by, run.status, refused)
+    is_kept = into is not None and is_finite and not refused
+    return found, _Memory(stage, results, is_kept) if is_whole else None
 
 
 def _refused(

@@ -11,6 +11,7 @@ from kinfmu.errors import CompilerError
 from kinfmu.run import FloatArray
 from kinfmu.simd.stage import Given, empty_results, is_printable, load_native_stage
 
+FRESH = 1 << 22  # numbers; larger arrays are fresh memory, which the system hands over with zeros
 AT_ONCE = 512  # samples; the arrays of a stage then stay in the processor's cache
 
 Native = Callable[[Sequence[Given], FloatArray, bool], bool]  # fills results (rows, n) from arrays (n,)
@@ -36,10 +37,17 @@ def native_results(
 
 def _empty(stage: CompiledStage, shape: tuple[int, int]) -> FloatArray:
     """Return an array of results without values, except for those that are always 0."""
+    if shape[0] * shape[1] > FRESH:
+        return empty_results(*shape, of=np.zeros)
     results = empty_results(*shape)
+    set_zeros(stage, results)
+    return results
+
+
+def set_zeros(stage: CompiledStage, results: FloatArray) -> None:
+    """Set the results of a stage that are always 0."""
     for rows_at_zero in stage.zeros:
         results[rows_at_zero] = 0.0
-    return results
 
 
 def stage_results(
@@ -49,15 +57,17 @@ def stage_results(
     shape: tuple[int, int],
     *,
     is_checked: bool = True,
+    into: FloatArray | None = None,
 ) -> tuple[FloatArray, bool]:
     """Return all results of a stage, (rows, n), and whether all are finite; they are not where a block is singular.
 
-    numbers: arrays (n,), or one number each. Without `is_checked` results pass as finite.
+    numbers: arrays (n,), or one number each. Without `is_checked` results pass as finite. into: results of an earlier
+    call, of the same shape, which are overwritten, except for those that are always 0.
     """
     n = shape[1]
+    results = _empty(stage, shape) if into is None else into
     if native is not None:
-        return native_results(stage, native, numbers, shape, is_checked=is_checked)
-    results = _empty(stage, shape)
+        return results, native(numbers, results, is_checked)
     if n <= stage.few:
         columns = [number.tolist() if isinstance(number, np.ndarray) else [number] * n for number in numbers]
         rows = []

@@ -268,6 +268,34 @@ def test_parameters_that_keep_a_change_point_have_derivatives_there(engine: str)
             np.testing.assert_allclose(found.rate_of(name, "scale"), run[rate], rtol=0, atol=1e-8)
 
 
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_the_memory_of_an_earlier_result_holds_the_numbers_of_the_next(engine: str) -> None:
+    model = kinfmu.compile(crossing(scaled=False), engine=engine)
+    first, second = np.linspace(0.1, 3.0, 130), np.linspace(-3.0, 0.5, 130)
+    reused = model.sensitivities(crank_angle=first)
+    reused.values_by[:] = np.pi  # by the user, whose arrays they are
+    for angles in (second, first, second):
+        wanted, arrays = model.sensitivities(crank_angle=angles), reused.rates_by
+        reused = model.sensitivities(crank_angle=angles, reuse=reused)
+        assert np.shares_memory(reused.rates_by, arrays)
+        for name in ("values", "rates", "values_by", "rates_by"):
+            np.testing.assert_array_equal(getattr(reused, name), getattr(wanted, name))
+        with pytest.raises(ValueError, match="read-only"):
+            reused.values_by[0] = 1.0
+
+
+def test_a_result_of_other_names_or_samples_is_left_alone() -> None:
+    model = kinfmu.compile(kinfmu.load("jansen_leg"), ["foot.x"], engine="python")
+    for other in ({"crank_angle": np.zeros(3)}, {"crank_angle": np.zeros(2), "wrt": model.parameters[:1]}):
+        earlier = model.sensitivities(crank_angle=np.array([0.1, 0.2]))
+        kept = earlier.values_by.copy()
+        again = model.sensitivities(**other, reuse=earlier)
+        np.testing.assert_array_equal(earlier.values_by, kept)
+        assert not np.shares_memory(again.values, earlier.values)
+    with pytest.raises(RequestError, match="reuse must be a result of sensitivities or None, not int"):
+        model.sensitivities(crank_angle=np.zeros(2), reuse=1)  # type: ignore[arg-type]
+
+
 def test_law_constants_have_derivatives_at_a_change_point() -> None:
     """z(u), u = start + speed t: derivatives are those over the driver value."""
     model = kinfmu.compile(crossing(False))
