@@ -81,7 +81,7 @@ class Sensitivities(Displayed):
 class _Memory(NamedTuple):
     """The memory of sensitivities: all results of a stage.
 
-    is_kept: True if nobody could change the results that are always 0.
+    is_kept: True if the results that are always 0 are certainly unchanged.
     """
 
     stage: CompiledStage

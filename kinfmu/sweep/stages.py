@@ -11,7 +11,7 @@ from kinfmu.errors import CompilerError
 from kinfmu.run import FloatArray
 from kinfmu.simd.stage import Given, empty_results, is_printable, load_native_stage
 
-FRESH = 1 << 22  # numbers; larger arrays are fresh memory, which the system hands over with zeros
+FRESH = 1 << 22  # numbers; larger arrays are fresh memory, which the system fills with zeros
 AT_ONCE = 512  # samples; the arrays of a stage then stay in the processor's cache
 
 Native = Callable[[Sequence[Given], FloatArray, bool], bool]  # fills results (rows, n) from arrays (n,)
