@@ -41,7 +41,10 @@ def ended(arguments: list[str], number: int, folder: Path, *, until: str) -> sub
     return subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP] if sys.platform != "win32" else [])
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.long)] if sys.platform != "win32" else [],
+)
 def test_a_simulation_leaves_a_whole_record(number: int, tmp_path: Path) -> None:
     result = ended(SIMULATE, number, tmp_path, until="run.mcap")
     name = signal.Signals(number).name

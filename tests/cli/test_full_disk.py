@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.gallery_members import mostly_long
+
 PROGRAM = """
 import resource, signal, sys
 from kinfmu.cli import main
@@ -27,7 +29,7 @@ COMMANDS = {
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="a limit on the size of files simulates a full disk")
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("name", mostly_long(COMMANDS, few=("schema", "figure", "new")))
 def test_a_full_disk_is_reported_in_one_line_and_leaves_no_file(name: str, tmp_path: Path) -> None:
     arguments, out = COMMANDS[name]
     existed = name != "new"  # new never replaces a file

@@ -113,6 +113,7 @@ def test_an_object_that_was_changed_on_disk_is_compiled_again(cache: Path, compi
     assert compiled.count("rare.c") == 2
 
 
+@pytest.mark.long
 def test_a_mechanism_with_other_lengths_gets_the_library_it_gets_without_a_cache(
     compiled: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

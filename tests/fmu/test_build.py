@@ -52,6 +52,7 @@ slave.freeInstance()  # as hosts do; pythonfmu's library may abort at exit where
 """
 
 
+@pytest.mark.long
 def test_two_builds_under_two_hash_seeds_are_the_same_bytes(tmp_path: Path) -> None:
     """FMUs of the python flavour, and all but the binaries of native ones."""
     paths = [str(GALLERY / name / "mechanism.toml") for name in ("fourbar", "double_pendulum")]

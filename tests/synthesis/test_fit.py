@@ -59,7 +59,7 @@ def test_no_design_that_closes_is_one_line_with_the_reason() -> None:
 
 
 def test_constraints_are_met_exactly_at_the_cost_of_the_targets() -> None:
-    free = kinfmu.fit(_problem(), starts=1, engine="python")
+    free = kinfmu.fit(_problem(), starts=1)
     swing = kinfmu.readings.Range("s", of="rocker.phi")
     bound = kinfmu.fit(
         _problem(
@@ -70,7 +70,6 @@ def test_constraints_are_met_exactly_at_the_cost_of_the_targets() -> None:
             ]
         ),
         starts=1,
-        engine="python",
     )
 
     lengths = sorted(bound.mechanism.parameters[name].value for name in ("ground", "crank", "coupler", "rocker"))
