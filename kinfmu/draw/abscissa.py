@@ -75,6 +75,12 @@ def labelled(name: str, unit: str) -> str:
     return f"{name} [{raised(unit)}]" if unit not in ("", "1") else name
 
 
+def axis_label(name: str, unit: str, longest: int) -> str:
+    """Return a name with its unit, which is on a line of its own if both have more letters than `longest`."""
+    text = labelled(name, unit)
+    return text if len(text) <= longest or text == name else f"{name}\n{text.removeprefix(name).lstrip()}"
+
+
 def raised(unit: str) -> str:
     """Return a unit with raised digits."""
     return unit.replace("2", "\N{SUPERSCRIPT TWO}").replace("3", "\N{SUPERSCRIPT THREE}")

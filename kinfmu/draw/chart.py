@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 LIGHT: Colour = (228, 228, 228)
 SMALL = 8.0  # [pt]
+_PLAIN = (-2, 5)  # powers of ten of the largest number from which and below which axes have plain numbers
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Look(NamedTuple):
@@ -47,6 +49,23 @@ def powers_of_ten(axes: Axes, values: FloatArray) -> None:
         low, high = np.floor(np.log10(known.min())), np.ceil(np.log10(known.max()))
         axes.set_ylim(10.0**low, 10.0 ** max(high, low + 1.0))
     axes.yaxis.set_minor_formatter(lambda *_: "")
+
+
+def numbers(axes: Axes, unit: str) -> str:
+    """Give a vertical axis plain numbers, and return their unit: with a power of ten if they are tiny or huge."""
+    size = float(np.abs(axes.get_ylim()).max())
+    power = int(np.floor(np.log10(size))) if size > 0.0 else 0
+    power = 0 if _PLAIN[0] <= power < _PLAIN[1] else 3 * (power // 3)
+
+    def text(value: float, _: object = None) -> str:
+        ticks = np.asarray(axes.yaxis.get_majorticklocs()) / 10.0**power
+        step = float(np.diff(ticks).max(initial=0.0))
+        digits = next((d for d in range(15) if (np.abs(ticks.round(d) - ticks) <= 1e-6 * step).all()), 15)
+        shown = f"{round(value / 10.0**power, digits) + 0.0:.{digits}f}"
+        return (shown.rstrip("0").rstrip(".") if digits else shown).replace("-", "\N{MINUS SIGN}")
+
+    axes.yaxis.set_major_formatter(text)
+    return unit if power == 0 else f"10{str(power).translate(_RAISED)} {'' if unit == '1' else unit}".rstrip()
 
 
 def named(axes: Axes, at: tuple[float, float], text: str, colour: Colour, **where: Any) -> None:

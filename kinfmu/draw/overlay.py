@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kinfmu.draw.abscissa import TICK_STEPS, Abscissa, abscissa, degrees_of, labelled, unit_in
-from kinfmu.draw.chart import SMALL, dress, powers_of_ten
+from kinfmu.draw.chart import SMALL, dress, numbers, powers_of_ten
 from kinfmu.draw.curves import LOST, gaps, rows_of
+from kinfmu.draw.polar import radial_scale
 from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
 from kinfmu.errors import FigureError
 from kinfmu.run import FloatArray, Run
@@ -208,9 +209,12 @@ def _panel(axes: Any, shown: Shown, panel: Sequence[str]) -> None:
                 look |= {"marker": "o", "markersize": 3.0}
             label = column if number == len(shown.runs) - 1 else "_"
             axes.plot(along[rows], values[rows], linewidth=_WIDE if is_wide else _NARROW, label=label, **look)
-            everything.append(values)
-    _scales(axes, shown, panel, np.concatenate(everything), unit)
-    if len(panel) > 1 or shown.polar:
+            everything.append((along, values))
+    if shown.polar:
+        _legend(axes, shown, panel, radial_scale(axes, everything))
+        return
+    _scales(axes, shown, panel, np.concatenate([values for _, values in everything]), unit)
+    if len(panel) > 1:
         _legend(axes, shown, panel)
 
 
@@ -218,14 +222,6 @@ def _scales(axes: Any, shown: Shown, panel: Sequence[str], values: FloatArray, u
     """Give a panel its scales, names and grid."""
     x = shown.x(shown.runs[0], panel[0])
     grey = ink(GREY)
-    if shown.polar:
-        axes.tick_params(labelsize=SMALL, labelcolor=grey)
-        axes.grid(linewidth=0.5, color=ink((228, 228, 228)))
-        axes.spines["polar"].set(linewidth=0.6, color=grey)
-        known = values[np.isfinite(values)]
-        if len(known) and known.min() >= 0.0:
-            axes.set_rmin(0.0)
-        return
     dress(axes, "")
     if is_logarithmic(panel[0]):
         powers_of_ten(axes, values)
@@ -233,7 +229,7 @@ def _scales(axes: Any, shown: Shown, panel: Sequence[str], values: FloatArray, u
         shown_values = range_of(values)
         if shown_values:
             axes.set_ylim(*shown_values)
-        axes.yaxis.set_major_formatter(lambda value, _: f"{value:.4g}".replace("-", "\N{MINUS SIGN}"))
+        unit = numbers(axes, unit)
     if x.is_angle:
         axes.locator_params(axis="x", nbins=9, steps=TICK_STEPS)
         axes.margins(x=0.01)
@@ -257,12 +253,14 @@ def range_of(values: FloatArray) -> tuple[float, float] | None:
     return shown_range(known, 0.0)
 
 
-def _legend(axes: Axes, shown: Shown, panel: Sequence[str]) -> None:
-    """Write the names of the curves above their panel; in a polar plot with the unit."""
+def _legend(axes: Axes, shown: Shown, panel: Sequence[str], centre: float = 0.0) -> None:
+    """Write the names of the curves above their panel; in a polar plot with the unit, and the value of the centre."""
     handles, labels = axes.get_legend_handles_labels()
     if shown.polar:
         unit = shown.unit(panel[0])[0]
         labels = [labelled(label, unit) for label in labels]
+        if centre < 0.0:
+            labels[-1] += f" (grey circle: 0; centre: {centre:.3g})".replace("-", "\N{MINUS SIGN}")
     where: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.06 if shown.polar else 1.0)}
     made = axes.legend(
         handles, labels, ncols=_LEGEND_COLUMNS, frameon=False, fontsize=SMALL, borderaxespad=0.2, borderpad=0.2,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from kinfmu.draw.abscissa import TICK_STEPS, degrees_of, labelled
-from kinfmu.draw.chart import SMALL, dress, powers_of_ten
+from kinfmu.draw.abscissa import TICK_STEPS, axis_label, degrees_of
+from kinfmu.draw.chart import SMALL, dress, numbers, powers_of_ten
 from kinfmu.draw.curves import LOST, curves, gaps, rows_of
 from kinfmu.draw.overlay import (
     LEAST,
@@ -22,13 +22,13 @@ from kinfmu.draw.overlay import (
     values_of,
 )
 from kinfmu.draw.sheet import FONT, GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
+from kinfmu.draw.stacks import Panel, Stack, stacks_of
 from kinfmu.draw.writing import check_suffix, check_target, write
-from kinfmu.errors import FigureError, RequestError
+from kinfmu.errors import FigureError
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import ROUND_OFF, Axis, axis_of, shown_range
-from kinfmu.run.channels import chosen_columns, coordinates, forces
 from kinfmu.scene import palette
-from kinfmu.units import CoordinateName, ForceName, InputName, SignalName, unit_of
+from kinfmu.units import CoordinateName, ForceName, SignalName
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,14 +36,13 @@ if TYPE_CHECKING:
 
 MOST_COORDINATES = 30  # more make a sheet too large to print
 _ABREAST = 3  # columns of panels in a row
-_PANELS = 3  # of a column
 _WIDTH, _HEIGHT = 244.0, 96.0  # [pt], of a panel with its margins
-_LEFT, _RIGHT, _TOP, _BOTTOM = 56.0, 22.0, 44.0, 34.0  # [pt] around all panels; the last tick has half its number there
-_BETWEEN, _GAP, _BLOCK_GAP = 62.0, 14.0, 52.0  # [pt] between coordinates, their panels, and rows of coordinates
+_LEFT, _RIGHT, _TOP, _BOTTOM = 64.0, 22.0, 44.0, 34.0  # [pt] around all panels; the last tick has half its number there
+_BETWEEN, _GAP, _BLOCK_GAP = 68.0, 14.0, 52.0  # [pt] between coordinates, their panels, and rows of coordinates
 _EDGE = 8.0  # [pt] around the title
-_DIAGNOSTICS = ("solver.", "watch.")
 _FORCES: palette.Colour = (185, 28, 28)  # that of driving arrows in drawings
-_LABEL = 40.0  # [pt] from an axis to its name
+_LABEL = 42.0  # [pt] from an axis to its name
+_LONGEST = 20  # letters of a name with its unit that fit next to a panel in one line
 
 
 @overload
@@ -103,7 +102,8 @@ def plot(
         run: The run.
         path: The .svg, .png or .pdf file.
         columns: Of a file: names such as 'coupler.x', 'coupler.*', 'q', '-crank.phi' or 'reactions', as in tables.
-            Default: all generalized coordinates, efforts and energies. With `ax`: columns of one unit, such as
+            Default: angles of bodies, points of interest, efforts and energies; of bodies that do not turn,
+            and without points of interest, all coordinates. With `ax`: columns of one unit, such as
             'coupler.vx', with * for any letters. Default: all generalized coordinates, if they have one unit.
         ax: Axes to draw into, in place of a file.
         x: The column along the horizontal axis, or one for each curve. Default: time, or the driver's value.
@@ -142,114 +142,6 @@ def plot(
         stacks = _chosen(run, columns, path)
         write(path, lambda: _sheet(runs, stacks, names, degrees=degrees))
     return None
-
-
-class Panel(NamedTuple):
-    """A panel: a column, its name on the axis, its unit, order of derivative, and the coordinate, force, ... it is."""
-
-    column: str
-    label: str
-    unit: str
-    order: int
-    name: CoordinateName | ForceName | SignalName | InputName | str  # a diagnostic is only a str
-
-
-class Stack(NamedTuple):
-    """Panels below each other, with a title."""
-
-    title: str
-    panels: tuple[Panel, ...]
-
-
-def stacks_of(run: Run, columns: Sequence[str]) -> list[Stack]:
-    """Return what to plot: a stack for each coordinate, and for the forces of each driver or joint."""
-    others = _inputs_and_diagnostics(run, columns)
-    if others:
-        columns = [name for name in columns if not _only_chooses(run, name, others)]
-    found = _of_coordinates_and_forces(run, columns) if columns or not others else []
-    return found + _of_others(run, others)
-
-
-def _of_coordinates_and_forces(run: Run, columns: Sequence[str]) -> list[Stack]:
-    """Return the stacks of coordinates, forces and signals."""
-    chosen = forces(run, columns)
-    names = list(columns)
-    if chosen and not any(name.startswith("-") for name in names):
-        names = [name for name in names if not forces(run, [name]) or _chooses_coordinates(run, name)]
-    coordinate_names = run.names or run.outputs
-    if columns:
-        coordinate_names = coordinates(run, names) if names else ()
-    per = axis_of(run).per
-    found = []
-    for name in coordinate_names:
-        nouns = [name.derivative(order) for order in range(3)]
-        units = [unit_of(name.quantity(order, per), run.length_unit) for order in range(3)]
-        panels = [
-            Panel(column, column.removeprefix(f"{name.owner}."), unit, order, name)
-            for order, (column, unit) in enumerate(zip(nouns, units, strict=True))
-        ]
-        found.append(Stack(name, tuple(panels)))
-    for owner in dict.fromkeys(force.owner for force in chosen):
-        own = [force for force in chosen if force.owner == owner]
-        panels = [_of_force(name, run.length_unit) for name in own]
-        title = owner or ("signals" if isinstance(own[0], SignalName) else "energy")
-        found += [Stack(title, tuple(panels[k : k + _PANELS])) for k in range(0, len(panels), _PANELS)]
-    return found
-
-
-def _inputs_and_diagnostics(run: Run, columns: Sequence[str]) -> list[str]:
-    """Return the inputs and diagnostics that names choose; none if the first name begins with a minus."""
-    if not columns or columns[0].startswith("-"):
-        return []
-    known = {*run.input_names, *(place.name for place in run.places(kept=False) if place.name.startswith(_DIAGNOSTICS))}
-    chosen: list[str] = []
-    for name in columns:
-        try:
-            found = set(chosen_columns(run, [name]))
-        except RequestError:
-            continue  # reported with the coordinates
-        chosen += [column for column in chosen_columns(run, [name]) if column in found & known and name != "all"]
-    return list(dict.fromkeys(chosen))
-
-
-def _only_chooses(run: Run, name: str, others: Sequence[str]) -> bool:
-    """Return True if all columns that a name chooses are among others."""
-    try:
-        return set(chosen_columns(run, [name])) <= {*others}
-    except RequestError:
-        return False
-
-
-def _of_others(run: Run, columns: Sequence[str]) -> list[Stack]:
-    """Return a stack for each driver whose inputs are chosen, and stacks of diagnostics."""
-    found = []
-    units = {place.name: place.unit for place in run.places(kept=False)}
-    inputs = [name for name in run.input_names if name in columns]
-    for driver in dict.fromkeys(name.driver for name in inputs):
-        own = [name for name in inputs if name.driver == driver]
-        label = {name: name.removeprefix(f"{driver}_") for name in own}
-        panels = [Panel(name, label[name], units[name], name.quantity.order, name) for name in own]
-        found.append(Stack(driver, tuple(panels)))
-    for owner in ("solver", "watch"):
-        of_owner = [column for column in columns if column.startswith(f"{owner}.")]
-        panels = [Panel(column, column.removeprefix(f"{owner}."), units[column], 0, column) for column in of_owner]
-        found += [Stack(owner, tuple(panels[k : k + _PANELS])) for k in range(0, len(panels), _PANELS)]
-    return found
-
-
-def _of_force(name: ForceName | SignalName, length_unit: str) -> Panel:
-    """Return the panel of a force or a signal."""
-    if isinstance(name, SignalName):
-        return Panel(name, name.removeprefix(f"{name.owner}."), name.unit, 0, name)
-    return Panel(name, name.noun, unit_of(name.quantity, length_unit), 0, name)
-
-
-def _chooses_coordinates(run: Run, name: str) -> bool:
-    """Return True if a name of columns chooses coordinates."""
-    try:
-        return bool(coordinates(run, [name]))
-    except RequestError:
-        return False
 
 
 def _chosen(run: Run, columns: Sequence[str], path: Path) -> list[Stack]:
@@ -335,8 +227,8 @@ def _panel(axes: Axes, runs: Sequence[Run], panel: Panel, *, degrees: bool) -> N
         if limits:
             axes.set_ylim(limits[0] * factor, limits[1] * factor)
         axes.locator_params(axis="y", nbins=4)
-        axes.yaxis.set_major_formatter(lambda value, _: f"{value:.4g}".replace("-", "\N{MINUS SIGN}"))
-    axes.set_ylabel(labelled(panel.label, unit), fontsize=SMALL, color=ink(GREY), labelpad=3.0)
+        unit = numbers(axes, unit)
+    axes.set_ylabel(axis_label(panel.label, unit, _LONGEST), fontsize=SMALL, color=ink(GREY), labelpad=3.0)
     is_kept = all(panel.column not in one.absent for one in runs)
     if not is_kept or (is_force and not len(known)):
         words = "not determined" if is_kept else "not kept"

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kinfmu.draw.abscissa import TICK_STEPS, Abscissa, abscissa, degrees_of, labelled
-from kinfmu.draw.chart import SMALL, dress
+from kinfmu.draw.chart import SMALL, dress, numbers
 from kinfmu.draw.curves import rows_of
 from kinfmu.draw.overlay import curve_colour, range_of, sheet_title
 from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
 from kinfmu.draw.writing import check_suffix, write
 from kinfmu.errors import FigureError, RequestError
+from kinfmu.motion.breaks import breaks_of, with_jumps
 from kinfmu.motion.jerk import motion_of
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import rates_per
@@ -62,7 +64,7 @@ def driver_axis(run: Run) -> Abscissa:
     """Return the values of the only driver that moves, or the axis of the run."""
     moving = [name for name in run.input_names[::3] if np.ptp(run.inputs[:, run.input_names.index(name)]) > 0.0]
     try:
-        return abscissa(run, moving[0]) if len(moving) == 1 else abscissa(run)
+        return replace(abscissa(run, moving[0]), name=moving[0].driver) if len(moving) == 1 else abscissa(run)
     except RequestError:
         return abscissa(run)
 
@@ -70,6 +72,8 @@ def driver_axis(run: Run) -> Abscissa:
 def _sheet(run: Run, across: Abscissa, name: str, table: FloatArray, units: list[str], *, degrees: bool) -> Figure:
     from matplotlib.figure import Figure
 
+    mechanism = run.mechanism
+    assert mechanism is not None  # noqa: S101  # for the type; the jerk was computed from it
     width = _LEFT + _WIDTH + _RIGHT
     title = sheet_title((run,), ("", ""))
     lines = title_lines(f"{title}: {name}" if title else name, width - 2.0 * _EDGE)
@@ -84,14 +88,17 @@ def _sheet(run: Run, across: Abscissa, name: str, table: FloatArray, units: list
         unit, factor = degrees_of(units[order]) if degrees else (units[order], 1.0)
         values = table[:, order] * factor
         rows = rows_of(values)
-        axes.plot(across.values[rows], values[rows], linewidth=1.2, color=ink(curve_colour(_COLOURS[order])))
+        x, y = across.values[rows], values[rows]
+        if order and len(rows) == len(values):  # a long run has many samples within the width of a line
+            x, y = with_jumps(x, y, breaks_of(run, mechanism, order))
+        axes.plot(x, y, linewidth=1.2, color=ink(curve_colour(_COLOURS[order])))
         dress(axes, "")
         limits = range_of(values)
         if limits:
             axes.set_ylim(*limits)
         axes.margins(x=0.01)
         axes.locator_params(axis="y", nbins=4)
-        axes.yaxis.set_major_formatter(lambda value, _: f"{value:.4g}".replace("-", "\N{MINUS SIGN}"))
+        unit = numbers(axes, unit)
         if across.is_angle:
             axes.locator_params(axis="x", nbins=9, steps=TICK_STEPS)
         axes.set_ylabel(labelled(letter, unit), fontsize=SMALL, color=ink(GREY))

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 import kinfmu
 from kinfmu.draw import plot
 from kinfmu.draw.overlay import overlay, overlay_sheet
-from kinfmu.draw.plots import _sheet, stacks_of
+from kinfmu.draw.plots import _sheet
+from kinfmu.draw.stacks import stacks_of
 from kinfmu.errors import FigureError, KinfmuError, RequestError
 from kinfmu.run import Run
 from tests.log.runs import fourbar, with_gap
@@ -60,7 +61,18 @@ def test_columns_of_one_unit_share_a_panel_over_an_angle_in_degrees(run: Run) ->
 def test_a_polar_plot_has_the_driver_as_its_angle(run: Run) -> None:
     (axes,) = sheet([run], ["A.y", "coupler.x"], ["crank.phi"], polar=True).axes
     np.testing.assert_allclose(axes.lines[0].get_xydata(), np.column_stack([run["crank.phi"], run["A.y"]]), atol=1e-12)
-    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["A.y [m]", "coupler.x [m]"]
+    names = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert names == [
+        "A.y [m]",
+        f"coupler.x [m] (grey circle: 0; centre: {axes.get_rmin():.3g})".replace("-", "\N{MINUS SIGN}"),
+    ]
+    assert axes.get_rmin() < -1.2  # the least value is -1
+    zero = axes.lines[-1].get_ydata()
+    assert not zero.any()
+    curve = np.concatenate([run[name] for name in ("A.y", "coupler.x")]) - axes.get_rmin()
+    curve = curve * np.exp(1j * np.tile(run["crank.phi"], 2))
+    numbers = (axes.get_yticks() - axes.get_rmin()) * np.exp(1j * np.radians(axes.get_rlabel_position()))
+    assert np.abs(numbers[:, None] - curve).min() > 0.1  # of a radius of about 3
     with pytest.raises(
         FigureError, match=r"^a polar plot needs an angle, not t \[s\]; name one, such as x = 'crank.phi'"
     ):
@@ -95,7 +107,7 @@ def test_inputs_and_diagnostics_are_columns_too(run: Run) -> None:
     ]
     panels = _sheet([run], stacks, degrees=True).axes
     np.testing.assert_allclose(panels[0].lines[0].get_ydata(), run.t, atol=1e-12)
-    assert [panel.get_ylabel() for panel in panels[:3]] == ["angle [deg]", "speed [deg/s]", "acceleration [deg/s²]"]
+    assert [panel.get_ylabel() for panel in panels[:3]] == ["angle [deg]", "speed [deg/s]", "acceleration\n[deg/s²]"]
     assert [panel.get_yscale() for panel in panels] == ["linear", "linear", "linear", "log", "log"]
     status = with_gap(run, 100, 120)
     (axes,) = sheet([status], ["solver.status"], []).axes

@@ -8,11 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import kinfmu
 from kinfmu.draw import plot
+from kinfmu.draw.abscissa import axis_label
+from kinfmu.draw.chart import numbers
 from kinfmu.draw.curves import gaps, rows_of
-from kinfmu.draw.plots import _sheet, _shown, stacks_of
+from kinfmu.draw.plots import _sheet, _shown
+from kinfmu.draw.stacks import stacks_of, usual_coordinates
 from kinfmu.errors import FigureError, RequestError
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
@@ -32,20 +36,54 @@ def test_each_coordinate_is_three_panels_with_its_numbers_and_units(run: Run) ->
     assert [panel.get_ylabel() for panel in panels] == [
         "x [m]",
         "vx [m/s]",
-        "ax [m/s²]",
+        "ax [10⁻⁶ m/s²]",
         "phi [rad]",
         "omega [rad/s]",
-        "alpha [rad/s²]",
+        "alpha [10⁻⁶ rad/s²]",
     ]
     assert [panel.get_title(loc="left") for panel in panels] == ["coupler.x", "", "", "rocker.phi", "", ""]
     for panel, name in zip(panels, ("coupler.x", "coupler.vx", "coupler.ax"), strict=False):
         np.testing.assert_array_equal(panel.lines[0].get_xydata(), np.column_stack([run.t, run[name]]))
 
 
-def test_all_generalized_coordinates_are_plotted_if_none_are_named(run: Run, tmp_path: Path) -> None:
+def test_angles_and_points_of_interest_are_plotted_if_no_columns_are_named(run: Run, tmp_path: Path) -> None:
     plot(run, tmp_path / "run.svg")
     words = re.findall(r">([\w.]+)</text>", (tmp_path / "run.svg").read_text(encoding="utf-8"))
-    assert [word for word in words if word in run.outputs] == list(run.names)
+    chosen = ["crank.phi", "coupler.phi", "rocker.phi", "A.x", "A.y"]  # not the origin of the coupler's frame
+    assert [word for word in words if word in run.outputs] == chosen
+
+
+def test_without_points_of_interest_all_coordinates_are_plotted_and_sliders_always(run: Run) -> None:
+    bare = dataclasses.replace(
+        run,
+        outputs=run.names,
+        values=run.values[:, : len(run.names)],
+        rates=run.rates[:, : len(run.names)],
+        accelerations=run.accelerations[:, : len(run.names)],
+    )
+    assert usual_coordinates(bare) == list(run.names)
+    mechanism = kinfmu.load("slider_crank")
+    mechanism = dataclasses.replace(mechanism, points={"middle": "rod.S"})
+    chosen = usual_coordinates(kinfmu.solve(mechanism, crank_angle=[0.0, 1.0]))
+    assert chosen == ["crank.phi", "rod.phi", "piston.x", "middle.x", "middle.y"]
+
+
+def test_names_of_axes_stay_off_numbers_and_numbers_differ() -> None:
+    axes = Figure().subplots()
+    axes.set_ylim(0.0005, 0.00131)
+    assert numbers(axes, "kg m²") == "10⁻³ kg m²"
+    texts = [axes.yaxis.get_major_formatter()(tick) for tick in axes.get_yticks()]
+    assert max(map(len, texts)) <= 6
+    np.testing.assert_allclose([float(text) for text in texts], 1e3 * axes.get_yticks(), atol=1e-9)
+    for low, high in ((1000.1, 1000.4), (-0.3, 0.3), (-23000.0, 40000.0)):
+        axes.set_ylim(low, high)
+        assert numbers(axes, "1") == "1"
+        texts = [axes.yaxis.get_major_formatter()(tick) for tick in axes.get_yticks()]
+        np.testing.assert_allclose(
+            [float(text.replace("\N{MINUS SIGN}", "-")) for text in texts], axes.get_yticks(), atol=1e-9
+        )
+    assert axis_label("reduced_inertia", "kg m2", 19) == "reduced_inertia\n[kg m²]"
+    assert axis_label("torque", "N m", 19) == "torque [N m]"
 
 
 def test_the_same_run_gives_the_same_bytes(run: Run, tmp_path: Path) -> None:
@@ -124,13 +162,13 @@ def heavy() -> Run:
 
 def test_efforts_and_energies_are_panels_with_their_units(heavy: Run) -> None:
     stacks = stacks_of(heavy, ["forces"])
-    assert [stack.title for stack in stacks] == ["crank", "crank", "energy"]
+    assert [stack.title for stack in stacks] == ["crank", "crank, continued", "energy"]
     panels = _sheet([heavy], stacks).axes
     assert [panel.get_ylabel() for panel in panels] == [
         "torque [N m]",
         "power [W]",
         "bias_torque [N m]",
-        "reduced_inertia [kg m²]",
+        "reduced_inertia\n[kg m²]",
         "kinetic_energy [J]",
         "potential_energy [J]",
     ]

@@ -11,8 +11,9 @@ import pytest
 
 from kinfmu import load
 from kinfmu.draw import figure, plot
-from kinfmu.draw.plots import _sheet, stacks_of
+from kinfmu.draw.plots import _sheet
 from kinfmu.draw.sheet import Sheet, title_lines
+from kinfmu.draw.stacks import stacks_of
 from kinfmu.run import Run
 from tests.log.runs import fourbar
 
