@@ -24,9 +24,18 @@ Coordinates = Mapping[str, float]
 class TransmissionRange:
     """Extremes of the angle between coupler and output, 0 to pi; pi/2 is best, 0 and pi transmit nothing.
 
-    driver, kind: whose values at_smallest and at_largest are, and whether it is an 'angle' or a 'length'; coupler,
-    output: names of the links; is_slide: the output slides, and the angle is that between rod and the normal of the
-    slide; in_line_at: limits of the driver where it is 0 or pi.
+    Attributes:
+        driver: Name of the driver.
+        kind: What its value is: 'angle' or 'length'.
+        coupler: Name of the coupler, or of the rod.
+        output: Name of the output link, or of the slider.
+        is_slide: True if the output slides: the angle is then that between the rod and the normal of the slide.
+        smallest: Smallest angle [rad].
+        at_smallest: Value of the driver there.
+        largest: Largest angle [rad].
+        at_largest: Value of the driver there.
+        in_line_at: Limits of the driver at which the angle is 0 or pi.
+
     """
 
     driver: str

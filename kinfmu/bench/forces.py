@@ -1,4 +1,4 @@
-"""Forces: what efforts and reactions add to the samples of a sweep by the native engine."""
+"""Cost of forces: time that efforts and reactions add to a sweep by the native engine."""
 
 from __future__ import annotations
 

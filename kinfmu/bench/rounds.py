@@ -1,4 +1,4 @@
-"""Timing in turn: every way once a round, so that whatever else the machine does meets all of them."""
+"""Timing in rounds: each round runs every way once, so that other load on the machine slows all of them."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def samples_in_turn(
         way(fewest)
         each_takes = max(time.process_time() - start, 1e-6) / fewest
         count = max(fewest, min(most, int(SLICE / each_takes)))
-        times = max(1, int(SLICE / (each_takes * count)))  # again and again, if all samples do not fill it
+        times = max(1, int(SLICE / (each_takes * count)))  # repeated, if all samples do not fill it
         slices.append(_slice(way, count, times))
         taken.append(count * times)
     measured = in_turn(slices, rounds, time.process_time, each)
@@ -95,7 +95,7 @@ def _slice(way: Callable[[int], object], count: int, times: int) -> Callable[[],
 
 @contextmanager
 def _garbage_set_aside() -> Iterator[None]:
-    """What lives already, such as plans, is no part of what is measured: the collector does not look at it."""
+    """Keep the garbage collector from objects that exist already, such as plans: they are not measured."""
     gc.collect()
     gc.freeze()
     try:

@@ -20,7 +20,7 @@ from kinfmu.solver.python.pose import evaluated
 
 DEFAULT = 1.49012e-8  # default xtol of fsolve
 FINEST = 1e-15
-UNREAD = "unread"  # a parameter that nothing depends on: models with parameters can tell their residuals
+UNREAD = "unread"  # a parameter on which nothing depends: only models with parameters have a function of residuals
 
 
 @lru_cache(maxsize=1)
