@@ -21,6 +21,7 @@ from kinfmu.dynamics.efforts import Efforts, State
 from kinfmu.errors import RequestError, listed
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import effort_noun, force_names, force_steps
+from kinfmu.plan.led_laws import led_laws
 from kinfmu.plan.steps import derivative_name, law_symbol
 from kinfmu.run import FloatArray
 from kinfmu.solver.python import Pose, Solver
@@ -33,6 +34,27 @@ class Inertia(NamedTuple):
 
     reduced: FloatArray
     bias: FloatArray
+
+
+class _Laws:
+    """The laws of joints that have breaks, as `led_laws` returns them, at poses of a plan."""
+
+    def __init__(self, plan: SolvePlan) -> None:
+        laws = led_laws(plan)
+        self.counts = laws.counts
+        if not self.counts:
+            return
+        stage = load_stage(laws.steps)
+        self._stage, self._places, self._count = stage.of_sample, stage.places, len(laws.steps.results)
+        given = [*(name.derivative(0) for name in plan.unknowns), *(driver.inputs[0] for driver in plan.drivers)]
+        self._chosen = itemgetter(*(given.index(name) for name in stage.given), 0, 0)  # two more: it returns a tuple
+
+    def at(self, pose: Pose) -> Vector:
+        numbers = [0.0] * self._count
+        found = self._stage(self._chosen((*pose.z, *pose.u))[:-2])
+        for place, value in zip(self._places, found, strict=True):
+            numbers[place] = value
+        return tuple(numbers)
 
 
 class EquationOfMotion:
@@ -71,6 +93,7 @@ class EquationOfMotion:
         self._biases = [order.index(name) for name in biases]
         self._reduced = [(k, j, order.index(name)) for (k, j), name in zip(pairs, reduced, strict=True)]
         self._stage = stage.of_sample
+        self._laws = _Laws(plan)
         given = [name.derivative(n) for n in range(3) for name in plan.outputs]
         given += [derivative_name(name, k) for k in range(d) for name in plan.outputs]
         given += [driver.inputs[n] for n in range(3) for driver in plan.drivers]
@@ -108,6 +131,15 @@ class EquationOfMotion:
         for k, j, place in self._reduced:
             reduced[k, j] = reduced[j, k] = results[place]
         return Inertia(reduced, np.array([results[place] for place in self._biases]))
+
+    @property
+    def law_counts(self) -> tuple[int, ...]:
+        """How many breaks each law of a joint has; empty without breaks."""
+        return self._laws.counts
+
+    def law_numbers(self, pose: Pose) -> Vector:
+        """Return arguments and breaks of the laws of joints at a pose, as `first_crossing` takes them."""
+        return self._laws.at(pose)
 
     def accelerations(self, t: float, u: Vector, ud: Vector) -> FloatArray | None:
         """Return the accelerations of the drivers (d,), in their units; None where the pose is not reached."""

@@ -19,6 +19,7 @@ from kinfmu.dynamics.equation import EquationOfMotion
 from kinfmu.errors import RequestError
 from kinfmu.run import FloatArray
 from kinfmu.solver.python import Pose
+from kinfmu.solver.python.law_breaks import CUTS, first_crossing, hop, landing, moved_by, wraps
 from kinfmu.solver.python.pose import Vector
 
 NEAR = 0.5  # determinant below which steps of several drivers are searched for limits
@@ -31,6 +32,7 @@ TOUCHING = 1e-3  # determinant at the turning point that counts as a limit: abou
 ARRIVED = 1e-4  # determinant of a pose within about 1e-8 rad of a limit: nearer ones lose digits of the accelerations
 ERRORS = 10.0  # tolerances by which the turning point may miss the limit
 BEYOND = (1e-6, 1e-4, 1e-2, 0.3)  # [rad, sizes] past a limit, where the solver states why it is one
+STEEP = 1.0  # [rad, sizes] that a driver moves in a step at most, if a law's argument is an arc tangent
 DETERMINED = 1e-12  # relative to the span between jumps: laws are read on that side of a jump
 
 METHODS = ("DOP853", "Radau")
@@ -95,6 +97,8 @@ class Stepper:
         self._longest = float(np.diff(times).max()) if len(times) > 1 else inf
         self._refined = 0  # how often the present step was divided
         self._suspect_until = inf  # [s] its end
+        self._cut = 0  # how often the present step was shortened
+        self._stop = inf  # [s] where a shortened step ends
         self.steps = 0
         self.end: End | None = None
 
@@ -154,7 +158,7 @@ class Stepper:
         """Step to a time; return whether it is reached."""
         while self._integrator.t < target:
             integrator = self._integrator
-            integrator.t_bound, integrator.status = target, "running"
+            integrator.t_bound, integrator.status = min(target, self._stop), "running"
             before = Step(integrator.t, integrator.y.copy(), integrator.f.copy(), self._equation.pose)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", RuntimeWarning)
@@ -165,10 +169,59 @@ class Stepper:
                 return False
             if self._refined and before.t >= self._suspect_until:  # it had none
                 self._take_long_steps()
-            if self._has_limit(before, Step(integrator.t, integrator.y, integrator.f, self._equation.pose)):
+            if integrator.t >= self._stop:
+                self._stop = inf
+            after = Step(integrator.t, integrator.y, integrator.f, self._equation.pose)
+            if self._equation.law_counts and self._is_cut(before, after):
+                continue
+            if self._has_limit(before, after):
                 return False
         self._y = self._integrator.y.copy()
         return True
+
+    def _is_cut(self, before: Step, after: Step) -> bool:
+        """Return whether a step crosses a break of a joint's law: then it is repeated up to that or is a short one."""
+        equation, d = self._equation, self._d
+        start = equation.law_numbers(before.pose)
+        y, rates = before.y, before.rates
+        reach = float(np.abs((after.y - y)[:d] / self._scales()).max())
+        if reach > STEEP and wraps(equation.law_counts, start):  # turns of an arc tangent could not be told
+            self._repeat(before, before.t + 0.9 * STEEP / reach * (after.t - before.t))
+            return True
+        crossing = first_crossing(equation.law_counts, start, equation.law_numbers(after.pose))
+        if crossing is None:
+            self._cut = 0
+            return False
+
+        def moved(u: FloatArray) -> float | None:
+            pose = equation.follow(tuple(u.tolist()))
+            return None if pose is None else moved_by(start, equation.law_numbers(pose), crossing.place)
+
+        equation.pose = before.pose
+        if abs(crossing.away) <= crossing.window:
+            speed = float(np.abs(y[d:] / self._scales()).max())
+            last = self._integrator.t_bound - before.t
+            h = hop(crossing, lambda h: moved(y[:d] + h * (y[d:] + 0.5 * h * rates[d:])), speed, last)
+            if h is not None:
+                self._y = np.concatenate([y[:d] + h * (y[d:] + 0.5 * h * rates[d:]), y[d:] + h * rates[d:]])
+                self._cut, self._stop = 0, inf
+                self._restart(before.t + h, self._longest)
+                return True
+        elif self._cut < CUTS:
+            curve = _interpolation(before, after, d)
+            t = landing(crossing, lambda t: moved(curve(t)), before.t, after.t)
+            if t is not None and before.t < t < after.t:
+                self._cut += 1
+                self._repeat(before, t)
+                return True
+        equation.pose = after.pose
+        return False
+
+    def _repeat(self, before: Step, end: float) -> None:
+        """Take steps to an earlier end in place of a step."""
+        self._y, self._stop, self._equation.pose = before.y, end, before.pose
+        self._restart(before.t, self._longest)
+        self._integrator.h_abs = end - before.t
 
     def _sample(self, t: float) -> Sample:
         state = self._y.tolist()

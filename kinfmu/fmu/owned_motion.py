@@ -14,6 +14,7 @@ from kinfmu.loads.following import Following
 from kinfmu.mechanism.mechanism import require_masses
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import ForceSteps, effort_noun, force_steps
+from kinfmu.plan.led_laws import LedLaws, led_laws
 from kinfmu.plan.mechanics import Mechanics
 from kinfmu.units import METRES
 
@@ -23,11 +24,13 @@ class OwnedMotion(NamedTuple):
 
     Attributes:
         inertia: Steps to the bias efforts, then the upper triangle of the reduced inertia, row by row.
+        laws: Laws of joints with breaks, at which the integrator restarts.
         starts: Value and speed of each driver at the start.
 
     """
 
     inertia: ForceSteps
+    laws: LedLaws
     starts: tuple[float, ...]
 
 
@@ -46,7 +49,7 @@ def owned_motion(plan: SolvePlan) -> tuple[SolvePlan, OwnedMotion]:
         raise RequestError(f"'{doubled[0]}' is an input of a driver and of a load; rename one of them")
     u, ud, _ = load_model(plan).drive(mechanism.run.start, tuple(constant.value for constant in plan.law_constants))
     starts = tuple(float(x) for pair in zip(u, ud, strict=True) for x in pair)
-    return replace(plan, jumps=_jumps_of_loads(plan)), OwnedMotion(_inertia(plan), starts)
+    return replace(plan, jumps=_jumps_of_loads(plan)), OwnedMotion(_inertia(plan), led_laws(plan), starts)
 
 
 def _inertia(plan: SolvePlan) -> ForceSteps:

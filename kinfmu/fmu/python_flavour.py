@@ -132,6 +132,10 @@ def archive(
         contents["kinfmu/solver/solutions.py"] = files("kinfmu.codegen.python").joinpath("solutions.py").read_bytes()
     if owned:
         contents["kinfmu/solver/jumps.py"] = emit_jumps(plan).encode()
+        laws = f"{emit_forces(plan, owned.laws.steps)}\n\nCOUNTS = {owned.laws.counts!r}\n"
+        contents["kinfmu/solver/laws.py"] = laws.encode()
+    else:
+        del contents["kinfmu/solver/law_breaks.py"]
     added = (*(WITH_FORCES if stages else ()), *(WITH_EFFORTS if owned else ()))
     contents |= {f"kinfmu/fmu/{name}": files("kinfmu.fmu").joinpath(name).read_bytes() for name in added}
     metadata = documents.metadata if documents else {}
@@ -209,8 +213,9 @@ def _entry(variables: Interface, token: str, in_si: Sequence[float], package: st
         attributes.append(f"positive = {tuple(positive)!r}")
         attributes.append(f"stages = {{{', '.join(f'{one!r}: {one}.forces' for one in stages)}}}")
     if in_si:
-        modules += ["inertia", "jumps"]
+        modules += ["inertia", "jumps", "laws"]
         attributes += ["inertia = staticmethod(inertia.forces)", "jumps = staticmethod(jumps.jumps)"]
+        attributes += ["law_counts = laws.COUNTS", "laws = staticmethod(laws.forces)"]
         attributes.append(f"in_si = {tuple(in_si)!r}")
     base, module = ("LoadedSlave", "loaded_slave") if stages else ("MechanismSlave", "slave")
     if in_si:

@@ -20,7 +20,7 @@ from kinfmu.fmu.layout import Numbers
 from kinfmu.fmu.loaded_slave import LoadedSlave
 from kinfmu.fmu.slave import as_numbers
 from kinfmu.fmu.torque_limits import Ended
-from kinfmu.fmu.torque_steps import TorqueSteps
+from kinfmu.fmu.torque_steps import JointLaws, TorqueSteps
 from kinfmu.solver.python import Pose, Status
 from kinfmu.solver.python.pose import failed
 
@@ -31,12 +31,14 @@ _UNDETERMINED = "the reduced inertia is singular, or a number is not finite"
 class TorqueSlave(LoadedSlave):
     """A mechanism that efforts drive as an FMI 2.0 co-simulation slave.
 
-    A subclass defines `inertia` (emitted: bias efforts and reduced inertia), `jumps` (emitted: of loads over time) and
-    `in_si` (units of the drivers).
+    A subclass defines `inertia` (emitted: bias efforts and reduced inertia), `jumps` (emitted: of loads over time),
+    `laws` (emitted: arguments and breaks of laws of joints), `law_counts` (of breaks) and `in_si` (units of drivers).
     """
 
     inertia: ClassVar[Callable[..., Numbers]]
     jumps: ClassVar[Callable[[Numbers, Numbers], Sequence[tuple[float, float]]]]
+    laws: ClassVar[Callable[..., Numbers]]
+    law_counts: ClassVar[tuple[int, ...]]
     in_si: ClassVar[Numbers]
     _udd: Numbers | None  # accelerations of the drivers at the requested pose
     _ended: Ended | None  # why the last step was discarded
@@ -111,6 +113,7 @@ class TorqueSlave(LoadedSlave):
             self._equation,
             self._solver,
             self._given(),
+            JointLaws(self.law_counts, self.laws),
             tolerance=self._integrator_tolerance,
             size=self._step_size,
         )

@@ -1,19 +1,22 @@
 """The motion of the drivers under efforts, over one step of the host. The FMU has a copy: standard library only.
 
-Steps of order 8 with error estimates of orders 5 and 3. They restart where laws of loads over time jump. Hairer,
-Norsett, Wanner: Solving Ordinary Differential Equations I, section II.10.
+Steps of order 8 with error estimates of orders 5 and 3. They restart where laws of loads over time jump, and where
+laws of joints have breaks. Hairer, Norsett, Wanner: Solving Ordinary Differential Equations I, section II.10.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import floor, inf, sqrt
+from typing import NamedTuple
 
 from kinfmu.fmu import dormand_prince as pair
 from kinfmu.fmu.equation_of_motion import EquationOfMotion, Given
 from kinfmu.fmu.layout import Numbers
 from kinfmu.fmu.torque_limits import Ended, StepEnd, is_arrived, limit_past, suspicion, time_to_rest
 from kinfmu.solver.python import Pose, Solver, Status
+from kinfmu.solver.python.hermite import Hermite
+from kinfmu.solver.python.law_breaks import CUTS, first_crossing, hop, landing, moved_by
 
 SAFETY = 0.9
 SHRINKS = 0.2  # a step is at least so much of the refused one
@@ -46,6 +49,13 @@ def next_jump(t: float, jumps: Sequence[tuple[float, float]]) -> float:
     return found
 
 
+class JointLaws(NamedTuple):
+    """Laws of joints with breaks: how many each has, and an emitted function that gives arguments and breaks."""
+
+    counts: tuple[int, ...]
+    numbers: Callable[..., Numbers]
+
+
 class TorqueSteps:
     """The steps of a motion from a good pose.
 
@@ -53,6 +63,7 @@ class TorqueSteps:
         equation: Gives the accelerations.
         solver: Gives the poses.
         given: By the host, constant during its step.
+        laws: Of joints, with breaks.
         tolerance: Error of a step, relative, and absolute in rad and sizes, per second for speeds.
         size: Of the first step [s]; 0: from speeds and accelerations.
 
@@ -63,8 +74,17 @@ class TorqueSteps:
     """
 
     def __init__(
-        self, equation: EquationOfMotion, solver: Solver, given: Given, *, tolerance: float, size: float
+        self,
+        equation: EquationOfMotion,
+        solver: Solver,
+        given: Given,
+        laws: JointLaws,
+        *,
+        tolerance: float,
+        size: float,
     ) -> None:
+        self._laws = laws
+        self._cuts, self._uncut = 0, 0.0  # how often a step was shortened to end before a break, and its size
         self._equation, self._solver, self._given, self._tolerance = equation, solver, given, tolerance
         self._reach: Numbers = solver.model.REACH
         self._scales = self._reach * 2
@@ -171,12 +191,61 @@ class TorqueSteps:
                     return None
             grown = h * (min(GROWS, SAFETY * error ** (-1.0 / pair.ORDER)) if error > 0.0 else GROWS)
             self.size = min(h, grown) if refused else max(grown, self.size) if is_last else grown
+            if self._laws.counts:
+                cut = self._cut(at, to, last)
+                if cut is None:
+                    self._pose = at.pose
+                    continue
+                to = cut
             is_accepted = self._is_without_limit(at, to)
             if self.ended is not None:
                 return None
             at = to if is_accepted else at
             self._pose = at.pose
         return at
+
+    def _law_numbers(self, pose: Pose) -> Numbers:
+        return self._laws.numbers(0.0, pose.u, (), (), pose.z, (), (), (), (), self._given.parameters)
+
+    def _cut(self, before: StepEnd, after: StepEnd, last: float) -> StepEnd | None:
+        """Return the end of a step, or of a short one past a break; None: the step is repeated up to a break."""
+        start, d = self._law_numbers(before.pose), len(self._reach)
+        crossing = first_crossing(self._laws.counts, start, self._law_numbers(after.pose))
+        if crossing is None:
+            self._cuts = 0
+            return after
+
+        def moved(u: Numbers) -> float | None:
+            pose = self._follow(u)
+            return None if pose is None else moved_by(start, self._law_numbers(pose), crossing.place)
+
+        def leap(h: float) -> Numbers:
+            pairs = list(zip(before.y, before.f, strict=True))
+            values = [u + h * (v + 0.5 * h * a) for (u, v), a in zip(pairs[:d], before.f[d:], strict=True)]
+            return (*values, *(v + h * a for v, a in pairs[d:]))
+
+        self._pose = before.pose
+        if abs(crossing.away) <= crossing.window:
+            speed = max([abs(v) / one for v, one in zip(before.y[d:], self._reach, strict=True)])
+            h = hop(crossing, lambda h: moved(leap(h)[:d]), speed, last - before.t)
+            end = None if h is None else self._complete(before.t + h, leap(h))
+            if end is not None:
+                self.size = self._uncut if self._cuts else self.size
+                self._cuts = 0
+                return end
+        elif self._cuts < CUTS:
+            ends = (before, after)
+            curves = [
+                Hermite((before.t, after.t), tuple((e.y[k], e.y[d + k], e.f[d + k]) for e in ends)) for k in range(d)
+            ]
+            t = landing(crossing, lambda t: moved(tuple([curve(t)[0] for curve in curves])), before.t, after.t)
+            if t is not None and before.t < t < after.t:
+                self._uncut = self._uncut if self._cuts else after.t - before.t
+                self._cuts += 1
+                self.size = t - before.t
+                return None
+        self._pose = after.pose
+        return after
 
     def _is_without_limit(self, before: StepEnd, after: StepEnd) -> bool:
         """Search a step for a limit, which is the end; False: there is one, or the step is repeated in smaller ones."""

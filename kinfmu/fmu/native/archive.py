@@ -120,7 +120,15 @@ def _contents(
     metadata: Mapping[str, str] = MappingProxyType({}),
 ) -> dict[str, bytes]:
     """Return every file except the binaries, by path in the FMU."""
-    code = sources(plan, variables, fmi, guid, forces, owned.inertia if owned else None)
+    code = sources(
+        plan,
+        variables,
+        fmi,
+        guid,
+        forces,
+        owned.inertia if owned else None,
+        owned.laws if owned else None,
+    )
     units = tuple(compiler.units(code))
     about = Description(
         variables, guid, variables.name, f"kinfmu {version}", fmi, units if fmi == "2.0" else (), metadata

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.util import find_spec
 from itertools import accumulate
 from pathlib import Path
@@ -24,6 +24,7 @@ from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.fmu.owned_motion import units_in_si
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import ForceSteps
+from kinfmu.plan.led_laws import LedLaws
 from kinfmu.plan.trace import parameter_symbol
 
 RUNTIME = Path(__file__).with_name("runtime")
@@ -56,7 +57,7 @@ _OF_FORCES = re.compile(r"^#if KF_FORCES\n.*?^#endif\n", re.DOTALL | re.MULTILIN
 _BY_OWNER = re.compile(
     r"^#if (?P<negated>!)?KF_TORQUE\n(?P<first>.*?)(?:^#else\n(?P<second>.*?))?^#endif\n", re.DOTALL | re.MULTILINE
 )
-_OF_TORQUE = ("limits.c", "torque.c")
+_OF_TORQUE = ("limits.c", "breaks.c", "torque.c")
 _HEADER_OF_TORQUE = "torque.h"
 _OTHER_VERSION = {"2.0": "fmi3.c", "3.0": "fmi2.c"}
 
@@ -68,6 +69,7 @@ def sources(
     token: str,
     forces: Mapping[str, ForceSteps] = MappingProxyType({}),
     inertia: ForceSteps | None = None,
+    laws: LedLaws | None = None,
 ) -> dict[str, str]:
     """Return all C files and headers of the FMU by name, except the headers of FMI.
 
@@ -78,6 +80,7 @@ def sources(
         token: Hash of the FMU's content.
         forces: Stages of the forces that are outputs, by part. Default: none.
         inertia: Steps to bias efforts and reduced inertia, if the FMU owns the motion of its drivers.
+        laws: Laws of joints with breaks, at which it restarts its integrator.
 
     """
     owns = inertia is not None
@@ -91,6 +94,10 @@ def sources(
         instance["inertia.c"] = "\n".join(
             [emit_forces(plan, inertia, "inertia"), *array("double kf_in_si", units_in_si(plan)), ""]
         )
+        counts = laws.counts if laws else ()
+        instance["laws.h"] = _laws_header(counts)
+        if laws and counts:
+            instance["laws.c"] = emit_forces(plan, laws.steps, "laws")
         instance["dormand_prince.h"] = dormand_prince(pair.C, pair.A, b=pair.B, e3=pair.E3, e5=pair.E5)
     if not (forces or owns):
         del instance["forces_at.c"], instance["solutions.c"]
@@ -103,6 +110,21 @@ def sources(
     tables |= {"step.c": _step(version, owns=owns), "events.c": _events(plan, owns=owns)}
     files = emit(plan) | compiler.sources(compiler.SOLVER) | instance | tables
     return dict(sorted(_prefixed(files, version).items()))
+
+
+def _laws_header(counts: Sequence[int]) -> str:
+    """Return laws.h: how many laws of joints have breaks, and how many each has."""
+    lines = [
+        "/* Laws of joints with breaks: generated from the mechanism, not to be edited. */",
+        "#ifndef KF_LAWS_H",
+        "#define KF_LAWS_H",
+        "",
+        f"#define KF_LAWS {len(counts)}",
+    ]
+    if counts:
+        lines.append(f"#define KF_LAW_NUMBERS {sum(counts) + 4 * len(counts)}")
+        lines += array("static int kf_law_breaks", counts)
+    return "\n".join([*lines, "", "#endif", ""])
 
 
 def _chosen(text: str, *, owns: bool) -> str:

@@ -66,7 +66,7 @@ static double time_to_rest(const kf_end *end)
 }
 
 /* Driver values within a step, by values, speeds and accelerations at both ends; rates: speeds in their place. */
-static void within(const kf_end *before, const kf_end *after, double t, double *u, double *rates)
+void kf_within(const kf_end *before, const kf_end *after, double t, double *u, double *rates)
 {
     const kf_end *const ends[2] = {before, after};
     const double nodes[2] = {before->t, after->t};
@@ -95,7 +95,7 @@ static double critical_time(kf_course *course, const kf_end *before, const kf_en
     (void)course;
     for (k = 0; k < HALVINGS; ++k) {
         const double middle = 0.5 * (low + high);
-        within(before, after, middle, &u, &rate);
+        kf_within(before, after, middle, &u, &rate);
         if (rate * before->y[1] > 0.0) {
             low = middle;
         } else {
@@ -109,7 +109,7 @@ static double critical_time(kf_course *course, const kf_end *before, const kf_en
 static double margin_within(kf_course *course, const kf_end *before, const kf_end *after, double t)
 {
     double u[KF_DRIVERS], rates[KF_DRIVERS];
-    within(before, after, t, u, rates);
+    kf_within(before, after, t, u, rates);
     return kf_follow(course, u) ? course->here->found.margin : 0.0;
 }
 
@@ -178,7 +178,7 @@ kf_verdict kf_search_limit(kf_course *course, const kf_end *before, const kf_end
         return KF_GOES_ON;
     }
     t = critical_time(course, before, after);
-    within(before, after, t, u, rates);
+    kf_within(before, after, t, u, rates);
     is_reached = kf_follow(course, u);
     margin = is_reached ? course->here->found.margin : 0.0;
     is_suspect = !is_reached || !(course->here->status == KF_BRIDGED || margin > (KF_DRIVERS == 1 ? SUSPECT : DIPS * least));

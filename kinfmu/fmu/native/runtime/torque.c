@@ -220,6 +220,9 @@ static bool complete(kf_course *course, kf_end *end)
     }
     end->margin = course->here->found.margin;
     end->is_bridged = course->here->status == KF_BRIDGED;
+#if KF_LAWS
+    kf_find_laws(course, end->laws);
+#endif
     return true;
 }
 
@@ -313,6 +316,19 @@ static bool advance(kf_course *course, kf_end *at, double last)
         }
         grown = h * (error > 0.0 ? fmin(GROWS, SAFETY * pow(error, -1.0 / ORDER)) : GROWS);
         course->size = refused ? fmin(h, grown) : is_last ? fmax(grown, course->size) : grown;
+#if KF_LAWS
+        switch (kf_search_break(course, at, &to, last)) {
+        case KF_REPEATS:
+            continue;
+        case KF_HOPS:
+            if (!complete(course, &to)) {
+                return fail(course, at);
+            }
+            break;
+        default:
+            break;
+        }
+#endif
         switch (kf_search_limit(course, at, &to)) {
         case KF_ENDS:
             return false;
