@@ -37,7 +37,7 @@ class Inertia(NamedTuple):
 
 
 class _Laws:
-    """The laws of joints that have breaks, as `led_laws` returns them, at poses of a plan."""
+    """The laws over quantities that have breaks, as `led_laws` returns them, at poses of a plan."""
 
     def __init__(self, plan: SolvePlan) -> None:
         laws = led_laws(plan)
@@ -47,11 +47,13 @@ class _Laws:
         stage = load_stage(laws.steps)
         self._stage, self._places, self._count = stage.of_sample, stage.places, len(laws.steps.results)
         given = [*(name.derivative(0) for name in plan.unknowns), *(driver.inputs[0] for driver in plan.drivers)]
+        given += [law_symbol(constant.name) for constant in plan.load_constants]
+        self._constants = tuple(constant.value for constant in plan.load_constants)
         self._chosen = itemgetter(*(given.index(name) for name in stage.given), 0, 0)  # two more: it returns a tuple
 
     def at(self, pose: Pose) -> Vector:
         numbers = [0.0] * self._count
-        found = self._stage(self._chosen((*pose.z, *pose.u))[:-2])
+        found = self._stage(self._chosen((*pose.z, *pose.u, *self._constants))[:-2])
         for place, value in zip(self._places, found, strict=True):
             numbers[place] = value
         return tuple(numbers)
@@ -134,11 +136,11 @@ class EquationOfMotion:
 
     @property
     def law_counts(self) -> tuple[int, ...]:
-        """How many breaks each law of a joint has; empty without breaks."""
+        """How many breaks each law over a quantity has; empty without breaks."""
         return self._laws.counts
 
     def law_numbers(self, pose: Pose) -> Vector:
-        """Return arguments and breaks of the laws of joints at a pose, as `first_crossing` takes them."""
+        """Return arguments and breaks of the laws over quantities at a pose, as `first_crossing` takes them."""
         return self._laws.at(pose)
 
     def accelerations(self, t: float, u: Vector, ud: Vector) -> FloatArray | None:

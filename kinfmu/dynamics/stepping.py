@@ -180,12 +180,12 @@ class Stepper:
         return True
 
     def _is_cut(self, before: Step, after: Step) -> bool:
-        """Return whether a step crosses a break of a joint's law: then it is repeated up to that or is a short one."""
+        """Return whether a step crosses a break of a law: then it is repeated up to that or is a short one."""
         equation, d = self._equation, self._d
         start = equation.law_numbers(before.pose)
         y, rates = before.y, before.rates
         reach = float(np.abs((after.y - y)[:d] / self._scales()).max())
-        if reach > STEEP and wraps(equation.law_counts, start):  # turns of an arc tangent could not be told
+        if reach > STEEP and wraps(equation.law_counts, start):  # turns of an arc tangent are ambiguous
             self._repeat(before, before.t + 0.9 * STEEP / reach * (after.t - before.t))
             return True
         crossing = first_crossing(equation.law_counts, start, equation.law_numbers(after.pose))

@@ -67,9 +67,9 @@ _BY_EFFORTS = """\
 <p>The efforts {inputs} are inputs, 0 at the start. The FMU owns the motion: {states} are states, with settable start
 values. In co-simulation it integrates them by an embedded Runge-Kutta pair of order 8, with the error of a step kept
 below <code>integrator.tolerance</code>; inputs are held during a step of the host, unless a native FMU is given their
-derivatives (FMI 2.0) or their values inside the step (FMI 3.0), and jumps of loads over time restart the integrator.
-Model exchange gives the states to the host. A motion ends at a limit of its drivers: the step returns Discard, and the
-states stay those at its start; in model exchange the FMU asks to terminate.</p>"""
+derivatives (FMI 2.0) or their values inside the step (FMI 3.0). Jumps of loads and breaks of cams' laws restart
+the integrator. Model exchange gives the states to the host. A motion ends at a limit of its drivers: the
+step returns Discard, and the states stay those at its start; in model exchange the FMU asks to terminate.</p>"""
 
 
 def page(

@@ -24,7 +24,7 @@ class OwnedMotion(NamedTuple):
 
     Attributes:
         inertia: Steps to the bias efforts, then the upper triangle of the reduced inertia, row by row.
-        laws: Laws of joints with breaks, at which the integrator restarts.
+        laws: Laws over quantities with breaks, at which the integrator restarts.
         starts: Value and speed of each driver at the start.
 
     """

@@ -81,8 +81,8 @@ def simulate(
 
     Efforts and external loads are inputs, such as crank_torque [N m] or wind_force [N], 0 by default: numbers, laws of
     time such as Harmonic(...), functions of t, functions of t and the state (a mapping of crank_angle, crank_speed),
-    or arrays over "time". At jumps of laws and at rows of arrays the integrator restarts. The motion ends at a limit of
-    the drivers with an event as above, and goes through change points.
+    or arrays over "time". At jumps of laws, breaks of cams' laws and rows of arrays the integrator restarts.
+    The motion ends at a limit of the drivers with an event as above, and goes through change points.
 
     Args:
         fmu_path: File of the FMU or of the SSP; a mechanism with masses for drive="torque".

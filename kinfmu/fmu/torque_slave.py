@@ -20,7 +20,7 @@ from kinfmu.fmu.layout import Numbers
 from kinfmu.fmu.loaded_slave import LoadedSlave
 from kinfmu.fmu.slave import as_numbers
 from kinfmu.fmu.torque_limits import Ended
-from kinfmu.fmu.torque_steps import JointLaws, TorqueSteps
+from kinfmu.fmu.torque_steps import LedLaws, TorqueSteps
 from kinfmu.solver.python import Pose, Status
 from kinfmu.solver.python.pose import failed
 
@@ -32,7 +32,7 @@ class TorqueSlave(LoadedSlave):
     """A mechanism that efforts drive as an FMI 2.0 co-simulation slave.
 
     A subclass defines `inertia` (emitted: bias efforts and reduced inertia), `jumps` (emitted: of loads over time),
-    `laws` (emitted: arguments and breaks of laws of joints), `law_counts` (of breaks) and `in_si` (units of drivers).
+    `laws` (emitted: arguments and breaks of laws over quantities), `law_counts` (of breaks) and `in_si` (units).
     """
 
     inertia: ClassVar[Callable[..., Numbers]]
@@ -113,7 +113,7 @@ class TorqueSlave(LoadedSlave):
             self._equation,
             self._solver,
             self._given(),
-            JointLaws(self.law_counts, self.laws),
+            LedLaws(self.law_counts, self.laws),
             tolerance=self._integrator_tolerance,
             size=self._step_size,
         )

@@ -1,7 +1,8 @@
 """The motion of the drivers under efforts, over one step of the host. The FMU has a copy: standard library only.
 
 Steps of order 8 with error estimates of orders 5 and 3. They restart where laws of loads over time jump, and where
-laws of joints have breaks. Hairer, Norsett, Wanner: Solving Ordinary Differential Equations I, section II.10.
+laws over a quantity of the pose have breaks. Hairer, Norsett, Wanner: Solving Ordinary Differential Equations I,
+section II.10.
 """
 
 from __future__ import annotations
@@ -49,8 +50,8 @@ def next_jump(t: float, jumps: Sequence[tuple[float, float]]) -> float:
     return found
 
 
-class JointLaws(NamedTuple):
-    """Laws of joints with breaks: how many each has, and an emitted function that gives arguments and breaks."""
+class LedLaws(NamedTuple):
+    """Laws over quantities: how many breaks each has, and an emitted function that gives arguments and breaks."""
 
     counts: tuple[int, ...]
     numbers: Callable[..., Numbers]
@@ -63,7 +64,7 @@ class TorqueSteps:
         equation: Gives the accelerations.
         solver: Gives the poses.
         given: By the host, constant during its step.
-        laws: Of joints, with breaks.
+        laws: Over quantities of the pose, with breaks.
         tolerance: Error of a step, relative, and absolute in rad and sizes, per second for speeds.
         size: Of the first step [s]; 0: from speeds and accelerations.
 
@@ -78,7 +79,7 @@ class TorqueSteps:
         equation: EquationOfMotion,
         solver: Solver,
         given: Given,
-        laws: JointLaws,
+        laws: LedLaws,
         *,
         tolerance: float,
         size: float,
@@ -205,7 +206,7 @@ class TorqueSteps:
         return at
 
     def _law_numbers(self, pose: Pose) -> Numbers:
-        return self._laws.numbers(0.0, pose.u, (), (), pose.z, (), (), (), (), self._given.parameters)
+        return self._laws.numbers(0.0, pose.u, (), (), pose.z, (), (), (), self._given.loads, self._given.parameters)
 
     def _cut(self, before: StepEnd, after: StepEnd, last: float) -> StepEnd | None:
         """Return the end of a step, or of a short one past a break; None: the step is repeated up to a break."""

@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import Mechanism, Run
+from kinfmu import AngleBetween, Mechanism, Run, TorqueOn
+from kinfmu.laws import MotionSequence
+from kinfmu.laws.sequence import Segment
+from tests.dynamics.test_torque_driven import pendulum
 from tests.motion.test_breaks import tappet
 
 
@@ -82,3 +85,15 @@ def test_a_motion_that_turns_round_crosses_the_same_break_twice() -> None:
     assert run["cam_angle"].max() > 0.75
     assert run["cam_angle"][-1] < 0.6
     assert energy_error(run, -0.4) < 1e-10
+
+
+def test_a_torque_over_the_angle_is_the_change_of_kinetic_energy() -> None:
+    """Three pieces over the angle: the work of each rise of the torque is its mean, by symmetry."""
+    law = MotionSequence((Segment("dwell", 1.0), Segment("simple_harmonic", 0.5, 6.0), Segment("dwell", 9.0)))
+    wheel = pendulum(gravity=None, loads=(TorqueOn("push", "rod", law, over=AngleBetween("rod")),))
+    state = {"crank_angle": 0.0, "crank_speed": 2.0}
+    run = kinfmu.simulate(wheel, drive="torque", start=0.0, stop=2.0, step=2.0, state=state, tolerance=1e-10)
+    last = run["crank_angle"][-1]
+    assert last > 1.5
+    work = 0.5 * 6.0 * 0.5 + 6.0 * (last - 1.5)
+    assert float(np.ptp(run["kinetic_energy"])) == pytest.approx(work, rel=5e-10)

@@ -80,7 +80,7 @@ def sources(
         token: Hash of the FMU's content.
         forces: Stages of the forces that are outputs, by part. Default: none.
         inertia: Steps to bias efforts and reduced inertia, if the FMU owns the motion of its drivers.
-        laws: Laws of joints with breaks, at which it restarts its integrator.
+        laws: Laws over quantities with breaks, at which it restarts its integrator.
 
     """
     owns = inertia is not None
@@ -113,9 +113,9 @@ def sources(
 
 
 def _laws_header(counts: Sequence[int]) -> str:
-    """Return laws.h: how many laws of joints have breaks, and how many each has."""
+    """Return laws.h: how many laws over quantities have breaks, and how many each has."""
     lines = [
-        "/* Laws of joints with breaks: generated from the mechanism, not to be edited. */",
+        "/* Laws over quantities with breaks: generated from the mechanism, not to be edited. */",
         "#ifndef KF_LAWS_H",
         "#define KF_LAWS_H",
         "",

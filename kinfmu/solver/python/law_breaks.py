@@ -1,4 +1,4 @@
-"""Breaks of the laws of joints, such as a cam's dwell: where they are crossed within a step of an integrator.
+"""Breaks of laws over a quantity of the pose, such as a cam's dwell: where a step of an integrator crosses them.
 
 A step across a break of the law, which moves by g(q), has the order of neither side. So it ends shortly before the
 break, and a short Taylor step leads just past it:

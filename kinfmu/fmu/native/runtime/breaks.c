@@ -1,4 +1,4 @@
-/* Breaks of the laws of joints, such as a cam's dwell, within a step. See kinfmu/solver/python/law_breaks.py.
+/* Breaks of laws over a quantity of the pose, such as a cam's dwell, within a step. See kinfmu/solver/python/law_breaks.py.
  *
  * A step across a break of the law, which moves by g(q), has the order of neither side. So it ends shortly before the break,
  * and a short Taylor step leads just past it:
@@ -30,7 +30,7 @@ typedef struct {
 void kf_find_laws(const kf_course *course, double *numbers)
 {
     const kf_pose *const pose = course->here;
-    kf_laws(0.0, KF_POSE_U(pose), NULL, NULL, pose->found.x, NULL, NULL, NULL, NULL,
+    kf_laws(0.0, KF_POSE_U(pose), NULL, NULL, pose->found.x, NULL, NULL, NULL, course->loads,
             course->instance->now.solver.model.parameters, numbers);
 }
 
