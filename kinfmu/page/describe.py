@@ -133,11 +133,12 @@ def _parameter(
     name: str, value: float, quantity: Quantity, unit: str, *, description: str = "", place: NumberPath | None = None
 ) -> dict[str, Any]:
     declared = "" if quantity.kind == "number" else unit_of(quantity, unit)
+    group = str(place[0] if len(place) == 2 else place[1]) if place else ""
     return {
         "name": place_text(place) if place else name,
         "label": label_of(place) if place else name,
-        "short": label_of(place).removeprefix(str(place[1])).lstrip(". ") if place else name,
-        "group": str(place[1]) if place else "",
+        "short": label_of(place).removeprefix(group).lstrip(". ") if place else name,
+        "group": group,
         "kind": quantity.kind,
         "unit": declared,
         "inFile": "" if place else declared,
@@ -188,7 +189,9 @@ def _line(shape: Shape, slide: Slide | None, numbers: Mapping[str, int]) -> dict
 
 
 def label_of(place: NumberPath) -> str:
-    """Return the place of a number in words: 'crank.P x', 'AB length'."""
+    """Return the place of a number in words: 'crank.P x', 'AB length', 'gravity y'."""
+    if place[0] == "gravity":
+        return " ".join(map(str, place))
     if place[0] == "bodies":
         _, body, *rest = place
         if isinstance(rest[-1], int):

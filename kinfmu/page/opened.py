@@ -31,10 +31,10 @@ class Opened(NamedTuple):
 
 
 def opened(mechanism: Mechanism) -> Opened:
-    """Return a mechanism with parameters in place of the plain numbers of its bodies, joints and loads.
+    """Return a mechanism with parameters in place of the plain numbers of its bodies, joints, loads and gravity.
 
-    These are coordinates of points, masses and moments of inertia, lengths, angles, offsets and ratios of joints,
-    and constants of loads and of their laws. Numbers given by expressions stay expressions, constants of the
+    These are coordinates of points, masses and moments of inertia, gravity, lengths, angles, offsets and ratios of
+    joints, and constants of loads and of their laws. Numbers given by expressions stay expressions, constants of the
     drivers' laws can be set anyway, and laws of cams and couplings and tables stay numbers.
     """
     places: dict[str, NumberPath] = {}
@@ -54,6 +54,7 @@ def opened(mechanism: Mechanism) -> Opened:
         bodies=members.bodies,
         joints=members.joints,
         loads=members.loads,
+        gravity=members.gravity,
         parameters={**mechanism.parameters, **parameters},
     )
     return Opened(changed, places)
@@ -65,7 +66,7 @@ def _can_be_opened(place: NumberPath, value: float) -> bool:
         return place[2] == "points" or (place[2] != "start" and value != 0.0)
     if place[0] == "joints":
         return "law" not in place
-    return place[0] == "loads" and "points" not in place
+    return place[0] == "gravity" or (place[0] == "loads" and "points" not in place)
 
 
 def place_text(place: NumberPath) -> str:

@@ -54,7 +54,7 @@ def find_conditions(mechanism: Mechanism, tracer: Tracer) -> tuple[PlanCondition
     laws |= {("loads", load.name): getattr(load, "law", None) for load in mechanism.loads}
 
     def look(place: NumberPath, value: Any, _: Quantity) -> Any:
-        if place in mechanism.expressions and isinstance(value, Node) and value.constant is None:
+        if len(place) > 2 and place in mechanism.expressions and isinstance(value, Node) and value.constant is None:
             table, name, key, *path = place
             law = laws.get((str(table), str(name)))
             if key == "law" and law is not None and law.numbers()[tuple(path)].measures.is_positive:

@@ -440,3 +440,13 @@ def test_an_fmu_declares_units_of_masses_and_refuses_a_negative_mass(tmp_path: P
     assert kinfmu.simulate(fmu, parameters={"m": 3.0, "F": 20.0}).good.all()
     with pytest.raises(KinfmuError, match=r"m = -1: \[bodies\.arm\] mass = -1 must be 0 or more"):
         kinfmu.simulate(fmu, parameters={"m": -1.0})
+
+
+def test_gravity_may_be_a_parameter() -> None:
+    base = kinfmu.load("fourbar_loaded")
+    written = text(base).replace("y = -9810.0", 'y = "g"').replace("[parameters]", '[parameters]\ng = "-9.81 m/s2"')
+    mech = parse(written)
+    here, moon = (kinfmu.solve(mech, [0.0, 0.1], parameters={"g": g}) for g in (-9810.0, -1620.0))
+    assert here["crank.torque"] == pytest.approx(kinfmu.solve(base, [0.0, 0.1])["crank.torque"], rel=1e-12)
+    expected = kinfmu.solve(replace(base, gravity=(0.0, -1620.0)), [0.0, 0.1])
+    assert moon["crank.torque"] == pytest.approx(expected["crank.torque"], rel=1e-12)

@@ -253,6 +253,39 @@ def test_flat_face_touches_its_cam_and_a_roller_runs_on_its_pitch_curve(chromium
         assert np.hypot(*(curve - place).T).min() < 0.5 * np.hypot(*(curve[1] - curve[0])) * 1.1
 
 
+def test_masses_and_gravity_have_the_limits_and_the_effects_of_the_file(chromium: Browser) -> None:
+    mech = kinfmu.load("fourbar_loaded")
+    with chromium.open(text_of("fourbar_loaded")) as page:
+        for key in ("mass", "inertia"):
+            before = page.get("Array.from(k.linkage.pose.forces)")
+            page.get(f"k.refresh(() => {{ k.design.set({{'bodies.rocker.{key}': -1}}); k.reshape(); }})")
+            page.settle()
+            text = page.tab.inner_text("#banner")
+            assert text.startswith(f"Not valid. [bodies.rocker] {key} = -1 must be 0 or more.")
+            assert page.get("Array.from(k.linkage.pose.forces)") == before
+            page.get(f"k.refresh(() => {{ k.design.set({{'bodies.rocker.{key}': 0.5}}); k.reshape(); }})")
+            page.settle()
+            assert page.tab.is_hidden("#banner")
+        page.get("k.refresh(() => { k.design.set({'gravity.x': 0.7, 'gravity.y': -1.62}); k.reshape(); })")
+        page.settle()
+        page.move(2.0)
+        forces = page.get("Array.from(k.linkage.pose.forces)")
+        names = page.get("k.linkage.part.forces.map(one => one.name)")
+        page.tab.click("#tab-files")
+        with page.tab.expect_download() as waiting:
+            page.tab.click("#save-file")
+        changed = parse(waiting.value.path().read_text("utf-8"))
+        assert page.errors == []
+    assert changed.gravity == (0.7, -1.62)
+    assert mech.gravity != changed.gravity
+    (driver,) = mech.drivers
+    value, speed, _ = driver.inputs()
+    rate = float(driver.law.at(1.0)) - float(driver.law.at(0.0))
+    run = kinfmu.solve(changed, **{value: [2.0], speed: [rate]})
+    for name, force in zip(names, forces, strict=True):
+        assert run[name][0] == pytest.approx(force, rel=1e-9, abs=1e-9)
+
+
 def test_change_points_are_found_again_with_new_lengths(chromium: Browser) -> None:
     with chromium.open(text_of("fourbar")) as page:  # its third bar moves along the coupler and stays parallel
         page.get("k.design.set({'bodies.coupler.points.A.x': 0.8, 'bodies.ground.points.B.x': 1.8}) && k.reshape()")

@@ -28,6 +28,7 @@ export class Design {
     #bind() {
         this.failure = this.linkage.setValues(this.values) ? "" : this.linkage.failure;
         this.isOtherBranch = !this.isOk && this.linkage.isOtherBranch;
+        this.isInvalid = !this.isOk && this.linkage.isInvalid;
         return this.isOk;
     }
 

@@ -208,8 +208,13 @@ export class Linkage {
         const isThere = ok && (through === which || comesTo(this, which, this.#vector(which, values), shown));
         if (ok && !isThere) shown.bind(before, true);
         this.isOtherBranch = result === "other branch" || (ok && !isThere);
+        this.isInvalid = result === "refused" && message.includes(" must be ");
         if (this.isOtherBranch) {
             this.failure = partingOf(this, probe, before, vector);
+            return false;
+        }
+        if (this.isInvalid) {
+            this.failure = message.replace(/^parameters .*?: (?=\[)/, "");
             return false;
         }
         if (!ok) {

@@ -122,7 +122,8 @@ class Page {
         $("undo").disabled = !design.past.length;
         $("redo").disabled = !design.future.length;
         $("reset").disabled = !design.changes().length;
-        if (!design.isOk) this.#banner(design.isOtherBranch ? "Another branch. " : "Does not close. ", `${sentence(design.failure)} The last good pose is shown in grey.`);
+        const head = design.isInvalid ? "Not valid. " : design.isOtherBranch ? "Another branch. " : "Does not close. ";
+        if (!design.isOk) this.#banner(head, `${sentence(design.failure)} The last good pose is shown in grey.`);
         else this.#banner("Stops here. ", motion.blocked && sentence(motion.blocked));
     }
 
