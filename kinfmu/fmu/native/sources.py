@@ -47,6 +47,7 @@ _STEP = (
     "time_derivatives.c",
     "instance.c",
     "variables.c",
+    "set_variables.c",
 )  # the functions that a step calls
 _HINTS = (  # in short steps, vector loads of values just stored stall, and branches are predicted well
     "#if defined(__GNUC__) && !defined(__clang__)",
