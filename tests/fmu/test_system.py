@@ -12,9 +12,10 @@ import pytest
 
 import kinfmu
 from kinfmu.errors import FmuError, KinfmuError, RequestError
-from kinfmu.log import McapLog, read, write_mcap, write_rrd
+from kinfmu.log import LiveView, McapLog, read, write_mcap, write_rrd
 from kinfmu.log.viewer.card import card
 from kinfmu.scene.components import component_runs
+from kinfmu.scene.forces import arrows
 from kinfmu.scene.scene import drawable
 from kinfmu.units import SignalName
 from tests.fmu.test_drive_example import HOSTS, STOP, example, fmus  # noqa: F401  # fixtures
@@ -244,6 +245,7 @@ def test_names_of_signals_have_owners() -> None:
 def test_each_mechanism_of_a_system_is_drawn_under_its_name(ssp: Ssp, tmp_path: Path) -> None:
     from tests.log.viewer.test_rerun_file import entities, verified
 
+    rr = pytest.importorskip("rerun")
     inputs = ("crank_angle", "crank_speed", "crank_acceleration")
     connectors = "".join(f'<ssd:Connector name="{name}" kind="input"><ssc:Real/></ssd:Connector>' for name in inputs)
     second = (
@@ -264,13 +266,29 @@ def test_each_mechanism_of_a_system_is_drawn_under_its_name(ssp: Ssp, tmp_path: 
         np.testing.assert_array_equal(second_run["ram.y"], one["ram.y"])  # the same press at the same crank
         assert second_run.fixed == one.fixed
         assert second_run.good.all()
+        first, second_arrows = (arrows(part, part.mechanism, drawable(part)[0]) for part in (one, second_run))
+        assert set(first.along) == set(second_arrows.along)
+        for name, along in first.along.items():  # the same forces, to the same scale
+            np.testing.assert_allclose(second_arrows.along[name], along, rtol=1e-9, atol=1e-9)
         found, note = drawable(second_run)
         assert found is not None
         assert not note
     write_rrd(run, tmp_path / "presses.rrd")
     assert verified(tmp_path / "presses.rrd")
     drawn = entities(tmp_path / "presses.rrd")
+    live = tmp_path / "live.rrd"
+    stream = rr.RecordingStream("kinfmu_test", recording_id="presses")
+    stream.save(live)
+    view = LiveView(stream)
+    view.begin(run.part(slice(0, 0)))
+    view.add(run.part(slice(0, 40)))
+    view.add(run.part(slice(40, len(run))))
+    view.end(run, "")
+    stream.disconnect()
     for name in ("press", "second\\ press"):
-        assert {f"/linkage/{name}/bodies/{body}" for body in ("crank", "ram")} <= drawn
+        parts_drawn = {f"/linkage/{name}/bodies/{body}" for body in ("crank", "ram")}
+        parts_drawn |= {f"/linkage/{name}/forces/{kind}" for kind in ("joints/guide", "loads/work")}
+        assert parts_drawn <= drawn
+        assert parts_drawn <= entities(live)
     assert not any(entity.startswith("/linkage/bodies") for entity in drawn)
     assert "[bodies" not in card(run)

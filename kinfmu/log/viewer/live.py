@@ -20,16 +20,16 @@ import numpy as np
 
 from kinfmu.errors import LogError
 from kinfmu.log.cdr import nanoseconds
+from kinfmu.log.viewer.arrows import log_arrows
 from kinfmu.log.viewer.blueprint import Drawn, single
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.decimated import decimated
 from kinfmu.log.viewer.headless import executable, last_error
 from kinfmu.log.viewer.linkage import APPLICATION, Linkage
-from kinfmu.log.viewer.rerun_file import left_out, log_card, log_group, log_status
+from kinfmu.log.viewer.rerun_file import drawn_linkages, left_out, log_card, log_group, log_status
 from kinfmu.log.viewer.series import Group, accuracy, efforts, error_estimates, groups, iterations, margin, signals
 from kinfmu.log.viewer.timeline import timeline_of
 from kinfmu.run import FloatArray, Run
-from kinfmu.scene.scene import drawable
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -58,7 +58,7 @@ class LiveView:
 
     def __init__(self, stream: rr.RecordingStream | None = None) -> None:
         self._stream = _stream_to_viewer() if stream is None else stream
-        self._paths: dict[str, list[FloatArray]] = {}
+        self._paths: dict[str, dict[str, list[FloatArray]]] = {}  # by linkage and path
         self._has_layout = False
         self._is_connected = True
 
@@ -87,26 +87,28 @@ class LiveView:
         nanoseconds(run.t)  # reports invalid times
         timeline = timeline_of([run])
         shown = timeline.placed(decimated(run))
-        scene, _ = drawable(shown) if shown.outputs or shown.mechanism_text else (None, "")
+        drawn, _ = drawn_linkages(shown)
         curves, diagnostics = _groups(shown)
         if not self._has_layout:
             self._stream.send_blueprint(
-                _following([*curves, *diagnostics], timeline.name, has_linkage=scene is not None)
+                _following([*curves, *diagnostics], timeline.name, [one for one in drawn if one.scene])
             )
             self._has_layout = True
-        if scene:
-            linkage = Linkage(self._stream, "/linkage", timeline, shown, scene)
-            linkage.log()
-            for name, points in scene.paths.items():
-                self._paths.setdefault(name, []).append(points)
-            linkage.log_paths({name: np.vstack(parts) for name, parts in self._paths.items()})
+        for one in drawn:
+            if one.scene:
+                linkage = Linkage(self._stream, one.root, timeline, one.run, one.scene)
+                linkage.log()
+                paths = self._paths.setdefault(one.root, {})
+                for name, points in one.scene.paths.items():
+                    paths.setdefault(name, []).append(points)
+                linkage.log_paths({name: np.vstack(parts) for name, parts in paths.items()})
         for group in (*curves, *diagnostics):
             log_group(self._stream, "", timeline, shown, group)
         log_status(self._stream, "", timeline, timeline.placed(run))
         self._flush()
 
     def end(self, run: Run, reason: str) -> None:  # noqa: ARG002  the card has the events and the verdict
-        """Show the layout of the whole run and its card.
+        """Show the layout of the whole run, its card, and the arrows of forces, whose scale is that of the whole run.
 
         Args:
             run: The whole run.
@@ -117,17 +119,18 @@ class LiveView:
             return
         timeline = timeline_of([run])
         shown = timeline.placed(decimated(run))
-        scene, note = drawable(shown) if shown.outputs or shown.mechanism_text else (None, "")
+        drawn, note = drawn_linkages(shown)
         solver = [
             group for group in (accuracy(shown), error_estimates(shown), margin(shown), iterations(shown)) if group
         ]
         forces = [*efforts(shown), *signals(shown)]
-        if scene:
-            Linkage(self._stream, "/linkage", timeline, shown, scene).log_paths(scene.paths)
+        for one in drawn:
+            if one.scene:
+                linkage = Linkage(self._stream, one.root, timeline, one.run, one.scene)
+                linkage.log_paths(one.scene.paths)
+                log_arrows(linkage)
         log_card(self._stream, card(run, " ".join([*left_out(run, shown), note]).strip()))
-        self._stream.send_blueprint(
-            single(timeline, shown, [Drawn("linkage", "/linkage", shown, scene)], groups(shown), forces, solver)
-        )
+        self._stream.send_blueprint(single(timeline, shown, drawn, groups(shown), forces, solver))
         self._flush()
 
     def _flush(self) -> None:
@@ -144,14 +147,14 @@ def _groups(run: Run) -> tuple[list[Group], list[Group]]:
     return [*groups(run).values(), *efforts(run), *signals(run)], [group for group in solver if group]
 
 
-def _following(shown: list[Group], timeline: str, *, has_linkage: bool) -> rrb.Blueprint:
+def _following(shown: list[Group], timeline: str, drawn: list[Drawn]) -> rrb.Blueprint:
     """Return a layout whose axes fit what is there so far, and whose cursor follows the newest sample."""
     import rerun.blueprint as rrb
 
     plots = [rrb.TimeSeriesView(origin=f"/{group.path}", name=group.title) for group in shown]
-    linkage = [rrb.Spatial2DView(origin="/linkage", name="linkage")] if has_linkage else []
+    linkages = [rrb.Spatial2DView(origin=one.root, name=one.title) for one in drawn]
     return rrb.Blueprint(
-        rrb.Horizontal(*linkage, rrb.Grid(*plots)),
+        rrb.Horizontal(*linkages, rrb.Grid(*plots)),
         rrb.TimePanel(timeline=timeline, play_state="following"),
         collapse_panels=True,
     )
