@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
@@ -8,7 +7,7 @@ from kinfmu.errors import MechanismError
 from kinfmu.joints.cam import closing
 from kinfmu.joints.joint import Condition, Joint
 from kinfmu.laws import Law
-from kinfmu.laws.law import TURN
+from kinfmu.laws.law import TURN, values_by_degree
 from kinfmu.measures.arithmetic import Value
 from kinfmu.measures.placement import Placement, PointPair, body_of
 from kinfmu.units import Radians
@@ -68,8 +67,7 @@ class CamFlatFace(Joint):
         why = self.law.why_not_periodic()
         if why:
             raise MechanismError(f"{where} law: {why}; a profile must close", joint=self.name)
-        for degrees in range(_SAMPLES):
-            distance = self.law.at(math.radians(degrees))
+        for degrees, distance in enumerate(values_by_degree(self.law)):
             if not distance > 0.0:
                 raise MechanismError(
                     f"{where} law: the tangent's distance from the pole is {distance:.6g} at {degrees} deg; "

@@ -9,7 +9,7 @@ from kinfmu.joints.cam import closing
 from kinfmu.joints.follower_element import RollerRadius, check_element, roller_conditions
 from kinfmu.joints.joint import Condition, Joint
 from kinfmu.laws import Law
-from kinfmu.laws.law import TURN
+from kinfmu.laws.law import TURN, values_by_degree
 from kinfmu.measures.arithmetic import Value, atan2, sqrt
 from kinfmu.measures.placement import Placement, PointPair, body_of
 
@@ -71,8 +71,7 @@ class CamRoller(Joint):
         why = self.law.why_not_periodic()
         if why:
             raise MechanismError(f"{where} law: {why}; a pitch curve must close", joint=self.name)
-        for degrees in range(_SAMPLES):
-            radius = self.law.at(math.radians(degrees))
+        for degrees, radius in enumerate(values_by_degree(self.law)):
             if not radius > 0.0:
                 raise MechanismError(
                     f"{where} law: the radius of the pitch curve is {radius:.6g} at {degrees} deg; it must be positive",

@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from functools import cache
+from functools import cache, lru_cache
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, NamedTuple, get_type_hints
 
@@ -153,3 +153,10 @@ def number_fields(cls: type[Law]) -> Mapping[str, LawQuantity]:
     hints = get_type_hints(cls, include_extras=True)
     metadata = {key.name: getattr(hints[key.name], "__metadata__", ()) for key in fields(cls)}  # type: ignore[arg-type]
     return {key: found for key, entries in metadata.items() for found in entries if isinstance(found, LawQuantity)}
+
+
+@lru_cache(maxsize=64)
+def values_by_degree(law: Law) -> tuple[float, ...]:
+    """Return the values of a law at all degrees of a turn; mechanisms that differ in their lengths share them."""
+    constants = {name: constant.value for name, constant in law.constants().items()}
+    return tuple(float(law.target(math.radians(degrees), **constants)) for degrees in range(360))

@@ -22,7 +22,6 @@ from kinfmu.motion.measure import (
     MeasuredValue,
     chosen_measures,
     listed_measures,
-    measure,
     read_value,
     reason_without_value,
 )
@@ -215,15 +214,16 @@ class BatchReading:
         reasons: dict[int, str],
     ) -> None:
         """Read the measures of the designs of a part that are solved; add the reasons of those without values."""
+        alone = [reading for reading in self._readings if reading.name in self._alone]
+        for k in np.flatnonzero(is_solved).tolist() if alone else ():
+            reason = self._read_one(alone, batch, k, part.start + k)
+            if reason:
+                reasons.setdefault(k, reason)
         closed_ones: dict[tuple[QuantityRead, ...], NDArray[np.bool_]] = {}
         whole: dict[bool, Motion] = {}  # of all designs: measures of one quantity share its extremes
         for reading in self._readings:
             value, at = self.values[reading.name][part], self.at[reading.name][part]
             if reading.name in self._alone:
-                for k in np.flatnonzero(is_solved).tolist():
-                    reason = self._read_one([reading], batch, k, part.start + k)
-                    if reason:
-                        reasons.setdefault(k, reason)
                 continue
             quantities = self._quantities[reading.name]
             if quantities not in closed_ones:
@@ -260,10 +260,18 @@ class BatchReading:
             self.status[design] = Status.INCONSISTENT
             return str(error)
         self.status[design] = run.status.max(initial=0)
+        margins = [reading for reading in readings if isinstance(reading, LowestMargin)]
+        if len(margins) == len(readings) and self._dependent.isdisjoint(reading.name for reading in readings):
+            # They read the samples alone: the mechanism with these parameters, which takes milliseconds, is not needed.
+            run = run.replaced(mechanism_source=self._model.mechanism)
+        try:
+            motion = Motion.of_run(run, with_margin=bool(margins))
+        except KinfmuError as error:
+            return str(error)
         reasons = []
         for reading in readings:
             try:
-                found = self._value_of(run, reading)
+                found = self._value_of(run, motion, reading)
             except KinfmuError as error:
                 reasons.append(str(error))
                 continue
@@ -271,13 +279,11 @@ class BatchReading:
             reasons += [found.reason] if found.reason else []
         return reasons[0] if reasons else ""
 
-    def _value_of(self, run: Run, reading: Reading) -> MeasuredValue:
+    def _value_of(self, run: Run, motion: Motion, reading: Reading) -> MeasuredValue:
         """Return a measure of one design, as `measure` does."""
-        if isinstance(reading, LowestMargin) and reading.name not in self._dependent:
-            # It reads the samples alone: the mechanism with these parameters, which takes milliseconds, is not needed.
-            run = run.replaced(mechanism_source=self._model.mechanism)
-            return read_value(run, Motion.of_run(run), reading)
-        return measure(run, [self._asked[reading.name]])[reading.name]
+        if reading.name in self._dependent:
+            (reading,) = chosen_measures(motion.mechanism, [self._asked[reading.name]])
+        return read_value(run, motion, reading)
 
     def _found(self, reading: Reading, motion: Motion) -> Finding:
         try:
