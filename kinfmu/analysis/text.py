@@ -361,10 +361,10 @@ def _range(report: Findings, reach: DriverRange) -> Iterator[ReportLine]:
         yield ReportLine("range", f"{reach.driver}: no limit from {seen[0]} to {seen[1]}")
     for limit, end in zip(limits, ends, strict=True):
         if limit.bodies:
-            yield ReportLine("", f"at {end} {_parted(report, reach, limit)}")
+            yield ReportLine("", f"at {end} {_limit_reason(report, reach, limit)}")
 
 
-def _parted(report: Findings, reach: DriverRange, limit: LimitPosition) -> str:
+def _limit_reason(report: Findings, reach: DriverRange, limit: LimitPosition) -> str:
     """Return the reason of a limit: two links in line, or bodies that can move."""
     for named in report.loops:
         for angle in named.transmission:

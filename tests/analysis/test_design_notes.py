@@ -103,12 +103,12 @@ def test_joints_that_hold_the_same_bodies_in_one_place_are_named() -> None:
     ]
 
 
-@pytest.mark.parametrize(("length", "is_told"), [("0.02", True), ("0.019", True), ("0.051", False), ("20", False)])
-def test_a_link_in_another_unit_is_reported(length: str, is_told: bool) -> None:
+@pytest.mark.parametrize(("length", "is_noted"), [("0.02", True), ("0.019", True), ("0.051", False), ("20", False)])
+def test_a_link_in_another_unit_is_reported(length: str, is_noted: bool) -> None:
     found = notes(("P = [20, 0] }", f"P = [{length}, 0] }}"), ("C = [40, 0]", "C = [60, 0]"))
     message = [note for note in found if "are its points in another unit?" in note]
-    assert len(message) == is_told
-    if is_told:
+    assert len(message) == is_noted
+    if is_noted:
         assert message[0].startswith(f"crank is {length} mm long between its joints, its neighbours at least 50 mm:")
 
 

@@ -227,7 +227,7 @@ def written(value: Any) -> str:
     return value.isoformat() if hasattr(value, "isoformat") else repr(value)
 
 
-def parsed_or_told(text: str) -> None:
+def parsed_or_reported(text: str) -> None:
     """Parse to a mechanism, or to a message of one line; anything else fails the test."""
     try:
         mechanism = parse(text, "junk.toml")
@@ -262,7 +262,7 @@ PATHS = all_paths(tomllib.loads(FOURBAR))
 @settings(max_examples=8 * EXAMPLES)
 @given(document=st.dictionaries(keys, junk, max_size=5))
 def test_any_tree_of_values_gives_a_mechanism_or_a_message_of_one_line(document: dict[str, Any]) -> None:
-    parsed_or_told("\n".join(f"{written(key)} = {written(value)}" for key, value in document.items()))
+    parsed_or_reported("\n".join(f"{written(key)} = {written(value)}" for key, value in document.items()))
 
 
 @settings(max_examples=10 * EXAMPLES)
@@ -272,7 +272,7 @@ def test_the_fourbar_with_anything_in_place_of_one_value_gives_a_mechanism_or_on
 ) -> None:
     document = tomllib.loads(FOURBAR)
     put(document, [*path, *deeper], value)
-    parsed_or_told("\n".join(f"{written(key)} = {written(inner)}" for key, inner in document.items()))
+    parsed_or_reported("\n".join(f"{written(key)} = {written(inner)}" for key, inner in document.items()))
 
 
 @settings(max_examples=5 * EXAMPLES)
@@ -283,10 +283,10 @@ def test_the_fourbars_text_with_a_piece_cut_out_or_put_in_gives_a_mechanism_or_o
     inserted = data.draw(
         st.one_of(st.text(max_size=6), st.sampled_from(['"', "[", "]", "{", "}", "=", "\n", "'''", "1e"]))
     )
-    parsed_or_told(FOURBAR[:start] + inserted + FOURBAR[end:])
+    parsed_or_reported(FOURBAR[:start] + inserted + FOURBAR[end:])
 
 
 @settings(max_examples=5 * EXAMPLES)
 @given(junk=st.text())
 def test_any_text_gives_one_line(junk: str) -> None:
-    parsed_or_told(junk)
+    parsed_or_reported(junk)

@@ -63,7 +63,7 @@ def test_what_is_drawn_is_chosen_like_a_channel() -> None:
     assert [is_drawn(names) for names in (["none"], ["q"], ["-drawn"], ["all", "-drawn"])] == [False] * 4
 
 
-def test_an_unknown_channel_is_told_with_what_comes_near() -> None:
+def test_an_unknown_channel_is_reported_with_similar_names() -> None:
     with pytest.raises(
         KinfmuError, match=r"^channel 'margins' is not known; did you mean 'margin'\?; channels: all, none"
     ):
@@ -109,7 +109,7 @@ def test_what_is_left_out_is_not_computed() -> None:
     assert np.isnan(part.error).all()
 
 
-def test_a_column_left_out_is_told_and_one_kept_is_as_it_was() -> None:
+def test_a_column_left_out_is_reported_and_one_kept_is_as_it_was() -> None:
     whole = run()
     part = select(whole, ["-coupler.x", "-iterations"])
     with pytest.raises(

@@ -90,7 +90,7 @@ def test_an_unknown_name_suggests_a_known_one(run: Run, name: str, meant: str) -
     assert str(caught.value) == f"the run has no column '{name}'; did you mean '{meant}'?"
 
 
-def test_a_name_like_no_other_is_told_without_a_suggestion(run: Run) -> None:
+def test_a_name_like_no_other_is_reported_without_a_suggestion(run: Run) -> None:
     with pytest.raises(KinfmuError, match=r"^the run has no column 'temperature of the oil'$"):
         run["temperature of the oil"]
 

@@ -57,7 +57,7 @@ def test_wrap_makes_a_difference_where_a_mechanism_does_not_repeat_each_turn() -
         ("parallel_jaw", {"piston_position": [1.0]}, "no input is one; inputs: piston_position, piston_speed"),
     ],
 )
-def test_wrap_without_angles_to_follow_is_told(name: str, arguments: dict[str, object], message: str) -> None:
+def test_wrap_without_angles_to_follow_is_reported(name: str, arguments: dict[str, object], message: str) -> None:
     with pytest.raises(KinfmuError, match=message):
         kinfmu.solve(kinfmu.load(name), wrap=True, **arguments)  # type: ignore[arg-type]
 

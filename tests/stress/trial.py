@@ -140,7 +140,7 @@ class Trial:
         return self.started is not None and self._sine_at_start() < AMBIGUOUS
 
     def _is_clear(self) -> bool:
-        """True if the start poses tell the assemblies apart: noise is small against what lies between them."""
+        """True if the start poses distinguish the assemblies: noise is small against what lies between them."""
         assert self.started is not None
         return not self.started.is_there or self._sine_at_start() > MEETING
 
@@ -231,14 +231,14 @@ class Trial:
         return found[0], found[1]
 
     def _confirm(self, run: Run, expected: Expected, which: NDArray[np.int64], size: float, verdict: Verdict) -> None:
-        """A share of the samples, all that look wrong and all where long doubles do not tell are judged again by 50
-        digits, which then count. Where long doubles tell, the two must agree.
+        """A share of the samples, all that look wrong and all where long doubles do not decide are judged again by 50
+        digits, which then count. Where long doubles decide, the two must agree.
         """
         rng = np.random.default_rng(self.seed)
-        tells = self._long_doubles_tell(self.inputs[0][which])
-        suspect = (verdict.relative[which] > 0.1 * WRONG).any(axis=1) | ~tells
+        decided = self._long_doubles_decide(self.inputs[0][which])
+        suspect = (verdict.relative[which] > 0.1 * WRONG).any(axis=1) | ~decided
         chosen = suspect | (rng.uniform(size=len(which)) < SHARE)
-        again, tells = which[chosen], tells[chosen]
+        again, decided = which[chosen], decided[chosen]
         if len(again) == 0 or SCREENING is DIGITS:
             verdict.digits = len(which) if SCREENING is DIGITS else 0
             return
@@ -246,13 +246,13 @@ class Trial:
         first = verdict.relative[again]
         with np.errstate(invalid="ignore"):  # where both are infinite
             gaps = np.where(relative == first, 0.0, np.abs(relative - first) / np.fmax(relative, WRONG))
-        verdict.gap = float(gaps[tells].max(initial=0.0))
+        verdict.gap = float(gaps[decided].max(initial=0.0))
         verdict.relative[again], verdict.absolute[again] = relative, absolute
         verdict.digits = len(again)
-        for k in again[(gaps > AGREED).any(axis=1) & tells]:
+        for k in again[(gaps > AGREED).any(axis=1) & decided]:
             verdict.faults.append(Fault("the oracles differ", int(k), f"by {verdict.gap:.1g}"))
 
-    def _long_doubles_tell(self, u: Floats) -> NDArray[np.bool_]:
+    def _long_doubles_decide(self, u: Floats) -> NDArray[np.bool_]:
         """False where samples (n, d) lie so close to a limit that few digits are left of what must stay positive.
 
         There the error of qdd is a rounding over the product of these.

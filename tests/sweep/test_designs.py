@@ -141,7 +141,7 @@ def test_threads_and_pieces_change_nothing(monkeypatch: pytest.MonkeyPatch) -> N
         assert other.reasons == alone.reasons
 
 
-def test_derivatives_that_nobody_wants_are_not_computed() -> None:
+def test_derivatives_that_are_not_requested_are_not_computed() -> None:
     model = kinfmu.compile(kinfmu.load("jansen_leg"), ["foot.x", "foot.y"])
     designs = model.solve_designs({"a": [38.0, 38.5]}, crank_angle=[0.0, 0.1], derivatives=0)
     assert designs.rates is None

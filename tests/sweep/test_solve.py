@@ -104,7 +104,7 @@ def test_two_drivers_take_arrays_and_numbers() -> None:
         ({"t": [0.0], "tolerance": "1e-9"}, r"^tolerance = '1e-9' must be a positive number$"),
     ],
 )
-def test_wrong_arguments_are_told_in_one_line(arguments: dict[str, object], message: str) -> None:
+def test_wrong_arguments_are_reported_in_one_line(arguments: dict[str, object], message: str) -> None:
     with pytest.raises(KinfmuError, match=message) as caught:
         kinfmu.solve(kinfmu.load("fourbar"), **arguments)  # type: ignore[arg-type]
     assert "\n" not in str(caught.value)
