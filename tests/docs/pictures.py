@@ -1,0 +1,87 @@
+"""Draw the pictures of docs/ whose files are in its pages: `python -m tests.docs.pictures` (scripts/pictures calls it).
+
+Studies and the fit come from the files in their pages, the page of a mechanism from headless Chromium.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from click.testing import CliRunner
+
+import kinfmu
+from kinfmu.cli import main
+from kinfmu.page import page
+from tests.page.browser import DESKTOP, PHONE
+
+DOCS = Path(__file__).parents[2] / "docs"
+COMMANDS = {  # of each page with files, and the pictures that they draw
+    "studies.md": {
+        "study tolerances.toml --figure {} --workers 1": "study-tolerances.svg",
+        "study lengths.toml --measures swing --figure {} --workers 1": "study-contours.svg",
+        "study samples.toml --measures swing,fastest --figure {} --workers 1": "study-ranges.png",
+    },
+    "fitting.md": {"fit arch.toml -o fitted.toml --starts 8 --seed 1 --workers 1 --figure {}": "fitted.svg"},
+}
+RANGES = """\
+mechanism = "hoeken.toml"
+designs = 256
+
+[parameters]
+crank = { from = "15 mm", to = "25 mm" }
+base = { from = "35 mm", to = "60 mm" }
+"""
+PAGES: dict[str, tuple[Any, Any, str]] = {  # size, theme, mechanism
+    "play.png": (DESKTOP, "light", "jansen_leg"),
+    "play-phone.png": (PHONE, "dark", "cam_roller"),
+}
+
+
+def draw_files() -> None:
+    """Draw the pictures of studies and fits."""
+    before = Path.cwd()
+    for name, commands in COMMANDS.items():
+        text = (DOCS / name).read_text("utf-8")
+        with tempfile.TemporaryDirectory() as folder:
+            os.chdir(folder)
+            Path("samples.toml").write_text(RANGES, "utf-8")
+            for first, content in re.findall(r"`(\w+\.toml)`[^`]*:\n\n```toml\n(.*?)```", text, re.DOTALL):
+                Path(first).write_text(content, "utf-8")
+            if name == "fitting.md":
+                blocks = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+                Path("guide.toml").write_text(blocks[0], "utf-8")
+                Path("arch.toml").write_text(blocks[1], "utf-8")
+            for command, picture in commands.items():
+                result = CliRunner().invoke(main, command.format(DOCS / picture).split())
+                if result.exit_code:
+                    raise SystemExit(result.output)
+            os.chdir(before)
+
+
+def draw_pages() -> None:
+    """Draw pages of mechanisms as they open, on a screen and on a phone."""
+    from playwright.sync_api import sync_playwright
+
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        for picture, (size, theme, name) in PAGES.items():
+            path = Path(folder, f"{name}.html")
+            path.write_text(page(kinfmu.load(name)), "utf-8")
+            tab = browser.new_page(viewport=size, color_scheme=theme, reduced_motion="reduce")
+            tab.goto(path.as_uri())
+            tab.wait_for_function("window.kinfmu && !window.kinfmu.isAsked")
+            tab.evaluate("() => window.kinfmu.refresh(() => window.kinfmu.move(0, 2.2))")
+            tab.wait_for_function("!window.kinfmu.isAsked")
+            tab.screenshot(path=DOCS / picture)
+        browser.close()
+
+
+if __name__ == "__main__":
+    draw_files()
+    draw_pages()
