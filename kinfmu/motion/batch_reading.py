@@ -24,6 +24,7 @@ from kinfmu.motion.measure import (
     listed_measures,
     read_value,
     reason_without_value,
+    with_measures,
 )
 from kinfmu.motion.motion import Motion
 from kinfmu.motion.needed import QuantityRead, needed
@@ -88,7 +89,8 @@ class BatchReading:
             raise RequestError(f"measure_designs needs a model, not {type(model).__name__}; kinfmu.compile gives one")
         mechanism = model.mechanism
         asked = None if measures is None else listed_measures(measures)
-        self._readings = chosen_measures(mechanism, asked)
+        self._measured = with_measures(mechanism, asked)
+        self._readings = self._measured.measures
         if not self._readings:
             raise RequestError(f"there are no measures: {mechanism.name} declares none, or measures = []; give some")
         self._asked = dict(zip((one.name for one in self._readings), asked or mechanism.measures, strict=True))
@@ -385,8 +387,8 @@ class BatchReading:
     @cached_property
     def _dependent(self) -> set[str]:
         """Names of the measures whose own numbers depend on parameters that are given."""
-        chosen = replace(self._model.mechanism, measures=self._readings)
-        return {str(place[1]) for place in dependent_numbers(chosen, self._open) if place[0] == "measures"}
+        dependent = dependent_numbers(self._measured, self._open)
+        return {str(place[1]) for place in dependent if place[0] == "measures"}
 
     def _units_of_parameters(self) -> dict[str, str]:
         """Return the units of the parameters and law constants that are given."""

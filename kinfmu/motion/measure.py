@@ -96,8 +96,13 @@ def chosen_measures(
     mechanism: Mechanism, measures: Iterable[Reading | str] | Reading | str | None
 ) -> tuple[Reading, ...]:
     """Return the measures of a call, checked and with numbers in place of texts."""
+    return with_measures(mechanism, measures).measures
+
+
+def with_measures(mechanism: Mechanism, measures: Iterable[Reading | str] | Reading | str | None) -> Mechanism:
+    """Return a mechanism with the measures of a call in place of its own; None: its own."""
     if measures is None:
-        return mechanism.measures
+        return mechanism
     own = {reading.name: reading for reading in mechanism.measures}
     chosen: list[Reading] = []
     for one in listed_measures(measures):
@@ -107,7 +112,7 @@ def chosen_measures(
             chosen.append(own[one])
         else:
             raise RequestError(f"there is no measure '{one}'{suggestion(one, own)}; measures: {listed(own)}")
-    return replace(mechanism, measures=tuple(chosen)).measures
+    return replace(mechanism, measures=tuple(chosen))
 
 
 def listed_measures(measures: Iterable[Reading | str] | Reading | str) -> list[Reading | str]:
