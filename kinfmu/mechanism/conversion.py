@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import chain
 
 from kinfmu.errors import MechanismError, listed
-from kinfmu.mechanism.dimension import Dimension
-from kinfmu.mechanism.expression import Expression, Step
+from kinfmu.mechanism.dimension import UNKNOWN, Dimension
+from kinfmu.mechanism.expression import OPERATIONS, Expression, Step
 from kinfmu.mechanism.valid import quoted
 from kinfmu.units import KINDS, METRES, Quantity, every_unit, length_power
 
@@ -49,14 +50,25 @@ def converted(
             f"give a number or a parameter ({listed(expression.names)}) its unit, such as '1 {KINDS[wanted.kind].unit}'"
         )
     units = every_unit(expression.length_unit)
-    steps: list[Step] = []
+    stack: list[tuple[Dimension, list[Step]]] = []
     for step in expression.steps:
-        steps.append(step)
         if step.operation == "number":
-            steps += _times(metre, -_power(units[step.unit][0] if step.unit else None), step.at)
+            power = _power(units[step.unit][0] if step.unit else None)
+            stack.append((step.dimension, [step, *_times(metre, -power, step.at)]))
         elif step.operation == "name":
-            steps += _times(metre, -_power(quantities.get(step.value)), step.at)
-    steps += _times(metre, result, len(expression.text))
+            power = _power(quantities.get(step.value))
+            stack.append((dimensions.get(step.value, UNKNOWN), [step, *_times(metre, -power, step.at)]))
+        else:
+            operation = OPERATIONS[step.operation]
+            first = len(stack) - operation.arity
+            operands, exponent = [one for one, _ in stack[first:]], (step.value,) if step.operation == "power" else ()
+            parts = [part for _, part in stack[first:]]
+            if step.operation in ("+", "-"):
+                for part, own, other in zip(parts, operands, reversed(operands), strict=True):
+                    power = int(other.length) if own.is_open and other.is_known and other.mass else 0
+                    part += _times(metre, -power, step.at)  # a number without a unit is in N, like the other term
+            stack[first:] = [(operation.dimension(*operands, *exponent), [*chain(*parts), step])]
+    steps = [*stack[0][1], *_times(metre, result, len(expression.text))]
     if len(steps) == len(expression.steps):
         return expression
     return replace(expression, steps=tuple(steps), is_converted=True)

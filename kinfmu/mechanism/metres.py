@@ -7,8 +7,7 @@ from dataclasses import fields, replace
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any
 
-from kinfmu.errors import MechanismError
-from kinfmu.mechanism.dimension import NUMBER, Dimension
+from kinfmu.mechanism.dimension import NUMBER, Dimension, DimensionError
 from kinfmu.mechanism.expression import OPERATIONS, Computed, Expression, Step
 from kinfmu.mechanism.members import Members
 from kinfmu.mechanism.parameters import NUMBER as PURE
@@ -135,10 +134,20 @@ def _power_text(unit: str, power: int) -> str:
 
 def _terms_have_units(expression: Expression, dimensions: Mapping[str, Dimension], needed: Dimension) -> bool:
     """Return True if all dimensions are compatible although numbers without a unit have none."""
-    steps = tuple(step._replace(dimension=NUMBER) if step.dimension.is_open else step for step in expression.steps)
-    strict = {name: one if one.is_known and not one.is_open else NUMBER for name, one in dimensions.items()}
-    try:
-        found = replace(expression, steps=steps).dimension(strict)
-    except MechanismError:
-        return False
-    return found.powers == needed.powers
+    stack: list[Dimension] = []
+    for step in expression.steps:
+        if step.operation in ("number", "name"):
+            known = step.dimension if step.operation == "number" else dimensions[step.value]
+            stack.append(known if known.is_known else NUMBER)
+            continue
+        operation = OPERATIONS[step.operation]
+        first = len(stack) - operation.arity
+        operands, exponent = stack[first:], (step.value,) if step.operation == "power" else ()
+        is_sum, has_mass = step.operation in ("+", "-"), any(one.mass for one in operands)
+        if not (is_sum and (has_mass or all(one.is_open for one in operands))):  # such a number is in N in every file
+            operands = [replace(one, is_bare=False) if one.is_open else one for one in operands]
+        try:
+            stack[first:] = [operation.dimension(*operands, *exponent)]
+        except DimensionError:
+            return False
+    return stack[0].powers == needed.powers

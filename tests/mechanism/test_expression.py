@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from kinfmu.equations.graph import Graph, evaluate
 from kinfmu.equations.taylor import Taylor
 from kinfmu.errors import MechanismError
+from kinfmu.mechanism import toml_file
 from kinfmu.mechanism.dimension import Dimension
 from kinfmu.mechanism.expression import DEEPEST, LARGEST_POWER, LONGEST, Expression
 from kinfmu.units import Quantity
@@ -281,3 +282,21 @@ def test_degree_sign_and_inch_are_units_of_rates_and_quotients_too() -> None:
         assert Expression(text).dimension(DIMENSIONS) == Expression(same).dimension(DIMENSIONS)
     with pytest.raises(MechanismError, match="expected one of"):
         Expression("60\N{DEGREE SIGN}\N{DEGREE SIGN}")
+
+
+@pytest.mark.parametrize(
+    ("written", "newton"),
+    [("5 N + 3", 8.0), ("3 + 5 N", 8.0), ("1 + 2 + 5 N - 3", 5.0), ("2*p - 3", 7.0), ("m*9.81 m/s2 + 3", 22.62)],
+)
+def test_a_bare_number_added_to_a_force_is_in_newtons_in_every_file(written: str, newton: float) -> None:
+    load = f'[loads.push]\ntype = "force"\nat = "crank.O"\nx = "{written}"\ny = 0\n'
+    lines = ['[parameters]\np = "5 N"\nm = "2 kg"\n', load]
+    for unit in ("m", "mm"):
+        head = (
+            f'name = "wheel"\n[units]\nlength = "{unit}"\n[bodies.ground]\npoints = {{ O = [0, 0] }}\n[bodies.crank]\n'
+        )
+        joint = 'points = { O = [0, 0] }\n[joints.O]\ntype = "revolute"\nbetween = ["ground.O", "crank.O"]\n'
+        driver = '[drivers.crank]\ntype = "angle"\nof = "crank"\nlaw = "constant_speed"\nspeed = 1.0\n'
+        mechanism = toml_file.parse(head + joint + driver + "".join(lines))
+        for one in (mechanism, mechanism.in_metres()):
+            assert one.loads[0].x == pytest.approx(newton, rel=1e-15)
