@@ -9,13 +9,28 @@ import numpy as np
 
 from kinfmu.log.viewer.linkage import MARGIN, Linkage, send
 from kinfmu.scene.forces import arrows
+from kinfmu.scene.scene import Scene
 
 if TYPE_CHECKING:
     import rerun as rr
 
 _JOINT, _LOAD = (185, 28, 28), (168, 85, 247)
 _ORDER = 50.0  # above the linkage
+_PLACES, _LOWEST_PART = 9, 0.2  # places of the legend; part of the size above the lowest point, in which names matter
 _RADIUS = 0.004  # as a part of the scene's size, however thin its links are
+
+
+def legend_start(scene: Scene, length: float) -> float:
+    """Return x where the arrow of the legend begins: below the linkage, off the names of supports there.
+
+    Of some places from left to right it is the one whose middle is furthest from them; the first one of equal ones.
+    """
+    low, high = scene.low, scene.high
+    deepest = low[1] + _LOWEST_PART * scene.size
+    below = np.array([at[0] for at in scene.supports.values() if at[1] < deepest])
+    starts = np.linspace(low[0], max(float(high[0]) - length, float(low[0])), _PLACES)
+    apart = np.abs(starts[:, None] + 0.5 * length - below).min(axis=1, initial=length)  # further away is as good
+    return float(starts[int(np.argmax(np.round(apart / scene.size, 6)))])
 
 
 def log_arrows(linkage: Linkage) -> None:
@@ -47,7 +62,7 @@ def log_arrows(linkage: Linkage) -> None:
             return columns.partition(chosen.astype(int))
 
         send(linkage.rec, entity, linkage.timeline, run.t, columns)
-    corner = [float(scene.low[0]), float(scene.low[1] - 0.6 * MARGIN * scene.size)]
+    corner = [legend_start(scene, found.length), float(scene.low[1] - 0.6 * MARGIN * scene.size)]
     linkage.rec.log(
         f"{path}/legend",
         rr.Arrows2D(

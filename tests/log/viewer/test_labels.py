@@ -10,10 +10,12 @@ import numpy as np
 import kinfmu
 from kinfmu import Mechanism
 from kinfmu.log import write_rrd
+from kinfmu.log.viewer.arrows import legend_start
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.labels import dots, places_below, shown_names
 from kinfmu.mechanism.toml_file import parse
-from kinfmu.scene.scene import Scene, drawable
+from kinfmu.scene.forces import arrows
+from kinfmu.scene.scene import Scene, drawable, scene
 from tests.gallery_members import every_member
 from tests.log.viewer.test_rerun_file import statics
 
@@ -90,3 +92,15 @@ def test_the_card_states_the_tool_that_made_the_fmu_but_not_its_token() -> None:
     assert "token" not in card(of_fmu)
     assert "| FMU made by | kinfmu 1 |" in card(of_fmu)
     assert "parameters set" not in card(of_fmu)
+
+
+def test_the_scale_of_forces_keeps_off_the_names_of_supports() -> None:
+    for name in ("fourbar_loaded", "excavator_loaded", "jansen_leg_loaded", "toggle_press"):
+        mechanism = kinfmu.load(name)
+        run = kinfmu.solve(mechanism)
+        found = scene(run, mechanism)
+        drawn = arrows(run, mechanism, found)
+        assert drawn is not None
+        middle = legend_start(found, drawn.length) + 0.5 * drawn.length
+        near = [at for at in found.supports.values() if at[1] < found.low[1] + 0.2 * found.size]
+        assert all(abs(at[0] - middle) > 0.1 * found.size for at in near), name
