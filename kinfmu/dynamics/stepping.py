@@ -33,6 +33,7 @@ ARRIVED = 1e-4  # determinant of a pose within about 1e-8 rad of a limit: nearer
 ERRORS = 10.0  # tolerances by which the turning point may miss the limit
 BEYOND = (1e-6, 1e-4, 1e-2, 0.3)  # [rad, sizes] past a limit, where the solver states why it is one
 STEEP = 1.0  # [rad, sizes] that a driver moves in a step at most, if a law's argument is an arc tangent
+LEAST_RELATIVE = 100 * float(np.finfo(float).eps)  # error that scipy accepts
 DETERMINED = 1e-12  # relative to the span between jumps: laws are read on that side of a jump
 
 METHODS = ("DOP853", "Radau")
@@ -73,7 +74,8 @@ class Stepper:
         ud: Initial speeds.
         times: (n,) samples [s]; the first is the start.
         jumps: Times inside, at which efforts jump: the integrator restarts there.
-        tolerance: Error of a step, relative, and absolute in rad and sizes, per second for speeds.
+        tolerance: Error of a step in rad and sizes, however far drivers have turned; of speeds per second, or relative
+            where they are faster than that. Radau's error of angles is relative where they exceed 1 rad.
         method: 'DOP853', or 'Radau' for stiff dampers and springs.
 
     """
@@ -94,6 +96,9 @@ class Stepper:
         self._y = np.array([*equation.pose.u, *ud])
         reach = np.array(equation.solver.model.REACH) if self._d == 1 else self._scales()
         self._atol = tolerance * np.concatenate([reach, reach])
+        self._rtol: Any = tolerance
+        if method == "DOP853":  # Radau's Newton needs one number
+            self._rtol = np.repeat([LEAST_RELATIVE, max(tolerance, LEAST_RELATIVE)], self._d)
         self._longest = float(np.diff(times).max()) if len(times) > 1 else inf
         self._refined = 0  # how often the present step was divided
         self._suspect_until = inf  # [s] its end
@@ -142,7 +147,7 @@ class Stepper:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # numbers that are not finite are reported as an end
             self._integrator: Any = make(
-                self._rates, t, self._y, self._span[1], rtol=self._tolerance, atol=self._atol, max_step=longest
+                self._rates, t, self._y, self._span[1], rtol=self._rtol, atol=self._atol, max_step=longest
             )
 
     def _rates(self, t: float, y: FloatArray) -> FloatArray:

@@ -51,7 +51,7 @@ def torque_driven(
         inputs: Efforts by the names of inputs, such as crank_torque [N m] or wind_force [N]; 0 by default.
         state: Initial values and speeds, such as crank_angle [rad] and crank_speed [rad/s]. Default: of the laws.
         parameters: Values of parameters and law constants, as in `solve`.
-        tolerance: Error of a step, relative, and absolute in rad and sizes; 1e-13 to 1e-4. Default: 1e-9.
+        tolerance: Error of a step in rad and sizes, for fast speeds relative; 1e-13 to 1e-4. Default: 1e-9.
         method: 'DOP853', or 'Radau' for stiff dampers and springs. Default: 'DOP853'.
         progress: Called with (samples done, number of samples).
 
