@@ -36,7 +36,7 @@ class Report(Findings, Displayed):
 
     @property
     def has_cut_cam(self) -> bool:
-        """True if the problem is a cam that cannot be made: the mechanism still moves as its law says."""
+        """Whether the problem is a cam that cannot be made; the mechanism still moves as its law says."""
         return self.plan is not None and any(cam.is_cut for cam in self.cams)
 
     def assemblies(self) -> Assemblies:
