@@ -40,7 +40,7 @@ class Abscissa:
     def angles(self) -> FloatArray:
         """The values as angles [rad], for polar plots; FigureError if they are no angles."""
         if self.unit not in ("deg", "rad"):
-            raise FigureError(f"a polar plot needs an angle, not {self.label}; name one, such as x = 'crank.phi'")
+            raise FigureError(f"a polar plot needs an angle, not {self.label}")
         return self.values * DEGREE if self.is_angle else self.values
 
 

@@ -92,19 +92,34 @@ def overlay(
             run[column]  # reports what the run does not hold
     if shown.polar:
         for column in chosen:
-            shown.x(first, column).angles  # noqa: B018  reports axes that are no angles
+            _check_angle(first, shown.x(first, column))
     labels = {(shown.x(run, column).unit, shown.x(run, column).is_axis) for run in runs for column in chosen}
     if len(labels) > 1:
         units = " and ".join(sorted(unit or "numbers" for unit, _ in labels))
         raise FigureError(f"one horizontal axis cannot show {units}; name columns x of one unit that both runs hold")
     panels = shown.panels()
     most = max(map(len, panels))
-    if len(panels) > MOST_PANELS or most > MOST_CURVES:
+    if len(panels) > MOST_PANELS:
         raise FigureError(
-            f"{len(chosen)} columns make {len(panels)} panels with up to {most} curves; a sheet holds {MOST_PANELS} "
-            f"panels of {MOST_CURVES} curves; choose some of them by name, such as {chosen[0]}"
+            f"{len(chosen)} columns make {len(panels)} panels, one for each unit; a sheet holds {MOST_PANELS}: "
+            f"choose some of them by name, such as {chosen[0]}"
+        )
+    if most > MOST_CURVES:
+        fullest = max(panels, key=len)
+        raise FigureError(
+            f"the panel [{shown.unit(fullest[0])[0]}] would have {most} curves and holds {MOST_CURVES}: leave out at "
+            f"least {most - MOST_CURVES} of them, by a minus in front of its name as in -{fullest[-1]}"
         )
     return shown
+
+
+def _check_angle(run: Run, across: Abscissa) -> None:
+    """Raise a FigureError that names an angle of the run if the horizontal axis of a polar plot is no angle."""
+    if across.unit in ("deg", "rad"):
+        return
+    angle = next((name for name in run.outputs if name.is_angle and name not in run.absent), "")
+    cure = f"; name one by x (--x), such as {angle}" if angle else ", and the run has none"
+    raise FigureError(f"a polar plot needs an angle, not {across.label}{cure}")
 
 
 def overlay_sheet(shown: Shown) -> Figure:

@@ -24,7 +24,7 @@ from kinfmu.draw.overlay import (
 from kinfmu.draw.sheet import FONT, GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
 from kinfmu.draw.stacks import Panel, Stack, stacks_of
 from kinfmu.draw.writing import check_suffix, check_target, write
-from kinfmu.errors import FigureError
+from kinfmu.errors import FigureError, listed
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import ROUND_OFF, Axis, axis_of, shown_range
 from kinfmu.scene import palette
@@ -157,6 +157,12 @@ def _chosen(run: Run, columns: Sequence[str], path: Path) -> list[Stack]:
         )
     if not len(run) or not stacks:
         raise FigureError(f"{path}: the run has no {'samples' if stacks else 'coordinates'} to plot")
+    wanted = [panel.column for stack in stacks for panel in stack.panels]
+    if all(column in run.absent for column in wanted):
+        raise FigureError(
+            f"{path}: the run does not keep {listed(wanted[:3])}{', ...' if len(wanted) > 3 else ''}; "
+            "keep them: --channels all, or their names"
+        )
     return stacks
 
 

@@ -123,7 +123,9 @@ class MotionSequence(Law):
             return "its sequence does not repeat; set repeat = true"
         whole = sum(segment.duration for segment in self.segments)
         if abs(whole - TURN) > NEARLY * TURN:
-            return f"the durations of its sequence add up to {math.degrees(whole):.9g} deg, not to a turn of 360 deg"
+            found = f"the durations of its sequence add up to {math.degrees(whole):.9g} deg, not to a turn of 360 deg"
+            bare = next((one.duration for one in self.segments if one.duration > TURN), None)
+            return found if bare is None else f"{found}; a bare angle is in radians: write '{bare:.6g} deg' for degrees"
         rise = sum(segment.rise for segment in self.segments)
         if abs(rise) > NEARLY * max(abs(segment.rise) for segment in self.segments):
             return f"the rises of its sequence add up to {rise:.9g}, not to 0"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
@@ -23,6 +24,7 @@ from kinfmu.readings.extremes import Maximum, Minimum, Peak, PeakAcceleration, P
 from kinfmu.units import METRES, CoordinateName
 
 OF_FORCES = (Minimum, Maximum, Range, Peak)  # measures that read forces
+_KEY = re.compile(r"^.*\.|_\d+$")  # what a key has around its word: 'rise' of 'law.rise_1'
 MOST_BODIES = 20_000  # fits into the memory of an ordinary computer
 
 
@@ -208,11 +210,13 @@ def _with_causes(
     parameters: Mapping[str, Parameter],
     expressions: Mapping[NumberPath, Expression],
 ) -> None:
-    """Run a member's own check; an error also states its expressions and the values of their parameters."""
+    """Run a member's own check; an error also states those expressions that give the keys that it names, if any."""
     try:
         check()
     except MechanismError as error:
-        at_fault = {place: e for place, e in expressions.items() if place[:2] == owner}
+        text = str(error)
+        own = {place: path_text(place).partition("] ")[2] for place in expressions if place[:2] == owner}
+        at_fault = {place: expressions[place] for place, key in own.items() if _KEY.sub("", key) in text}
         if not at_fault:
             raise
         values = dict.fromkeys(name for expression in at_fault.values() for name in expression.names)
@@ -236,6 +240,9 @@ def _check_reference(bodies: Bodies, where: str, value: Any, reference: Referenc
 
 
 def _check_body(bodies: Bodies, where: str, name: str) -> None:
+    body = name.partition(".")[0]
+    if body != name and body in bodies:
+        raise MechanismError(f"{where}: {quoted(name)} must be a body; did you mean '{body}'?")
     if name not in bodies:
         raise MechanismError(
             f"{where}: body {quoted(name)} is not in the mechanism{suggestion(name, bodies)}; bodies: {listed(bodies)}"

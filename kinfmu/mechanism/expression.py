@@ -242,6 +242,11 @@ _TOKEN = re.compile(
 _WORD = r"(?:[A-Za-z_][A-Za-z0-9_]*|\N{DEGREE SIGN})"
 _UNIT = re.compile(rf"[ \t]*({_WORD}((?: {_WORD}){{0,2}}))(/{_WORD})?")  # the longest has three words, 'N m s/rad'
 
+_SIGNS_IN_UNIT = re.compile(r"[ \t]*([^\W\d][^+,()-]*)")
+_PLAIN_SIGNS = str.maketrans(
+    {"^": "", "\N{SUPERSCRIPT TWO}": "2", "\N{SUPERSCRIPT THREE}": "3", "\N{MIDDLE DOT}": " ", "\N{DOT OPERATOR}": " "}
+)
+
 
 class _Parser:
     """Parser from text to steps, by recursive descent."""
@@ -349,6 +354,7 @@ class _Parser:
     def _number(self, token: _Token) -> None:
         """Parse a number and its unit, the longest known one."""
         value, unit, measures = float(token.text), "", dimension.BARE
+        self._refuse_signs_in_unit()
         match = _UNIT.match(self._text, self._at)
         if match:
             begin, ends = match.start(1), [match.end(), match.end(1)]
@@ -366,6 +372,17 @@ class _Parser:
             raise _error(self._text, token.at, "the number is too large")
         self._steps.append(Step("number", token.at, value, unit, measures))
         self._next()
+
+    def _refuse_signs_in_unit(self) -> None:
+        """Raise a MechanismError for a unit after a number with signs of a textbook in it: 'kg m^2', 'N\N{MIDDLE DOT}m'."""
+        match = _SIGNS_IN_UNIT.match(self._text, self._at)
+        written = match[1].rstrip() if match else ""
+        plain = written.translate(_PLAIN_SIGNS)
+        if " " in plain:  # 'kg m**2' is no square of 'kg m', but 'mm**2' is one of 'mm'
+            plain = plain.replace("**", "")
+        unit = spelled(plain)
+        if match and plain != written and unit in self._units:
+            raise _error(self._text, match.start(1), f"no unit {quoted(written)}; did you mean '{unit}'?")
 
     def _inside(self, opening: _Token, count: int) -> None:
         """Parse parentheses with `count` sums, separated by commas."""

@@ -39,6 +39,14 @@ def check_keys(where: str, table: Mapping[str, Any], known: Iterable[str]) -> No
             raise MechanismError(f"{place}: unknown key{suggestion(key, known)}; keys: {listed(known)}")
 
 
+def refuse_mechanism(document: Mapping[str, Any], kind: str, keys: Iterable[str]) -> None:
+    """Raise a MechanismError for the document of a mechanism in place of that of a study or a fit, its `kind`."""
+    if "bodies" in document and "mechanism" not in document:
+        raise MechanismError(
+            f"this is a mechanism file; a {kind} file names it, such as mechanism = 'fourbar.toml'; keys: {listed(keys)}"
+        )
+
+
 def table_of(document: Mapping[str, Any], name: str) -> dict[str, Any]:
     """Return the table [name], empty if it is missing."""
     table = document.get(name, {})

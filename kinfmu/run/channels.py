@@ -187,8 +187,10 @@ def _of_coordinates(
     found = {name} if name in owners else groups.get(name, {column for column in columns if fnmatchcase(column, name)})
     if found.isdisjoint(owners):
         known = dict.fromkeys(owners.values())
+        of_forces = groups["forces"] | groups["reactions"] | groups["signals"]
+        near = suggestion(name, [*owners, *sorted(of_forces - {name}), *GROUPS_OF_COORDINATES])
         raise RequestError(
-            f"the run has no coordinate '{name}'{suggestion(name, [*owners, *GROUPS_OF_COORDINATES])}; "
+            f"the run has no coordinate '{name}'{near}; "
             f"coordinates: {listed(known)}, or {listed(GROUPS_OF_COORDINATES)}, with * for any letters"
         )
     return found

@@ -16,6 +16,7 @@ from kinfmu.draw.plots import _sheet
 from kinfmu.draw.stacks import stacks_of
 from kinfmu.errors import FigureError, KinfmuError, RequestError
 from kinfmu.run import Run
+from kinfmu.units import CoordinateName
 from tests.log.runs import fourbar, with_gap
 
 
@@ -74,9 +75,21 @@ def test_a_polar_plot_has_the_driver_as_its_angle(run: Run) -> None:
     numbers = (axes.get_yticks() - axes.get_rmin()) * np.exp(1j * np.radians(axes.get_rlabel_position()))
     assert np.abs(numbers[:, None] - curve).min() > 0.1  # of a radius of about 3
     with pytest.raises(
-        FigureError, match=r"^a polar plot needs an angle, not t \[s\]; name one, such as x = 'crank.phi'"
+        FigureError, match=r"^a polar plot needs an angle, not t \[s\]; name one by x \(--x\), such as crank\.phi$"
     ):
         sheet([run], ["A.y"], [], polar=True)
+
+
+def test_a_sheet_with_too_many_curves_names_what_to_leave_out(run: Run) -> None:
+    names = tuple(CoordinateName(f"body{k}", "x") for k in range(20))
+    table = np.zeros((len(run), 20))
+    wide = dataclasses.replace(run, outputs=names, coordinate_count=20, values=table, rates=table, accelerations=table)
+    message = (
+        r"^the panel \[m\] would have 20 curves and holds 18: leave out at least 2 of them, by a minus .* -body19\.x$"
+    )
+    with pytest.raises(FigureError, match=message):
+        sheet([wide], list(map(str, names)), [])
+    assert sheet([wide], [*map(str, names), "-body19.x", "-body18.x"], []).axes
 
 
 def test_two_runs_share_a_plot_the_first_one_wide(run: Run) -> None:

@@ -138,6 +138,15 @@ def test_a_column_that_was_not_kept_is_an_empty_panel_with_a_note(run: Run) -> N
     assert [[text.get_text() for text in panel.texts] for panel in panels] == [[], ["not kept"], ["not kept"]]
 
 
+def test_a_plot_of_columns_that_were_not_kept_is_refused(heavy: Run, tmp_path: Path) -> None:
+    message = (
+        r"the run does not keep O\.force_x, O\.force_y, P\.force_x, \.\.\.; keep them: --channels all, or their names$"
+    )
+    with pytest.raises(FigureError, match=message):
+        plot(select(heavy, ["-reactions"]), tmp_path / "a.svg", ["reactions"])
+    assert not (tmp_path / "a.svg").exists()
+
+
 def test_what_cannot_be_plotted_is_reported(run: Run, tmp_path: Path) -> None:
     with pytest.raises(RequestError, match=r"the run has no coordinate 'cupler\.x'; did you mean 'coupler\.x'\?"):
         plot(run, tmp_path / "run.svg", ["cupler.x"])
@@ -184,7 +193,7 @@ def test_reactions_are_plotted_if_they_are_named(heavy: Run) -> None:
     assert [panel.unit for panel in pin.panels] == ["N", "N"]
     without = stacks_of(heavy, ["-forces"])
     assert [stack.title for stack in without] == list(heavy.names)
-    with pytest.raises(RequestError, match=r"no coordinate 'O\.forse_x'"):
+    with pytest.raises(RequestError, match=r"no coordinate 'O\.forse_x'; did you mean 'O\.force_x'\?"):
         stacks_of(heavy, ["crank.torque", "O.forse_x"])
 
 

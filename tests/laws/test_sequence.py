@@ -88,6 +88,11 @@ TURN = 2.0 * math.pi
             MotionSequence(UP_AND_DOWN, repeat=True),
             "the durations of its sequence add up to 214.859173 deg, not to a turn of 360 deg",
         ),
+        (
+            MotionSequence((Segment("dwell", 110.0), Segment("dwell", 250.0)), repeat=True),
+            "the durations of its sequence add up to 20626.4806 deg, not to a turn of 360 deg; "
+            "a bare angle is in radians: write '110 deg' for degrees",
+        ),
         (MotionSequence((Segment("dwell", TURN),), repeat=True), ""),
         (
             MotionSequence((Segment("cycloidal", TURN, 0.25),), repeat=True),

@@ -161,8 +161,7 @@ CHANGES = {
     "a driven body that is not there": (
         'of = "crank"',
         'of = "crank.O"',
-        "[drivers.crank] of: body 'crank.O' is not in the mechanism; did you mean 'crank'?; "
-        "bodies: ground, crank, coupler, rocker",
+        "[drivers.crank] of: 'crank.O' must be a body; did you mean 'crank'?",
     ),
     "a driven ground": (
         'of = "crank"',

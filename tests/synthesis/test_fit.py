@@ -194,6 +194,7 @@ TARGET = 'mechanism = "crank_rocker"\n[targets.t]\n'
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        ("[bodies.crank]", "fit.toml: this is a mechanism file; a fit file names it"),
         ("targetz = 1", "targetz: unknown key; did you mean 'targets'"),
         ("", "mechanism is missing"),
         ('mechanism = "fourba"', "did you mean 'fourbar'"),
