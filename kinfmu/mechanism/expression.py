@@ -374,7 +374,7 @@ class _Parser:
         self._next()
 
     def _refuse_signs_in_unit(self) -> None:
-        """Raise a MechanismError for a unit after a number with signs of a textbook in it: 'kg m^2', 'N\N{MIDDLE DOT}m'."""
+        """Raise a MechanismError for a unit with signs that files write without, such as 'kg m^2'."""
         match = _SIGNS_IN_UNIT.match(self._text, self._at)
         written = match[1].rstrip() if match else ""
         plain = written.translate(_PLAIN_SIGNS)

@@ -43,7 +43,8 @@ def refuse_mechanism(document: Mapping[str, Any], kind: str, keys: Iterable[str]
     """Raise a MechanismError for the document of a mechanism in place of that of a study or a fit, its `kind`."""
     if "bodies" in document and "mechanism" not in document:
         raise MechanismError(
-            f"this is a mechanism file; a {kind} file names it, such as mechanism = 'fourbar.toml'; keys: {listed(keys)}"
+            f"this is a mechanism file; a {kind} file names it, such as mechanism = 'fourbar.toml'; keys: "
+            f"{listed(keys)}"
         )
 
 

@@ -153,7 +153,8 @@ MESSAGES = {
     "a^2": "'a^2', character 2: powers are written with **",
     "4 kg m^2": "'4 kg m^2', character 3: no unit 'kg m^2'; did you mean 'kg m2'?",
     "4 kg m**2": "'4 kg m**2', character 3: no unit 'kg m**2'; did you mean 'kg m2'?",
-    "2*(1 kg m\N{SUPERSCRIPT TWO})": "'2*(1 kg m\N{SUPERSCRIPT TWO})', character 6: no unit 'kg m\N{SUPERSCRIPT TWO}'; did you mean 'kg m2'?",
+    "4 kg m\N{SUPERSCRIPT TWO}": "'4 kg m\N{SUPERSCRIPT TWO}', character 3: no unit 'kg m\N{SUPERSCRIPT TWO}'; "
+    "did you mean 'kg m2'?",
     "3 m/s^2 + a": "'3 m/s^2 + a', character 3: no unit 'm/s^2'; did you mean 'm/s2'?",
     "3 N\N{MIDDLE DOT}m": "'3 N\N{MIDDLE DOT}m', character 3: no unit 'N\N{MIDDLE DOT}m'; did you mean 'N m'?",
     "a**0.5": "'a**0.5', character 4: expected a whole number as exponent, found '0.5'",
