@@ -19,6 +19,7 @@ _WEB = Path(__file__).parent / "web"
 _SCRIPTS = (
     "geometry",
     "numbers",
+    "messages",
     "colours",
     "pen",
     "view",

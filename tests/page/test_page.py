@@ -134,7 +134,7 @@ def test_lengths_that_do_not_close_keep_the_last_pose_in_grey(chromium: Browser)
         field.press("Enter")
         page.settle()
         banner = page.tab.text_content("#banner")
-        assert re.match(r"Does not close\. Rows knee\.x, knee\.y do not close: gap [\d.]+ mm\. The last good", banner)
+        assert re.match(r"Does not close\. Joint knee does not close: gap [\d.]+ mm\. The last good", banner)
         assert page.get("k.extra().isGhost")
         assert page.get("Array.from(k.linkage.pose.q)") == pose
         field.fill("15")
@@ -145,14 +145,12 @@ def test_lengths_that_do_not_close_keep_the_last_pose_in_grey(chromium: Browser)
         assert page.errors == []
 
 
-def test_a_crank_at_its_limit_names_row_and_gap(chromium: Browser) -> None:
+def test_a_crank_at_its_limit_names_joint_and_gap(chromium: Browser) -> None:
     with chromium.open(text_of("triple_rocker")) as page:
         limit = max(one["at"] for one in page.get("k.linkage.limits"))
         page.move(limit + 0.2)
         banner = page.tab.text_content("#banner")
-        assert re.match(
-            r"Stops here\. .* cannot close; there, rows \w+\.x, \w+\.y do not close: gap [\d.]+ mm\.$", banner
-        )
+        assert re.match(r"Stops here\. .* cannot close; there, joint \w+ does not close: gap [\d.]+ mm\.$", banner)
         assert page.get("k.linkage.u[0]") == pytest.approx(limit, abs=1e-3)
         assert page.errors == []
 

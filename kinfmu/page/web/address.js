@@ -7,6 +7,7 @@ export class Address {
         this.page = page;
         window.addEventListener("hashchange", () => {
             if (location.hash === this.written) return;
+            page.motion.blocked = "";
             this.read();
             page.reshape();
         });

@@ -3,6 +3,8 @@
 import { number } from "./numbers.js";
 
 const LONGEST = 0.22; // of the smaller side of the view
+const SHORTEST = 0.3; // of the longest one, where arrows of points at the edge would leave the view
+const EDGE = 8; // [px] between the head of an arrow and the edge of the view
 const OUTLIERS = 2; // times the longest arrow: forces may grow without bound near singular poses
 const COLOURS = {
     velocity: { light: [0, 120, 85], dark: [90, 200, 150] },
@@ -26,7 +28,12 @@ export function arrows({ linkage, show, view, drawn, theme }) {
         const most = Math.max(...vectors.map(({ v }) => Math.hypot(...v)), 0);
         if (!(most > 0) || !Number.isFinite(most)) continue;
         const largest = vectors.find(({ v }) => Math.hypot(...v) === most);
-        for (const one of vectors) found.push({ from: one.at, along: one.v.map((x) => (x * longest) / most), colour: inTheme(kind), text: one === largest ? `${number(most, 3)} ${of}` : "" });
+        const whole = vectors.map(({ at, v }) => ({ from: at, along: v.map((x) => (x * longest) / most) }));
+        const part = Math.max(Math.min(...whole.map((one) => partInView(view, one))), SHORTEST);
+        whole.forEach(({ from, along }, k) => {
+            const text = vectors[k] === largest ? `${number(most, 3)} ${of}` : "";
+            found.push({ from, along: along.map((x) => x * part), colour: inTheme(kind), text });
+        });
     }
     const wanted = [...(show.forces ? ["force"] : []), ...(show.shaking ? ["shaking"] : [])];
     for (const kind of linkage.part.reactions.length ? wanted : []) {
@@ -40,6 +47,16 @@ export function arrows({ linkage, show, view, drawn, theme }) {
         legend.push({ length: (newton * longest) / most, colour: inTheme(kind), text: `${number(newton, 3)} N ${kind === "force" ? "in joints" : "shaking force"}` });
     }
     return { found, legend };
+}
+
+// Return the part of an arrow that is in the view: 1 for all of it, or if it does not begin there.
+function partInView(view, { from, along }) {
+    const start = view.pixel(from);
+    const size = [view.width, view.height];
+    if (start.some((x, axis) => x < 0 || x > size[axis])) return 1;
+    const moves = [along[0], -along[1]]; // pixels, y down
+    const parts = moves.map((move, axis) => (move ? (move > 0 ? size[axis] - EDGE - start[axis] : start[axis] - EDGE) / Math.abs(move) : 1));
+    return Math.min(1, ...parts);
 }
 
 function movingPoints(linkage, drawn) {

@@ -10,7 +10,7 @@ const MOST_NAMES = 80; // at once, the most important ones; more are unreadable,
 const SPOTS = [[0.9, -0.9], [-0.9, -0.9], [0.9, 0.9], [-0.9, 0.9], [0, -1.2], [0, 1.2], [1.2, 0], [-1.2, 0]]; // around a place
 const CELL = 48; // [px] of the grid that finds names in the way
 
-// Draw a pose; show: what is switched on; view: from the plane to pixels.
+// Draw a pose; show: what is switched on; view: from the plane to pixels. Returns the handles { driver, body, at } of drivers.
 export function draw(pen, linkage, view, theme, show, extra) {
     const painter = new Painter(pen, linkage, view, theme, extra.isGhost);
     painter.grid(show.grid);
@@ -26,6 +26,7 @@ export function draw(pen, linkage, view, theme, show, extra) {
     painter.pins(extra.held);
     marks(painter, show, extra);
     if (show.names) painter.names();
+    return painter.handles;
 }
 
 class Painter {
@@ -34,7 +35,7 @@ class Painter {
         this.pose = linkage.pose;
         this.boxes = new Boxes(); // of names and pins
         this.lines = new Boxes(); // of links and arrows
-        this.wanted = [];
+        [this.wanted, this.handles] = [[], []];
         this.fine = linkage.fineness;
         this.width = Math.max(4, Math.min(15, 13 * this.fine));
         this.size = Math.max(0.55, Math.min(1.15, 1.15 * this.fine));

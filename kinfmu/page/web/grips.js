@@ -38,6 +38,12 @@ export function gripAt(linkage, p, reach) {
     return null;
 }
 
+// Return the handle of a driver that is at a place, as a grip of its body; null without one.
+export function handleAt(linkage, view, handles, p, reach) {
+    const handle = handles.find(({ at }) => distance(view.plane(at), p) < reach);
+    return handle ? { driver: handle.driver, body: handle.body, local: seen(linkage.bodyPose(handle.body), ...view.plane(handle.at)), point: null } : null;
+}
+
 // Return the point of any body, the ground included, that is nearest to a place within a reach; null without one.
 export function pinAt(linkage, p, reach) {
     let best = null;
@@ -61,7 +67,7 @@ function lines(linkage) {
 // Move drivers so that a gripped place comes near a target; return true if it reached a pose.
 export function pull(linkage, grip, target) {
     const { drivers } = linkage.data;
-    const k = drivers.findIndex((driver) => driver.kind === "angle" && driver.body === linkage.bodies[grip.body]);
+    const k = grip.driver ?? drivers.findIndex((driver) => driver.kind === "angle" && driver.body === linkage.bodies[grip.body]);
     if (k >= 0 && drivers[k].pivot !== null) {
         const pivot = linkage.point(drivers[k].pivot);
         const now = place(linkage, grip);

@@ -1,6 +1,6 @@
 // The hand on the drawing: mouse, touch and wheel.
 
-import { gripAt, parametersOf, pinAt, place, pull, stretch } from "./grips.js";
+import { gripAt, handleAt, parametersOf, pinAt, place, pull, stretch } from "./grips.js";
 
 export class Hand {
     constructor(page) {
@@ -68,12 +68,10 @@ export class Hand {
     }
 
     #grab(p, reach) {
-        const { linkage, mode } = this.page;
-        if (mode === "lengths") {
-            const point = pinAt(linkage, p, reach);
-            return point === null ? null : { kind: "pin", point, names: null };
-        }
-        const grip = gripAt(linkage, p, reach);
+        const { linkage, mode, handles, view } = this.page;
+        const point = mode === "lengths" ? pinAt(linkage, p, reach) : null;
+        if (point !== null) return { kind: "pin", point, names: null };
+        const grip = handleAt(linkage, view, handles, p, reach) || (mode === "move" ? gripAt(linkage, p, reach) : null);
         return grip && { kind: "grip", grip };
     }
 

@@ -11,6 +11,7 @@ import { Frames } from "./frames.js";
 import { Hand } from "./hand.js";
 import { keyboard } from "./keyboard.js";
 import { Linkage } from "./linkage.js";
+import { ofJoints } from "./messages.js";
 import { Motion } from "./motion.js";
 import { sentence } from "./numbers.js";
 import { filesPanel, Plots, showPanel } from "./panels.js";
@@ -31,6 +32,7 @@ class Page {
         this.drawn = interest.map(({ point, colour }) => ({ point, colour })); // points with curves
         this.curves = [];
         this.traces = new Map();
+        this.handles = []; // of drivers, as drawn
         this.mode = "move";
         this.driver = 0;
         this.canvas = $("drawing");
@@ -93,7 +95,7 @@ class Page {
         const ratio = window.devicePixelRatio || 1;
         c.setTransform(ratio, 0, 0, ratio, 0, 0);
         c.clearRect(0, 0, view.width, view.height);
-        draw(new CanvasPen(c), linkage, view, this.theme, this.show, this.extra());
+        this.handles = draw(new CanvasPen(c), linkage, view, this.theme, this.show, this.extra());
         this.#readouts();
         this.plots.draw();
     }
@@ -123,8 +125,9 @@ class Page {
         $("redo").disabled = !design.future.length;
         $("reset").disabled = !design.changes().length;
         const head = design.isInvalid ? "Not valid. " : design.isOtherBranch ? "Another branch. " : "Does not close. ";
-        if (!design.isOk) this.#banner(head, `${sentence(design.failure)} The last good pose is shown in grey.`);
-        else this.#banner("Stops here. ", motion.blocked && sentence(motion.blocked));
+        const stated = (failure) => failure && sentence(ofJoints(failure, linkage.data.drivers.map((driver) => driver.name)));
+        if (!design.isOk) this.#banner(head, `${stated(design.failure)} The last good pose is shown in grey.`);
+        else this.#banner("Stops here. ", stated(motion.blocked));
     }
 
     #banner(head, text) {
@@ -159,7 +162,7 @@ class Page {
     setValue(name, value) {
         this.refresh(() => {
             this.design.set({ [name]: value });
-            this.reshape();
+            this.#taken();
         }, `value ${name}`);
     }
 
@@ -174,9 +177,15 @@ class Page {
     undo(isRedo = false) {
         this.refresh(() => {
             if (!(isRedo ? this.design.redo() : this.design.undo())) return;
-            this.reshape();
+            this.#taken();
             this.address.write();
         });
+    }
+
+    // The design has other values, and a move before that stopped is no more what is shown.
+    #taken() {
+        this.motion.blocked = "";
+        this.reshape();
     }
 
     // Take over values that did not close before, at a pose where they may.
@@ -200,7 +209,7 @@ class Page {
         $("reset").addEventListener("click", () => {
             this.refresh(() => {
                 this.design.reset();
-                this.reshape();
+                this.#taken();
                 this.address.write();
             });
         });

@@ -87,7 +87,7 @@ function outerOf(painter, body, centre) {
     return corners.reduce((most, p) => Math.max(most, distance(painter.dot(p), centre)), 0);
 }
 
-// Mark the range of a turning driver, its limits and change points on a circle about its pivot.
+// Mark the range of a turning driver, its limits and change points on a circle about its pivot, with a handle at its value.
 function driverMarks(painter) {
     const { linkage, pen, theme } = painter;
     linkage.data.drivers.forEach((driver, k) => {
@@ -111,6 +111,8 @@ function driverMarks(painter) {
         for (const limit of linkage.limits) if (limit.driver === k) mark(limit.at, theme.bad, `limit ${degrees(limit.at, 1)}`);
         for (const point of linkage.changePoints) if (point.driver === k) mark(point.at, theme.accent, `change point ${degrees(point.at, 1)}`);
         const p = on(linkage.u[k], radius);
-        pen.circle(...p, 4, { colour: theme.accent, fill: theme.accent });
+        pen.circle(...p, 7, { width: 2, colour: theme.paper, fill: theme.accent });
+        painter.boxes.add([p[0] - 8, p[1] - 8, p[0] + 8, p[1] + 8]);
+        painter.handles.push({ driver: k, body, at: p });
     });
 }

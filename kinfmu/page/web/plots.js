@@ -139,7 +139,9 @@ export class Plot {
         for (let k = Math.ceil(this.range[0] / stepX - 1e-9); k * stepX <= this.range[1] * (1 + 1e-12) + 1e-12; k++) {
             const at = px(k * stepX);
             line(c, [[at, MARGIN.top], [at, height - MARGIN.bottom]]);
-            if (at < width - 34) c.fillText(isAngle ? degrees(k * stepX, 0) : number(k * stepX, 4), at, height - MARGIN.bottom + 12);
+            const text = isAngle ? degrees(k * stepX, 0) : number(k * stepX, 4);
+            const half = 0.5 * c.measureText(text).width; // the last label may end at the edge, where the unit of other axes is
+            if (isAngle || at < width - 34) c.fillText(text, Math.min(at, width - half - 2), height - MARGIN.bottom + 12);
         }
         c.textAlign = "right";
         c.fillText(xLabel, width - 4, height - MARGIN.bottom + 12);
