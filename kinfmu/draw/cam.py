@@ -13,7 +13,8 @@ from kinfmu.cams import CamProfile
 from kinfmu.draw.abscissa import TICK_STEPS
 from kinfmu.draw.chart import SMALL, dress
 from kinfmu.draw.dxf import DXF_UNITS, POINT_STYLE, without_date
-from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, ink
+from kinfmu.draw.motion import COLOUR
+from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, arc, ink
 from kinfmu.draw.writing import SUFFIXES, write, write_bytes
 from kinfmu.errors import FigureError, MissingPackageError, listed
 from kinfmu.files.whole_file import suffix_of
@@ -26,15 +27,17 @@ if TYPE_CHECKING:
 
 _DXF = ".dxf"
 _FIGURE, _PLOT = 300.0, (270.0, 124.0)  # [pt]
-_LEFT, _BOTTOM, _TOP, _GAP, _EDGE = 46.0, 36.0, 30.0, 62.0, 10.0  # [pt]
+_LEFT, _BOTTOM, _TOP, _GAP, _EDGE = 46.0, 36.0, 44.0, 62.0, 10.0  # [pt]
 _LIMITS = {False: 30.0, True: 45.0}  # [deg] of the pressure angle, for sliding and swinging followers
+_ARROW = 0.5  # radius of the arrow about the axle, of the base circle
 _FLAT = 20.0  # of the largest distance from the axle; larger radii of curvature are not plotted
 
 
 def cam(profile: CamProfile, path: str | Path) -> None:
     """Draw the profile of a cam into a figure (.svg, .png, .pdf) or a CAD drawing (.dxf).
 
-    A figure shows profile, pitch curve, base circle and the roller or face at the first angle, and next to them
+    A figure shows profile, pitch curve, base circle and the roller or face at the first angle, with an arrow in the
+    sense in which the angle of the cam grows, and next to them
     pressure angle and radius of curvature over the cam's angle. A drawing has the closed polygons through the points of
     profile and pitch curve, the base circle and the axle as a point, on the layers PROFILE, PITCH, BASE and AXLE.
 
@@ -121,30 +124,51 @@ def _outline(axes: Axes, profile: CamProfile) -> None:
     axes.fill(*profile.profile.T, facecolor=ink(palette.lighter(colour)), edgecolor=ink(palette.darker(colour)), lw=1.2)
     around = np.linspace(0.0, 2.0 * np.pi, 181)
     circle = np.column_stack([np.cos(around), np.sin(around)])
-    axes.plot(*(profile.axle + _base_radius(profile) * circle).T, color=ink(GREY), lw=0.7, ls=":")
+    axes.plot(*(profile.axle + _base_radius(profile) * circle).T, color=ink(GREY), lw=0.7, ls=":", label="base circle")
     axes.plot(*profile.axle, "+", color=ink(INK), ms=9.0)
+    first = f"at {np.degrees(profile.angle[0]):.4g}\N{DEGREE SIGN}"
     if profile.pitch is not None:
-        axes.plot(*profile.pitch.T, color=ink(GREY), lw=0.8, ls="--")
+        axes.plot(*profile.pitch.T, color=ink(GREY), lw=0.8, ls="--", label="pitch curve")
         if profile.roller_radius:
-            axes.plot(*(profile.pitch[0] + profile.roller_radius * circle).T, color=ink(INK), lw=1.0)
+            axes.plot(
+                *(profile.pitch[0] + profile.roller_radius * circle).T, color=ink(INK), lw=1.0, label=f"roller {first}"
+            )
     else:
         along = profile.face[0]
         ends = np.array([profile.offset.min(), profile.offset.max()]) - profile.offset[0]
-        axes.plot(*(profile.profile[0] + ends[:, None] * along).T, color=ink(INK), lw=1.6)
+        axes.plot(*(profile.profile[0] + ends[:, None] * along).T, color=ink(INK), lw=1.6, label=f"face {first}")
+    _turning(axes, profile)
     dress(axes, "")
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.06)
+    _legend(axes)
     unit = profile.length_unit
     axes.set_xlabel(f"x of {profile.cam} [{unit}]", fontsize=SMALL, color=ink(GREY), labelpad=1.0, parse_math=False)
     axes.set_ylabel(f"y of {profile.cam} [{unit}]", fontsize=SMALL, color=ink(GREY), labelpad=1.0, parse_math=False)
+
+
+def _legend(axes: Axes) -> None:
+    """Write the names of the lines above the axes."""
+    look: dict[str, Any] = {"ncols": 4, "frameon": False, "fontsize": SMALL, "labelcolor": ink(GREY)}
+    look |= {"borderaxespad": 0.2, "borderpad": 0.2, "handlelength": 1.8, "columnspacing": 1.2}
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), **look)
+
+
+def _turning(axes: Axes, profile: CamProfile) -> None:
+    """Draw an arrow about the axle in the sense in which the cam's angle grows."""
+    route = arc(profile.axle, _ARROW * _base_radius(profile), np.radians(20.0), np.radians(110.0))
+    axes.plot(*route.T, color=ink(COLOUR), lw=1.2, label="angle of the cam")
+    head: dict[str, Any] = {"arrowstyle": "-|>", "color": ink(COLOUR), "lw": 1.2, "shrinkA": 0.0, "shrinkB": 0.0}
+    axes.annotate("", route[-1], route[-2], arrowprops=head)
 
 
 def _pressure(axes: Axes, profile: CamProfile, across: FloatArray) -> None:
     limit = _LIMITS[profile.is_swinging]
     axes.plot(across, np.degrees(profile.pressure_angle), color=ink(palette.BODIES[5]), lw=1.2)
     for value in (-limit, limit):
-        axes.axhline(value, color=ink(palette.RUNS[0]), lw=0.8, ls="--")
+        axes.axhline(value, color=ink(palette.RUNS[0]), lw=0.8, ls="--", label="usual limit" if value > 0.0 else "_")
     dress(axes, "")
+    _legend(axes)
     axes.set_ylabel("pressure angle [deg]", fontsize=SMALL, color=ink(GREY))
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
+from kinfmu.cams import CAM_JOINTS
+from kinfmu.cams.placed import members_of
 from kinfmu.draw.gap import gap_note, gaps
 from kinfmu.draw.instant import instant, pose_note
 from kinfmu.draw.motion import motion
@@ -19,6 +21,7 @@ from kinfmu.draw.writing import check_target, write
 from kinfmu.errors import listed
 from kinfmu.joints import Coordinate, Distance, Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism import Mechanism
+from kinfmu.scene.cams import cam_shapes
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.shape import Shape
 from kinfmu.scene.shapes import shapes
@@ -83,7 +86,7 @@ def sheet_of(shown: Instant, ax: Axes | None = None) -> Sheet:
     size = float(np.ptp(reach, axis=0).max())
     sheet = Sheet(reach, shortest(found, size), mechanism.length_unit, mechanism.title or mechanism.name, ax)
     names = draw(sheet, found, tracks, [*arrows, *places, *gaps(shown)])
-    notes = [text for text in (gap_note(shown), pose_note(shown)) if text]
+    notes = [text for text in (gap_note(shown), pose_note(shown), *_face_notes(shown)) if text]
     if len(names) <= MOST_NAMES:
         place(names, sheet)
     else:
@@ -109,6 +112,16 @@ def draw(sheet: Sheet, found: Sequence[Shape], tracks: Sequence[Mark], above: Se
     painter.cylinders()
     names += [name for mark in above for name in mark.draw(sheet)]
     return [*painter.names, *names]
+
+
+def _face_notes(shown: Instant) -> Iterator[str]:
+    """Yield a sentence for each flat face whose contact never reaches the point that defines it."""
+    points = {joint.name: members_of(joint)[2] for joint in shown.joints if isinstance(joint, CAM_JOINTS)}
+    for shape in cam_shapes(shown):
+        if shape.reach is not None and shape.reach[0] * shape.reach[1] > 0.0:
+            near, far = sorted(map(abs, shape.reach))
+            distance = f"{near:.4g}" if far - near <= 1e-6 * far else f"{near:.4g} to {far:.4g}"
+            yield f"{shape.joint}: contact {distance} {shown.mechanism.length_unit} from {points[shape.joint]}"
 
 
 def _not_drawn(mechanism: Mechanism, found: Sequence[Shape]) -> list[str]:

@@ -25,7 +25,12 @@ if TYPE_CHECKING:
 
 MOST_PANELS = 8  # more make a sheet too large to print
 MOST_CURVES = 18  # of a panel: so many colours differ
-_WIDTH, _HEIGHT, _SQUARE = 420.0, 130.0, 330.0  # [pt] of a panel; of one with equal axes, and of a polar one
+_WIDTH, _HEIGHT, _SQUARE = (
+    420.0,
+    130.0,
+    330.0,
+)  # [pt] of a panel; longest side of an equal or polar one
+_NARROWEST = 0.4  # width to height, or height to width, of a panel with equal axes
 _LEFT, _RIGHT, _TOP, _BOTTOM, _GAP = 60.0, 24.0, 34.0, 34.0, 16.0  # [pt] around and between panels
 _LEGEND_LINE, _LEGEND_COLUMNS = 12.0, 3  # [pt]; names in a line of a legend
 _EDGE = 8.0  # [pt] around the title
@@ -128,7 +133,7 @@ def overlay_sheet(shown: Shown) -> Figure:
 
     panels = shown.panels()
     equal = [_is_map(shown, panel) for panel in panels]
-    sizes = [(_SQUARE, _SQUARE) if shown.polar or square else (_WIDTH, _HEIGHT) for square in equal]
+    sizes = [_size(shown, panel, is_map=is_map) for panel, is_map in zip(panels, equal, strict=True)]
     legends = [_legend_height(shown, panel) for panel in panels]
     title = sheet_title(shown.runs, shown.names)
     width = _LEFT + max(size[0] for size in sizes) + _RIGHT
@@ -197,6 +202,24 @@ def _is_map(shown: Shown, panel: Sequence[str]) -> bool:
     run = shown.runs[0]
     lengths = {str(name) for name in (*run.outputs, *run.fixed) if not name.is_angle}
     return not shown.polar and bool(shown.xs) and lengths.issuperset((*panel, *shown.xs))
+
+
+def _size(shown: Shown, panel: Sequence[str], *, is_map: bool) -> tuple[float, float]:
+    """Return width and height of a panel [pt]; one with equal scales is as long and as high as its paths need."""
+    if shown.polar:
+        return _SQUARE, _SQUARE
+    if not is_map:
+        return _WIDTH, _HEIGHT
+    along = np.concatenate([shown.x(run, column).values for run in shown.runs for column in panel])
+    up = np.concatenate([values_of(run, column) for run in shown.runs for column in panel])
+    wide, high = (
+        float(np.ptp(values[np.isfinite(values)])) if np.isfinite(values).any() else 0.0 for values in (along, up)
+    )
+    longest = max(wide, high)
+    if longest == 0.0:
+        return _SQUARE, _SQUARE
+    least = _HEIGHT / _SQUARE
+    return _SQUARE * max(wide / longest, least), _SQUARE * max(high / longest, least)
 
 
 def _legend_height(shown: Shown, panel: Sequence[str]) -> float:

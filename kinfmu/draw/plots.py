@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_COORDINATES = 30  # more make a sheet too large to print
-_ABREAST = 3  # columns of panels in a row
+_ABREAST = 3  # columns of panels in a row, at most
 _WIDTH, _HEIGHT = 244.0, 96.0  # [pt], of a panel with its margins
 _LEFT, _RIGHT, _TOP, _BOTTOM = 64.0, 22.0, 44.0, 34.0  # [pt] around all panels; the last tick has half its number there
 _BETWEEN, _GAP, _BLOCK_GAP = 68.0, 14.0, 52.0  # [pt] between coordinates, their panels, and rows of coordinates
@@ -172,8 +172,8 @@ def _sheet(
     from matplotlib.figure import Figure
 
     axis = axis_of(runs[0])
-    abreast = min(len(stacks), _ABREAST)
-    rows = [stacks[k : k + _ABREAST] for k in range(0, len(stacks), _ABREAST)]
+    abreast = -(-len(stacks) // -(-len(stacks) // _ABREAST))  # rows of about the same length
+    rows = [stacks[k : k + abreast] for k in range(0, len(stacks), abreast)]
     blocks = [max(len(stack.panels) for stack in row) * _HEIGHT + _BLOCK_GAP for row in rows]
     width = _LEFT + abreast * _WIDTH - _BETWEEN + _RIGHT
     title = title_lines(sheet_title(runs, names), width - 2.0 * _EDGE)
@@ -183,7 +183,7 @@ def _sheet(
     look: dict[str, Any] = {"fontsize": TITLE_FONT, "va": "top", "color": ink(INK), "parse_math": False}
     made.text(_EDGE / width, 1.0 - _EDGE / height, "\n".join(title), **look)
     for index, stack in enumerate(stacks):
-        row, column = divmod(index, _ABREAST)
+        row, column = divmod(index, abreast)
         left = _LEFT + column * _WIDTH
         panels: list[Axes] = []
         for place, panel in enumerate(stack.panels):

@@ -36,7 +36,7 @@ def scatter_matrix(parameters: Sequence[Quantities], measures: Sequence[Quantiti
     step = -(-len(columns[0].values) // MOST_DOTS)
     for row, (vertical, line) in enumerate(zip(columns, panels, strict=True)):
         is_measure = row >= len(parameters)
-        colour = ink(colour_of(row - len(parameters)) if is_measure else palette.GROUND)
+        colour = ink(colour_of(row - len(parameters)) if is_measure else palette.on_white(palette.GROUND))
         for column, (horizontal, axes) in enumerate(zip(columns, line, strict=True)):
             axes.grid(visible=False)
             x, y = horizontal.values, vertical.values

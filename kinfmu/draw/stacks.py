@@ -79,10 +79,12 @@ def usual_coordinates(run: Run) -> list[CoordinateName]:
 
 
 def _title_of(name: ForceName | SignalName) -> str:
-    """Return the title of the stack of a force or a signal: its driver or joint, or what it is."""
+    """Return the title of the stack of a force or a signal: its driver or joint; external loads belong to 'loads'."""
     if isinstance(name, SignalName):
         return name.owner or "signals"
-    return name.owner or ("shaking" if name.noun.startswith("shaking") else "energy")
+    if name.owner or name.quantity.kind == "energy":
+        return name.owner or "energy"
+    return "shaking" if name.noun.startswith("shaking") else "loads"
 
 
 def _stacked(title: str, panels: Sequence[Panel]) -> list[Stack]:

@@ -50,25 +50,45 @@ def _crossed(argument: FloatArray, law: Law, order: int) -> FloatArray:
 def with_jumps(x: FloatArray, y: FloatArray, breaks: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return a curve (n,), (n,) with a vertical line at each break, from one side of it to the other.
 
-    Both ends continue their side in a straight line. Breaks without two samples of their own on either side are left as
-    they are.
+    Both ends continue their side in a straight line. A break without two samples of its own on either side, such as at
+    the points of a table, is a step from one sample to the next; several breaks between two samples are one step. Of a
+    break at the first or last sample, only the side within the run is drawn.
     """
     drop: list[int] = []
     places, xs, ys = [], [], []
+    last = len(x) - 1
+    steps: dict[int, list[float]] = {}  # breaks within each interval that is drawn as a step, by its first sample
+
+    def add(place: float, at: float, value: float) -> None:
+        places.append(place)
+        xs.append(at)
+        ys.append(value)
+
+    def straight(a: int, b: int, at: float) -> float:
+        return float(y[b] + (y[b] - y[a]) / (x[b] - x[a]) * (at - x[b]))
+
     for place in breaks.tolist():
         nearest = round(place)
         is_sample = abs(place - nearest) < AT_SAMPLE
         left, right = (nearest - 1, nearest + 1) if is_sample else (int(place), int(place) + 1)
-        others = (breaks != place) & (breaks > left - 1) & (breaks < right + 1)
-        if left < 1 or right > len(x) - 2 or others.any():
+        others = ((breaks != place) & (breaks > left - 1) & (breaks < right + 1)).any()
+        sides = [(left - 1, left)] * (left >= 1) + [(right + 1, right)] * (right < last)
+        is_end = is_sample and nearest in (0, last) and bool(sides)
+        if others or not (len(sides) == 2 or is_end):
+            for first in (nearest - 1, nearest) if is_sample else (left,):
+                steps.setdefault(first, []).append(place)
             continue
-        first = int(place)
-        at = x[nearest] if is_sample else x[first] + (place - first) * (x[first + 1] - x[first])
         drop += [nearest] * is_sample
-        for a, b in ((left - 1, left), (right + 1, right)):
-            places.append(place)
-            xs.append(at)
-            ys.append(y[b] + (y[b] - y[a]) / (x[b] - x[a]) * (at - x[b]))
+        at = float(np.interp(place, np.arange(len(x)), x))
+        for a, b in sides:
+            add(place, at, straight(a, b, at))
+    for first, within in steps.items():
+        if 0 <= first < last:
+            inside = [place for place in within if first + AT_SAMPLE < place < first + 1 - AT_SAMPLE]
+            place = float(np.mean(inside or within))
+            at = float(np.interp(place, np.arange(len(x)), x))
+            add(place, at, float(y[first]))
+            add(place, at, float(y[first + 1]))
     kept = np.delete(np.arange(len(x)), drop)
     order = np.argsort(np.concatenate([kept, places]), kind="stable")
     return np.concatenate([x[kept], xs])[order], np.concatenate([y[kept], ys])[order]

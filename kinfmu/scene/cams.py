@@ -28,7 +28,8 @@ class CamShape:
     joint, cam, follower: names of the joint and the two bodies; profile: the real one (k, 2), None where the follower
     is unknown or would be undercut; pitch: the pitch curve (k, 2), None under a flat face; roller: its centre (2,);
     radius: of the roller [length], 0 where there is none; face: ends of the flat face (2, 2); away: unit vector (2,)
-    from the cam through the face; contact: where both touch (2,), None without a profile.
+    from the cam through the face; contact: where both touch (2,), None without a profile; reach: the least and the
+    largest distance of the contact from the follower's point along the face [length], counted along its line.
     """
 
     joint: str
@@ -41,6 +42,7 @@ class CamShape:
     face: FloatArray | None
     away: FloatArray | None
     contact: FloatArray | None
+    reach: tuple[float, float] | None
 
 
 class _Curve(NamedTuple):
@@ -82,6 +84,11 @@ def _shape(shown: Instant, joint: CamJoint) -> CamShape | None:
     size = float(radius or 0.0) if is_real else 0.0
     profile, contact = around.curve - size * around.normal, now.curve - size * now.normal
 
+    reach = face = None
+    if normal is not None:
+        reach = _reach(shown, joint, touching, normal, around)
+        face = _face(shown, touching, normal, reach, float(np.abs(around.curve).max()))
+
     def drawn(points: ComplexArray) -> FloatArray:
         """Return the place in the world of points from the origin in the cam's frame."""
         return shown.placed(cam, np.column_stack([(points + origin).real, (points + origin).imag]))
@@ -94,9 +101,10 @@ def _shape(shown: Instant, joint: CamJoint) -> CamShape | None:
         pitch=drawn(around.curve) if normal is None else None,
         roller=shown.point(touching),
         radius=size,
-        face=None if normal is None else _face(shown, joint, touching, normal, around),
+        face=face,
         away=None if normal is None else np.array(unit_vector(shown.angle(follower) + normal)),
         contact=drawn(contact)[0] if is_real else None,
+        reach=reach,
     )
 
 
@@ -120,13 +128,27 @@ def _argument(shown: Instant, joint: CamRoller | CamFlatFace) -> float:
     return cmath.phase(ends[1] - ends[0]) - cam
 
 
-def _face(shown: Instant, joint: CamJoint, touching: str, normal: float, around: _Curve) -> FloatArray:
-    """Return the ends of a flat face in the world: as far as the contact reaches, and a little more."""
-    along = 1j * cmath.exp(1j * (shown.angle(body_of(touching)) + normal))
+def _reach(shown: Instant, joint: CamJoint, touching: str, normal: float, around: _Curve) -> tuple[float, float]:
+    """Return the range of the contact along a flat face in a turn, from the follower's point."""
     low, high = float(around.offset.min()), float(around.offset.max())
-    more = _OVERHANG * max(high - low, float(np.abs(around.curve).max()))
-    place = complex(*shown.point(touching))
-    if isinstance(joint, CamFlatFace):  # its offsets are from the pole
-        place += along * ((complex(*shown.point(joint.between[0])) - place) * along.conjugate()).real
-    ends = [place + at * along for at in (low - more, high + more)]
+    if not isinstance(joint, CamFlatFace):
+        return low, high
+    along = _along(shown, touching, normal)  # its offsets are from the pole
+    pole = ((complex(*shown.point(joint.between[0])) - complex(*shown.point(touching))) * along.conjugate()).real
+    return low + pole, high + pole
+
+
+def _face(shown: Instant, touching: str, normal: float, reach: tuple[float, float], size: float) -> FloatArray:
+    """Return the ends of a flat face in the world: as far as the contact reaches, and a little more.
+
+    The follower's point, which connects the face with its body, is on it.
+    """
+    along, place = _along(shown, touching, normal), complex(*shown.point(touching))
+    more = _OVERHANG * max(reach[1] - reach[0], size)
+    ends = [place + at * along for at in (min(reach[0] - more, 0.0), max(reach[1] + more, 0.0))]
     return np.array([[end.real, end.imag] for end in ends])
+
+
+def _along(shown: Instant, touching: str, normal: float) -> complex:
+    """Return the unit vector along a flat face."""
+    return 1j * cmath.exp(1j * (shown.angle(body_of(touching)) + normal))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from matplotlib.figure import Figure
 
 import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, RunSettings, Translational
+from kinfmu.analysis import cam_profile
+from kinfmu.draw.cam import _figure
 from kinfmu.draw.instant import instant
 from kinfmu.draw.sheet import ink
 from kinfmu.joints import CamFlatFace, CamOscillating, CamRoller, CamTranslating
@@ -122,6 +125,33 @@ def test_a_flat_face_is_drawn_where_it_touches_the_profile() -> None:
         np.testing.assert_allclose(disc.face[:, 1], disc.contact[1], rtol=1e-12)
         assert disc.face[:, 0].min() < disc.contact[0] < disc.face[:, 0].max()
         assert disc.profile[:, 1].max() == pytest.approx(disc.contact[1], abs=1e-2)
+
+
+def test_a_flat_face_is_connected_with_its_point(tmp_path: Path) -> None:
+    """The contact of an eccentric disc stays 35 to 55 from the follower's point, which the face reaches too."""
+    joint = CamFlatFace("contact", ("cam.O", "follower.tip"), Harmonic(10.0, 1.0, 30.0), QUARTER)
+    follower = Body("follower", {"tip": (40, 0), "stem": (0, 45)}, (5, 30, 0))
+    mechanism = cam(follower, Translational("guide", ("ground.G", "follower.stem"), QUARTER), joint, 0.9)
+    shown = instant(mechanism)
+    (disc,) = cam_shapes(shown)
+    tip = shown.point("follower.tip")
+    assert disc.face is not None
+    assert disc.contact is not None
+    assert disc.reach == pytest.approx((tip[0] - 10.0, tip[0] + 10.0), abs=2e-3)  # a sample each degree
+    np.testing.assert_allclose(disc.face[0], tip, atol=1e-9)
+    assert disc.face[1, 0] < disc.contact[0] - 1.0
+    kinfmu.draw.figure(mechanism, tmp_path / "face.svg")
+    text = (tmp_path / "face.svg").read_text("utf-8")
+    assert f"contact: contact {tip[0] - 10.0:.4g} to {tip[0] + 10.0:.4g} m from follower.tip" in text
+
+
+def test_the_picture_of_a_cam_names_its_lines_and_shows_the_sense_of_its_angle() -> None:
+    outline, pressure, _ = _figure(cam_profile(kinfmu.load("cam_roller"), "pitch")).axes
+    names = [text.get_text() for text in outline.get_legend().get_texts()]
+    assert names == ["base circle", "pitch curve", "roller at 0\N{DEGREE SIGN}", "angle of the cam"]
+    assert [text.get_text() for text in pressure.get_legend().get_texts()] == ["usual limit"]
+    (arrow,) = (line for line in outline.lines if line.get_label() == "angle of the cam")
+    assert (np.diff(np.unwrap(np.arctan2(*arrow.get_xydata().T[::-1]))) > 0.0).all()  # counter-clockwise
 
 
 @pytest.mark.parametrize("radius", [None, 29.5])

@@ -40,6 +40,15 @@ def test_a_coupler_curve_is_a_circle_with_equal_scales(run: Run) -> None:
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("coupler.x [m]", "coupler.y [m]")
 
 
+def test_a_flat_path_has_a_flat_sheet(run: Run) -> None:
+    narrow = dataclasses.replace(run, values=run.values * np.where(np.array(run.outputs) == "coupler.y", 0.5, 1.0))
+    round_, flat = (sheet([one], ["coupler.y"], ["coupler.x"]) for one in (run, narrow))
+    boxes = [axes.get_window_extent() for axes in (round_.axes[0], flat.axes[0])]
+    assert boxes[0].height == pytest.approx(boxes[0].width)
+    assert boxes[1].height == pytest.approx(0.5 * boxes[1].width)
+    assert round_.get_figheight() - flat.get_figheight() == pytest.approx(330.0 / 2.0 / 72.0)
+
+
 def test_each_curve_may_have_its_own_x(run: Run) -> None:
     (axes,) = sheet([run], ["coupler.y", "A.y"], ["coupler.x", "A.x"]).axes
     for line, centre in zip(axes.lines, (1.0, 2.0), strict=True):

@@ -16,12 +16,12 @@ from kinfmu.draw.abscissa import axis_label
 from kinfmu.draw.chart import numbers
 from kinfmu.draw.curves import gaps, rows_of
 from kinfmu.draw.plots import _sheet, _shown
-from kinfmu.draw.stacks import stacks_of, usual_coordinates
+from kinfmu.draw.stacks import _title_of, stacks_of, usual_coordinates
 from kinfmu.errors import FigureError, RequestError
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
 from kinfmu.run.channels import select
-from kinfmu.units import CoordinateName
+from kinfmu.units import CoordinateName, ForceName, Quantity
 from tests.log.runs import fourbar, with_gap
 from tests.sweep.test_forces import loaded
 
@@ -195,6 +195,18 @@ def test_reactions_are_plotted_if_they_are_named(heavy: Run) -> None:
     assert [stack.title for stack in without] == list(heavy.names)
     with pytest.raises(RequestError, match=r"no coordinate 'O\.forse_x'; did you mean 'O\.force_x'\?"):
         stacks_of(heavy, ["crank.torque", "O.forse_x"])
+
+
+def test_columns_without_a_joint_or_driver_have_the_title_of_what_they_are() -> None:
+    kinds = {"kick_force": "force", "brake_torque": "torque", "shaking_moment": "torque", "kinetic_energy": "energy"}
+    titles = [_title_of(ForceName("", noun, Quantity(kind))) for noun, kind in kinds.items()]
+    assert titles == ["loads", "loads", "shaking", "energy"]
+
+
+def test_four_stacks_are_two_rows_of_two(run: Run) -> None:
+    made = _sheet([run], stacks_of(run, ["coupler.x", "coupler.y", "coupler.phi", "rocker.phi"]))
+    lefts = sorted({round(axes.get_position().x0, 6) for axes in made.axes})
+    assert (len(made.axes), len(lefts)) == (12, 2)
 
 
 def test_reactions_without_values_say_so() -> None:

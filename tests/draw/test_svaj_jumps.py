@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -47,5 +48,37 @@ def test_both_ends_of_a_jump_continue_their_sides() -> None:
         (k,) = np.flatnonzero(np.diff(along) == 0.0)
         assert (along[k], values[k], values[k + 1]) == pytest.approx((place, 2.0 * place, 100.0 - place))
         assert math.isclose(len(along), len(x) + (2 if place % 1.0 else 1))
-    same = with_jumps(x, x, np.array([3.2, 3.6]))  # too near to one another
-    np.testing.assert_array_equal(same[0], x)
+
+
+def test_breaks_without_samples_of_their_own_are_steps() -> None:
+    x, y = np.arange(6.0), np.array([0.0, 1.0, 5.0, 2.0, 7.0, 3.0])
+    along, values = with_jumps(x, y, np.array([2.2, 2.6, 3.5]))  # two within one interval, and its neighbour
+    upright = np.flatnonzero(np.diff(along) == 0.0)
+    assert list(zip(along[upright], values[upright], values[upright + 1], strict=True)) == [
+        (pytest.approx(2.4), 5.0, 2.0),
+        (3.5, 2.0, 7.0),
+    ]
+    np.testing.assert_array_equal(values, [0.0, 1.0, 5.0, 5.0, 2.0, 2.0, 2.0, 7.0, 7.0, 3.0])
+
+
+def test_a_curve_that_ends_at_a_break_ends_with_its_own_side() -> None:
+    along, values = with_jumps(np.arange(5.0), np.array([0.0, 1.0, 2.0, 3.0, -50.0]), np.array([4.0]))
+    np.testing.assert_allclose(along, np.arange(5.0))
+    np.testing.assert_allclose(values, np.arange(5.0))
+
+
+def test_the_jerk_of_a_cam_from_a_table_has_no_slopes_at_the_ends_of_its_dwells() -> None:
+    """Cubic pieces that meet at every second sample: each jump is upright."""
+    count = 90
+    angle = np.linspace(0.0, 2.0 * math.pi, count + 1)
+    lift = 30.0 + 2.0 * np.where(angle < math.pi, 1.0 - np.cos(2.0 * angle), 0.0)
+    lift[-1] = lift[0]
+    law = kinfmu.laws.Spline(tuple(zip(angle, lift, strict=True)), "periodic")
+    mechanism = kinfmu.load("cam_roller")
+    joints = [replace(j, law=law) if isinstance(j, kinfmu.CamRoller) else j for j in mechanism.joints]
+    run = kinfmu.solve(replace(mechanism, joints=joints), cam_angle=np.linspace(0.0, 2.0 * math.pi, 2 * count + 1))
+    table, _ = motion_of(run, "pitch")
+    x, y = _sheet(run, driver_axis(run), "pitch", table, ["mm"] * 4, degrees=False).axes[3].lines[0].get_data()
+    slanted = (np.diff(x) > 0.0) & (np.abs(np.diff(y)) > 0.05 * np.ptp(y))
+    assert not slanted.any()
+    assert np.ptp(y) > 10.0

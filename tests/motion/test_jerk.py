@@ -81,7 +81,7 @@ def test_jerk_of_a_cam_follower_is_that_of_its_law(tmp_path: Path) -> None:
     np.testing.assert_allclose(by_time, table * 2.0 ** np.arange(4.0), atol=1e-11)
     svaj(run, tmp_path / "svaj.svg", "lift", degrees=True)
     text = (tmp_path / "svaj.svg").read_text(encoding="utf-8")
-    assert all(f">{label}<" in text for label in ("s [m]", "v [m/rad]", "a [m/rad²]", "j [m/rad³]", "cam_angle [deg]"))
+    assert all(f">{label}<" in text for label in ("s [m]", "v [m/rad]", "a [m/rad²]", "j [m/rad³]", "cam [deg]"))
 
 
 def test_jerk_has_a_gap_at_a_bridge_and_is_refused_if_it_is_not_known() -> None:
