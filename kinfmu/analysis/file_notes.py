@@ -11,7 +11,7 @@ import numpy as np
 from kinfmu.analysis.singular import DriverRange
 from kinfmu.analysis.values import LOOKS, law_values, value_text
 from kinfmu.drivers import AngleDriver, DistanceDriver
-from kinfmu.equations.start_poses import StartValues, start_from_poses
+from kinfmu.equations.start_poses import StartValues, open_joints_text, start_from_poses
 from kinfmu.equations.system import System
 from kinfmu.errors import KinfmuError, listed
 from kinfmu.joints.cam import Cam
@@ -169,7 +169,13 @@ def run_notes(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Iterator[str]:
 
 
 def start_notes(system: System, values: StartValues) -> Iterator[str]:
-    """Yield one line if the mechanism was assembled at the start of the laws in place of the start poses' values."""
+    """Yield a line for joints that the start poses leave wide open, and one for a start at other driver values.
+
+    That is a mechanism assembled at the start of the laws in place of the start poses' values.
+    """
+    opened = open_joints_text(system, start_from_poses(system).q)
+    if opened:
+        yield f"in the start poses of the file {opened}; assembly closed {'it' if ', ' not in opened else 'them'}"
     if not values.is_moved:
         return
     given, unit = start_from_poses(system).u, system.mechanism.length_unit

@@ -9,6 +9,9 @@ import numpy as np
 
 from kinfmu.equations.system import FloatArray, System
 
+ROUGH = 0.1  # sizes; poses read off a sketch close the joints more narrowly
+_MOST_LISTED = 3  # joints in a message
+
 
 class StartValues(NamedTuple):
     """Where assembly begins: a rough pose q (n,) and driver values u (d,).
@@ -72,3 +75,38 @@ def distance_from_start(system: System, start: StartValues, pose: FloatArray) ->
             off = math.remainder(off, math.tau) if name.is_angle else off / system.size
             largest = max(largest, abs(off))
     return largest
+
+
+class OpenJoint(NamedTuple):
+    """A joint that start poses given for all its bodies leave open, by a gap [length]."""
+
+    name: str
+    gap: float
+
+
+def open_joints(system: System, q: FloatArray) -> list[OpenJoint]:
+    """Return the joints that complete start poses leave open by more than what a sketch is rounded by, widest first.
+
+    Args:
+        system: The equations of the mechanism.
+        q: (n,) the start poses, as in StartValues.
+
+    """
+    mechanism = system.mechanism
+    complete = {body.name for body in mechanism.moving_bodies if all(value is not None for value in body.start)}
+    gaps = system.gaps(system.residual(q, np.zeros(len(mechanism.drivers))))
+    found = []
+    for member in system.members[: len(mechanism.joints)]:
+        lengths = [gaps[k] for k in member.rows if system.rows[k].kind == "length"]
+        gap = math.hypot(*lengths)
+        if member.bodies and complete.issuperset(member.bodies) and gap > ROUGH * system.size:
+            found.append(OpenJoint(member.owner.name, gap))
+    return sorted(found, key=lambda one: -one.gap)
+
+
+def open_joints_text(system: System, q: FloatArray) -> str:
+    """Return 'joint B is open by 82 mm' for the joints that complete start poses leave open; '' if there are none."""
+    found, unit = open_joints(system, q), system.mechanism.length_unit
+    shown = [f"joint {one.name} is open by {one.gap:.4g} {unit}" for one in found[:_MOST_LISTED]]
+    more = len(found) - len(shown)
+    return ", ".join([*shown, *([f"and {more} more"] if more else [])])

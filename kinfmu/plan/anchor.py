@@ -9,7 +9,7 @@ import numpy as np
 
 from kinfmu.equations.assembly import SINGULAR, Assembled, AssembledStart, closes_nearby
 from kinfmu.equations.closing import branches, close, margin
-from kinfmu.equations.start_poses import StartValues
+from kinfmu.equations.start_poses import StartValues, open_joints_text, start_from_poses
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import AmbiguousStartError, AssemblyError, MobilityError, listed
 from kinfmu.plan.open_loop import find_open_loop
@@ -59,6 +59,9 @@ def _does_not_close(system: System, start: StartValues, kept: Sequence[int]) -> 
     cure = (
         "check start poses: the loop closes from others" if loop.closes_elsewhere else "check lengths and start poses"
     )
+    opened = open_joints_text(system, start_from_poses(system).q)
+    if opened:  # an earlier loop may have closed far from its start poses
+        cure += f"; in the start poses of the file {opened}"
     return AssemblyError(
         f"the mechanism does not close near its start pose ({_at(system, start.u)}): {loop}; {cure}",
         joint=loop.joint,

@@ -136,3 +136,60 @@ def test_notes_are_in_the_report_of_an_invalid_mechanism_too() -> None:
     report = check(mechanism)
     assert report.problem is not None
     assert report.notes == ("[parameters] rod changes nothing: no number of the mechanism refers to it",)
+
+
+SIX_BAR = """
+name = "six_bar"
+[bodies.ground]
+points = { O = [0, 0], C = [3, 0], G = [6, 1] }
+[bodies.crank]
+points = { O = [0, 0], A = [0, 1] }
+start = { x = 0, y = 0, phi = 0 }
+[bodies.coupler]
+points = { A = [0, 1], B = [3, 2], P = [2, 3] }
+start = { x = 0, y = 0, phi = 0 }
+[bodies.rocker]
+points = { C = [3, 0], B = [3, 2] }
+start = { x = 0, y = 0, phi = 0 }
+[bodies.bar]
+points = { P = [2, 3], R = [5, 3] }
+start = { x = 0, y = 0, phi = 0 }
+[bodies.flap]
+points = { G = [6, 1], R = [5, 3] }
+start = { x = 0, y = 0, phi = 0 }
+[joints]
+O = { type = "revolute", between = ["ground.O", "crank.O"] }
+A = { type = "revolute", between = ["crank.A", "coupler.A"] }
+B = { type = "revolute", between = ["coupler.B", "rocker.B"] }
+C = { type = "revolute", between = ["ground.C", "rocker.C"] }
+P = { type = "revolute", between = ["coupler.P", "bar.P"] }
+R = { type = "revolute", between = ["bar.R", "flap.R"] }
+G = { type = "revolute", between = ["ground.G", "flap.G"] }
+[drivers.crank]
+type = "angle"
+of = "crank"
+law = "constant_speed"
+"""  # in coordinates of the world
+
+
+def _open_in_start_poses(text: str) -> list[str]:
+    return [note for note in check(parse(text)).notes if "start poses" in note]
+
+
+def test_joints_that_the_start_poses_leave_wide_open_are_reported() -> None:
+    assert _open_in_start_poses(SIX_BAR) == []
+    wrong = SIX_BAR.replace('"coupler.B", "rocker.B"', '"coupler.P", "rocker.B"')
+    assert _open_in_start_poses(wrong) == [
+        "in the start poses of the file joint B is open by 1.414 m; assembly closed it"
+    ]
+    rough = SIX_BAR.replace("B = [3, 2], P", "B = [3.1, 2.2], P")  # as read off a sketch
+    assert _open_in_start_poses(rough) == []
+    incomplete = wrong.replace("start = { x = 0, y = 0, phi = 0 }\n[bodies.bar]", "start = { phi = 0 }\n[bodies.bar]")
+    assert _open_in_start_poses(incomplete) == []
+
+
+def test_an_error_of_a_later_loop_names_an_earlier_joint_that_the_start_poses_leave_open() -> None:
+    wrong = SIX_BAR.replace("B = [3, 2], P", "B = [-1, 0], P").replace("R = [5, 3]", "R = [4, 2]")
+    problem = str(check(parse(wrong)).problem)
+    assert "the loop of bodies bar, flap with joints P, R, G does not close" in problem
+    assert problem.endswith("; in the start poses of the file joint B is open by 4.472 m")
