@@ -19,12 +19,13 @@ from kinfmu.analysis.lift_off import LiftOff, lift_offs
 from kinfmu.analysis.measuring import SAMPLES_PER_TURN, turns_of_cycle
 from kinfmu.analysis.singular import DriverRange
 from kinfmu.errors import KinfmuError, RequestError
+from kinfmu.joints.cam import Cam
 from kinfmu.laws import ConstantSpeed, External
 from kinfmu.mechanism import Mechanism
 from kinfmu.motion.motion import Motion, break_places, force_of
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import effort_noun
-from kinfmu.plan.reactions import undetermined_reactions
+from kinfmu.plan.undetermined import shared_reactions, unknown_contacts, why_unknown
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import axis_of
 from kinfmu.sweep import solve
@@ -61,13 +62,22 @@ class InertiaRange:
 
 
 @dataclass(frozen=True)
+class UnknownContact:
+    """A contact force of unknown direction: the joint of the cam, the reactions that depend on it, what is missing."""
+
+    joint: str
+    reactions: tuple[str, ...]
+    reason: str
+
+
+@dataclass(frozen=True)
 class Loading:
     """Forces over a motion.
 
     over: the motion, as text; efforts: of each driver; inertias: reduced; reaction: the joint that transmits the
     largest determined force; shaking: force and moment on the ground; undetermined: reactions that share a load, with
     the rows that share it; reason: why there are no numbers, '' if there are; missing: samples without numbers;
-    lift_offs: contacts of cams that would have to pull.
+    lift_offs: contacts of cams that would have to pull; unknown_contacts: contacts of cams without a known direction.
     """
 
     over: str
@@ -79,6 +89,7 @@ class Loading:
     reason: str = ""
     missing: int = 0
     lift_offs: tuple[LiftOff, ...] = ()
+    unknown_contacts: tuple[UnknownContact, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """Return the forces as plain data."""
@@ -89,6 +100,7 @@ class Loading:
             "largest_reaction": None if self.reaction is None else asdict(self.reaction),
             "shaking": [asdict(peak) for peak in self.shaking],
             "undetermined": [{"reactions": list(names), "rows": list(rows)} for names, rows in self.undetermined],
+            "unknown_contacts": [asdict(one) | {"reactions": list(one.reactions)} for one in self.unknown_contacts],
             "lift_offs": [one.as_json() for one in self.lift_offs],
             "reason": self.reason or None,
             "samples_without_numbers": self.missing,
@@ -111,23 +123,34 @@ def loading(plan: SolvePlan, ranges: Sequence[DriverRange], cams: Sequence[CamFi
     if not (mechanism.has_masses or mechanism.loads):
         return None
     undetermined: dict[tuple[str, ...], list[str]] = {}
-    for name, rows in undetermined_reactions(plan).items():
+    for name, rows in shared_reactions(plan).items():
         undetermined.setdefault(rows, []).append(name)
     shared = tuple((tuple(names), rows) for rows, names in undetermined.items())
+    cam_joints = {joint.name: joint for joint in mechanism.joints if isinstance(joint, Cam)}
+    hidden = tuple(
+        UnknownContact(name, tuple(map(str, names)), why_unknown(plan, cam_joints[name]))
+        for name, names in unknown_contacts(plan).items()
+    )
+    found = _over_motion(mechanism, ranges, cams)
+    return replace(found, undetermined=shared, unknown_contacts=hidden)
+
+
+def _over_motion(mechanism: Mechanism, ranges: Sequence[DriverRange], cams: Sequence[CamFindings]) -> Loading:
+    """Return the forces over a motion, without those that are undetermined."""
     try:
         arguments, over = _motion(mechanism, ranges)
         run = _with_breaks(solve(mechanism, **arguments), mechanism, arguments)
         over = over or f"the run of the file, {axis_of(run).range()}"
         missing = int((~run.good).sum())
         if missing == len(run):
-            return Loading(over, undetermined=shared, reason="no sample has numbers", missing=missing)
+            return Loading(over, reason="no sample has numbers", missing=missing)
         forces = _Forces(run)
         efforts = tuple(map(forces.peak, _efforts(mechanism)))
         inertias, shaking = tuple(forces.inertias()), tuple(map(forces.peak, ("shaking_force", "shaking_moment")))
         reaction, lifts = forces.largest_reaction(), forces.lift_offs(cams)
-        return Loading(over, efforts, inertias, reaction, shaking, shared, missing=missing, lift_offs=lifts)
+        return Loading(over, efforts, inertias, reaction, shaking, missing=missing, lift_offs=lifts)
     except KinfmuError as reason:
-        return Loading("no motion", undetermined=shared, reason=str(reason))
+        return Loading("no motion", reason=str(reason))
 
 
 def _motion(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> tuple[dict[str, Any], str]:

@@ -271,6 +271,9 @@ def _forces(report: Findings) -> Iterator[ReportLine]:
         yield ReportLine("", f"{peak.name}: peak {_peak_text(peak)}")
     for lift in loading.lift_offs:
         yield ReportLine("", _lift_off_text(lift))
+    for contact in loading.unknown_contacts:
+        loaded = _names(contact.reactions)
+        yield ReportLine("", f"{contact.joint}: contact force unknown, {contact.reason}; without a value: {loaded}")
     redundant = {row.row.name: row.row.owner for row in report.redundant}
     for names, rows in loading.undetermined:
         others = [row for row in rows if row in redundant]

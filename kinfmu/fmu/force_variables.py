@@ -8,15 +8,16 @@ from kinfmu.codegen.forces import STAGES
 from kinfmu.equations.graph import Node, symbols
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.fmu.interface import Variable
-from kinfmu.joints import CamFlatFace, CamOscillating, CamRoller, CamTranslating
+from kinfmu.joints import CamFlatFace, CamOscillating, CamRoller, CamTranslating, Joint
 from kinfmu.mechanism import LawConstant, Mechanism
 from kinfmu.mechanism.force_names import external_names
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import ForceSteps, force_names, force_steps
-from kinfmu.plan.reactions import reaction_names_of, reaction_steps, undetermined_reactions
+from kinfmu.plan.reactions import reaction_names_of, reaction_steps
 from kinfmu.plan.shaking import shaking_steps
 from kinfmu.plan.steps import Assignment, derivative_name, law_symbol
 from kinfmu.plan.trace import parameter_symbol
+from kinfmu.plan.undetermined import shared_reactions, unknown_contacts, why_unknown
 from kinfmu.units import ForceName, InputName, Quantity, unit_of
 
 _WORDS = {
@@ -76,20 +77,25 @@ def force_stages(plan: SolvePlan, names: Sequence[str], *, are_default: bool) ->
     Args:
         plan: The plan.
         names: Of forces and reactions.
-        are_default: They were not requested: those that redundant rows leave undetermined are left out.
+        are_default: They were not requested: those that are undetermined are left out.
 
     Raises:
         RequestError: A reaction that was requested is undetermined.
 
     """
-    undetermined = undetermined_reactions(plan)
+    shared, contacts = shared_reactions(plan), unknown_contacts(plan)
+    reasons: dict[str, str] = {
+        name: f"[joints.{cam}] gives no contact force: {why_unknown(plan, _joint(plan, cam))}"  # type: ignore[arg-type]
+        for cam, loaded in contacts.items()
+        for name in loaded
+    }
+    reasons |= {name: f"rows {listed(rows)} share its load in an unknown way" for name, rows in shared.items()}
     for name in () if are_default else names:
-        if name in undetermined:
-            shared = listed(undetermined[name])  # type: ignore[index]
-            raise RequestError(f"outputs: '{name}' is undetermined: rows {shared} share its load in an unknown way")
+        if name in reasons:
+            raise RequestError(f"outputs: '{name}' is undetermined: {reasons[name]}")
     found = {
         "forces": force_steps(plan, names, coefficients="given"),
-        "reactions": reaction_steps(plan, [name for name in names if name not in undetermined]),
+        "reactions": reaction_steps(plan, [name for name in names if name not in reasons]),
         "shaking": shaking_steps(plan, names),
     }
     return {stage: found[stage] for stage in STAGES if found[stage].names}
@@ -176,7 +182,7 @@ def variable_description(plan: SolvePlan, name: ForceName) -> str:
     if not name.owner:
         return _WORDS[name.noun]
     if name in reaction_names_of(plan.mechanism):
-        joint = next(one for one in plan.mechanism.joints if one.name == name.owner)
+        joint = _joint(plan, name.owner)
         if type(joint) in _OF_CAMS:
             return f"Joint {name.owner}: {_OF_CAMS[type(joint)]}"
         return f"Joint {name.owner}: {_ROWS.get(name.noun, name.noun)} of its first body on its second"
@@ -185,6 +191,10 @@ def variable_description(plan: SolvePlan, name: ForceName) -> str:
         return f"Driver {name.owner}: change of its effort with the acceleration of driver {other}"
     words = _WORDS[noun]
     return f"Driver {name.owner}: {words[0].lower()}{words[1:]}"
+
+
+def _joint(plan: SolvePlan, name: str) -> Joint:
+    return next(one for one in plan.mechanism.joints if one.name == name)
 
 
 def _load_inputs(mechanism: Mechanism) -> list[InputName]:

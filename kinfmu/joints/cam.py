@@ -43,6 +43,15 @@ class Cam(Joint):
     def follower(self) -> PoseQuantity:
         """Return the quantity of the follower."""
 
+    @abstractmethod
+    def touching(self) -> str | None:
+        """Return the follower's point that is the roller's centre, or is on the flat face; None if unknown."""
+
+    @property
+    def is_contact_known(self) -> bool:
+        """True if a roller, a knife edge or a flat face is given; then the contact force has a known direction."""
+        return self.touching() is not None and not (self.roller_radius is None and self.normal is None)
+
     @property
     def law_kinds(self) -> tuple[str, str]:
         """Kinds of the law's output and of its input."""
@@ -111,6 +120,9 @@ class CamTranslating(Cam):
     def bodies(self) -> tuple[str, ...]:
         return (*map(body_of, self.between), self.cam)
 
+    def touching(self) -> str:
+        return self.between[1]
+
     def follower(self) -> PositionAlong:
         return PositionAlong(self.between, self.axis)
 
@@ -154,6 +166,9 @@ class CamOscillating(Cam):
 
     def bodies(self) -> tuple[str, ...]:
         return (*self.between, self.cam)
+
+    def touching(self) -> str | None:
+        return self.contact
 
     def follower(self) -> AngleBetween:
         return AngleBetween(self.between[1], self.between[0])

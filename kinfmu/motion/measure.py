@@ -160,7 +160,10 @@ def _reason(run: Run, reading: Reading) -> str:
     of = getattr(reading, "of", None)
     made = measured_forces(run.mechanism).get(of, ()) if run.mechanism and isinstance(of, str) else ()
     if any(run.good.any() and not np.isfinite(run[name][run.good]).any() for name in made):
-        return f"'{of}' is not determined: redundant rows share the load, or laws of loads have no times"
+        return (
+            f"'{of}' is not determined: redundant rows share the load, the contact of a cam is unknown, or laws of "
+            "loads have no times"
+        )
     return reason_without_value(run, run.good)
 
 

@@ -29,7 +29,7 @@ from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.toml_text import text
 from kinfmu.page.module import PageModule
 from kinfmu.page.opened import AXES, place_text
-from kinfmu.plan.reactions import undetermined_reactions
+from kinfmu.plan.undetermined import undetermined_reactions
 from kinfmu.scene import palette
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.shape import Shape

@@ -22,9 +22,10 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import reaction_names_of, shaking_names
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.forces import ForceSteps, force_names, force_steps, loaded_coordinates
-from kinfmu.plan.reactions import reaction_steps, undetermined_reactions
+from kinfmu.plan.reactions import reaction_steps
 from kinfmu.plan.shaking import shaking_steps
 from kinfmu.plan.trace import Tracer, parameter_symbol
+from kinfmu.plan.undetermined import undetermined_reactions
 
 FOLLOWER = ("follower.h", "follower.c")
 EXPORTS = (
@@ -57,7 +58,7 @@ class PageModule(NamedTuple):
         points: The points 'body.point' whose places in their bodies it returns.
         parameters: Names of what it can bind, in its order: parameters, or their labels, then constants of the laws.
         forces: Names of its forces; none without masses and loads.
-        reactions: Names of the reactions of joints, without those that redundant rows leave undetermined, then of
+        reactions: Names of the reactions of joints, without those that are undetermined, then of
             shaking force and moment; none without masses and loads.
 
     """

@@ -15,6 +15,7 @@ from kinfmu.equations.graph import Node
 from kinfmu.equations.system import System
 from kinfmu.mechanism.force_names import names_of_rows, reaction_names_of
 from kinfmu.plan.block import Block
+from kinfmu.plan.contacts import carried
 from kinfmu.plan.forces import ForceSteps, chosen_steps
 from kinfmu.plan.mechanics import Mechanics
 from kinfmu.plan.origin import localized
@@ -22,39 +23,20 @@ from kinfmu.plan.plan import SolvePlan
 from kinfmu.plan.shaking import shaking_nodes
 from kinfmu.plan.steps import Assignment
 from kinfmu.plan.structure import RowTracer
-from kinfmu.units import CoordinateName, ForceName
+from kinfmu.units import CoordinateName
 
 __all__ = [
     "names_of_rows",
     "reaction_names_of",
     "reaction_steps",
-    "row_names",
-    "undetermined_reactions",
 ]
-
-
-def undetermined_reactions(plan: SolvePlan) -> dict[ForceName, tuple[str, ...]]:
-    """Return the reactions that redundant rows leave undetermined, each with the rows that share its load."""
-    shared: dict[str, tuple[str, ...]] = {}
-    for rows in plan.load_sharing:
-        for row in rows:
-            shared[row] = tuple(dict.fromkeys((*shared.get(row, ()), *rows)))
-    return {
-        name: shared[row]
-        for row, name in zip(row_names(plan), reaction_names_of(plan.mechanism), strict=False)
-        if row in shared
-    }
-
-
-def row_names(plan: SolvePlan) -> list[str]:
-    """Return the names of the joints' rows, in the order of `reaction_names_of`."""
-    return [f"{joint.name}.{label}" for joint in plan.mechanism.joints for label in joint.labels]
 
 
 def reaction_steps(plan: SolvePlan, wanted: Container[str] | None = None) -> ForceSteps:
     """Return the steps to the reactions of all joints and on the ground, in the order of `reaction_names_of`.
 
-    Where redundant rows share a load, the steps give one of the possible distributions.
+    Where redundant rows share a load, the steps give one of the possible distributions. What the unknown contact of a
+    cam loads lacks its force.
 
     Args:
         plan: The plan, as `Mechanics` takes it.
@@ -64,11 +46,17 @@ def reaction_steps(plan: SolvePlan, wanted: Container[str] | None = None) -> For
     mechanics = Mechanics(plan)
     multipliers = _Multipliers(plan, mechanics).of_row
     zero = mechanics.graph.constant(0.0)
-    results: list[Node] = []
-    for joint in mechanics.tracer.joints:
+    efforts: dict[int, list[Node]] = {}
+    row = 0
+    for number, joint in enumerate(mechanics.tracer.joints):
+        efforts[number] = []
         for kind, scale in zip(joint.kinds(), joint.scales(), strict=True):
-            effort = -(multipliers.get(len(results), zero) * scale)
-            results.append(effort / mechanics.metre if kind == "length" else effort)
+            effort = -(multipliers.get(row, zero) * scale)
+            efforts[number].append(effort / mechanics.metre if kind == "length" else effort)
+            row += 1
+    for (number, row), amount in carried(mechanics, efforts).items():
+        efforts[number][row] = efforts[number][row] + amount
+    results = [effort for own in efforts.values() for effort in own]
     names = reaction_names_of(plan.mechanism)
     if wanted is None:
         results += shaking_nodes(plan, mechanics)

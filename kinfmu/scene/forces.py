@@ -50,8 +50,10 @@ def arrows(run: Run, mechanism: Mechanism, scene: Scene) -> Arrows | None:
         name.owner for name in run.reaction_names if name in run.absent
     }
     for joint in mechanism.joints:
-        points = getattr(joint, "between", ())
-        if joint.name not in kept or any(body_of(point) not in scene.frames for point in points):
+        points = getattr(joint, "between", ())  # or bodies, of joints that have no arrow
+        if joint.name not in kept or any(point not in mechanism.body_points for point in points):
+            continue
+        if any(body_of(point) not in scene.frames for point in points):
             continue
         ends = [world(scene.frames[body_of(point)], mechanism.body_points[point]) for point in points]
         force = _force(run, scene, joint, ends)

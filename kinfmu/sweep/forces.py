@@ -16,10 +16,11 @@ from kinfmu.mechanism.force_names import shaking_names
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.forces import force_names, force_steps, loaded_coordinates
 from kinfmu.plan.origin import localized
-from kinfmu.plan.reactions import reaction_names_of, reaction_steps, undetermined_reactions
+from kinfmu.plan.reactions import reaction_names_of, reaction_steps
 from kinfmu.plan.shaking import shaking_steps
 from kinfmu.plan.steps import derivative_name, law_symbol
 from kinfmu.plan.trace import parameter_symbol
+from kinfmu.plan.undetermined import undetermined_reactions
 from kinfmu.run import FloatArray, Run
 from kinfmu.simd.stage import strided_columns
 from kinfmu.solver.python.status import Status
@@ -164,7 +165,7 @@ class ForceModel:
 
     @cached_property
     def _undetermined(self) -> list[int]:
-        """Columns of the reactions that redundant rows leave undetermined."""
+        """Columns of the reactions that are undetermined."""
         names = reaction_names_of(self.poses.plan.mechanism)
         return [names.index(name) for name in undetermined_reactions(self.poses.plan)]
 

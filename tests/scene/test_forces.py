@@ -47,6 +47,27 @@ def test_undetermined_reactions_and_those_not_kept_have_no_arrow(run: Run) -> No
     assert set(found.along) == {"joints.O", "joints.S", "joints.bore"}
 
 
+def test_joints_between_bodies_have_no_arrow() -> None:
+    lever = """[bodies.lever]
+points = { E = [0, 0] }
+mass = 1
+[joints.E]
+type = "revolute"
+between = ["ground.O", "lever.E"]
+[joints.lobe]
+type = "cam_oscillating"
+between = ["ground", "lever"]
+cam = "arm"
+law = "harmonic"
+amplitude = "10 deg"
+frequency = 1
+"""
+    mechanism = parse(ARM + lever, "lever.toml")
+    run = kinfmu.solve(mechanism)
+    found = arrows(run, mechanism, scene(run, mechanism))
+    assert found is None  # the bearings depend on the contact, which is unknown
+
+
 LOADS = """
 [loads.weight]
 type = "force"

@@ -11,7 +11,7 @@ import pytest
 import kinfmu
 from kinfmu import Mechanism
 from kinfmu.plan import compile_plan
-from kinfmu.plan.reactions import undetermined_reactions
+from kinfmu.plan.undetermined import undetermined_reactions
 from tests.mechanisms import wheels
 
 QUARTER = math.pi / 2
