@@ -20,7 +20,9 @@ SWEEP_SHOW = 10.0  # [s] to play a run that has no time
 EDGE = 0.01  # of the run's time, left free before and after the curves
 LEGEND_EDGE, LETTER = 34.0, 7.0  # [points]; width of a legend around its names, and of a letter
 ABREAST = 4  # most plots of efforts and signals in a row
+FEW = 4  # plots of two runs, up to which they are wide
 PLOT, NARROW = 400.0, 200.0  # [points], widths of plots on a usual screen
+STATUS, LANES = 0.13, 0.17  # of the height of the right side, for the states of one run and of two
 LEAST_LEGEND, MOST_LEGEND = 0.15, 0.6  # of the run's time, left free after the curves for the legend
 
 
@@ -55,9 +57,7 @@ def single(
             rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], timeline, [run]) for group in found]))
     if forces:
         width = NARROW if len(forces) > len(KINDS) else PLOT
-        views = [plot(group.title, [("", group)], timeline, [run], width) for group in forces]
-        abreast = -(-len(views) // -(-len(views) // ABREAST))  # so that rows are of about the same length
-        rows += [rrb.Horizontal(*views[k : k + abreast]) for k in range(0, len(views), abreast)]
+        rows += _abreast([plot(group.title, [("", group)], timeline, [run], width) for group in forces])
     shares = [2.0] * len(rows)
     if solver:
         rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], timeline, [run], NARROW) for group in solver]))
@@ -65,7 +65,7 @@ def single(
     has_motion = bool(run.outputs) or any(one.scene for one in drawn)
     if has_motion:
         rows.append(status_view([""], timeline, [run]))
-        shares.append(1.0)
+        shares.append(STATUS * sum(shares) / (1.0 - STATUS) if shares else 1.0)
     linked = [linkage_view([one.root], timeline, [one.run], [one.scene], one.title) for one in drawn]
     linkages = (linked[0] if len(linked) == 1 else rrb.Grid(*linked)) if has_motion and linked else None
     left = _left(linkages, [""], [run])
@@ -79,12 +79,21 @@ def compared(
     scenes: Sequence[Scene | None],
     curves: Sequence[Mapping[tuple[str, str], Group]],
     difference: Mapping[tuple[str, str], Group],
+    loads: Sequence[Mapping[str, Group]],
+    loaded: Sequence[Group],
 ) -> rrb.Blueprint:
-    """Return the layout of two runs: curves overlaid, and below the differences of their common coordinates."""
+    """Return the layout of two runs: curves overlaid, and below the differences of what they have in common.
+
+    loads: efforts, energies, reactions and signals of both runs; loaded: their differences that are visible.
+    """
     import rerun.blueprint as rrb
 
     overlaid = [row for order in ORDERS if (row := _overlaid(order, timeline, runs, curves))]
-    rows: list[rrb.Container | rrb.View] = [*overlaid[:1]]
+    of_loads = [_both(path, timeline, runs, loads) for path in dict.fromkeys([*loads[0], *loads[1]])]
+    rows: list[rrb.Container | rrb.View] = [*overlaid[:1]] if difference or not loaded else []
+    most = 2 if len(loaded) <= FEW else ABREAST - 1  # titles of comparisons are long
+    if not rows:
+        rows += _abreast([_both(group.path, timeline, runs, loads) for group in loaded], most)
     for order in ORDERS:
         found = [difference[order, kind] for kind in KINDS if (order, kind) in difference]
         if found:
@@ -93,12 +102,32 @@ def compared(
                     *[plot(f"B - A: {group.title}", [("/difference", group)], timeline, runs) for group in found]
                 )
             )
+    width = NARROW if len(loaded) > len(KINDS) else PLOT
+    rows += _abreast(
+        [plot(f"B - A: {group.title}", [("/difference", group)], timeline, runs, width) for group in loaded], most
+    )
     rows.append(status_view(["/a", "/b"], timeline, runs))
     left = _left(linkage_view(["/a/linkage", "/b/linkage"], timeline, runs, scenes), ["/a", "/b"], runs)
-    apart = rrb.Vertical(*rows, row_shares=[2.0] * (len(rows) - 1) + [1.6], name="B - A")
-    both = rrb.Vertical(*overlaid, name="A and B")
+    plots = len(rows) - 1
+    status = 2.0 * plots * LANES / (1.0 - LANES) or 1.0
+    apart = rrb.Vertical(*rows, row_shares=[2.0] * plots + [status], name="B - A")
+    both = rrb.Vertical(*overlaid, *_abreast(of_loads, ABREAST - 1), name="A and B")
     right = rrb.Tabs(apart, both)
     return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), timeline, runs)
+
+
+def _abreast(views: Sequence[rrb.View], most: int = ABREAST) -> list[rrb.Container]:
+    """Return rows of at most so many views, of about the same length."""
+    import rerun.blueprint as rrb
+
+    abreast = -(-len(views) // -(-len(views) // most)) if views else 1
+    return [rrb.Horizontal(*views[k : k + abreast]) for k in range(0, len(views), abreast)]
+
+
+def _both(path: str, timeline: Timeline, runs: tuple[Run, Run], loads: Sequence[Mapping[str, Group]]) -> rrb.View:
+    """Return a plot of the efforts of one unit of both runs."""
+    pair = [(root, of[path]) for root, of in zip(("/a", "/b"), loads, strict=True) if path in of]
+    return plot(f"{pair[0][1].title} of A (wide) and B", pair, timeline, runs, NARROW)
 
 
 def _left(linkage: rrb.View | rrb.Container | None, roots: Sequence[str], runs: Sequence[Run]) -> rrb.Container:

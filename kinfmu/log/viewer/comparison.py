@@ -13,6 +13,7 @@ from kinfmu.log.cdr import nanoseconds
 from kinfmu.log.viewer.blueprint import compared
 from kinfmu.log.viewer.card import plain
 from kinfmu.log.viewer.decimated import decimated
+from kinfmu.log.viewer.differences import common, difference_of, differs, loads_of, most_apart, parameters_apart
 from kinfmu.log.viewer.linkage import Linkage
 from kinfmu.log.viewer.rerun_file import application, left_out, log_card, log_group, log_status, recording
 from kinfmu.log.viewer.series import Group, groups
@@ -22,9 +23,9 @@ from kinfmu.run.axis import axis_of
 from kinfmu.run.verdict import sentence
 from kinfmu.scene import palette
 from kinfmu.scene.scene import drawable
-from kinfmu.units import CoordinateName
 
 MOST_LISTED = 6  # coordinates that a line names
+MOST_ROWS = 10  # efforts of the card's table
 
 
 class _Look(NamedTuple):
@@ -64,22 +65,31 @@ def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = 
     for run in (a, b):
         nanoseconds(run.t)
     timeline = _in_common(a, b, path)
-    difference = _difference(a, b)
+    difference = difference_of(a, b)
     shown = [timeline.placed(decimated(run)) for run in (a, b)]
     scenes, notes = zip(*(drawable(run) for run in shown), strict=True)
     apart = timeline.placed(decimated(difference)) if difference else None
     differences = groups(apart) if apart else {}
     curves = [groups(run) for run in shown]
-    layout = compared(timeline, (shown[0], shown[1]), scenes, curves, differences)
-    own_name = application(shown, [group for found in (*curves, differences) for group in found.values()])
+    loads = [{group.path: group for group in loads_of(run)} for run in shown]
+    load_differences = {group.path: group for group in loads_of(apart)} if apart else {}
+    moved = {key: group for key, group in differences.items() if differs(group, curves[0].get(key))}
+    loaded = [group for path, group in load_differences.items() if differs(group, loads[0].get(path))]
+    layout = compared(
+        timeline, (shown[0], shown[1]), scenes, curves, moved or ({} if loaded else differences), loads, loaded
+    )
+    in_views = [group for found in (*curves, differences) for group in found.values()]
+    own_name = application(shown, [*in_views, *loads[0].values(), *loads[1].values(), *moved.values(), *loaded])
     with recording(path, f"{names[0]} and {names[1]}", layout, own_name) as rec:
-        for run, drawn, scene, own, look in zip((a, b), shown, scenes, curves, _LOOKS, strict=True):
+        for number, (run, drawn, scene, own, look) in enumerate(
+            zip((a, b), shown, scenes, curves, _LOOKS, strict=True)
+        ):
             if scene:
                 Linkage(rec, f"{look.root}/linkage", timeline, drawn, scene, look.colour, look.bars, look.layer).log()
-            for group in own.values():
+            for group in (*own.values(), *loads[number].values()):
                 log_group(rec, look.root, timeline, drawn, _named(group, look), look.curves)
             log_status(rec, look.root, timeline, timeline.placed(run))
-        for group in differences.values():
+        for group in (*differences.values(), *load_differences.values()):
             log_group(rec, "/difference", timeline, apart or a, group)
         decimation = [
             f"{look.name}: {text}"
@@ -99,49 +109,16 @@ def _in_common(a: Run, b: Run, path: str | Path) -> Timeline:
 
 def in_common(a: Run, b: Run, names: tuple[str, str] = ("A", "B")) -> str:
     """Return a line that states which coordinates two runs have in common; '' if both have the same coordinates."""
-    common = _common(a, b)
-    if len(common) == len(a.outputs) == len(b.outputs):
+    shared = common(a, b)
+    if len(shared) == len(a.outputs) == len(b.outputs):
         return ""
-    if not common:
+    if not shared:
         return f"{names[0]} and {names[1]} have no coordinates in common, so there are no differences to show"
-    shown = listed([*common[:MOST_LISTED], *["..."][: len(common) > MOST_LISTED]])
+    shown = listed([*shared[:MOST_LISTED], *["..."][: len(shared) > MOST_LISTED]])
     return (
-        f"{names[0]} and {names[1]} have {len(common)} of {len(a.outputs)} and {len(b.outputs)} coordinates in common, "
+        f"{names[0]} and {names[1]} have {len(shared)} of {len(a.outputs)} and {len(b.outputs)} coordinates in common, "
         f"whose differences are shown: {shown}"
     )
-
-
-def _common(a: Run, b: Run) -> list[CoordinateName]:
-    return [name for name in a.outputs if name in b.outputs]
-
-
-def _difference(a: Run, b: Run) -> Run | None:
-    """Return B - A of the common coordinates at the times, or driver values, of A; None if there are none.
-
-    Where the times differ, B is interpolated linearly, with an error of at most h^2 / 8 times the second derivative.
-    """
-    common = _common(a, b)
-    if not common or not len(a) or not len(b):
-        return None
-    at = axis_of(a).values
-    of_a, of_b = ([run.outputs.index(name) for name in common] for run in (a, b))
-    tables = {
-        key: _at(at, axis_of(b).values, getattr(b, key)[:, of_b]) - getattr(a, key)[:, of_a]
-        for key in ("values", "rates", "accelerations")
-    }
-    absent = a.absent | b.absent
-    return dataclasses.replace(a, outputs=tuple(common), coordinate_count=len(common), absent=absent, **tables)
-
-
-def _at(times: FloatArray, t: FloatArray, table: FloatArray) -> FloatArray:
-    """Return the columns of a table (n, k), given at t, at other times; NaN outside the range of t."""
-    if np.array_equal(times, t):
-        return table
-    if len(t) > 1 and np.all(np.diff(t) < 0.0):
-        t, table = t[::-1], table[::-1]
-    if np.any(np.diff(t) <= 0.0):
-        raise LogError("the runs have different times, and B cannot be interpolated because its times do not increase")
-    return np.column_stack([np.interp(times, t, column, left=np.nan, right=np.nan) for column in table.T])
 
 
 def _named(group: Group, look: _Look) -> Group:
@@ -160,12 +137,16 @@ def _card(a: Run, b: Run, difference: Run | None, names: tuple[str, str], notes:
         "",
         *[plain(note) for note in notes],
     ]
-    if common := in_common(a, b):
-        lines += ["", f"{plain(common)}.", ""]
+    if changed := parameters_apart(a, b):
+        rows = [f"| {plain(name)} | {plain(one)} | {plain(other)} |" for name, one, other in changed]
+        lines += ["", "| parameter | A | B |", "|---|---:|---:|", *rows, ""]
+    if shared := in_common(a, b):
+        lines += ["", f"{plain(shared)}.", ""]
     if difference is None:
         return "\n".join(lines)
     if not np.array_equal(axis_of(a).values, axis_of(b).values):
         lines += [f"{_differ(a)}: B is interpolated linearly at those of A.", ""]
+    lines += _loads(a, difference)
     apart, equal = [], []
     for k, name in enumerate(difference.outputs):
         tables = (difference.values, difference.rates, difference.accelerations)
@@ -179,6 +160,31 @@ def _card(a: Run, b: Run, difference: Run | None, names: tuple[str, str], notes:
     if equal:
         lines += [f"Equal in both: {', '.join(equal)}.", ""]
     return "\n".join(lines)
+
+
+def _loads(a: Run, difference: Run) -> list[str]:
+    """Return a table of the efforts, reactions and signals that differ most, and the number of the others."""
+    found = most_apart(a, difference)
+    if not found:
+        return []
+    rows = [
+        f"| {plain(one.name)} | {one.largest:.3g} {'' if one.unit == '1' else one.unit} | {_percent(one.part)} |"
+        for one in found[:MOST_ROWS]
+    ]
+    more = len(found) - MOST_ROWS
+    rest = [f"{more} more differ less.", ""] if more > 0 else []
+    return [
+        "",
+        "| effort or reaction | largest difference | of its largest value in A |",
+        "|---|---:|---:|",
+        *rows,
+        "",
+        *rest,
+    ]
+
+
+def _percent(part: float) -> str:
+    return f"{100.0 * part:.2g} %" if part < np.inf else "-"
 
 
 def _differ(run: Run) -> str:

@@ -20,6 +20,7 @@ from kinfmu.run import Run
 from kinfmu.run.channels import select
 from kinfmu.units import CoordinateName
 from tests.log.runs import KINDS, fourbar, without_samples
+from tests.sweep.test_forces import loaded
 
 SCALARS, STRIPS = "Scalars:scalars", "LineStrips2D:strips"
 
@@ -194,6 +195,32 @@ def test_the_card_of_a_comparison_lists_what_differs_and_names_what_is_equal(run
     assert "| A.x | 0.25 | 0 | 0 |" in text
     assert "Equal in both: crank.phi, coupler.x, coupler.y, coupler.phi, rocker.phi, A.y." in text
     assert "coupler.x |" not in text
+
+
+def test_runs_that_differ_in_forces_only_are_compared_by_their_forces(tmp_path: Path) -> None:
+    times = np.linspace(0.0, 0.1, 21)
+    light = loaded("slider_crank")
+    heavy = dataclasses.replace(light, gravity=(2.0 * light.gravity[0], 2.0 * light.gravity[1]))
+    a, b = (
+        dataclasses.replace(kinfmu.solve(one, times), info={"name": "x", "g": str(k)})
+        for k, one in enumerate((light, heavy), 1)
+    )
+    write_comparison(a, b, tmp_path / "compare.rrd")
+    (text,) = documents(tmp_path / "compare.rrd", "/card")
+    assert "| parameter | A | B |\n|---|---:|---:|\n| g | 1 | 2 |" in text
+    apart = b["crank.torque"] - a["crank.torque"]
+    largest, part = np.abs(apart).max(), np.abs(apart).max() / np.abs(a["crank.torque"]).max()
+    assert f"| crank.torque | {largest:.3g} N m | {100.0 * part:.2g} % |" in text
+    assert "| kinetic" not in text
+    parts = [float(line.split("|")[3].strip(" %")) for line in text.splitlines() if line.endswith("% |")]
+    assert parts == sorted(parts, reverse=True)
+    assert len(parts) > 3
+    found = rows(tmp_path / "compare.rrd", "/difference/forces/torque", SCALARS)
+    np.testing.assert_allclose([value for _, (value,) in found], apart, rtol=1e-12, atol=1e-15)
+    assert {"/a/forces/torque", "/b/reactions/force", "/difference/reactions/force"} <= entities(
+        tmp_path / "compare.rrd"
+    )
+    assert verified(tmp_path / "compare.rrd")
 
 
 def test_runs_of_different_times_are_compared_by_interpolation(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 
@@ -42,6 +43,13 @@ def _loaded(path: Path) -> None:
     write_rrd(kinfmu.solve(loaded("slider_crank"), np.linspace(0.0, 0.1, 21)), path)
 
 
+def _forces(path: Path) -> None:
+    """Two runs that differ in their forces only: no plot shows zeros."""
+    light = loaded("slider_crank")
+    heavy = dataclasses.replace(light, gravity=(2.0 * light.gravity[0], 2.0 * light.gravity[1]))
+    write_comparison(*(kinfmu.solve(one, np.linspace(0.0, 0.1, 21)) for one in (light, heavy)), path)
+
+
 @pytest.mark.parametrize(
     ("name", "write", "views"),
     [
@@ -50,6 +58,7 @@ def _loaded(path: Path) -> None:
         ("selected.rrd", _selected, {"linkage", "angle [rad]", "solver status"}),
         ("loaded.rrd", _loaded, {"linkage", "crank.torque [N m]", "crank.power [W]", "energy [J]"}),
         ("compared.rrd", _compared, {"linkage", "B - A: position [m]", "position [m] of A (wide) and B"}),
+        ("forces.rrd", _forces, {"crank.torque [N m] of A (wide) and B", "B - A: crank.torque [N m]", "solver status"}),
     ],
 )
 def test_no_view_reports_an_error(
@@ -60,6 +69,7 @@ def test_no_view_reports_an_error(
     shot = viewer.glance()
     assert shot.reports == ()
     assert views <= set(shot.views)
+    assert ("B - A: position [m]" in shot.views) == (name == "compared.rrd")
     assert shot.png.startswith(b"\x89PNG")
 
 

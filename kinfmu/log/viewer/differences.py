@@ -1,0 +1,123 @@
+"""Differences of two runs: B - A of what both have, the parameters that differ, and the efforts that differ most."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from kinfmu.errors import LogError
+from kinfmu.log.viewer.reactions import reactions
+from kinfmu.log.viewer.series import Group, efforts, signals
+from kinfmu.run import FloatArray, Run
+from kinfmu.run.axis import axis_of
+from kinfmu.units import CoordinateName, ForceName, SignalName, unit_of
+
+SAME = 1e-9  # of the largest value; smaller differences are not visible
+_TEXTS = ("name", "title", "token", "engine", "generation_tool")  # of a run's info, which are no parameters
+
+
+class Apart(NamedTuple):
+    """The largest difference of a column, with its unit, and relative to the column's largest value."""
+
+    name: str
+    largest: float
+    unit: str
+    part: float
+
+
+def common(a: Run, b: Run) -> list[CoordinateName]:
+    """Return the coordinates that both runs have."""
+    return [name for name in a.outputs if name in b.outputs]
+
+
+def difference_of(a: Run, b: Run) -> Run | None:
+    """Return B - A of common coordinates, forces and signals at the times, or driver values, of A; None without any.
+
+    Where the times differ, B is interpolated linearly, with an error of at most h^2 / 8 times the second derivative.
+    """
+    both = common(a, b)
+    if not both or not len(a) or not len(b):
+        return None
+    at = axis_of(a).values
+    tables: dict[str, Any] = {}
+    for key in ("values", "rates", "accelerations"):
+        tables[key] = _apart(a, b, at, key, [run.outputs for run in (a, b)], both)
+    for names_key, key in (("force_names", "forces"), ("reaction_names", "reactions"), ("signal_names", "signals")):
+        names = [getattr(run, names_key) for run in (a, b)]
+        shared = tuple(name for name in names[0] if name in names[1])
+        has_both = getattr(a, key) is not None and getattr(b, key) is not None
+        tables[names_key] = shared if has_both else ()
+        tables[key] = _apart(a, b, at, key, names, shared) if has_both and shared else None
+    absent = a.absent | b.absent
+    counted = {"outputs": tuple(both), "coordinate_count": len(both), "absent": absent, "shaking": None}
+    return dataclasses.replace(a, **counted, **tables)  # type: ignore[arg-type]  # of several types
+
+
+def _apart(
+    a: Run, b: Run, at: FloatArray, key: str, names: Sequence[Sequence[str]], shared: Sequence[str]
+) -> FloatArray:
+    """Return B - A of the shared columns of a table."""
+    of_a, of_b = ([own.index(name) for name in shared] for own in names)
+    of_b_there = _at(at, axis_of(b).values, np.asarray(getattr(b, key))[:, of_b])
+    return np.asarray(of_b_there - np.asarray(getattr(a, key))[:, of_a])
+
+
+def _at(times: FloatArray, t: FloatArray, table: FloatArray) -> FloatArray:
+    """Return the columns of a table (n, k), given at t, at other times; NaN outside the range of t."""
+    if np.array_equal(times, t):
+        return table
+    if len(t) > 1 and np.all(np.diff(t) < 0.0):
+        t, table = t[::-1], table[::-1]
+    if np.any(np.diff(t) <= 0.0):
+        raise LogError("the runs have different times, and B cannot be interpolated because its times do not increase")
+    return np.column_stack([np.interp(times, t, column, left=np.nan, right=np.nan) for column in table.T])
+
+
+def loads_of(run: Run) -> list[Group]:
+    """Return efforts, energies, reactions and signals of a run, one group for each unit."""
+    return [*efforts(run), *reactions(run), *signals(run)]
+
+
+def differs(group: Group, own: Group | None) -> bool:
+    """Return True if a difference is visible, compared with the curves of a run itself."""
+    return own is None or _size(group.values) > SAME * _size(own.values)
+
+
+def parameters_apart(a: Run, b: Run) -> list[tuple[str, str, str]]:
+    """Return the parameters that differ with their values in both runs, '-' where a run has none."""
+    names = dict.fromkeys(name for name in (*a.info, *b.info) if name not in _TEXTS and "\n" not in name)
+    pairs = [(name, a.info.get(name, "-"), b.info.get(name, "-")) for name in names]
+    return [(name, _short(one), _short(other)) for name, one, other in pairs if one != other]
+
+
+def most_apart(a: Run, difference: Run) -> list[Apart]:
+    """Return forces, reactions and signals that differ, those that differ most of their size first."""
+    found = []
+    names: tuple[ForceName | SignalName, ...] = (
+        *difference.force_names,
+        *difference.reaction_names,
+        *difference.signal_names,
+    )
+    for name in names:
+        if name in difference.absent:
+            continue
+        largest, size = (_size(np.where(a.good, run[name], np.nan)) for run in (difference, a))
+        if largest > SAME * size:
+            unit = name.unit if isinstance(name, SignalName) else unit_of(name.quantity, a.length_unit)
+            found.append(Apart(name, largest, unit, largest / size if size else np.inf))
+    return sorted(found, key=lambda one: -one.part)
+
+
+def _size(values: FloatArray) -> float:
+    return float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
+
+
+def _short(value: str) -> str:
+    """Return a number with six digits; other texts as they are."""
+    try:
+        return f"{float(value):.6g}"
+    except ValueError:
+        return value
