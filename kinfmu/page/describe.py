@@ -27,6 +27,8 @@ from kinfmu.mechanism.force_names import force_names, reaction_names_of
 from kinfmu.mechanism.members import NumberPath
 from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.toml_text import text
+from kinfmu.page.cams import CAM_SHAPES, cam_data
+from kinfmu.page.dependencies import dependent_points, parameters_of
 from kinfmu.page.module import PageModule
 from kinfmu.page.opened import AXES, place_text
 from kinfmu.plan.undetermined import undetermined_reactions
@@ -60,6 +62,7 @@ def describe(mechanism: Mechanism, report: Report) -> dict[str, Any]:
     for shape in shapes(shown):
         slide = next(along[shape.frame]) if shape.kind == "rod" else lines.get(shape.name)
         found.append(_shape(shown, shape, numbers) | _line(shape, slide, numbers))
+    cams = {shape["name"] for shape in found if shape["kind"] in CAM_SHAPES}
     bodies = [GROUND_NAME, *(body.name for body in mechanism.moving_bodies)]
     return {
         "name": mechanism.name,
@@ -79,6 +82,7 @@ def describe(mechanism: Mechanism, report: Report) -> dict[str, Any]:
             for k, (name, point) in enumerate(mechanism.points.items())
         ],
         "loads": [_load(load, numbers) for load in mechanism.loads],
+        "cams": [cam_data(mechanism, joint, numbers) for joint in shown.joints if joint.name in cams],
         "shapes": [shape for shape in found if shape["kind"] not in _NOT_DRAWN],
         "loops": list(_loops(report, numbers)),
         "notes": list(report.notes),
@@ -91,7 +95,7 @@ def module_data(module: PageModule, places: Mapping[str, NumberPath]) -> dict[st
     """Return the text of a module and what its numbers are; places: of parameters for plain numbers of the file."""
     mechanism, plan = module.plan.mechanism, module.plan
     unit = mechanism.length_unit
-    users = _users(mechanism)
+    users = dependent_points(mechanism)
     quantities = {str(name): name.quantity for name in (*force_names(mechanism), *reaction_names_of(mechanism))}
     parameters = [
         _parameter(one.name, one.value, one.quantity, unit, description=one.description, place=places.get(one.name))
@@ -149,35 +153,9 @@ def _parameter(
     }
 
 
-def _users(mechanism: Mechanism) -> dict[str, list[str]]:
-    """Return for each parameter the points 'body.point' whose coordinates depend on it."""
-    found: dict[str, list[str]] = {}
-    for place, expression in mechanism.expressions.items():
-        if place[0] != "bodies" or place[2] != "points":
-            continue
-        for name in _behind(mechanism, expression):
-            point = f"{place[1]}.{place[3]}"
-            if point not in found.setdefault(name, []):
-                found[name].append(point)
-    return found
-
-
-def _behind(mechanism: Mechanism, expression: Expression) -> set[str]:
-    """Return the parameters on which an expression depends."""
-    names, seen = list(expression.names), set()
-    while names:
-        name = names.pop()
-        if name not in seen:
-            seen.add(name)
-            other = mechanism.parameters[name].expression
-            names += other.names if other else ()
-    return seen
-
-
 def _numbers(mechanism: Mechanism, joint: Joint) -> dict[str, Any]:
     """Return the parameters on which numbers of a joint depend; nothing if there are none."""
-    of_joint = [one for place, one in mechanism.expressions.items() if place[:2] == ("joints", joint.name)]
-    names = sorted({name for expression in of_joint for name in _behind(mechanism, expression)})
+    names = parameters_of(mechanism, joint)
     return {"numbers": names} if names else {}
 
 
@@ -318,7 +296,7 @@ def _shape(shown: Instant, shape: Shape, numbers: Mapping[str, int]) -> dict[str
             None,
         )
         if pole is not None:  # the file has the pitch curve itself, not what the roller does
-            found |= {"anchor": numbers[pole], "hasCurve": True}
+            found["anchor"] = numbers[pole]
     if shape.kind.startswith("die") or shape.frame.startswith("die."):
         (joint,) = (one for one in shown.joints if f"die.{one.name}" == shape.frame)
         point = joint.of if isinstance(joint, Coordinate) else joint.between[1]  # type: ignore[attr-defined]

@@ -24,6 +24,7 @@ _SCRIPTS = (
     "pen",
     "view",
     "engine",
+    "cams",
     "forms",
     "ranges",
     "branches",

@@ -26,9 +26,10 @@ def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
         yield opened
 
 
-def test_page_is_one_small_file_without_addresses() -> None:
-    text = text_of("jansen_leg")
-    assert len(text.encode()) <= LARGEST
+@pytest.mark.parametrize("name", ["crank_rocker", "jansen_leg", "excavator"])
+def test_page_is_one_small_file_without_addresses(name: str) -> None:
+    text = text_of(name)
+    assert 200_000 <= len(text.encode()) <= LARGEST
     outside = text.replace("http://www.w3.org/2000/svg", "")
     assert "http://" not in outside
     assert "https://" not in outside

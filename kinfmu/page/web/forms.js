@@ -1,20 +1,23 @@
-// Shapes after a change of lengths: slides, wheels, racks and cylinders follow; what the page cannot know is left out.
+// Shapes after a change of lengths: slides, wheels, racks, cams and cylinders follow; what the page cannot know is left out.
 
+import { camsOf, isJointChanged, OF_CAMS } from "./cams.js";
 import { distance, placed, seen } from "./geometry.js";
 
 const POSES = 120; // that decide how far slides reach
 const BEYOND = 0.35; // of the pinion's radius, additional length at both ends of a rack
 const OF_SHORTEST = 0.9; // of the shortest length of a cylinder, its longest barrel; the rod stays in it by the rest
 export const CAMS = ["cam", "pitch"]; // closed curves of a cam: its profile, and the path of the roller's centre on it
-const OF_JOINTS = ["wheel", "spoke", "belt", "rack", "cam", "pitch", "roller"]; // whose size follows from numbers of their joint
+const OF_JOINTS = ["wheel", "spoke", "belt", "rack"]; // whose size follows from numbers of their joint
 
-// Return the shapes to draw with the lengths as set; those of the file if none is changed.
+// Return the shapes to draw with the lengths as set, those of the file if none is changed, and in words what is left out.
 export function formsOf(linkage) {
     const { shapes } = linkage.data;
-    if (!linkage.isChanged) return shapes;
+    if (!linkage.isChanged) return { shapes, leftOut: [] };
     const tracks = tracksOf(linkage, shapes);
-    const isKnown = (shape) => !OF_JOINTS.includes(shape.kind) || (!isJointChanged(linkage, shape.name) && (!CAMS.includes(shape.kind) || shape.hasCurve));
-    return shapes.filter(isKnown).map((shape) => {
+    const cams = camsOf(linkage);
+    const unknown = shapes.filter((shape) => OF_JOINTS.includes(shape.kind) && isJointChanged(linkage, shape.name));
+    const isKept = (shape) => !unknown.includes(shape) && !(OF_CAMS.includes(shape.kind) && cams.some(({ name }) => name === shape.name));
+    const kept = shapes.filter(isKept).map((shape) => {
         if (shape.line) return ofSlide(linkage, shape, tracks.get(shape));
         if (shape.kind === "rack") return ofRack(linkage, shape, tracks.get(shape));
         if (shape.kind === "wheel" || shape.kind === "spoke") return scaled(shape, growth(linkage, shape.name));
@@ -22,12 +25,11 @@ export function formsOf(linkage) {
         if (shape.kind === "barrel" || shape.kind === "shaft") return ofCylinder(linkage, shape);
         return shape;
     });
-}
-
-function isJointChanged(linkage, name) {
-    const joint = linkage.data.joints.find((one) => one.name === name);
-    const isOwn = (one) => one.name.startsWith(`joints.${name}.`) || joint?.numbers?.includes(one.name);
-    return linkage.parameters.some((one) => isOwn(one) && linkage.bound.get(one.name) !== one.value);
+    const wheels = [...new Set(unknown.map(({ name }) => name))].map((name) => `the wheels of ${name}, whose numbers are changed`);
+    return {
+        shapes: [...kept, ...cams.flatMap((cam) => cam.shapes)],
+        leftOut: [...wheels, ...cams.map((cam) => cam.leftOut).filter(Boolean)],
+    };
 }
 
 // Return for each shape that depends on a path the places of its point in the frame of its holder, over the range.

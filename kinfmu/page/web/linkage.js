@@ -279,7 +279,7 @@ export class Linkage {
     findRanges() {
         Object.assign(this, rangesOf(this));
         this.changePoints = changePointsOf(this);
-        this.shapes = formsOf(this);
+        Object.assign(this, formsOf(this));
         this.shapesOf = grouped(this.shapes, (shape) => shape.kind);
     }
 

@@ -121,6 +121,8 @@ class Page {
     #readouts() {
         this.transport.update();
         const { design, linkage, motion } = this;
+        $("note").hidden = !linkage.leftOut.length;
+        $("note").textContent = `Not drawn with these values: ${linkage.leftOut.join("; ")}. kinfmu check --figure draws the saved file.`;
         $("undo").disabled = !design.past.length;
         $("redo").disabled = !design.future.length;
         $("reset").disabled = !design.changes().length;

@@ -1,0 +1,39 @@
+"""Which points and numbers of a mechanism depend on which of its parameters."""
+
+from __future__ import annotations
+
+from kinfmu.joints.joint import Joint
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.expression import Expression
+
+
+def dependent_points(mechanism: Mechanism) -> dict[str, list[str]]:
+    """Return for each parameter the points 'body.point' whose coordinates depend on it."""
+    found: dict[str, list[str]] = {}
+    for place, expression in mechanism.expressions.items():
+        if place[0] != "bodies" or place[2] != "points":
+            continue
+        for name in parameters_behind(mechanism, expression):
+            point = f"{place[1]}.{place[3]}"
+            if point not in found.setdefault(name, []):
+                found[name].append(point)
+    return found
+
+
+def parameters_of(mechanism: Mechanism, joint: Joint, key: str = "") -> list[str]:
+    """Return the parameters on which numbers of a joint depend, or only the number of a key."""
+    path = ("joints", joint.name, key) if key else ("joints", joint.name)
+    found = [one for place, one in mechanism.expressions.items() if place[: len(path)] == path]
+    return sorted({name for expression in found for name in parameters_behind(mechanism, expression)})
+
+
+def parameters_behind(mechanism: Mechanism, expression: Expression) -> set[str]:
+    """Return the parameters on which an expression depends."""
+    names, seen = list(expression.names), set()
+    while names:
+        name = names.pop()
+        if name not in seen:
+            seen.add(name)
+            other = mechanism.parameters[name].expression
+            names += other.names if other else ()
+    return seen
