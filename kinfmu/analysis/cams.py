@@ -28,7 +28,7 @@ from kinfmu.cams.profile import TURN, angles_within, profile_at
 from kinfmu.cams.traced import traced
 from kinfmu.drivers import Driver
 from kinfmu.errors import KinfmuError, MechanismError, RequestError, listed, suggestion
-from kinfmu.joints import CamFlatFace
+from kinfmu.joints import CamFlatFace, CamOscillating, CamTranslating
 from kinfmu.laws import MotionSequence
 from kinfmu.measures import AngleBetween
 from kinfmu.mechanism import Mechanism
@@ -117,10 +117,15 @@ class CamFindings:
         worst = self.steepest
         if worst is None or self.cam is None or abs(worst.value) <= self.limit + 1e-9:
             return ""
-        kind = "translating" if self.cam.pivot is None else "swinging"
+        kind, cure = "translating" if self.cam.pivot is None else "swinging", "a larger base circle lowers it"
+        other = with_opposite_lift(self.cam)
+        if other is not None and other < abs(worst.value):
+            cure = (
+                f"the lift moves the follower towards the cam: with rises of the opposite sign it is {degrees(other)}"
+            )
         return (
             f"cam '{self.joint}': pressure angle {degrees(worst.value)} ({self.place(worst.at)}) is above "
-            f"{degrees(self.limit)}, the usual limit of {kind} followers; a larger base circle lowers it"
+            f"{degrees(self.limit)}, the usual limit of {kind} followers; {cure}"
         )
 
     def problem(self) -> MechanismError | None:
@@ -194,6 +199,22 @@ class CamFindings:
                 "face": None if found.width is None else {"low": one(found.width[0]), "high": one(found.width[1])},
             }
         return {"joint": self.joint, "element": self.element, "driver": self.driver, **values}
+
+
+def with_opposite_lift(cam: PlacedCam) -> float | None:
+    """Return the largest pressure angle with the opposite lift [rad]; None for lifts away from the cam, or unknown."""
+    joint = cam.joint
+    if not isinstance(joint, CamTranslating | CamOscillating) or not isinstance(law := joint.law, MotionSequence):
+        return None
+    lifts = np.cumsum([segment.rise for segment in law.segments]) * pressing_sign(cam)
+    if -lifts.min() <= lifts.max():
+        return None
+    opposite = replace(law, segments=tuple(segment._replace(rise=-segment.rise) for segment in law.segments))
+    try:
+        found = critical_values(replace(cam, joint=replace(joint, law=opposite)))
+    except MechanismError:
+        return None
+    return max(abs(extreme.value) for extreme in found.pressure)
 
 
 def cam_profile(

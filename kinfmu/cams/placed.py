@@ -112,10 +112,8 @@ def placed_cam(mechanism: Mechanism, joint: CamJoint, poses: Mapping[str, tuple[
 
 def members_of(joint: CamJoint) -> tuple[str, str, str | None]:
     """Return cam and follower, and the follower's point that is the roller's centre or on the face; None if unknown."""
-    if isinstance(joint, CamTranslating):
-        return joint.cam, body_of(joint.between[1]), joint.between[1]
-    if isinstance(joint, CamOscillating):
-        return joint.cam, joint.between[1], joint.contact
+    if isinstance(joint, CamTranslating | CamOscillating):
+        return joint.cam, joint.bodies()[1], joint.touching()
     return body_of(joint.between[0]), body_of(joint.between[1]), joint.between[1]
 
 

@@ -111,7 +111,11 @@ class CamTranslating(Cam):
     name: str
     between: Annotated[PointPair, "a point of body i, which holds cam and guide, then a point of the follower j"]
     cam: Annotated[BodyName, "the cam, body k"]
-    law: Annotated[Law, "lift f over the cam's angle [length over rad]"]
+    law: Annotated[
+        Law,
+        "lift f over the cam's angle [length over rad]; away from the cam it is positive if the axis points from the "
+        "cam to the follower",
+    ]
     axis: Annotated[Radians, "direction e of the lift in i's frame [rad]"] = 0.0
     offset: Annotated[Length, "position of the follower where the lift is 0 [length]"] = 0.0
     roller_radius: RollerRadius = None
@@ -143,7 +147,11 @@ class CamOscillating(Cam):
     name: str
     between: Annotated[BodyPair, "body i, which holds both pivots, then the follower j"]
     cam: Annotated[BodyName, "the cam, body k"]
-    law: Annotated[Law, "lift f over the cam's angle [rad over rad]"]
+    law: Annotated[
+        Law,
+        "lift f over the cam's angle [rad over rad]; away from the cam it is positive if the cam is to the right, seen "
+        "from the pivot towards the contact, else negative",
+    ]
     offset: Annotated[Radians, "angle of the follower where the lift is 0 [rad]"] = 0.0
     contact: Annotated[
         str | None, Reference("point"), "centre of the roller, or a point of the flat face, on the follower"

@@ -17,6 +17,7 @@ import kinfmu
 from kinfmu.cams import PlacedCam, critical
 from kinfmu.cams.traced import Traced
 from kinfmu.errors import KinfmuError, MechanismError, RequestError
+from kinfmu.joints import CamOscillating
 from kinfmu.page.describe import describe
 from kinfmu.readings import PressureAngle
 from tests.cams import followers
@@ -294,7 +295,7 @@ def test_pages_hold_flat_faces_and_cams_that_cannot_be_made(made: Any) -> None:
     mechanism = made()
     found = describe(mechanism, kinfmu.check(mechanism))
     kinds = {shape["kind"]: shape for shape in found["shapes"] if shape["name"] == "lift"}
-    assert ("cam" in kinds) == ("rod" in kinds) == (made is followers.lifted_face)
+    assert ("cam" in kinds) == ("face" in kinds) == (made is followers.lifted_face)
     assert "line" not in kinds.get("rod", {})
 
 
@@ -304,6 +305,28 @@ def test_check_reports_a_steep_cam_as_a_note() -> None:
     assert len(notes) == 1
     assert "above 30 deg, the usual limit of translating followers" in notes[0]
     assert not [note for note in kinfmu.check(followers.lifted_roller(8.0)).notes if "pressure angle" in note]
+
+
+@pytest.mark.parametrize("joint", ["swinging", "translating"])
+def test_the_note_on_a_steep_cam_names_a_wrong_sign_of_the_lift(joint: str) -> None:
+    """A rise towards the cam; the number of the opposite sign is that of the mended file."""
+
+    def made(sign: float) -> kinfmu.Mechanism:
+        if joint == "translating":
+            return followers.lifted_roller(2.0, followers.rise_and_return(sign * 15.0), offset=22.0)
+        law = followers.rise_and_return(sign * 0.5)
+        return followers.swinging(
+            CamOscillating("lift", ("ground", "follower"), "cam", law, -0.5, contact="follower.F", roller_radius=0.5)
+        )
+
+    outwards = 1.0 if joint == "translating" else -1.0
+    (note,) = (note for note in kinfmu.check(made(-outwards)).notes if "pressure angle" in note)
+    mended = kinfmu.cam_profile(made(outwards), "lift", np.linspace(0.0, math.tau, 7201)).pressure_angle
+    words = "the lift moves the follower towards the cam: with rises of the opposite sign it is "
+    assert words in note
+    assert float(note.partition(words)[2].removesuffix(" deg")) == pytest.approx(
+        math.degrees(np.abs(mended).max()), rel=1e-5
+    )
 
 
 def test_a_roller_that_cuts_the_profile_elsewhere_is_reported() -> None:
