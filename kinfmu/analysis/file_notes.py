@@ -51,16 +51,19 @@ def file_notes(mechanism: Mechanism) -> Iterator[str]:
     yield from _lengths_without_a_unit(mechanism)
     yield from _cams(mechanism)
     yield from _loads(mechanism)
-    large: list[tuple[NumberPath, float]] = []
+    large: dict[tuple[NumberPath, float], tuple[NumberPath, float]] = {}  # a rise and its return are one mistake
+    cams = {joint.name for joint in mechanism.joints if isinstance(joint, Cam)}
 
     def look(place: NumberPath, value: Any, quantity: Quantity) -> Any:
-        is_turns = "law" in place or place[0] == "drivers"  # may be many turns; multiples of 15 are probably degrees
+        # Those of laws may be many turns, but for cams; multiples of 15 are probably degrees.
+        is_turns = ("law" in place and place[1] not in cams) or place[0] == "drivers"
         if quantity == Quantity("angle") and abs(value) > _TURN and (not is_turns or looks_like_degrees(value)):
-            large.append((place, float(value)))
+            owner = place[:2] if "law" in place else place
+            large.setdefault((owner, abs(value)), (place, float(value)))
         return value
 
     mechanism.members.changed(look)
-    for place, value in large:
+    for place, value in large.values():
         yield (
             f"{path_text(place)} = {value:.6g} rad is {math.degrees(value):.6g} deg, more than a turn: "
             "a bare angle is in radians; degrees are written such as '60 deg'"

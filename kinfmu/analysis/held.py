@@ -66,6 +66,7 @@ def alone(plan: SolvePlan, number: int) -> SolvePlan:
             drivers=(mechanism.drivers[number],),
             coordinates="all",
             points={},
+            measures=(),  # they may read forces of the other drivers
         )
     )
 

@@ -60,6 +60,8 @@ def study(
     if workers is not None and dask not in (None, "local"):
         raise click.UsageError("--workers is for this machine; the Dask cluster has its own")
     defined = read_study(file, engine=engine)
+    for text in defined.notes:
+        note(text)
     target = output or Path(f"{file.stem}.parquet")
     designs = _Designs()
     try:

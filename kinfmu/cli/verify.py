@@ -27,7 +27,8 @@ from kinfmu.errors import KinfmuError
 def verify(fmu: Path, results: Path | None, tolerance: float | None) -> None:
     """Check a host by the reference results in an FMU.
 
-    Each FMU of kinfmu holds the outputs at about 20 samples, in extra/org.kinfmu, with the step that belongs to them.
+    An FMU of kinfmu holds the outputs at about 20 samples, in extra/org.kinfmu, with the step that belongs to them. An
+    FMU that torques drive has none.
     """
     from kinfmu.fmu import verify as verified
 

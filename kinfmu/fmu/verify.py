@@ -7,6 +7,7 @@ import io
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote
 
 import numpy as np
 
@@ -102,6 +103,11 @@ def verify(fmu: str | Path, results: str | Path | None = None, *, tolerance: flo
     with unpacked(path) as folder:
         about = description.read(text_in(path, folder, DESCRIPTION, LARGEST_DESCRIPTION).encode(), str(path))
         name = about.interface.name
+        if not (folder / FOLDER).is_dir() and about.interface.part("states"):
+            raise FmuError(
+                f"{path}: efforts drive this FMU, and its results depend on them and on the steps of the host, so that "
+                f"it holds no reference results; compare with kinfmu simulate {quote(str(path))}"
+            )
         if not (folder / FOLDER).is_dir():
             raise FmuError(f"{path}: holds no reference results ({FOLDER}/{name}_ref.csv); build it again")
         texts = {file.name: text_in(path, folder, f"{FOLDER}/{file.name}") for file in (folder / FOLDER).iterdir()}

@@ -23,6 +23,8 @@ from kinfmu.readings import Reading
 from kinfmu.readings.extremes import Maximum, Minimum, Peak, PeakAcceleration, PeakSpeed, Range
 from kinfmu.units import METRES, CoordinateName
 
+_EFFORTS = ("torque", "force", "power")  # nouns of forces of drivers; joints have forces, too
+_OF_MECHANISM = ("shaking_force", "shaking_moment", "kinetic_energy", "potential_energy")
 OF_FORCES = (Minimum, Maximum, Range, Peak)  # measures that read forces
 _KEY = re.compile(r"^.*\.|_\d+$")  # what a key has around its word: 'rise' of 'law.rise_1'
 MOST_BODIES = 20_000  # fits into the memory of an ordinary computer
@@ -141,12 +143,28 @@ def _check_reading(members: Members, known: Mapping[str, Any], reading: Reading)
                 )
             continue
         if value not in known and not is_point:
+            cause = _why_no_force(members, value)
+            if cause:
+                raise MechanismError(f"{where}{key.name}: {quoted(value)} is not there: {cause}")
             near = suggestion(value, [*known, *forces])
             raise MechanismError(
                 f"{where}{key.name}: {quoted(value)} is not a coordinate of this mechanism{near}; "
                 f"coordinates: {listed(name for name, (_, order) in known.items() if not order)}"
             )
     reading.check()
+
+
+def _why_no_force(members: Members, name: str) -> str:
+    """Return why a mechanism has no force of a name such as 'crank.torque'; '' if it is no such name."""
+    owner, _, noun = name.rpartition(".")
+    drivers, joints = ({one.name for one in found} for found in (members.drivers, members.joints))
+    if noun in _EFFORTS and owner not in joints | drivers and owner in members.bodies_by_name:
+        near = suggestion(owner, drivers)
+        return f"there is no driver '{owner}'{near}; drivers: {listed(member.name for member in members.drivers)}"
+    is_force = (noun in _EFFORTS and owner in joints | drivers) or name in _OF_MECHANISM
+    if is_force and not (members.loads or any(body.has_mass for body in members.bodies)):
+        return "without masses and loads there are no forces"
+    return ""
 
 
 def _check_names(table: str, names: Iterable[str]) -> None:

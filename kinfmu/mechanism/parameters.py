@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
@@ -30,12 +30,14 @@ class Parameter:
         quantity: What it measures. Default: from its unit, else from the key whose value is its name or its negative,
             else a number.
         description: One line for people. Default: none.
+        unit: The unit in which the value was written. Default: none.
 
     """
 
     value: float
     quantity: Quantity | None = None
     description: str = ""
+    unit: str = field(default="", compare=False)
 
     @property
     def kind(self) -> str:
@@ -57,12 +59,13 @@ def read_parameter(name: str, parameter: Parameter | float | str, length_unit: s
         parameter = Parameter(parameter)  # type: ignore[arg-type]  # text until it is resolved
     check_line(f"[parameters] {name} description", parameter.description)
     value = read_number(f"[parameters] {name}", parameter.value, parameter.quantity, length_unit)
-    quantity = parameter.quantity
-    if quantity is None and isinstance(parameter.value, str) and not isinstance(value, Expression):
+    quantity, unit = parameter.quantity, parameter.unit
+    if isinstance(parameter.value, str) and not isinstance(value, Expression):
         literal = Expression(parameter.value, length_unit).literal
-        if literal and literal.unit:
-            quantity, _ = every_unit(length_unit)[literal.unit]
-    return Parameter(value, quantity, parameter.description)  # type: ignore[arg-type]  # computed later
+        unit = literal.unit if literal else ""
+        if quantity is None and unit:
+            quantity, _ = every_unit(length_unit)[unit]
+    return Parameter(value, quantity, parameter.description, unit)  # type: ignore[arg-type]  # computed later
 
 
 def resolve_parameters(parameters: Mapping[str, Parameter], alone: Mapping[str, set[Quantity]]) -> dict[str, Parameter]:
@@ -108,7 +111,7 @@ def resolve_parameters(parameters: Mapping[str, Parameter], alone: Mapping[str, 
             expression = converted(where, expression, quantities, dimensions, quantity)
             done[name] = Parameter(compute(where, expression, values), quantity or NUMBER, parameter.description)
         else:
-            done[name] = Parameter(parameter.value, quantity or NUMBER, parameter.description)
+            done[name] = Parameter(parameter.value, quantity or NUMBER, parameter.description, parameter.unit)
         quantities[name] = done[name].quantity
         values[name] = float(done[name].value)
     return {name: done[name] for name in parameters}

@@ -18,7 +18,7 @@ from kinfmu.mechanism.members import NumberPath
 from kinfmu.mechanism.number import read_constant, read_number, unit_advice
 from kinfmu.mechanism.parameters import NUMBER, Parameter
 from kinfmu.mechanism.valid import is_number, quoted
-from kinfmu.units import Quantity
+from kinfmu.units import Quantity, unit_of
 
 
 class LawConstant(NamedTuple):
@@ -133,6 +133,20 @@ class Settable:
         if isinstance(setting, LawConstant) and setting.is_positive and not number > 0.0:
             raise RequestError(f"{name} = {quoted(value)} must be positive")
         return number
+
+    def note_on_bare(self, name: str, values: Iterable[object]) -> str:
+        """Return a note if one of the values is bare and the file writes the parameter in another unit; else ''."""
+        parameter = self.parameters.get(name)
+        if parameter is None or not (parameter.unit and parameter.quantity):
+            return ""
+        taken = unit_of(parameter.quantity, self._length_unit)
+        bare = next((value for value in values if is_number(value) and value != 0), None)
+        if parameter.unit == taken or bare is None:
+            return ""
+        return (
+            f"{name} = {bare:.12g} is taken in {taken}; the mechanism file writes it in {parameter.unit}: "
+            f"for these write '{bare:.12g} {parameter.unit}'"
+        )
 
     def _expression(self, name: str) -> Expression | None:
         """Return the expression of a parameter or a law constant, if it has one."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -75,6 +75,7 @@ class Study:
         motion: The motion that every design makes.
         engine: 'python' or 'native'.
         file_text: Text of the study file; '' if there is none.
+        notes: Probable mistakes in the numbers of the parameters, a line each.
 
     """
 
@@ -83,6 +84,7 @@ class Study:
     motion: StudyMotion
     engine: str
     file_text: str = ""
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.sampling)
@@ -209,7 +211,16 @@ def define(
         )
     if engine == "auto":
         engine = _engine(len(samples) * len(motion))
-    return Study(mechanism, samples, motion, engine, file_text)
+    return Study(mechanism, samples, motion, engine, file_text, tuple(_notes(mechanism, parameters)))
+
+
+def _notes(mechanism: Mechanism, parameters: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
+    """Yield a line for each parameter that has a bare number and another unit in the mechanism file."""
+    for name, table in parameters.items():
+        given = [table[key] for key in ("from", "to", "tolerance", "nominal") if key in table]
+        text = mechanism.settable.note_on_bare(name, [*given, *table.get("values", ())])
+        if text:
+            yield f"[parameters] {text}"
 
 
 def _refuse_large_hypercube(sampling: Sampling) -> None:

@@ -92,6 +92,7 @@ class FitOutcome:
     optima: tuple[Optimum, ...]
     tried: int
     refused: Mapping[str, int]
+    idle: tuple[str, ...] = ()
     note: str = ""
 
     @property

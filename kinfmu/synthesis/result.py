@@ -10,6 +10,7 @@ import numpy as np
 
 from kinfmu.display import Displayed
 from kinfmu.errors import KinfmuError
+from kinfmu.run import FloatArray
 from kinfmu.sweep.continued import continued
 from kinfmu.synthesis.equations import Equations, Evaluation, NotAssembledError
 from kinfmu.synthesis.outcome import ConstraintResult, FitOutcome, Optimum, TargetErrors
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 HOLDS = 1e-6  # violation relative to the limit, or to 1, up to which a constraint holds
+_NO_EFFECT = 1e-9  # of the largest effect: round-off
 _SAME = 1e-6  # relative difference of sums up to which a mechanism file gives the motion that was fitted
 
 
@@ -37,6 +39,7 @@ class FitResult(FitOutcome, Displayed):
         optima: The local optima found, best first.
         tried: Number of designs that were solved.
         refused: How often designs could not be assembled or did not reach a sample, by reason.
+        idle: Unknowns that have no effect on the targets near the best design.
         note: What to know about `mechanism`; '' if there is nothing.
 
     """
@@ -70,7 +73,7 @@ def result_of(equations: Equations, optima: Sequence[Optimum], tried: int, refus
     settings = {name: best.parameters[name] for name in problem.parameters}
     followed = continued(problem.mechanism, settings)
     z = np.array([(best.parameters[name] - b.low) / (b.high - b.low) for name, b in problem.bounds.items()])
-    fitted, _ = equations.at(z)
+    fitted, jacobian = equations.at(z)
     found, note = fitted, followed.message
     try:
         again = Equations(problem.of(followed.mechanism), "python")
@@ -90,8 +93,17 @@ def result_of(equations: Equations, optima: Sequence[Optimum], tried: int, refus
         optima=tuple(optima),
         tried=tried,
         refused=dict(refused),
+        idle=_idle(problem, jacobian),
         note=note,
     )
+
+
+def _idle(problem: FitProblem, jacobian: FloatArray) -> tuple[str, ...]:
+    """Return the unknowns whose columns of the Jacobian (r, n) are 0; none with measures, whose rows it leaves out."""
+    sizes = np.linalg.norm(jacobian, axis=0)
+    if problem.measuring is not None or not sizes.any():
+        return ()
+    return tuple(name for name, size in zip(problem.bounds, sizes, strict=True) if size <= _NO_EFFECT * sizes.max())
 
 
 def _errors(problem: FitProblem, found: Evaluation) -> list[TargetErrors]:

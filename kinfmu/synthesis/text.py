@@ -34,6 +34,7 @@ def report(result: FitOutcome) -> list[str]:
             verdict = "holds" if met.holds else f"VIOLATED by {met.violation:.3g}"
             lines.append(f"  {met.name}: {verdict}; {met.text}")
     lines += ["", "parameters", *aligned([("", "value", "unit", "bounds", ""), *parameter_rows(result)])]
+    lines += [f"  note: {text}" for text in parameter_notes(result)]
     lines += ["", "local optima"]
     rows = [
         (f"{k}", f"{one.total:.9g}", f"{one.searches}", *(f"{value:.6g}" for value in one.parameters.values()))
@@ -91,6 +92,14 @@ def parameter_rows(result: FitOutcome) -> list[tuple[str, ...]]:
         at = "at its lower bound" if value - low < near else "at its upper bound" if high - value < near else ""
         rows.append((name, f"{value:.12g}", unit, f"[{low:.6g}, {high:.6g}]", at))
     return rows
+
+
+def parameter_notes(result: FitOutcome) -> list[str]:
+    """Return a line for each unknown with no effect on the targets, and for each with bare bounds in another unit."""
+    problem = result.problem
+    lines = [f"{name} has no effect on the targets: any value between its bounds is as good" for name in result.idle]
+    lines += [problem.mechanism.settable.note_on_bare(name, bounds) for name, bounds in problem.unknowns.items()]
+    return [line for line in lines if line]
 
 
 def _own_quantities(problem: FitProblem) -> dict[str, Quantity]:

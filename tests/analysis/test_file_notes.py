@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import pytest
 
 from kinfmu import gallery
 from kinfmu.analysis import check
 from kinfmu.analysis.file_notes import file_notes
+from kinfmu.errors import MechanismError
+from kinfmu.joints.cam import CamOscillating
+from kinfmu.laws.sequence import MotionSequence, Segment
 from kinfmu.mechanism.toml_file import parse
 from tests.mechanism.test_wrong_files import CRANK_ROCKER, DRIVER
 
@@ -193,3 +199,32 @@ def test_an_error_of_a_later_loop_names_an_earlier_joint_that_the_start_poses_le
     problem = str(check(parse(wrong)).problem)
     assert "the loop of bodies bar, flap with joints P, R, G does not close" in problem
     assert problem.endswith("; in the start poses of the file joint B is open by 4.472 m")
+
+
+EFFORT = '[measures.motor]\ntype = "peak"\nof = "crank.torque"\n'
+
+
+def test_a_measure_of_an_effort_does_not_hide_what_the_mechanism_lacks() -> None:
+    heavy = SIX_BAR.replace("R = [5, 3] }", 'R = [5, 3] }\nmass = "1 kg"', 1)
+    pin = 'R = { type = "revolute", between = ["bar.R", "flap.R"] }\n'
+    assert check(parse(heavy + EFFORT)).problem is None
+    report = check(parse(heavy.replace(pin, "") + EFFORT))
+    assert "mobility is 3 but there is 1 driver" in str(report.problem)
+    assert f"[joints] {pin.strip()}" in str(report)
+    for text, message in (
+        (heavy.partition("[drivers")[0], "'crank.torque' is not there: there is no driver 'crank'; drivers: none"),
+        (SIX_BAR, "'crank.torque' is not there: without masses and loads there are no forces"),
+    ):
+        with pytest.raises(MechanismError, match=rf"\[measures\.motor\] of: {message}$"):
+            parse(text + EFFORT)
+
+
+def test_a_rise_of_a_cam_in_degrees_without_a_unit_is_reported_once() -> None:
+    mechanism = gallery.load("fourbar")
+    segments = (Segment("cycloidal", 3.0, -22.0), Segment("cycloidal", math.tau - 3.0, 22.0))
+    cam = CamOscillating("lobe", ("ground", "rocker"), "crank", MotionSequence(segments, repeat=True))
+    notes = list(file_notes(replace(mechanism, joints=(*mechanism.joints, cam))))
+    assert notes == [
+        "[joints.lobe] rise_1 = -22 rad is -1260.51 deg, more than a turn: a bare angle is in radians; "
+        "degrees are written such as '60 deg'"
+    ]

@@ -147,3 +147,9 @@ def test_native_fmus_agree_with_the_python_engine(built_native: Build, fmi: int)
     assert found.ok, str(found)
     assert len(found.names) == 21
     assert found.difference < 1e-10
+
+
+def test_an_fmu_that_torques_drive_has_no_reference(tmp_path: Path) -> None:
+    fmu = kinfmu.build(kinfmu.load("fourbar_loaded"), tmp_path / "t.fmu", flavour="python", drive="torque")
+    with pytest.raises(FmuError, match=r"t\.fmu: efforts drive this FMU, .* holds no reference results; compare with"):
+        kinfmu.verify(fmu)

@@ -201,3 +201,15 @@ def test_so_is_one_in_a_call(parameters: dict[Any, Any], arguments: dict[str, An
     with pytest.raises(RequestError) as error:
         kinfmu.study(linkage(), parameters, workers=1, **arguments)
     assert str(error.value).startswith(message)
+
+
+def test_a_bare_number_is_noted_where_the_mechanism_file_writes_another_unit(tmp_path: Path) -> None:
+    path = write(tmp_path, CRANK)
+    assert read_study(path).notes == ()
+    file = tmp_path / "hoeken.toml"
+    file.write_text(file.read_text("utf-8").replace('"20 mm"', '"2 cm"'), "utf-8")
+    assert read_study(path).notes == (
+        "[parameters] crank = 15 is taken in mm; the mechanism file writes it in cm: for these write '15 cm'",
+    )
+    path.write_text(CRANK.replace("15", "'1.5 cm'").replace("25", "'2.5 cm'"), "utf-8")
+    assert read_study(path).notes == ()

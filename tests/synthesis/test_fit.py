@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from click.testing import CliRunner
 import kinfmu
 from kinfmu.cli import main
 from kinfmu.mechanism import toml_text
+from kinfmu.mechanism.parameters import Parameter
 from kinfmu.synthesis import (
     FunctionTarget,
     GrashofConstraint,
@@ -126,6 +128,15 @@ def test_starts_and_offsets_are_listed_with_their_units() -> None:
     unit = four_bar().length_unit
     units = {"f.start": "rad", "f.offset": "rad", "g.start": "rad", "g.offset": unit}
     assert {name: rows[name] for name in units} == units
+
+
+def test_an_unknown_without_effect_is_noted() -> None:
+    written = four_bar()
+    mechanism = replace(written, parameters={**written.parameters, "spare": Parameter(1.0)})
+    found = kinfmu.fit(_problem(mechanism=mechanism, unknowns={**BOUNDS, "spare": (0.0, 2.0)}), starts=1)
+    assert found.idle == ("spare",)
+    assert "note: spare has no effect on the targets: any value between its bounds is as good" in str(found)
+    assert kinfmu.fit(_problem(), starts=1).idle == ()
 
 
 def test_the_files_of_a_fit_are_never_replaced_by_its_result(tmp_path: Path) -> None:
