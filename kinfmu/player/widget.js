@@ -47,7 +47,8 @@ function connect(model, page) {
         if (!filed || !same(values, filed)) model.set("file", page.file());
         filed = values;
         if (!same(driversNow(), model.get("drivers"))) model.set("drivers", driversNow());
-        if (design.failure !== model.get("problem")) model.set("problem", design.failure);
+        const problem = page.inWords(design.failure);
+        if (problem !== model.get("problem")) model.set("problem", problem);
         model.save_changes();
     };
     const reportSoon = () => (waiting ||= setTimeout(report, PERIOD));

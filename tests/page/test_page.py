@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 import kinfmu
+import kinfmu.page
 from kinfmu.mechanism.toml_file import parse
+from kinfmu.mechanism.toml_text import text as toml_text
 from tests.page.browser import PHONE, Browser, browser, needs_browser, text_of
 
 pytestmark = needs_browser
@@ -33,6 +35,16 @@ def test_page_is_one_small_file_without_addresses(name: str) -> None:
     outside = text.replace("http://www.w3.org/2000/svg", "")
     assert "http://" not in outside
     assert "https://" not in outside
+
+
+@pytest.mark.long
+def test_page_with_a_spline_of_500_points_has_about_400_kb() -> None:
+    angles = np.linspace(0.0, 2.0 * math.pi, 501)
+    points = [[float(x), 50.0 + 8.0 * math.cos(x) + 2.0 * math.cos(3.0 * x)] for x in angles]
+    text = toml_text(kinfmu.load("cam_roller"))
+    law = text[text.index('law = "sequence"') : text.index("roller_radius")]
+    mech = parse(text.replace(law, f'law = "spline"\nends = "periodic"\npoints = {points}\n'))
+    assert 300_000 <= len(kinfmu.page.page(mech).encode()) <= 430_000
 
 
 @pytest.mark.parametrize("name", ["crank_rocker", "jansen_leg", "excavator"])

@@ -127,9 +127,13 @@ class Page {
         $("redo").disabled = !design.future.length;
         $("reset").disabled = !design.changes().length;
         const head = design.isInvalid ? "Not valid. " : design.isOtherBranch ? "Another branch. " : "Does not close. ";
-        const stated = (failure) => failure && sentence(ofJoints(failure, linkage.data.drivers.map((driver) => driver.name)));
-        if (!design.isOk) this.#banner(head, `${stated(design.failure)} The last good pose is shown in grey.`);
-        else this.#banner("Stops here. ", stated(motion.blocked));
+        if (!design.isOk) this.#banner(head, `${sentence(this.inWords(design.failure))} The last good pose is shown in grey.`);
+        else this.#banner("Stops here. ", motion.blocked && sentence(this.inWords(motion.blocked)));
+    }
+
+    // Return why something does not close, with joints and drivers in place of rows.
+    inWords(failure) {
+        return ofJoints(failure, this.linkage.data.drivers.map((driver) => driver.name));
     }
 
     #banner(head, text) {
