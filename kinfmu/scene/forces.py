@@ -8,10 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinfmu.cams import CAM_JOINTS
 from kinfmu.joints import Distance, Fixed, Joint, PointOnLine, Revolute, Translational
 from kinfmu.measures.placement import body_of
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.run import FloatArray, Run
+from kinfmu.scene.contacts import contact_force
 from kinfmu.scene.loads import load_forces
 from kinfmu.scene.placing import world
 from kinfmu.scene.scene import Scene
@@ -50,6 +52,11 @@ def arrows(run: Run, mechanism: Mechanism, scene: Scene) -> Arrows | None:
         name.owner for name in run.reaction_names if name in run.absent
     }
     for joint in mechanism.joints:
+        if joint.name in kept and isinstance(joint, CAM_JOINTS):
+            contact = contact_force(run, mechanism, scene, joint)
+            if contact is not None and np.isfinite(contact[0]).any():
+                known[f"joints.{joint.name}"], tails[f"joints.{joint.name}"] = contact
+            continue
         points = getattr(joint, "between", ())  # or bodies, of joints that have no arrow
         if joint.name not in kept or any(point not in mechanism.body_points for point in points):
             continue

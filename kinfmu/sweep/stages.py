@@ -71,7 +71,7 @@ def stage_results(
     if n <= stage.few:
         columns = [number.tolist() if isinstance(number, np.ndarray) else [number] * n for number in numbers]
         rows = []
-        for given in zip(*columns, strict=True):
+        for given in zip(*columns, strict=True) if columns else [()] * n:  # results may be constants
             try:
                 rows.append(stage.of_sample(given))
             except (ArithmeticError, ValueError):

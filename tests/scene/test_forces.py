@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from kinfmu.run import Run
 from kinfmu.scene.forces import LONGEST, arrows
 from kinfmu.scene.scene import scene
 from tests.analysis.test_loading import ARM
+from tests.cams.followers import ALL
 from tests.sweep.test_forces import loaded
 
 
@@ -66,6 +69,29 @@ frequency = 1
     run = kinfmu.solve(mechanism)
     found = arrows(run, mechanism, scene(run, mechanism))
     assert found is None  # the bearings depend on the contact, which is unknown
+
+
+@pytest.mark.parametrize("follower", ALL)
+def test_the_force_of_a_cam_starts_at_the_contact_and_is_that_on_its_axle(follower: str) -> None:
+    """The cam has no weight, so its axle carries the contact force alone."""
+    mechanism = ALL[follower]()
+    mechanism = replace(
+        mechanism,
+        bodies=tuple(
+            replace(body, mass=1.0, center_of_mass=(-20.0, 0.0)) if body.name == "follower" else body
+            for body in mechanism.bodies
+        ),
+        gravity=(0.0, -9810.0),
+    )
+    run = kinfmu.solve(mechanism, np.linspace(0.0, 0.9, 7))
+    shown = scene(run, mechanism)
+    found = arrows(run, mechanism, shown)
+    assert found is not None
+    newtons = found.along["joints.lift"] * found.newton / found.length
+    np.testing.assert_allclose(newtons, np.column_stack([run["O.force_x"], run["O.force_y"]]), rtol=1e-9, atol=1e-9)
+    x, y = found.at["joints.lift"].T
+    moment = x * newtons[:, 1] - y * newtons[:, 0]  # about the axle, in N mm
+    np.testing.assert_allclose(moment, 1e3 * run["cam.torque"], rtol=1e-8, atol=1e-8)
 
 
 LOADS = """

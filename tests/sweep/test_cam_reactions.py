@@ -172,6 +172,15 @@ def test_reactions_are_those_of_the_same_cam_given_by_its_curve(led: str, given:
         np.testing.assert_allclose(one[name], other[name], rtol=0, atol=1e-12 * scale, err_msg=name)
 
 
+def test_reactions_that_are_constants_are_those_of_every_sample() -> None:
+    """A lever with its centre of mass in its pivot."""
+    lever = swung_roller()
+    bodies = tuple(replace(body, mass=2.0) if body.name == "follower" else body for body in lever.bodies)
+    run = kinfmu.solve(replace(lever, bodies=bodies, gravity=(0.0, -9810.0)), np.linspace(0.0, 0.9, 5))
+    np.testing.assert_allclose(run["C.force_y"], 19.62, rtol=1e-15)
+    np.testing.assert_array_equal(run["lift.moment"], 0.0)
+
+
 def test_bearings_have_no_value_where_the_contact_is_unknown() -> None:
     text = (HEAD + JOINTS["up"] + SLIDING).replace("roller_radius = 0.01", "")
     mechanism = parse(text)
