@@ -38,10 +38,14 @@ export function gripAt(linkage, p, reach) {
     return null;
 }
 
-// Return the handle of a driver that is at a place, as a grip of its body; null without one.
+// Return the handle of a driver that is at a place, as a grip of its body, and how far it is; null without one.
 export function handleAt(linkage, view, handles, p, reach) {
-    const handle = handles.find(({ at }) => distance(view.plane(at), p) < reach);
-    return handle ? { driver: handle.driver, body: handle.body, local: seen(linkage.bodyPose(handle.body), ...view.plane(handle.at)), point: null } : null;
+    for (const { driver, body, at } of handles) {
+        const centre = view.plane(at);
+        const gap = distance(centre, p);
+        if (gap < reach) return { driver, body, gap, local: seen(linkage.bodyPose(body), ...centre), point: null };
+    }
+    return null;
 }
 
 // Return the point of any body, the ground included, that is nearest to a place within a reach; null without one.

@@ -69,9 +69,10 @@ export class Hand {
 
     #grab(p, reach) {
         const { linkage, mode, handles, view } = this.page;
-        const point = mode === "lengths" ? pinAt(linkage, p, reach) : null;
+        const handle = handleAt(linkage, view, handles, p, reach);
+        const point = mode === "lengths" ? pinAt(linkage, p, handle ? handle.gap : reach) : null; // the nearer one
         if (point !== null) return { kind: "pin", point, names: null };
-        const grip = handleAt(linkage, view, handles, p, reach) || (mode === "move" ? gripAt(linkage, p, reach) : null);
+        const grip = handle || (mode === "move" ? gripAt(linkage, p, reach) : null);
         return grip && { kind: "grip", grip };
     }
 
