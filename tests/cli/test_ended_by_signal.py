@@ -25,12 +25,9 @@ def ended(arguments: list[str], number: int, folder: Path, *, until: str) -> sub
     temporary.mkdir()
     environment = {**os.environ, "TMPDIR": str(temporary)}
     command = [sys.executable, "-m", "kinfmu", *arguments]
-    before = signal.signal(number, signal.SIG_DFL)  # nohup, from which the tests may run, has SIGHUP ignored
-    process = subprocess.Popen(
+    with subprocess.Popen(
         command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    signal.signal(number, before)
-    with process:
+    ) as process:
         start = time.monotonic()
         while not list(folder.glob(until)) and time.monotonic() < start + 60.0:
             time.sleep(0.01)

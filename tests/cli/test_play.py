@@ -24,8 +24,11 @@ def test_play_prints_the_address_of_the_page_and_ends_with_ctrl_c(tmp_path: Path
         with urllib.request.urlopen(address, timeout=30) as answer:  # noqa: S310  its own server
             assert b"<title>crank_rocker</title>" in answer.read()
         play.send_signal(signal.SIGINT)
-        assert play.wait(30) == 0
-        assert "Traceback" not in play.communicate()[1]
+        try:
+            assert "Traceback" not in play.communicate(timeout=30)[1]
+        finally:
+            play.kill()  # else leaving the block waits for a program that does not end
+        assert play.returncode == 0
 
 
 def test_play_reports_a_mechanism_that_cannot_be_played(
