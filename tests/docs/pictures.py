@@ -24,6 +24,7 @@ COMMANDS = {  # of each page with files, and the pictures that they draw
     "studies.md": {
         "study tolerances.toml --figure {} --workers 1": "study-tolerances.svg",
         "study lengths.toml --measures swing --figure {} --workers 1": "study-contours.svg",
+        "study response.toml --figure {} --workers 1": "study-response.svg",
         "study samples.toml --measures swing,fastest --figure {} --workers 1": "study-ranges.png",
     },
     "fitting.md": {"fit arch.toml -o fitted.toml --starts 8 --seed 1 --workers 1 --figure {}": "fitted.svg"},
@@ -35,6 +36,26 @@ designs = 256
 [parameters]
 crank = { from = "15 mm", to = "25 mm" }
 base = { from = "35 mm", to = "60 mm" }
+"""
+ONE_GRID = """\
+mechanism = "hoeken.toml"
+
+[parameters]
+crank = { from = "10 mm", to = "28 mm", count = 37 }
+"""
+OPEN = """\
+name = "open"
+title = "Four-bar whose coupler is too short"
+units.length = "mm"
+bodies.ground.points = { O = [0, 0], C = [90, 0] }
+bodies.crank = { points = { O = [0, 0], P = [30, 0] }, start = { phi = "60 deg" } }
+bodies.coupler = { points = { P = [0, 0], Q = [30, 0] }, start = { x = 15, y = 26, phi = "-10 deg" } }
+bodies.rocker = { points = { C = [0, 0], Q = [25, 0] }, start = { x = 90, phi = "130 deg" } }
+joints.O = { type = "revolute", between = ["ground.O", "crank.O"] }
+joints.P = { type = "revolute", between = ["crank.P", "coupler.P"] }
+joints.Q = { type = "revolute", between = ["coupler.Q", "rocker.Q"] }
+joints.C = { type = "revolute", between = ["ground.C", "rocker.C"] }
+drivers.crank = { type = "angle", of = "crank", law = "constant_speed", start = "60 deg", speed = "30 rpm" }
 """
 PAGES: dict[str, tuple[Any, Any, str]] = {  # size, theme, mechanism
     "play.png": (DESKTOP, "light", "jansen_leg"),
@@ -50,6 +71,7 @@ def draw_files() -> None:
         with tempfile.TemporaryDirectory() as folder:
             os.chdir(folder)
             Path("samples.toml").write_text(RANGES, "utf-8")
+            Path("response.toml").write_text(ONE_GRID, "utf-8")
             for first, content in re.findall(r"`(\w+\.toml)`[^`]*:\n\n```toml\n(.*?)```", text, re.DOTALL):
                 Path(first).write_text(content, "utf-8")
             if name == "fitting.md":
@@ -61,6 +83,16 @@ def draw_files() -> None:
                 if result.exit_code:
                     raise SystemExit(result.output)
             os.chdir(before)
+
+
+def draw_gap() -> None:
+    """Draw a mechanism that does not close."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "open.toml")
+        path.write_text(OPEN, "utf-8")
+        result = CliRunner().invoke(main, ["check", str(path), "--figure", str(DOCS / "gap.svg")])
+        if result.exit_code != 1 or "gap" not in result.output:
+            raise SystemExit(result.output)
 
 
 def draw_pages() -> None:
@@ -84,4 +116,5 @@ def draw_pages() -> None:
 
 if __name__ == "__main__":
     draw_files()
+    draw_gap()
     draw_pages()
