@@ -99,6 +99,8 @@ def checked_settings(mechanism: Mechanism, settings: Sequence[tuple[str, str]], 
         if constant is not None and constant.quantity == Quantity("angle"):
             _note_degrees(setting, text)
     values = {setting: _value(text) for setting, text in settings if setting not in of_run}
+    for text in filter(None, (settable.note_on_bare(setting, [value]) for setting, value in values.items())):
+        note(f"--set: {text}")
     run = as_values([(setting, text) for setting, text in settings if setting in of_run])
     try:
         for setting in values:

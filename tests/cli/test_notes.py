@@ -12,6 +12,7 @@ import pytest
 import kinfmu
 from kinfmu import log
 from kinfmu.cli.messages import patience
+from kinfmu.mechanism import toml_text
 from tests.cli.conftest import Command, read_csv
 
 
@@ -152,6 +153,17 @@ def test_a_constant_of_an_angle_that_looks_like_degrees_is_reported(notes: Calla
     ]
     assert notes(*call, "--set", "crank.start=90deg") == []
     assert notes(*call, "--set", "crank.speed=90") == []
+
+
+def test_a_bare_number_is_reported_where_the_file_writes_another_unit(
+    notes: Callable[..., list[str]], tmp_path: Path
+) -> None:
+    text = toml_text.text(kinfmu.load("crank_rocker"))
+    (tmp_path / "cm.toml").write_text(text.replace("[bodies", '[parameters]\nspare = "2 cm"\n[bodies', 1), "utf-8")
+    assert notes("check", "cm.toml", "--set", "spare=0.03") == [
+        "note: --set: spare = 0.03 is taken in mm; the mechanism file writes it in cm: for these write '0.03 cm'"
+    ]
+    assert notes("check", "cm.toml", "--set", "spare=3cm") == []
 
 
 @pytest.mark.parametrize("is_first", [True, False])
