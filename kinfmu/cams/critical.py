@@ -10,7 +10,7 @@ import numpy as np
 
 from kinfmu.cams.placed import PlacedCam
 from kinfmu.cams.profile import TURN, envelope
-from kinfmu.cams.traced import Traced, traced
+from kinfmu.cams.traced import ComplexArray, Traced, traced
 from kinfmu.run import FloatArray
 
 _SAMPLES = 721  # in a turn, between which extremes are searched
@@ -194,6 +194,11 @@ def _gouge(placed: PlacedCam, found: Traced) -> Extreme | None:
     """Return where the roller cuts a part of the profile that it touches at another angle, and how deep; else None."""
     radius = placed.radius or 0.0
     profile, size = envelope(placed, found), float(np.abs(found.curve).max())
-    gaps = np.array([float(np.abs(found.curve - point).min()) for point in profile]) - radius
-    k = int(np.argmin(gaps))
-    return Extreme(-float(gaps[k]), float(found.angle[k]) % TURN) if gaps[k] < -_TOUCH * size else None
+    depths = cut_depths(found.curve, profile, radius)
+    k = int(np.argmax(depths))
+    return Extreme(float(depths[k]), float(found.angle[k]) % TURN) if depths[k] > _TOUCH * size else None
+
+
+def cut_depths(curve: ComplexArray, profile: ComplexArray, radius: float) -> FloatArray:
+    """Return how deep the roller, at the places (n,) of its centre, cuts the profile at its points (k,) [length]."""
+    return np.array([radius - float(np.abs(curve - point).min()) for point in profile])

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinfmu.cams import CAM_JOINTS, CamJoint, PlacedCam, placed_cam
+from kinfmu.cams.critical import cut_depths
 from kinfmu.cams.placed import members_of
 from kinfmu.cams.traced import ComplexArray, given_curve, traced
 from kinfmu.errors import MechanismError
@@ -18,6 +19,7 @@ from kinfmu.run import FloatArray
 from kinfmu.scene.instant import Instant
 
 _ANGLES = np.linspace(0.0, 2.0 * np.pi, 361)[:-1]  # [rad], points of a curve
+_TOUCH = 1e-9  # of the radius; deeper cuts are more than rounding
 _OVERHANG = 0.15  # of the contact's range, by which a flat face is longer on either side
 
 
@@ -80,7 +82,7 @@ def _shape(shown: Instant, joint: CamJoint) -> CamShape | None:
         is_real = bool((around.radius > 0.0).all() and ((around.curve * around.normal.conj()).real > 0.0).all())
     elif radius is not None:
         bends_less = (around.radius > radius) | (around.radius <= 0.0)
-        is_real = bool(bends_less.all() and np.abs(around.curve).min() > radius)
+        is_real = bool(bends_less.all() and np.abs(around.curve).min() > radius) and not _cuts(around, radius)
     size = float(radius or 0.0) if is_real else 0.0
     profile, contact = around.curve - size * around.normal, now.curve - size * now.normal
 
@@ -106,6 +108,12 @@ def _shape(shown: Instant, joint: CamJoint) -> CamShape | None:
         contact=drawn(contact)[0] if is_real else None,
         reach=reach,
     )
+
+
+def _cuts(around: _Curve, radius: float) -> bool:
+    """Return True if the roller, at some place, cuts into the profile that it makes at another."""
+    depths = cut_depths(around.curve, around.curve - radius * around.normal, radius)
+    return bool(depths.max() > _TOUCH * radius)
 
 
 def _led(placed: PlacedCam, s: FloatArray) -> _Curve:

@@ -17,7 +17,7 @@ from kinfmu.draw.instant import instant
 from kinfmu.draw.sheet import ink
 from kinfmu.joints import CamFlatFace, CamOscillating, CamRoller, CamTranslating
 from kinfmu.joints.joint import Joint
-from kinfmu.laws import Harmonic, Law, MotionSequence, Segment
+from kinfmu.laws import Harmonic, Law, MotionSequence, Segment, Spline
 from kinfmu.scene import palette
 from kinfmu.scene.cams import CamShape, cam_shapes
 from kinfmu.scene.details import on_face
@@ -197,3 +197,15 @@ def test_a_pitch_curve_without_a_profile_counts_as_drawn() -> None:
     mechanism = cam(follower, Translational("guide", ("ground.G", "follower.stem"), QUARTER), contact, 0.4)
     axes = kinfmu.draw.figure(mechanism, ax=Figure().subplots())
     assert not [text.get_text() for text in axes.texts if "not drawn" in text.get_text()]
+
+
+def test_a_profile_that_its_roller_cuts_at_another_place_is_not_drawn() -> None:
+    """A pitch curve with a waist 12 wide between lobes of radius above 9: a roller of radius 7 cuts it through."""
+    a, b = 20.2267, 19.7767  # of a hippopede, r^2 = 4 b (a - b sin^2)
+    turn = np.linspace(0.0, 2.0 * math.pi, 181)
+    distances = np.sqrt(4.0 * b * (a - b * np.sin(turn) ** 2))
+    law = Spline(tuple(zip(turn.tolist(), [*distances[:-1].tolist(), float(distances[0])], strict=True)), "periodic")
+    for radius, is_drawn in ((5.0, True), (7.0, False)):
+        shape = translating(CamRoller("contact", ("cam.O", "follower.tip"), law, radius), QUARTER)
+        assert (shape.profile is not None) == is_drawn
+        assert shape.pitch is not None
