@@ -45,7 +45,7 @@ def scatter_matrix(parameters: Sequence[Quantities], measures: Sequence[Quantiti
                 axes.set_yticks([])
             else:
                 known = np.isfinite(x) & np.isfinite(y)
-                dots: dict[str, Any] = {"s": 3.0, "linewidths": 0.0, "alpha": 0.6}
+                dots: dict[str, Any] = {"s": 3.0, "linewidths": 0.0}
                 axes.scatter(x[known][::step], y[known][::step], color=colour, rasterized=len(x) > _BINS**2, **dots)
             few_ticks(axes, 3, 3 if row != column else None)
             is_last, is_first = row == count - 1, column == 0
