@@ -124,7 +124,7 @@ def _is_near(u: FloatArray, values: FloatArray) -> bool:
 
 
 def _without_run(mechanism: Mechanism, problem: KinfmuError, *, with_gap: bool) -> Instant:
-    """Return only the start pose, closed with all rows or, if drivers contradict them, with those of the joints."""
+    """Return only the start pose: closed with all rows, with the gap of an open loop, or closed by the joints alone."""
     open_gap = None
     local, origin = localized(mechanism)
     system = System(local)
@@ -132,12 +132,13 @@ def _without_run(mechanism: Mechanism, problem: KinfmuError, *, with_gap: bool) 
     if assembled is not None:
         q = assembled.q
     else:
-        q, gap = close(Part(system, range(system.joint_row_count)), start.q, start.u)
-        if gap > CLOSED:
-            loop = problem.data.get("loop")
-            if not with_gap or not isinstance(loop, OpenLoop):
-                raise problem
+        loop = problem.data.get("loop")
+        if with_gap and isinstance(loop, OpenLoop):  # it may close at other driver values, which would hide the gap
             q, open_gap = loop.pose, OpenGap(loop.joint, f"gap {loop.gap:.4g} {loop.unit}")
+        else:
+            q, gap = close(Part(system, range(system.joint_row_count)), start.q, start.u)
+            if gap > CLOSED:
+                raise problem
     directions = {driver.name: 1.0 for driver in mechanism.drivers}
     return Instant(mechanism, _by_body(mechanism, q, origin), directions, open_gap)
 

@@ -122,6 +122,12 @@ def test_a_mechanism_that_does_not_close_is_drawn_with_its_gap(tmp_path: Path) -
         figure(mechanism, path, at=u)
 
 
+@pytest.mark.long
+def test_a_leg_that_closes_at_other_crank_angles_is_drawn_with_its_gap(tmp_path: Path) -> None:
+    figure(kinfmu.load("jansen_leg").with_parameters({"j": 20.0}), tmp_path / "figure.svg")
+    assert "does not close: gap 3.117 mm at knee" in texts_in(tmp_path / "figure.svg")
+
+
 @pytest.mark.parametrize("name", ["figure.eps", "figure", "svg"])
 def test_another_kind_of_file_is_refused(name: str, tmp_path: Path) -> None:
     path = tmp_path / name
