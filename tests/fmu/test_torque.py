@@ -197,8 +197,8 @@ def test_the_run_of_a_limit_ends_with_one_event(fmu_of: Callable[..., Path]) -> 
     assert run.status.tolist()[-2:] == [Status.OK, Status.OUTSIDE]
 
 
-def test_model_exchange_ends_at_the_limit_too(fmu_of: Callable[..., Path]) -> None:
-    texts: list[str] = []
+def test_model_exchange_ends_at_the_limit_too(fmu_of: Callable[..., Path], capfd: pytest.CaptureFixture[str]) -> None:
+    """fmpy would keep a logger of its caller for every later FMU of the process, after it is gone; so it prints."""
     found = simulate_fmu(
         str(fmu_of("rocker", "native", 2)),
         fmi_type="ModelExchange",
@@ -207,11 +207,10 @@ def test_model_exchange_ends_at_the_limit_too(fmu_of: Callable[..., Path]) -> No
         output_interval=0.01,
         start_values={"crank_angle": 0.5, "crank_speed": 0.1},
         output=["crank_angle"],
-        logger=lambda *arguments: texts.append(arguments[-1].decode()),
     )
     assert found["time"][-1] == pytest.approx(0.693, abs=0.01)
     assert found["crank_angle"].min() > -1.7619585
-    assert any("the motion ends at a limit" in text for text in texts)
+    assert "the motion ends at a limit" in capfd.readouterr().out
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
