@@ -20,7 +20,8 @@ def encoder(path: Path) -> str:
     found = shutil.which("ffmpeg")
     if found is None:
         raise MissingPackageError(
-            f"{path}: an MP4 needs the program ffmpeg, which is not found; install it, or write a .gif"
+            f"{path}: an MP4 needs the program ffmpeg, which is not found; install it (Debian, Ubuntu: apt-get "
+            "install ffmpeg), or write a .gif"
         )
     return found
 

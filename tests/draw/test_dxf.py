@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import kinfmu
 from kinfmu.draw import animate, animation, dxf
-from kinfmu.draw.video import encoder
+from kinfmu.draw.video import encoder, mp4
 from kinfmu.errors import FigureError, MissingPackageError
 from tests.log.runs import fourbar
 
@@ -55,7 +58,8 @@ def test_drawings_and_videos_that_cannot_be_made_are_reported(tmp_path: Path, mo
         dxf(run, tmp_path / "a.dxf")
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(
-        MissingPackageError, match=r"a\.mp4: an MP4 needs the program ffmpeg, which is not found; install"
+        MissingPackageError,
+        match=r"a\.mp4: .* ffmpeg, which is not found; install it \(Debian, Ubuntu: apt-get install ffmpeg\), or",
     ):
         animate(run, tmp_path / "a.mp4")
     broken = tmp_path / "ffmpeg"
@@ -68,11 +72,27 @@ def test_drawings_and_videos_that_cannot_be_made_are_reported(tmp_path: Path, mo
 
 def test_a_video_holds_every_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     try:
-        encoder(tmp_path)
+        ffmpeg = encoder(tmp_path)
     except MissingPackageError:
-        pytest.skip("ffmpeg is not installed")
+        pytest.skip("ffmpeg is not installed; scripts/video installs it")
+    drawn: list[Image.Image] = []
+
+    def keep(images: Sequence[Image.Image], seconds: float, path: Path) -> bytes:
+        drawn.extend(images)
+        return mp4(images, seconds, path)
+
     monkeypatch.setattr(animation, "MOST", 6)
+    monkeypatch.setattr(animation, "mp4", keep)
     animate(fourbar(np.arange(0.0, 91.0)), tmp_path / "a.mp4")
     data = (tmp_path / "a.mp4").read_bytes()
     assert data[4:8] == b"ftyp"
+    assert data.index(b"moov") < data.index(b"mdat")  # players begin before the whole file is there
     assert b"avc1" in data
+    subprocess.run([ffmpeg, "-v", "error", "-i", tmp_path / "a.mp4", tmp_path / "%d.png"], check=True)
+    assert len(list(tmp_path.glob("*.png"))) == len(drawn) == 7
+    for k, image in enumerate(drawn, start=1):
+        with Image.open(tmp_path / f"{k}.png") as shown:
+            seen = np.asarray(shown.convert("RGB"), float)[: image.height, : image.width]
+        own, others = (np.abs(seen - np.asarray(one, float)).mean() for one in (image, drawn[k % len(drawn)]))
+        assert own < 2.0  # of 255; the format is lossy
+        assert others > 2.0 * own

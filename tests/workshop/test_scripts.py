@@ -164,7 +164,7 @@ def test_tests_run_in_the_checkout_from_any_folder(miniature: Miniature, tmp_pat
     assert miniature.environment.endswith(f"cwd={miniature.root}")
 
 
-@pytest.mark.parametrize("script", ["setup", "demo", "check", "docs", "graphics", "browser"])
+@pytest.mark.parametrize("script", ["setup", "demo", "check", "docs", "graphics", "browser", "video"])
 def test_help_is_printed_without_setting_anything_up(miniature: Miniature, script: str) -> None:
     status, printed = miniature.run(script, "--help")
     assert status == 0
@@ -173,7 +173,7 @@ def test_help_is_printed_without_setting_anything_up(miniature: Miniature, scrip
     assert miniature.asked == []
 
 
-@pytest.mark.parametrize("script", ["setup", "demo", "docs", "graphics", "browser"])
+@pytest.mark.parametrize("script", ["setup", "demo", "docs", "graphics", "browser", "video"])
 def test_an_argument_that_means_nothing_is_wrong_usage(miniature: Miniature, script: str) -> None:
     assert miniature.run(script, "all") == (2, f"kinfmu: scripts/{script} takes no arguments, got 'all'\n")
     assert miniature.asked == []
