@@ -13,6 +13,7 @@ from kinfmu.errors import MechanismError, RequestError, listed, suggestion
 from kinfmu.loads import Load
 from kinfmu.loads.following import Following
 from kinfmu.measures.arithmetic import Value
+from kinfmu.mechanism.display_unit import DisplayUnit, display_unit, written_unit
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.members import NumberPath
 from kinfmu.mechanism.number import read_constant, read_number, unit_advice
@@ -147,6 +148,19 @@ class Settable:
             f"{name} = {bare:.12g} is taken in {taken}; the mechanism file writes it in {parameter.unit}: "
             f"for these write '{bare:.12g} {parameter.unit}'"
         )
+
+    def display_unit(self, name: str, values: Iterable[object] = ()) -> DisplayUnit:
+        """Return the unit in which people read a parameter or law constant.
+
+        Args:
+            name: Its name.
+            values: Values that a user gave. The unit is that of the first one with a unit. Default: that of the
+                mechanism file, or the unit used inside.
+
+        """
+        setting = self.constants.get(name) or self.parameters[name]
+        own = setting.unit if isinstance(setting, Parameter) else ""
+        return display_unit(setting.quantity, self._length_unit, written_unit(values, self._length_unit) or own)
 
     def _expression(self, name: str) -> Expression | None:
         """Return the expression of a parameter or a law constant, if it has one."""

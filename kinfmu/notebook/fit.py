@@ -14,7 +14,10 @@ from kinfmu.synthesis.text import parameter_rows
 @html_of.register
 def fit_html(result: FitResult) -> str:
     """Return the picture of a fit, its unknowns, and the errors of its targets and constraints."""
-    errors = [(one.name, one.type, one.rms, one.largest, one.units[0]) for one in result.errors]
+    errors = []
+    for one in result.errors:
+        unit, factor = one.display[0]
+        errors.append((one.name, one.type, one.rms / factor, one.largest / factor, unit))
     constraints = [(one.name, "holds" if one.holds else "violated", one.text) for one in result.constraints]
     return page(
         f"{result.mechanism.name}: sum of squares {result.squares:.6g}, rms {result.rms:.6g}",

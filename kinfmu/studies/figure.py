@@ -49,7 +49,8 @@ def figure_of(result: StudyRows, measures: tuple[str, ...] = ()) -> Any:
     parameters = [_column(result, name) for name in result.parameters]
     if kind == "contours":
         grids = [np.array(one["values"]) for one in result.definition["parameters"].values()]
-        x, y = (one._replace(values=grid) for one, grid in zip(parameters, grids, strict=True))
+        factors = [result.display_unit(name).factor for name in result.parameters]
+        x, y = (p._replace(values=grid / f) for p, grid, f in zip(parameters, grids, factors, strict=True))
         sorted_x, sorted_y = np.argsort(x.values), np.argsort(y.values)
         shape = (len(x.values), len(y.values))
         fields = [
@@ -72,12 +73,14 @@ def picture_of(result: StudyRows) -> str:
 
 
 def _column(result: StudyRows, name: str) -> Quantities:
-    return Quantities(name, result.units[name], result[name])
+    unit, factor = result.display_unit(name)
+    return Quantities(name, unit, result[name] / factor)
 
 
 def _contributed(result: StudyRows, name: str) -> Contributed:
     parts = result.nominal.contributions(name)
     known = parts if np.isfinite(list(parts.values())).all() else {}
+    unit, factor = result.display_unit(name)
     return Contributed(
-        name, result.units[name], result.nominal.deviation(name), result.statistics[name].deviation, known
+        name, unit, result.nominal.deviation(name) / factor, result.statistics[name].deviation / factor, known
     )

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from kinfmu.errors import MissingPackageError, StudyError, suggestion
 from kinfmu.mechanism import Mechanism, toml_file
+from kinfmu.mechanism.display_unit import DisplayUnit, display_unit
 from kinfmu.mechanism.valid import quoted
 from kinfmu.run import FloatArray
 from kinfmu.run.tables import table_package
@@ -21,6 +22,7 @@ from kinfmu.studies.definition import DESIGN, REASON, Study
 from kinfmu.studies.nominal import Nominal
 from kinfmu.studies.statistics import Moments, Statistics
 from kinfmu.studies.table import metadata_of
+from kinfmu.units import quantity_in
 
 
 class StudyRows:
@@ -37,6 +39,7 @@ class StudyRows:
         self.parameters = tuple(name for name, role in roles.items() if role == "parameter")
         self.measures = tuple(name for name, role in roles.items() if role == "measure")
         self.units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in schema}
+        self._shown = {field.name: (field.metadata or {}).get(b"display_unit", b"").decode() for field in schema}
         self.definition: Mapping[str, Any] = json.loads(about["study"])
         self.nominal = Nominal.from_json(json.loads(about["nominal"]))
         self.version = about["version"]
@@ -121,6 +124,16 @@ class StudyRows:
             for name, column in zip(self.measures, batch.columns, strict=True):
                 moments[name].add(column.to_numpy())
         return {name: one.statistics() for name, one in moments.items()}
+
+    def display_unit(self, name: str) -> DisplayUnit:
+        """Return the unit in which summary and pictures show a column: as the files write it, measured angles in deg.
+
+        The column itself and `units` keep the units of the table.
+        """
+        length = self.mechanism.length_unit
+        own, shown = self.units[name], self._shown[name]
+        quantity = None if own == "1" else quantity_in(own, length)
+        return display_unit(quantity, length, shown) if shown else DisplayUnit(own)
 
     def good(self) -> NDArray[np.bool_]:
         """Return (m,) True for designs whose measures all have values."""

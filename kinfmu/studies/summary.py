@@ -52,12 +52,12 @@ def measure_rows(result: StudyRows) -> list[tuple[str, ...]]:
         header.insert(5, _FIRST_ORDER)
     rows = [tuple(header)]
     for name in result.measures:
-        found = result.statistics[name]
-        row = [name, result.units[name], _short(result.nominal.measures[name].value), _short(found.mean)]
-        row.append(_short(found.deviation, 4))
+        found, (unit, factor) = result.statistics[name], result.display_unit(name)
+        row = [name, unit, _short(result.nominal.measures[name].value / factor), _short(found.mean / factor)]
+        row.append(_short(found.deviation / factor, 4))
         if has_tolerances:
-            row.append(_short(result.nominal.deviation(name), 4))
-        rows.append((*row, _short(found.low), _short(found.high), str(found.missing)))
+            row.append(_short(result.nominal.deviation(name) / factor, 4))
+        rows.append((*row, _short(found.low / factor), _short(found.high / factor), str(found.missing)))
     return rows
 
 

@@ -30,9 +30,9 @@ def schema_of(study: Study, nominal: Nominal) -> Any:
     import pyarrow as pa
 
     fields = [pa.field(DESIGN, pa.int64(), nullable=False, metadata={"unit": "1"})]
-    fields += [_number(pa, one.name, one.unit, "parameter") for one in study.sampling.variations]
+    fields += [_number(pa, one.name, one.unit, "parameter", one.display_unit) for one in study.sampling.variations]
     for name, found in nominal.measures.items():
-        fields.append(_number(pa, name, found.unit, "measure"))
+        fields.append(_number(pa, name, found.unit, "measure", "deg" if found.unit == "rad" else ""))
         fields += [_number(pa, place, found.at_unit, "place") for place in places(name, len(found.at))]
     fields.append(pa.field(STATUS, pa.int8(), nullable=False, metadata={"unit": "1"}))
     fields.append(pa.field(REASON, pa.string(), metadata={"unit": ""}))
@@ -48,8 +48,9 @@ def schema_of(study: Study, nominal: Nominal) -> Any:
     return pa.schema(fields, metadata={_PREFIX + key: text for key, text in about.items()})
 
 
-def _number(pa: Any, name: str, unit: str, role: str) -> Any:
-    return pa.field(name, pa.float64(), nullable=False, metadata={"unit": unit, "role": role})
+def _number(pa: Any, name: str, unit: str, role: str, display: str = "") -> Any:
+    shown = {} if display in ("", unit) else {"display_unit": display}
+    return pa.field(name, pa.float64(), nullable=False, metadata={"unit": unit, "role": role, **shown})
 
 
 def part_bytes(schema: Any, first: int, columns: Columns) -> bytes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -33,12 +33,14 @@ class Grid:
         name: The parameter or law constant.
         unit: Its unit.
         values: The values, in this order.
+        display_unit: The unit in which people wrote them.
 
     """
 
     name: str
     unit: str
     values: tuple[float, ...]
+    display_unit: str = field(default="", compare=False)
 
     def as_json(self) -> dict[str, Any]:
         return {"unit": self.unit, "values": list(self.values)}
@@ -53,6 +55,7 @@ class UniformRange:
         unit: Its unit.
         low: Lower end.
         high: Upper end.
+        display_unit: The unit in which people wrote them.
 
     """
 
@@ -60,6 +63,7 @@ class UniformRange:
     unit: str
     low: float
     high: float
+    display_unit: str = field(default="", compare=False)
 
     def at(self, points: FloatArray) -> FloatArray:
         """Return the values at points of the unit interval."""
@@ -80,6 +84,7 @@ class Tolerance:
         tolerance: Half of the tolerance zone: nominal - tolerance to nominal + tolerance.
         distribution: 'normal', or 'uniform' over the zone.
         deviations: Of a normal distribution: how many standard deviations the tolerance is.
+        display_unit: The unit in which people wrote it.
 
     """
 
@@ -89,6 +94,7 @@ class Tolerance:
     tolerance: float
     distribution: Literal["normal", "uniform"]
     deviations: float
+    display_unit: str = field(default="", compare=False)
 
     @property
     def deviation(self) -> float:
@@ -153,6 +159,9 @@ def read_variation(where: str, name: str, table: Mapping[str, Any], mechanism: M
         return found
 
     unit = unit_of(quantity, length)
+    values = table.get("values", ())
+    given = [table.get(key) for key in ("from", "to", "tolerance", "nominal")]
+    shown = settable.display_unit(name, [*(values if isinstance(values, list | tuple) else ()), *given]).unit
     kinds = [key for key in ("values", "from", "tolerance") if key in table]
     if len(kinds) != 1:
         what = (
@@ -162,20 +171,19 @@ def read_variation(where: str, name: str, table: Mapping[str, Any], mechanism: M
     (kind,) = kinds
     _refuse_others(where, table, kind)
     if kind == "values":
-        values = table["values"]
         if not isinstance(values, list | tuple | np.ndarray) or not len(values):
             raise MechanismError(f"{where} values = {quoted(values)} must be a list of numbers")
-        return Grid(name, unit, tuple(number("values", value) for value in values))
+        return Grid(name, unit, tuple(number("values", value) for value in values), shown)
     if kind == "from":
         if "to" not in table:
             raise MechanismError(f"{where} needs the key 'to'")
         low, high = number("from", table["from"]), number("to", table["to"])
         if "count" in table:
             count = whole_number(f"{where} count", table["count"], 2, MOST_OF_A_GRID)
-            return Grid(name, unit, tuple(np.linspace(low, high, count).tolist()))
+            return Grid(name, unit, tuple(np.linspace(low, high, count).tolist()), shown)
         if low == high:
             raise MechanismError(f"{where}: 'from' and 'to' are equal: {low:.9g}")
-        return UniformRange(name, unit, min(low, high), max(low, high))
+        return UniformRange(name, unit, min(low, high), max(low, high), shown)
     written = setting.value
     nominal = number("nominal", table.get("nominal", float(written)))
     tolerance = number("tolerance", table["tolerance"], above=0.0)
@@ -190,7 +198,7 @@ def read_variation(where: str, name: str, table: Mapping[str, Any], mechanism: M
         raise MechanismError(f"{where} deviations = {quoted(deviations)} must be a positive number")
     if "deviations" in table and distribution != "normal":
         raise MechanismError(f"{where} deviations: only a normal distribution has them")
-    return Tolerance(name, unit, nominal, tolerance, distribution, float(deviations))
+    return Tolerance(name, unit, nominal, tolerance, distribution, float(deviations), shown)
 
 
 def whole_number(where: str, value: object, least: int, most: int = MOST_DESIGNS) -> int:

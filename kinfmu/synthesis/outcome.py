@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.display_unit import DisplayUnit
 from kinfmu.run import FloatArray
 from kinfmu.synthesis.problem import FitProblem
 from kinfmu.units import unit_of
@@ -44,6 +45,7 @@ class TargetErrors:
         errors: (m, d) reached minus wanted; of angles without whole turns.
         rms: Root of the mean square of the points' errors; angles of poses count times their length.
         largest: Largest error of a point.
+        display: The units of the columns in reports.
 
     """
 
@@ -58,6 +60,7 @@ class TargetErrors:
     errors: FloatArray
     rms: float
     largest: float
+    display: tuple[DisplayUnit, ...]
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,7 @@ class ConstraintResult:
         text: The value and its limit.
         violation: By how much the limit is exceeded; 0 if it is not.
         holds: Whether it is met, within a millionth of the limit.
+        display: The unit of the violation in reports.
 
     """
 
@@ -76,6 +80,7 @@ class ConstraintResult:
     text: str
     violation: float
     holds: bool
+    display: DisplayUnit
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -10,8 +10,10 @@ import numpy as np
 
 from kinfmu.display import Displayed
 from kinfmu.errors import KinfmuError
+from kinfmu.mechanism.display_unit import DisplayUnit
 from kinfmu.run import FloatArray
 from kinfmu.sweep.continued import continued
+from kinfmu.synthesis import display_units
 from kinfmu.synthesis.equations import Equations, Evaluation, NotAssembledError
 from kinfmu.synthesis.outcome import ConstraintResult, FitOutcome, Optimum, TargetErrors
 from kinfmu.synthesis.problem import FitProblem
@@ -125,6 +127,7 @@ def _errors(problem: FitProblem, found: Evaluation) -> list[TargetErrors]:
                 row.errors,
                 float(np.sqrt((sizes**2).mean())),
                 float(sizes.max()),
+                display_units.of_columns(problem, target),
             )
         )
     aims: Any = problem.measuring.aims if problem.measuring else ()
@@ -146,6 +149,7 @@ def _errors(problem: FitProblem, found: Evaluation) -> list[TargetErrors]:
                     error,
                     size,
                     size,
+                    (display_units.of_measure(problem, aim.name, aim.unit),),
                 )
             )
     return result
@@ -161,15 +165,17 @@ def _constraints(problem: FitProblem, found: Evaluation) -> list[ConstraintResul
                 f"; the other links exceed {one.links[one.shortest].text} by {float(met[1:].min()):.6g} {unit} or more"
             )
         violation = max(0.0, -float(met.min()))
-        constraints.append(ConstraintResult(one.name, text, violation, violation <= HOLDS * max(1.0, abs(one.gap))))
+        holds = violation <= HOLDS * max(1.0, abs(one.gap))
+        constraints.append(ConstraintResult(one.name, text, violation, holds, DisplayUnit(unit)))
     for aim, value in zip(problem.measuring.aims if problem.measuring else (), found.measured, strict=True):
         if aim.value is not None:
             continue
-        limits = [f"at least {aim.minimum:.6g}"] if aim.minimum is not None else []
-        limits += [f"at most {aim.maximum:.6g}"] if aim.maximum is not None else []
+        display = display_units.of_measure(problem, aim.name, aim.unit)
+        limits = [f"at least {aim.minimum / display.factor:.6g}"] if aim.minimum is not None else []
+        limits += [f"at most {aim.maximum / display.factor:.6g}"] if aim.maximum is not None else []
         violation = max(0.0, aim.excess(float(value))[0])
         size = max(1.0, *(abs(limit) for limit in (aim.minimum, aim.maximum) if limit is not None))
-        shown = "" if aim.unit == "1" else f" {aim.unit}"
-        text = f"{aim.reading.type} = {float(value):.6g}{shown}, {' and '.join(limits)}{shown}"
-        constraints.append(ConstraintResult(aim.name, text, violation, violation <= HOLDS * size))
+        shown = display.suffix
+        text = f"{aim.reading.type} = {float(value) / display.factor:.6g}{shown}, {' and '.join(limits)}{shown}"
+        constraints.append(ConstraintResult(aim.name, text, violation, violation <= HOLDS * size, display))
     return constraints

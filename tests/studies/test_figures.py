@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,9 @@ import pytest
 
 import kinfmu
 from kinfmu.errors import FigureError, StudyError
-from kinfmu.studies.figure import picture_of
-from tests.studies.linkage import linkage
+from kinfmu.mechanism import toml_file
+from kinfmu.studies.figure import figure_of, picture_of
+from tests.studies.linkage import TEXT, linkage, swing
 
 KINDS: dict[str, dict[str, Any]] = {
     "response": {"crank": {"from": 10, "to": 25, "count": 5}},
@@ -20,9 +22,9 @@ KINDS: dict[str, dict[str, Any]] = {
     "contributions": {"crank": {"tolerance": 0.1}, "base": {"tolerance": 0.1}},
 }
 SHOWN = {
-    "response": ["crank [mm]", "swing [rad]", "fastest [rad/s]"],
-    "contours": ["crank [mm]", "base [mm]", "swing [rad]", "fastest [rad/s]"],
-    "scatter": ["crank [mm]", "base [mm]", "swing [rad]", "fastest [rad/s]", "hoeken: 16 designs"],
+    "response": ["crank [mm]", "swing [deg]", "fastest [rad/s]"],
+    "contours": ["crank [mm]", "base [mm]", "swing [deg]", "fastest [rad/s]"],
+    "scatter": ["crank [mm]", "base [mm]", "swing [deg]", "fastest [rad/s]", "hoeken: 16 designs"],
     "contributions": ["crank", "base", "part of the variance [%]", "hoeken: tolerances"],
 }
 
@@ -42,12 +44,44 @@ def test_each_kind_names_what_it_shows_and_is_the_same_every_time(kind: str, tmp
     assert (tmp_path / "figure.png").read_bytes()[:4] == b"\x89PNG"
 
 
+def test_columns_are_shown_in_the_units_of_the_files_and_the_table_keeps_its_own(tmp_path: Path) -> None:
+    tilted = TEXT.replace("{ crank", '{ tilt = "5 deg", lean = "0.1 rad", crank').replace(
+        'Q = ["rocker", 0] }, start = { x = 20',
+        'Q = ["rocker", 0], pen = ["rocker*cos(tilt + lean)", "rocker*sin(tilt + lean)"] }, start = { x = 20',
+    )
+    width = 'measures.width = { type = "range", of = "pen.x" }'
+    mechanism = toml_file.parse(tilted + 'points.pen = "coupler.pen"\n' + width)
+    tables = {"tilt": {"from": 0, "to": 0.5, "count": 3}, "base": {"values": ["1.5 in", 40, 50]}}
+    path = tmp_path / "study.parquet"
+    kinfmu.study(mechanism, tables, output=path, workers=1)
+    found = kinfmu.StudyResult.read(path)
+    assert (found.units["tilt"], found.units["base"], found.units["swing"]) == ("rad", "mm", "rad")
+    assert found["tilt"].max() == 0.5
+    shown = {name: found.display_unit(name) for name in ("tilt", "base", "width", "swing", "fastest")}
+    assert [unit for unit, _ in shown.values()] == ["deg", "in", "mm", "deg", "rad/s"]
+    assert shown["base"].factor == pytest.approx(25.4)
+    figure = figure_of(found)
+    panel = figure.axes[0]
+    assert (panel.get_xlabel(), panel.get_ylabel()) == ("tilt [deg]", "base [in]")
+    assert panel.get_xlim() == pytest.approx((0.0, math.degrees(0.5)))
+    assert panel.get_ylim() == pytest.approx((1.5, 50.0 / 25.4))
+    (row,) = [line.split() for line in str(found).splitlines() if line.split()[:1] == ["swing"]]
+    assert row[1] == "deg"
+    assert float(row[2]) == pytest.approx(math.degrees(swing(20.0, 50.0, 40.0)), rel=1e-5)
+    lean = kinfmu.study(mechanism, {"lean": {"from": 0, "to": 0.5, "count": 3}}, workers=1)
+    assert lean.display_unit("lean").unit == "rad"  # as the file writes it
+    tolerances = {"tilt": {"tolerance": 0.01}, "crank": {"tolerance": "0.002 in"}}
+    scattered = kinfmu.study(mechanism, tables | tolerances, measures="swing", designs=4, workers=1)
+    assert [scattered.display_unit(name).unit for name in ("tilt", "crank")] == ["deg", "in"]
+
+
 def test_contributions_are_written_at_their_bars(tmp_path: Path) -> None:
     found = kinfmu.study(linkage(), KINDS["contributions"], measures="swing", designs=4, workers=1)
     found.figure(tmp_path / "figure.svg")
     text = (tmp_path / "figure.svg").read_text()
     for part in found.nominal.contributions("swing").values():
         assert f">{100.0 * part:.1f} %<" in text
+    assert f"deviation {math.degrees(found.nominal.deviation('swing')):.4g} deg to first order" in text
 
 
 def test_what_cannot_be_drawn_is_refused(tmp_path: Path) -> None:

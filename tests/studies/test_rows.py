@@ -138,7 +138,7 @@ def test_it_shows_itself_in_notebooks() -> None:
     assert page.count("<img ") == 1
     picture = found._repr_svg_()
     assert picture is not None
-    assert "swing [rad]" in picture
+    assert "swing [deg]" in picture
     assert repr(found) == "<Study of hoeken: 3 designs; swing, fastest>"
 
 

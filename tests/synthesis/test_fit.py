@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import re
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -128,6 +129,54 @@ def test_starts_and_offsets_are_listed_with_their_units() -> None:
     unit = four_bar().length_unit
     units = {"f.start": "rad", "f.offset": "rad", "g.start": "rad", "g.offset": unit}
     assert {name: rows[name] for name in units} == units
+
+
+def test_the_report_shows_numbers_in_the_units_in_which_they_are_written() -> None:
+    written = four_bar()
+    tilted = kinfmu.Mechanism(
+        **{field.name: getattr(written, field.name) for field in fields(written) if field.init}
+        | {"parameters": {**written.parameters, "tilt": "10 deg", "spin": 0.2}}
+    )
+    points = [("0 deg", "5 deg"), ("30 deg", 0.1), ("60 deg", "10 deg")]
+    swing = kinfmu.readings.Range("s", of="rocker.phi")
+    result = kinfmu.fit(
+        kinfmu.FitProblem(
+            tilted,
+            {"crank": ("50 cm", "250 cm"), "coupler": (2.0, 5.0), "tilt": (0.0, np.pi), "spin": (0.0, 1.0)},
+            [
+                FunctionTarget(name="f", of="rocker.phi", points=points, start=("60 deg", 2), offset=("90 deg", 3)),
+                MeasureTarget(name="s", of=swing, value="50 deg", weight=1e-3),
+            ],
+            [MeasureConstraint(name="small", of=swing, maximum="1 deg", weight=1e-9)],
+        ),
+        starts=1,
+    )
+    text, found = str(result), result.parameters
+    assert {row[0]: row[2:4] for row in parameter_rows(result)} == {
+        "crank": ("cm", "[50, 250]"),
+        "coupler": ("m", "[2, 5]"),
+        "tilt": ("deg", "[0, 180]"),
+        "spin": ("", "[0, 1]"),
+        "f.start": ("deg", "[60, 114.592]"),
+        "f.offset": ("deg", "[90, 171.887]"),
+    }
+    values = {row[0]: float(row[1]) for row in parameter_rows(result)}
+    assert values["crank"] == pytest.approx(100.0 * found["crank"], rel=1e-9)
+    assert values["tilt"] == pytest.approx(np.degrees(found["tilt"]), rel=1e-9)
+    function, measure = result.errors
+    assert f"f (function): rms {np.degrees(function.rms):.6g} deg" in text
+    assert "rocker.phi [deg], wanted" in text
+    for k in range(3):
+        assert f" {np.degrees(function.wanted[k, 0]):.6g} " in text
+    assert f"s (measure): {np.degrees(measure.reached[0, 0]):.9g} deg, wanted 50 deg" in text
+    assert f"small: VIOLATED by {np.degrees(result.constraints[0].violation):.3g} deg; range = " in text
+    assert "deg, at most 1 deg" in text
+    optima = next(line for line in text.splitlines() if "sum of squares  " in line)
+    assert re.split(" {2,}", optima.strip())[-6:] == [
+        "crank [cm]", "coupler [m]", "tilt [deg]", "spin", "f.start [deg]", "f.offset [deg]",
+    ]  # fmt: skip
+    assert function.units == ("rad",)  # numbers of the result keep the units used inside
+    assert f">{np.degrees(function.rms):.6g}<" in str(result._repr_html_())
 
 
 def test_an_unknown_without_effect_is_noted() -> None:
