@@ -123,7 +123,7 @@ static double apart(const kf_solver *solver, kf_pose *here, kf_pose *there)
     kf_motion(solver, there, NULL, NULL, swept[1], NULL, NULL);
     for (k = 0; k < KF_OUTPUTS; ++k) {
         double gap = swept[0][k] - swept[1][k];
-        gap = kf_output_is_angle[k] ? gap - TURN * floor(gap / TURN + 0.5) : gap / KF_SIZE;
+        gap = kf_output_is_angle[k] ? gap - TURN * floor(gap / TURN + 0.5) : gap / kf_size;
         largest = fmax(largest, fabs(gap));
     }
     return largest;
@@ -261,7 +261,7 @@ bool kf_page_gap(void)
             if (gap > CLOSED) {
                 has_gap = true;
                 append_rows(k, "does not close: gap ", "do not close: gap ");
-                kf_append_number(refusal, "%.4g", gap * KF_SIZE);
+                kf_append_number(refusal, "%.4g", gap * kf_size);
                 kf_append(refusal, " %s", kf_length_unit);
             }
         }

@@ -68,15 +68,12 @@ def _sizes(parts: Parts) -> str:
         "TALL": int(any(len(block.residuals) > len(block.unknowns) for block in solved)),
         "LARGEST_BLOCK": max((len(block.residuals) * len(block.unknowns) for block in solved), default=0),
     }
-    offset = max(map(abs, plan.origin)) / plan.size
     lines = [
-        f"/* Sizes of {plan.mechanism.name}: generated from its mechanism, not to be edited. */",
+        "/* Sizes of a model: generated from its mechanism, not to be edited. */",
         "#ifndef KF_SIZES_H",
         "#define KF_SIZES_H",
         "",
         *(f"#define KF_{name} {count}" for name, count in counts.items()),
-        f"#define KF_SIZE {plan.size!r} /* of the mechanism, in its unit of length */",
-        f"#define KF_OFFSET {offset!r} /* from the world's origin, in sizes */",
         "",
         "#endif",
     ]
@@ -91,6 +88,8 @@ def tables(plan: SolvePlan, solved: Sequence[Block], labels: Mapping[str, str]) 
     distances = distance_rows(plan, solved)
     ends = list(accumulate(len(block.unknowns) for block in solved))
     return [
+        f"const double kf_size = {plan.size!r};",
+        f"const double kf_offset = {max(map(abs, plan.origin)) / plan.size!r};",
         *array("double kf_anchor_u", anchor_u),
         *array("double kf_anchor_z", anchor_z),
         *array("double kf_unknown_scales", scales),

@@ -146,7 +146,7 @@ static bool keeps_distances(const kf_solver *solver, const kf_bridge *bridge, co
             double squared;
             kf_residuals(&solver->model, found, kf_distance_blocks[k], residuals);
             squared = residuals[kf_distance_rows[k]] * kf_distance_scales[k] + u * u;
-            if (fabs(sqrt(fmax(squared, 0.0)) - fabs(u)) > CLOSED * KF_SIZE) {
+            if (fabs(sqrt(fmax(squared, 0.0)) - fabs(u)) > CLOSED * kf_size) {
                 return false;
             }
         }

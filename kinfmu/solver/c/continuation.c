@@ -159,7 +159,7 @@ static void append_failure(kf_solver *solver, const double *parameters, int bloc
     gap = kf_gap(solver, model, block, kf_anchor_u, solver->scratch.z);
     if (gap > 1e-9) {
         kf_append(solver->message, "the mechanism does not close: rows %s leave a gap of ", kf_block_row_names[block]);
-        kf_append_number(solver->message, "%.4g", gap * KF_SIZE);
+        kf_append_number(solver->message, "%.4g", gap * kf_size);
         kf_append(solver->message, " %s", kf_length_unit);
     } else {
         kf_append(solver->message, "beyond a singular point, where rows %s are dependent",

@@ -228,7 +228,7 @@ double kf_largest_gap(const double *there, const double *here)
     double largest = 0.0;
     int k;
     for (k = 0; k < KF_OUTPUTS; ++k) {
-        const double gap = fabs(there[k] - here[k]) / (kf_output_is_angle[k] ? 1.0 : KF_SIZE);
+        const double gap = fabs(there[k] - here[k]) / (kf_output_is_angle[k] ? 1.0 : kf_size);
         if (gap != gap) {
             return INFINITY;
         }
@@ -350,7 +350,7 @@ void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double 
     }
     speed = fmax(speed, kf_largest_gap(solver->scratch.rows[0][1], zeros));
     curve = fmax(curve, kf_largest_gap(solver->scratch.rows[0][2], zeros));
-    errors[0] = KF_EPS * (1.0 + largest + KF_OFFSET) + sqrt(squares[0]);
+    errors[0] = KF_EPS * (1.0 + largest + kf_offset) + sqrt(squares[0]);
     errors[1] = KF_ROUNDINGS * KF_EPS * speed + sqrt(squares[1]);
     errors[2] = KF_ROUNDINGS * KF_EPS * curve + sqrt(squares[2]);
     if (lost || is_at_a_crossing(solver, pose, &drive) || is_a_track_at_a_crossing(solver, pose)) {

@@ -107,6 +107,6 @@ void kf_append_watch(char *message, const kf_model *model, const kf_found *found
         most = fabs(watches[k]) > fabs(watches[most]) ? k : most;
     }
     kf_append(message, "redundant row %s does not close: %s", kf_watch_names[most], about);
-    kf_append_number(message, format, fabs(watches[most]) * KF_SIZE);
+    kf_append_number(message, format, fabs(watches[most]) * kf_size);
     kf_append(message, " %s", kf_length_unit);
 }

@@ -301,7 +301,7 @@ static kf_answer along_parameters(kf_instance *instance, const double *seed, uns
 {
     kf_state *const s = &instance->now;
     const double *const given = KF_REAL(s, KF_PART_PARAMETERS);
-    const double least = fmin(1.0, KF_SIZE);
+    const double least = fmin(1.0, kf_size);
     double fastest = 0.0;
     kf_solver *other;
     kf_answer answer;

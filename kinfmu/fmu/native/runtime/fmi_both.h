@@ -194,7 +194,7 @@ FMI(Status) FMI(GetNominalsOfContinuousStates)(void *c, double nominals[], size_
         return unsupported(c, "there are two continuous states for each driver");
     }
     for (k = 0; k < count; ++k) {
-        nominals[k] = kf_driver_is_angle[k / 2] ? 1.0 : KF_SIZE;
+        nominals[k] = kf_driver_is_angle[k / 2] ? 1.0 : kf_size;
     }
     return FMI(OK);
 }

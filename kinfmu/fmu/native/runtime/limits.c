@@ -28,7 +28,7 @@ static const double beyond[4] = {1e-6, 1e-4, 1e-2, 0.3}; /* [rad, sizes] past a 
 /* 1 rad, or the size of the mechanism. */
 double kf_unit(int driver)
 {
-    return kf_driver_is_angle[driver] ? 1.0 : KF_SIZE;
+    return kf_driver_is_angle[driver] ? 1.0 : kf_size;
 }
 
 /* Return whether a motion at u with speeds ud ends there: whether the poses past it are not reached. */
