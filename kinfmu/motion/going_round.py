@@ -8,17 +8,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.motion.quintic import ranges
 from kinfmu.motion.track import Track
 
 _SAME_POSE = 1e-9  # [rad, sizes]; a motion whose first and last pose differ by less goes round
 _SAME_RATE = 1e-6  # of the largest; the same for rates and accelerations
-_FEW = 16  # distance of the samples that suffice in most cases
 
 
+@np.errstate(invalid="ignore")  # of samples without numbers
 def goes_round(tracks: Sequence[tuple[Track, bool]]) -> NDArray[np.bool_]:
     """Return whether motions go round: quantities, rates and accelerations of the last sample are those of the first.
 
-    They are compared with their largest values; some of the samples show most of these.
+    They are compared with their largest values, of angles and of other quantities.
 
     Args:
         tracks: One or more quantities, each with True if it is an angle, which may be whole turns further.
@@ -27,20 +28,14 @@ def goes_round(tracks: Sequence[tuple[Track, bool]]) -> NDArray[np.bool_]:
         (...) True for the designs that go round; False where a sample has no numbers, or nothing moves.
 
     """
-    is_known = np.logical_and.reduce([np.isfinite(row.sum(axis=-1)) for track, _ in tracks for row in track.rows])
-    same = _is_same(tracks, _FEW)
-    return np.asarray(is_known & (same if same.all() else _is_same(tracks, 1)))
-
-
-def _is_same(tracks: Sequence[tuple[Track, bool]], step: int) -> NDArray[np.bool_]:
-    """Compare the ends with the largest values among some of the samples, of angles and of other quantities."""
     is_same, moves = np.asarray(True), np.asarray(False)
     for order in range(3):
         scales: dict[bool, NDArray[np.float64]] = {}
         apart: list[tuple[NDArray[np.float64], bool]] = []
         for track, is_angle in tracks:
-            row, some = track.rows[order], track.rows[order][..., ::step]
-            low, high = some.min(axis=-1), some.max(axis=-1)
+            row = track.rows[order]
+            low, high = ranges(row)
+            is_same = is_same & (low <= high)  # both are NaN where a sample has no numbers
             difference = row[..., -1] - row[..., 0]
             if order == 0:
                 moves = moves | (high > low)

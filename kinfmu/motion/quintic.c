@@ -129,6 +129,39 @@ static int64_t largest(const kf_quantity *of, int64_t count)
     return k;
 }
 
+/* The smallest and the largest of some numbers; both NaN if one of them is not finite. */
+static void range(const double *numbers, int64_t count, double *low, double *high)
+{
+    double lows[VECTOR], highs[VECTOR], zeros[VECTOR] = {0.0}, least, most, all = 0.0;
+    int64_t k;
+    int i;
+    for (i = 0; i < VECTOR; ++i) {
+        lows[i] = highs[i] = numbers[0];
+    }
+    for (k = 0; k + VECTOR <= count; k += VECTOR) {
+        for (i = 0; i < VECTOR; ++i) {
+            const double one = numbers[k + i];
+            lows[i] = one < lows[i] ? one : lows[i];
+            highs[i] = one > highs[i] ? one : highs[i];
+            zeros[i] += 0.0 * one;
+        }
+    }
+    least = lows[0];
+    most = highs[0];
+    for (; k < count; ++k) {
+        least = numbers[k] < least ? numbers[k] : least;
+        most = numbers[k] > most ? numbers[k] : most;
+        all += 0.0 * numbers[k];
+    }
+    for (i = 0; i < VECTOR; ++i) {
+        least = lows[i] < least ? lows[i] : least;
+        most = highs[i] > most ? highs[i] : most;
+        all += zeros[i];
+    }
+    *low = all == 0.0 ? least : NAN;
+    *high = all == 0.0 ? most : NAN;
+}
+
 /* Mark the intervals whose control points exceed a value; the number of marks. */
 static int64_t mark(const kf_quantity *of, int64_t count, const double *h, double value, int64_t most, int64_t *marked)
 {
@@ -207,6 +240,15 @@ void kf_maxima(int64_t designs, int64_t count, const double *x, const double *h,
         } else {
             value[k] = at[k] = NAN;
         }
+    }
+}
+
+/* The smallest and the largest number of each design, of a table (designs, count) with a step from design to design. */
+void kf_ranges(int64_t designs, int64_t count, const double *table, ptrdiff_t step, double *low, double *high)
+{
+    int64_t k;
+    for (k = 0; k < designs; ++k) {
+        range(table + k * step, count, &low[k], &high[k]);
     }
 }
 

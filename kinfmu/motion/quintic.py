@@ -39,8 +39,21 @@ def use_compiled() -> None:
     table = (place, step)
     library.kf_maxima.argtypes = (count, count, place, place, ctypes.c_double, *table * 3, place, place)
     library.kf_higher.argtypes = (count, count, ctypes.c_bool, place, place, *table * 3, place, place)
-    library.kf_maxima.restype = library.kf_higher.restype = None
+    library.kf_ranges.argtypes = (count, count, *table, place, place)
+    library.kf_maxima.restype = library.kf_higher.restype = library.kf_ranges.restype = None
     _compiled.append(library)
+
+
+def ranges(table: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the smallest and the largest number of each row (..., n); both NaN where one of them is not finite."""
+    if not _compiled:
+        low, high = table.min(axis=-1), table.max(axis=-1)
+        is_known = np.isfinite(low) & np.isfinite(high)
+        return np.where(is_known, low, np.nan), np.where(is_known, high, np.nan)
+    rows = _by_samples(table.reshape(-1, table.shape[-1]))
+    low, high = np.empty(len(rows)), np.empty(len(rows))
+    _compiled[0].kf_ranges(*rows.shape, _start(rows), rows.strides[0] // 8, _start(low), _start(high))
+    return low.reshape(table.shape[:-1]), high.reshape(table.shape[:-1])
 
 
 def maxima(x: FloatArray, rows: Rows, sign: float = 1.0) -> tuple[FloatArray, FloatArray]:
