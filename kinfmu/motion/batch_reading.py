@@ -39,7 +39,7 @@ from kinfmu.run import Run
 from kinfmu.run.axis import TIME, axis_for
 from kinfmu.solver.python.status import Status
 from kinfmu.sweep import Model
-from kinfmu.sweep.designs import Batch, Driving, solve_batch, solve_by_library
+from kinfmu.sweep.designs import Batch, Driving, parts_of, solve_batch, solve_by_library
 from kinfmu.sweep.driving import column_of, run_times
 from kinfmu.units import CoordinateName, InputName, Quantity, unit_of
 
@@ -129,9 +129,7 @@ class BatchReading:
 
     def run(self, workers: int) -> None:
         """Solve and measure all designs."""
-        most = max(1, SAMPLES_AT_ONCE // len(self._driving.times))
-        size = max(1, min(most, -(-self._count // (4 * workers)))) if workers > 1 else most  # some for each thread
-        parts = [slice(first, min(first + size, self._count)) for first in range(0, self._count, size)]
+        parts = parts_of(self._count, max(1, SAMPLES_AT_ONCE // len(self._driving.times)), workers)
         is_native = self._model.is_native(self._count * len(self._driving.times))
         if not is_native or not self._needed.quantities:
             found = [self._measure(part) for part in parts]

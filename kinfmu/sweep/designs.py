@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass
@@ -281,7 +281,7 @@ def solve_by_library(
         into = [None if table is None else table[part] for table in tables]
         return library.solve_designs(values[part], given, law, into, status[part], tolerance)
 
-    parts = list(_parts(batch.count, len(driving.times), threads))
+    parts = parts_of(batch.count, max(1, SAMPLES_AT_ONCE // max(1, len(driving.times))), threads)
     with ThreadPoolExecutor(threads) as pool:
         found = list(pool.map(piece, parts)) if threads > 1 else [piece(part) for part in parts]
     alone: set[int] = set(np.flatnonzero(invalid).tolist())
@@ -293,13 +293,13 @@ def solve_by_library(
     return sorted(alone), {design: reason for design, reason in reasons.items() if design not in alone}
 
 
-def _parts(designs: int, samples: int, threads: int) -> Iterator[slice]:
-    """Yield slices of designs: some for each thread, and none too large."""
-    count = max(1, SAMPLES_AT_ONCE // max(1, samples))
+def parts_of(designs: int, most: int, threads: int) -> list[slice]:
+    """Return slices of designs, of at most so many each; several for each thread, as many for one as for another."""
+    count = -(-designs // most)
     if threads > 1:
-        count = max(1, min(count, -(-designs // (4 * threads))))
-    for first in range(0, designs, count):
-        yield slice(first, min(first + count, designs))
+        count = max(4, -(-count // threads)) * threads
+    size = max(1, -(-designs // max(1, count)))
+    return [slice(first, min(first + size, designs)) for first in range(0, designs, size)]
 
 
 def _alone(

@@ -10,6 +10,7 @@ import pytest
 import kinfmu
 from kinfmu import Mechanism
 from kinfmu.errors import KinfmuError, RequestError
+from kinfmu.sweep.designs import parts_of
 from tests.gallery_members import mostly_long
 from tests.open_lengths import with_open_lengths
 
@@ -180,3 +181,20 @@ def test_a_wrong_request_is_refused_in_one_line(
 ) -> None:
     with pytest.raises(RequestError, match=message):
         kinfmu.compile(kinfmu.load("jansen_leg")).solve_designs(values, **arguments)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3, 8])
+@pytest.mark.parametrize("designs", [1, 2, 7, 1000, 10_000])
+@pytest.mark.parametrize("most", [1, 415])
+def test_parts_hold_all_designs_and_every_thread_gets_as_many(designs: int, most: int, threads: int) -> None:
+    parts = parts_of(designs, most, threads)
+    assert [k for part in parts for k in range(part.start, part.stop)] == list(range(designs))
+    sizes = [part.stop - part.start for part in parts]
+    assert max(sizes) <= most
+    if designs >= 1000:
+        assert len(parts) % threads == 0 or max(sizes) == 1
+        assert threads == 1 or len(parts) >= 4 * threads
+
+
+def test_no_designs_have_no_parts() -> None:
+    assert parts_of(0, 10, 2) == []

@@ -58,7 +58,7 @@ _OF_FORCES = re.compile(r"^#if KF_FORCES\n.*?^#endif\n", re.DOTALL | re.MULTILIN
 _BY_OWNER = re.compile(
     r"^#if (?P<negated>!)?KF_TORQUE\n(?P<first>.*?)(?:^#else\n(?P<second>.*?))?^#endif\n", re.DOTALL | re.MULTILINE
 )
-_OF_TORQUE = ("limits.c", "breaks.c", "torque.c")
+_OF_TORQUE = ("equation_of_motion.c", "limits.c", "breaks.c", "torque.c")
 _HEADER_OF_TORQUE = "torque.h"
 _OTHER_VERSION = {"2.0": "fmi3.c", "3.0": "fmi2.c"}
 

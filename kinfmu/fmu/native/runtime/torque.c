@@ -2,8 +2,7 @@
  *
  *     J(u) udd = T - bias(u, ud)        u: driver values, T: efforts, J: reduced inertia
  *
- * J and the bias efforts come from one motion with accelerations of 0 and from the rates at unit speeds, which on a bridge
- * are interpolated where the blocks are singular. Steps are of order 8 with error estimates of orders 5 and 3: Hairer,
+ * See equation_of_motion.c for the accelerations. Steps are of order 8 with error estimates of orders 5 and 3: Hairer,
  * Norsett, Wanner: Solving Ordinary Differential Equations I, section II.10.
  */
 #include "torque.h"
@@ -25,93 +24,6 @@
 #define ROUNDED 2e-14  /* of the times at its ends: a jump is known so well */
 #define LEAST 10.0     /* roundings of the time that a step is long at least */
 #define MOST 1000000   /* steps of the integrator in one step of the host */
-
-static const double resting[KF_DRIVERS];
-
-/* The accelerations of the drivers at a good pose; false: reduced inertias do not determine them. */
-bool kf_accelerations(const kf_solver *solver, kf_pose *pose, double t, const double *ud, const double *efforts,
-                      const double *loads, double *udd)
-{
-    const kf_model *const model = &solver->model;
-    const double *const u = KF_POSE_U(pose);
-    double found[KF_DRIVERS + KF_DRIVERS * (KF_DRIVERS + 1) / 2];
-    int k;
-#if KF_DRIVERS == 1
-    double zd[KF_ROOM(KF_UNKNOWNS)], zdd[KF_ROOM(KF_UNKNOWNS)];
-    kf_tangent(model, pose);
-    for (k = 0; k < KF_UNKNOWNS; ++k) {
-        zd[k] = pose->x1[k] * ud[0];
-        zdd[k] = pose->x2[k] * (ud[0] * ud[0]);
-    }
-    kf_inertia(t, u, ud, resting, pose->found.x, zd, zdd, pose->x1, loads, model->parameters, found);
-    udd[0] = (efforts[0] - found[0]) / found[1] / kf_in_si[0];
-    return found[1] > 0.0 && isfinite(udd[0]);
-#else
-    double slopes[KF_ROOM(KF_DRIVERS * KF_UNKNOWNS)], unit[KF_DRIVERS];
-    double matrix[KF_DRIVERS * KF_DRIVERS], right[KF_DRIVERS], factors[KF_LU_ROOM(KF_DRIVERS)], determinant;
-    int j, place = KF_DRIVERS;
-    bool good = true;
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        memset(unit, 0, sizeof unit);
-        unit[k] = 1.0;
-        kf_rates_in_time(model, pose, unit, NULL);
-        memcpy(slopes + k * KF_UNKNOWNS, pose->x1, KF_UNKNOWNS * sizeof *slopes);
-    }
-    kf_rates_in_time(model, pose, ud, resting);
-    kf_inertia(t, u, ud, resting, pose->found.x, pose->x1, pose->x2, slopes, loads, model->parameters, found);
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        right[k] = efforts[k] - found[k];
-        for (j = k; j < KF_DRIVERS; ++j) {
-            matrix[k * KF_DRIVERS + j] = matrix[j * KF_DRIVERS + k] = found[place++];
-        }
-        good = good && matrix[k * KF_DRIVERS + k] > 0.0;
-    }
-    if (!good || !kf_lu(KF_DRIVERS, matrix, factors, &determinant)) {
-        return false;
-    }
-    kf_lu_solve(KF_DRIVERS, factors, right, udd);
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        udd[k] /= kf_in_si[k];
-        good = good && isfinite(udd[k]);
-    }
-    return good;
-#endif
-}
-
-/* Return the first driver without reduced inertia at a good pose, or -1. */
-int kf_massless(const kf_solver *solver, kf_pose *pose, double t, const double *ud, const double *loads)
-{
-    double none[KF_DRIVERS], one[KF_DRIVERS], a[KF_DRIVERS], b[KF_DRIVERS];
-    int k;
-    memset(none, 0, sizeof none);
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        memset(one, 0, sizeof one);
-        one[k] = 1.0;
-        if (!kf_accelerations(solver, pose, t, ud, none, loads, a) || !kf_accelerations(solver, pose, t, ud, one, loads, b)) {
-            return k;
-        }
-    }
-    return -1;
-}
-
-/* u, ud, udd of the states; the accelerations are NaN where the reduced inertia does not determine them. */
-void kf_state_drive(kf_state *s, double *u, double *ud, double *udd)
-{
-    int k;
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        u[k] = s->real[3 * k];
-        ud[k] = s->real[3 * k + 1];
-    }
-    if (!KF_GOOD(s->status) || !kf_accelerations(&s->solver, kf_shown(s), s->time, ud, KF_REAL(s, KF_PART_EFFORTS),
-                                                 KF_REAL(s, KF_PART_LOADS), udd)) {
-        for (k = 0; k < KF_DRIVERS; ++k) {
-            udd[k] = NAN;
-        }
-    }
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        s->real[3 * k + 2] = udd[k];
-    }
-}
 
 static kf_answer check_count(const kf_instance *instance, const double *numbers, size_t count)
 {
