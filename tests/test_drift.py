@@ -44,7 +44,9 @@ def off(run: Run, bars: tuple[float, ...]) -> np.ndarray:
     return np.array(columns)  # (6, n)
 
 
-@pytest.mark.parametrize(("bars", "turns"), [(DOUBLE_CRANK, 10_000), (CRANK_ROCKER, 1_000)])
+@pytest.mark.parametrize(
+    ("bars", "turns"), [pytest.param(DOUBLE_CRANK, 10_000, marks=pytest.mark.long), (CRANK_ROCKER, 1_000)]
+)
 def test_turns_there_and_back_by_jumps_are_exact_to_the_rounding_of_the_angle(
     bars: tuple[float, ...], turns: int
 ) -> None:
@@ -58,7 +60,7 @@ def test_turns_there_and_back_by_jumps_are_exact_to_the_rounding_of_the_angle(
     np.testing.assert_allclose(errors[:, [2, 4]], errors[:, [0, 0]], rtol=0, atol=4.0 * EPS)  # back where it was
 
 
-@pytest.mark.parametrize("bars", [DOUBLE_CRANK, CRANK_ROCKER])
+@pytest.mark.parametrize("bars", [pytest.param(DOUBLE_CRANK, marks=pytest.mark.long), CRANK_ROCKER])
 def test_walked_sample_by_sample_errors_do_not_grow(bars: tuple[float, ...]) -> None:
     there = 1.0 + np.arange(0.0, 1000.0, 0.097) * TURN
     run = kinfmu.solve(linkage(bars), crank_angle=np.concatenate([there, there[::-1]]))

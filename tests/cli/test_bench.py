@@ -100,6 +100,7 @@ def test_tables_and_charts_are_written_in_the_requested_folder(
     assert "| readable reference |" in page
 
 
+@pytest.mark.long
 def test_the_tables_hold_every_engine_with_a_time_and_a_small_error_and_the_shipped_one_first(written: Path) -> None:
     page = (written / PAGE).read_text(encoding="utf-8")
     engines = rows_of(page.split("<!-- generated: engines -->")[1].split("<!-- end")[0])
@@ -159,6 +160,7 @@ def test_without_matplotlib_the_tables_are_written_and_the_reason_is_reported(
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted([PAGE, SETTINGS_PAGE])
 
 
+@pytest.mark.long
 def test_the_charts_name_every_engine_and_quantity(written: Path) -> None:
     chart = (written / "accuracy-work-precision.svg").read_text(encoding="utf-8")
     near = (written / "accuracy-singular.svg").read_text(encoding="utf-8")

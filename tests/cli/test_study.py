@@ -64,9 +64,8 @@ def test_a_mistake_in_the_file_is_one_line(tmp_path: Path, monkeypatch: pytest.M
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there are no such signals")
-@pytest.mark.parametrize(
-    ("number", "status"), [(signal.SIGINT, 1), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.long)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 1), (signal.SIGTERM, 143)])
 def test_an_interrupted_study_says_how_to_go_on(number: int, status: int, tmp_path: Path) -> None:
     write(tmp_path, LONG)
     command = [sys.executable, "-m", "kinfmu", "study", "study.toml", "--workers", "2", "--engine", "python"]

@@ -181,6 +181,7 @@ def is_that_of(mechanism: kinfmu.Mechanism, joint: str, drawn: dict[str, dict[st
         assert drawn["roller"]["radius"] == pytest.approx(known.roller_radius)
 
 
+@pytest.mark.long
 def test_values_that_do_not_enter_a_cam_keep_its_shapes(cams: Opened) -> None:
     page = cams
     before = {joint: shapes(page, joint) for joint in ("lobe", "lift", "pad", "press")}
@@ -199,9 +200,17 @@ def test_values_that_do_not_enter_a_cam_keep_its_shapes(cams: Opened) -> None:
     "values",
     [
         {"swing": math.radians(-9), "h": 6.0},
-        {"reach": -44.0, "bodies.ground.points.D.y": -70.0, "joints.press.offset": 58.0},
-        {"bodies.ground.points.E.x": 84.0, "joints.pad.normal": math.radians(176), "joints.press.normal": 1.4},
-        {"joints.mesh.ratio": 0.5, "bodies.ground.points.Q.x": 180.0, "joints.lift.offset": 36.0},
+        pytest.param(
+            {"reach": -44.0, "bodies.ground.points.D.y": -70.0, "joints.press.offset": 58.0}, marks=pytest.mark.long
+        ),
+        pytest.param(
+            {"bodies.ground.points.E.x": 84.0, "joints.pad.normal": math.radians(176), "joints.press.normal": 1.4},
+            marks=pytest.mark.long,
+        ),
+        pytest.param(
+            {"joints.mesh.ratio": 0.5, "bodies.ground.points.Q.x": 180.0, "joints.lift.offset": 36.0},
+            marks=pytest.mark.long,
+        ),
     ],
 )
 def test_values_that_enter_a_cam_draw_the_cam_of_the_saved_file(cams: Opened, values: dict[str, float]) -> None:

@@ -214,6 +214,7 @@ def test_pin_dragged_too_far_stays_where_the_lengths_close(chromium: Browser) ->
         assert page.errors == []
 
 
+@pytest.mark.long
 def test_slides_and_wheels_follow_new_lengths(chromium: Browser) -> None:
     with chromium.open(text_of("scotch_yoke")) as page:
         page.get("k.design.set({'bodies.crank.points.P.x': 52}) && k.reshape()")
@@ -231,6 +232,7 @@ def test_slides_and_wheels_follow_new_lengths(chromium: Browser) -> None:
         assert page.errors == []
 
 
+@pytest.mark.long
 def test_flat_face_touches_its_cam_and_a_roller_runs_on_its_pitch_curve(chromium: Browser) -> None:
     with chromium.open(text_of("flat_face_lever")) as page:
         page.move(0.7)

@@ -37,6 +37,7 @@ def _problem(**changes: Any) -> kinfmu.FitProblem:
     return kinfmu.FitProblem(**given)
 
 
+@pytest.mark.long
 def test_the_result_does_not_depend_on_the_number_of_workers() -> None:
     alone, together = (kinfmu.fit(_problem(), starts=2, workers=n, engine="python") for n in (1, 2))
 
@@ -61,6 +62,7 @@ def test_no_design_that_closes_is_one_line_with_the_reason() -> None:
         kinfmu.fit(_problem(mechanism=four_bar(), unknowns={"crank": (5.5, 6.0)}), starts=1, engine="python")
 
 
+@pytest.mark.long
 def test_constraints_are_met_exactly_at_the_cost_of_the_targets() -> None:
     free = kinfmu.fit(_problem(), starts=1)
     swing = kinfmu.readings.Range("s", of="rocker.phi")

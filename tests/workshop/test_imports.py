@@ -46,6 +46,7 @@ def test_importing_loads_no_heavy_package(statement: str, late: set[str]) -> Non
     assert loaded & late == set()
 
 
+@pytest.mark.long
 def test_building_and_stepping_an_fmu_loads_nothing_to_log_with(tmp_path: Path) -> None:
     statement = (
         f"import kinfmu; fmu = kinfmu.build(kinfmu.load('fourbar'), {str(tmp_path / 'fourbar.fmu')!r}); "

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu import gallery
 from kinfmu.log import write_mcap, write_rrd
 from kinfmu.log.viewer import headless
 from kinfmu.log.viewer.comparison import write_comparison
 from kinfmu.run.channels import select
 from kinfmu.sweep import run_times
-from tests.gallery_members import every_member
+from tests.gallery_members import mostly_long
 from tests.log.runs import KINDS, fourbar, with_gap
 from tests.log.viewer.test_rerun_file import verified
 from tests.sweep.test_forces import loaded
@@ -53,9 +54,14 @@ def _forces(path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "write", "views"),
     [
-        ("gap.rrd", _single, {"linkage", "angular velocity [rad/s]", "log10 margin", "solver status", "log", "run"}),
+        pytest.param(
+            "gap.rrd",
+            _single,
+            {"linkage", "angular velocity [rad/s]", "log10 margin", "solver status", "log", "run"},
+            marks=pytest.mark.long,
+        ),
         ("one.rrd", _one_sample, {"linkage", "position [m]"}),
-        ("selected.rrd", _selected, {"linkage", "angle [rad]", "solver status"}),
+        pytest.param("selected.rrd", _selected, {"linkage", "angle [rad]", "solver status"}, marks=pytest.mark.long),
         ("loaded.rrd", _loaded, {"linkage", "crank.torque [N m]", "crank.power [W]", "energy [J]"}),
         ("compared.rrd", _compared, {"linkage", "B - A: position [m]", "position [m] of A (wide) and B"}),
         ("forces.rrd", _forces, {"crank.torque [N m] of A (wide) and B", "B - A: crank.torque [N m]", "solver status"}),
@@ -73,7 +79,7 @@ def test_no_view_reports_an_error(
     assert shot.png.startswith(b"\x89PNG")
 
 
-@every_member
+@pytest.mark.parametrize("name", mostly_long(gallery.names(), few=("cam_roller", "excavator_loaded", "fourbar")))
 def test_no_view_of_the_gallery_reports_an_error(name: str, tmp_path: Path, viewer: headless.Viewer) -> None:
     mechanism = kinfmu.load(name)
     times = run_times(mechanism.run)
