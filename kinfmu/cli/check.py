@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,7 @@ from kinfmu.cli.arguments import OutputFile, mechanism_argument
 from kinfmu.cli.group import errors_of, main
 from kinfmu.cli.quantities import driver_value
 from kinfmu.cli.settings import checked_settings, set_option
-from kinfmu.errors import KinfmuError, listed
+from kinfmu.errors import KinfmuError, MechanismError, listed
 
 if TYPE_CHECKING:
     from kinfmu.analysis import Assemblies, Report
@@ -48,7 +49,13 @@ def check(
     """
     from kinfmu.analysis import check as checked
 
-    mech = checked_settings(gallery.load(mechanism), settings).mechanism()
+    try:
+        loaded = gallery.load(mechanism)
+    except MechanismError as problem:
+        if not settings:
+            _print_part(mechanism, problem, as_json=as_json)
+        raise
+    mech = checked_settings(loaded, settings).mechanism()
     value = _value(mech, mechanism, at, picture)
     with errors_of(mechanism):
         report = checked(mech)
@@ -76,6 +83,24 @@ def check(
                 click.echo(f"  figure      {picture}")
         if report.problem is not None:
             raise report.problem
+
+
+def _print_part(path: str, problem: MechanismError, *, as_json: bool) -> None:
+    """Print what can be found of an invalid mechanism file; nothing if its bodies or joints are invalid."""
+    from kinfmu.analysis import check as checked
+    from kinfmu.mechanism.partial_file import read_partially
+
+    part = read_partially(path)
+    if part is None:
+        return
+    try:
+        report = checked(part.mechanism)
+    except KinfmuError:  # the file's own problem is reported
+        return
+    reason = type(problem)(str(problem).removeprefix(f"{path}: "), **problem.data)
+    text = f"this report leaves out {listed(part.left_out)}, because of the problem"
+    report = replace(report, problem=reason, notes=(text,))
+    click.echo(json.dumps(report.as_json(), indent=2) if as_json else str(report))
 
 
 def _assemblies(report: Report) -> Assemblies | None:

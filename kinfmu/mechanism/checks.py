@@ -163,7 +163,7 @@ def _why_no_force(members: Members, name: str) -> str:
         return f"there is no driver '{owner}'{near}; drivers: {listed(member.name for member in members.drivers)}"
     is_force = (noun in _EFFORTS and owner in joints | drivers) or name in _OF_MECHANISM
     if is_force and not (members.loads or any(body.has_mass for body in members.bodies)):
-        return "without masses and loads there are no forces"
+        return "without masses and loads there are no forces; give a body a mass, such as mass = '1.2 kg'"
     return ""
 
 

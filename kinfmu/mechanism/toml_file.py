@@ -105,7 +105,7 @@ def parse(text: str, where: str = "mechanism", folder: str | Path | None = None)
         raise MechanismError(f"{where}: too large for a mechanism (largest: {LARGEST_FILE} characters)")
     document = document_of(text, where)
     try:
-        return _mechanism(document, None if folder is None else Path(folder))
+        return mechanism_of(document, None if folder is None else Path(folder))
     except MechanismError as error:
         raise type(error)(f"{where}: {error}", **error.data) from None
 
@@ -133,7 +133,8 @@ def _deep_key(text: str) -> int | None:
     return next((token.start() for token in _TOKEN.finditer(text) if token.lastgroup), None)
 
 
-def _mechanism(document: dict[str, Any], folder: Path | None) -> Mechanism:
+def mechanism_of(document: dict[str, Any], folder: Path | None) -> Mechanism:
+    """Return the mechanism of the tables of a file; folder: where relative paths start, None refuses files."""
     check_keys("", document, _TABLES)
     document = expanded(document)
     units = table_of(document, "units")

@@ -157,3 +157,94 @@ def test_a_name_that_is_nowhere_is_wrong_usage(refuses: Callable[..., str]) -> N
     assert refuses("check", "none.toml").endswith("none.toml: there is no such file")
     assert refuses("check", "n" * 5000 + ".toml").endswith(": there is no such file")
     assert refuses("check") == "Missing argument 'MECH'."
+
+
+_DRIVER = """[drivers.crank]
+type = "angle"
+of = "crank"
+law = "constant_speed"
+start = 0
+speed = "1 deg/s"
+"""
+_PEAK = '[measures.peak]\ntype = "maximum"\nof = "crank.torque"\n'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem", "left_out", "lines"),
+    [
+        (
+            "[points]",
+            f"{_PEAK}[points]",
+            "[measures.peak] of: 'crank.torque' is not there: without masses and loads there are no forces; give a "
+            "body a mass, such as mass = '1.2 kg'",
+            "[measures]",
+            ["mobility    1, driven by crank", "redundant   AB (row AB.length)", "range       crank turns all the way"],
+        ),
+        (
+            "[points]",
+            "[gravity]\nx = 0\n[points]",
+            "[gravity] needs the key 'y'; downwards: x = 0, y = '-9.81 m/s2'",
+            "[gravity]",
+            ["mobility    1, driven by crank", "range       crank turns all the way"],
+        ),
+        (
+            "[bodies.rocker]",
+            "[bodies.rocker]\ninertia = 2.0",
+            "[bodies.rocker] inertia needs a mass, such as mass = '1.2 kg'",
+            "masses",
+            ["mobility    1, driven by crank", "range       crank turns all the way"],
+        ),
+        (
+            _DRIVER,
+            _PEAK,
+            "[measures.peak] of: 'crank.torque' is not there: there is no driver 'crank'; drivers: none",
+            "[measures]",
+            [
+                "mobility    1, no driver",
+                "loose       crank.phi, ",
+                'could add   [drivers] crank = { type = "angle", of',
+            ],
+        ),
+        (
+            _DRIVER,
+            '[drivers.crank]\ntype = "angle"\nlaw = "constant_speed"\n',
+            "[drivers.crank] needs the key 'of'; keys: of, law",
+            "[drivers], [run], [points]",
+            ["mobility    1, no driver", 'could add   [drivers] crank = { type = "angle", of = "crank", law'],
+        ),
+    ],
+)
+def test_what_is_valid_of_a_file_is_reported_before_its_problem(
+    old: str,
+    new: str,
+    problem: str,
+    left_out: str,
+    lines: list[str],
+    command: Command,
+    fourbar_file: Callable[..., Path],
+) -> None:
+    path = fourbar_file(old, new)
+    result = command("check", path.name)
+    assert result.exit_code == 1
+    assert result.stderr == f"kinfmu: mine.toml: {problem}\n"
+    for line in [*lines, f"note        this report leaves out {left_out}, because", f"problem     {problem}\n"]:
+        assert line in result.stdout
+    found = json.loads(command("check", path.name, "--json").stdout)
+    assert (found["mobility"], found["problem"]) == (1, problem)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ('"rocker.C"', '"rocker.Z"', "body 'rocker' has no point 'Z'"),
+        ('name = "fourbar"', 'name = "fourbar', "not valid TOML"),
+        ("[bodies.rocker]", "[rest]", "[rest]: unknown key"),
+    ],
+)
+def test_a_file_whose_bodies_or_joints_are_invalid_has_no_report(
+    old: str, new: str, problem: str, command: Command, fourbar_file: Callable[..., Path]
+) -> None:
+    result = command("check", fourbar_file(old, new).name)
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert problem in result.stderr
+    assert result.stderr.count("\n") == 1
