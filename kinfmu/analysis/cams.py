@@ -29,7 +29,7 @@ from kinfmu.cams.traced import traced
 from kinfmu.drivers import Driver
 from kinfmu.errors import KinfmuError, MechanismError, RequestError, listed, suggestion
 from kinfmu.joints import CamFlatFace, CamOscillating, CamTranslating
-from kinfmu.laws import MotionSequence
+from kinfmu.laws import Harmonic, Law, MotionSequence, Spline
 from kinfmu.measures import AngleBetween
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
@@ -41,6 +41,7 @@ from kinfmu.solver.python import Pose
 
 SLIDING_LIMIT, SWINGING_LIMIT = math.radians(30.0), math.radians(45.0)  # [rad], usual for pressure angles
 _ANGLES = 361  # of a table by default, one a degree
+_ROUNDING = 1e-9  # of a lift; lifts to both sides that differ less are equal
 _SAME_ANGLE = 1e-7  # [rad]; closer angles are equal
 
 
@@ -121,7 +122,7 @@ class CamFindings:
         other = with_opposite_lift(self.cam)
         if other is not None and other < abs(worst.value):
             cure = (
-                f"the lift moves the follower towards the cam: with rises of the opposite sign it is {degrees(other)}"
+                f"the lift moves the follower towards the cam: with lifts of the opposite sign it is {degrees(other)}"
             )
         return (
             f"cam '{self.joint}': pressure angle {degrees(worst.value)} ({self.place(worst.at)}) is above "
@@ -202,14 +203,31 @@ class CamFindings:
 
 
 def with_opposite_lift(cam: PlacedCam) -> float | None:
-    """Return the largest pressure angle with the opposite lift [rad]; None for lifts away from the cam, or unknown."""
+    """Return the largest pressure angle with the opposite lift [rad]; None for lifts away from the cam, or unknown.
+
+    A lift counts from where a sequence or a table begins, a harmonic one from 0: it goes to both sides of its middle,
+    so that it must be towards the cam as a whole. Other laws do not repeat after a turn.
+    """
     joint = cam.joint
-    if not isinstance(joint, CamTranslating | CamOscillating) or not isinstance(law := joint.law, MotionSequence):
+    if not isinstance(joint, CamTranslating | CamOscillating):
         return None
-    lifts = np.cumsum([segment.rise for segment in law.segments]) * pressing_sign(cam)
-    if -lifts.min() <= lifts.max():
+    opposite: Law
+    match joint.law:
+        case MotionSequence(segments=segments) as law:
+            lifts = np.cumsum([segment.rise for segment in segments])
+            opposite = replace(law, segments=tuple(segment._replace(rise=-segment.rise) for segment in segments))
+        case Spline(points=points) as law:
+            base = points[0][1]
+            lifts = np.array([u - base for _, u in points])
+            opposite = replace(law, points=tuple((x, 2.0 * base - u) for x, u in points))
+        case Harmonic(start=middle, amplitude=amplitude) as law if abs(middle) >= abs(amplitude) * (1.0 - _ROUNDING):
+            lifts = np.array([middle - amplitude, middle + amplitude])
+            opposite = replace(law, start=-middle, amplitude=-amplitude)
+        case _:
+            return None
+    lifts = lifts * pressing_sign(cam)
+    if -lifts.min() <= lifts.max() * (1.0 + _ROUNDING):
         return None
-    opposite = replace(law, segments=tuple(segment._replace(rise=-segment.rise) for segment in law.segments))
     try:
         found = critical_values(replace(cam, joint=replace(joint, law=opposite)))
     except MechanismError:

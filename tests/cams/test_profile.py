@@ -18,6 +18,7 @@ from kinfmu.cams import PlacedCam, critical
 from kinfmu.cams.traced import Traced
 from kinfmu.errors import KinfmuError, MechanismError, RequestError
 from kinfmu.joints import CamOscillating
+from kinfmu.laws import Harmonic, Law, Spline
 from kinfmu.page.describe import describe
 from kinfmu.readings import PressureAngle
 from tests.cams import followers
@@ -307,14 +308,26 @@ def test_check_reports_a_steep_cam_as_a_note() -> None:
     assert not [note for note in kinfmu.check(followers.lifted_roller(8.0)).notes if "pressure angle" in note]
 
 
+def table(law: Law) -> Spline:
+    """Return a law of a turn as a table."""
+    points = [(x, float(law.at(x))) for x in np.linspace(0.0, TURN, 73).tolist()]
+    return Spline((*points[:-1], (TURN, points[0][1])), ends="periodic")
+
+
+@pytest.mark.parametrize("form", ["sequence", "table", "harmonic"])
 @pytest.mark.parametrize("joint", ["swinging", "translating"])
-def test_the_note_on_a_steep_cam_names_a_wrong_sign_of_the_lift(joint: str) -> None:
+def test_the_note_on_a_steep_cam_names_a_wrong_sign_of_the_lift(joint: str, form: str) -> None:
     """A rise towards the cam; the number of the opposite sign is that of the mended file."""
 
     def made(sign: float) -> kinfmu.Mechanism:
+        height = sign * (15.0 if joint == "translating" else 0.5)
+        law: Law = followers.rise_and_return(height)
+        if form == "table":
+            law = table(law)
+        if form == "harmonic":
+            law = Harmonic(0.5 * height, 1.0, 0.5 * height, math.radians(-90.0))
         if joint == "translating":
-            return followers.lifted_roller(2.0, followers.rise_and_return(sign * 15.0), offset=22.0)
-        law = followers.rise_and_return(sign * 0.5)
+            return followers.lifted_roller(2.0, law, offset=22.0)
         return followers.swinging(
             CamOscillating("lift", ("ground", "follower"), "cam", law, -0.5, contact="follower.F", roller_radius=0.5)
         )
@@ -322,11 +335,20 @@ def test_the_note_on_a_steep_cam_names_a_wrong_sign_of_the_lift(joint: str) -> N
     outwards = 1.0 if joint == "translating" else -1.0
     (note,) = (note for note in kinfmu.check(made(-outwards)).notes if "pressure angle" in note)
     mended = kinfmu.cam_profile(made(outwards), "lift", np.linspace(0.0, math.tau, 7201)).pressure_angle
-    words = "the lift moves the follower towards the cam: with rises of the opposite sign it is "
+    words = "the lift moves the follower towards the cam: with lifts of the opposite sign it is "
     assert words in note
     assert float(note.partition(words)[2].removesuffix(" deg")) == pytest.approx(
         math.degrees(np.abs(mended).max()), rel=1e-5
     )
+
+
+@pytest.mark.parametrize("phase", [0.0, math.pi])
+def test_a_motion_to_both_sides_has_no_wrong_sign(phase: float) -> None:
+    wave = Harmonic(amplitude=12.0, frequency=1.0, phase=phase)
+    for law in (wave, table(wave)):
+        found = kinfmu.check(followers.lifted_roller(2.0, law, offset=22.0))
+        (note,) = (note for note in found.notes if "pressure angle" in note)
+        assert note.endswith("; a larger base circle lowers it")
 
 
 def test_a_roller_that_cuts_the_profile_elsewhere_is_reported() -> None:
