@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
@@ -11,6 +11,7 @@ import numpy as np
 from kinfmu.cams import CAM_JOINTS
 from kinfmu.cams.placed import members_of
 from kinfmu.draw.gap import gap_note, gaps
+from kinfmu.draw.gravity import gravity
 from kinfmu.draw.instant import instant, pose_note
 from kinfmu.draw.motion import motion
 from kinfmu.draw.names import Mark, Name, place
@@ -23,6 +24,7 @@ from kinfmu.joints import Coordinate, Distance, Fixed, PointOnLine, Revolute, Tr
 from kinfmu.mechanism import Mechanism
 from kinfmu.scene.cams import cam_shapes
 from kinfmu.scene.instant import Instant
+from kinfmu.scene.load_shapes import load_text
 from kinfmu.scene.shape import Shape
 from kinfmu.scene.shapes import shapes
 
@@ -85,7 +87,9 @@ def sheet_of(shown: Instant, ax: Axes | None = None) -> Sheet:
     reach = np.vstack([extent(found), *(mark.extent() for mark in (*arrows, *places, *tracks))])
     size = float(np.ptp(reach, axis=0).max())
     sheet = Sheet(reach, shortest(found, size), mechanism.length_unit, mechanism.title or mechanism.name, ax)
-    names = draw(sheet, found, tracks, [*arrows, *places, *gaps(shown)])
+    texts = {load.name: load_text(load) for load in mechanism.loads}
+    names = draw(sheet, found, tracks, [*arrows, *places, *gaps(shown)], texts)
+    names += gravity(sheet, mechanism)
     notes = [text for text in (gap_note(shown), pose_note(shown), *_face_notes(shown)) if text]
     if len(names) <= MOST_NAMES:
         place(names, sheet)
@@ -98,8 +102,17 @@ def sheet_of(shown: Instant, ax: Axes | None = None) -> Sheet:
     return sheet
 
 
-def draw(sheet: Sheet, found: Sequence[Shape], tracks: Sequence[Mark], above: Sequence[Mark]) -> list[Name]:
-    """Draw shapes of the world, paths between plates and bars, and marks above all, and return the names to place."""
+def draw(
+    sheet: Sheet,
+    found: Sequence[Shape],
+    tracks: Sequence[Mark],
+    above: Sequence[Mark],
+    loads: Mapping[str, str] | None = None,
+) -> list[Name]:
+    """Draw shapes of the world, paths between plates and bars, and marks above all, and return the names to place.
+
+    loads: texts next to loads, by name.
+    """
     painter = Painter(sheet, found)
     painter.wheels()
     painter.cams()
@@ -110,6 +123,7 @@ def draw(sheet: Sheet, found: Sequence[Shape], tracks: Sequence[Mark], above: Se
     painter.slides()
     painter.racks()
     painter.cylinders()
+    painter.loads(loads or {})
     names += [name for mark in above for name in mark.draw(sheet)]
     return [*painter.names, *names]
 

@@ -11,7 +11,6 @@ from kinfmu.draw.names import Mark, Name
 from kinfmu.draw.sheet import Sheet, arc
 from kinfmu.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
 from kinfmu.equations.system import size_of
-from kinfmu.joints import Revolute
 from kinfmu.measures.placement import body_of, unit_vector
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray
@@ -109,7 +108,8 @@ def _mark(shown: Instant, driver: Driver) -> Mark:
         along = np.array([1.0, 0.0] if driver.axis == "x" else [0.0, 1.0])
         return Push(text, shown.point(driver.of), direction * along)
     *held, body = driver.bodies()
-    centre = _pivot(shown, body, held[0] if held else GROUND_NAME)
+    pin = shown.pivot(body, held[0] if held else GROUND_NAME)
+    centre = shown.point(pin) if pin else np.asarray(shown.poses[body][0, :2])
     return Turn(text, centre, direction, _heading(shown, body, centre))
 
 
@@ -119,14 +119,6 @@ def value_text(shown: Instant, driver: Driver, value: float) -> str:
         return f"{round(math.degrees(value), 1) + 0.0:.6g}\N{DEGREE SIGN}"
     finest = 4 - math.ceil(math.log10(size_of(shown.mechanism)))
     return f"{round(value, finest) + 0.0:.6g} {shown.mechanism.length_unit}"
-
-
-def _pivot(shown: Instant, body: str, against: str) -> FloatArray:
-    """Return the pin between two bodies, else the first pin of the body, else the origin of its frame."""
-    pins = [joint for joint in shown.joints if isinstance(joint, Revolute) and body in joint.bodies()]
-    for joint in sorted(pins, key=lambda joint: against not in joint.bodies()):
-        return shown.point(joint.between[0])
-    return np.asarray(shown.poses[body][0, :2])
 
 
 def _heading(shown: Instant, body: str, centre: FloatArray) -> float:

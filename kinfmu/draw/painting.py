@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -20,12 +20,14 @@ _GREY, _LIGHT_GREY = palette.darker(palette.GROUND), palette.lighter(palette.BAR
 _EDGE = 0.9  # [pt]
 _NAMED_AT = (0.5, 0.35, 0.65, 0.2, 0.8)  # of the length of an edge, places for its name
 _SLOT, _OPENING = 1.55, 0.75  # widths of a slotted link and of its slot, relative to a bar
+_LOAD, _TO_NAME = 1.2, 5.0  # [pt]; lines of loads, distance of their names
 _BARREL, _ROD, _PISTON = 5.5, 1.9, 1.6  # [pt]; half widths of a cylinder, half thickness of its piston
 
 
 def placed(shown: Instant, found: Sequence[Shape]) -> list[Shape]:
     """Return shapes in the world as drawn."""
-    return [shape.placed(shown.frames[shape.frame][0]) for shape in found]
+    poses = {name: pose[0] for name, pose in shown.frames.items()}
+    return [shape.placed(poses) for shape in found]
 
 
 def extent(found: Sequence[Shape]) -> FloatArray:
@@ -38,6 +40,15 @@ def shortest(found: Sequence[Shape], size: float) -> float:
     steps = [np.diff(shape.points, axis=0) for shape in found if shape.kind in ("link", "bar")]
     lengths = [length for step in steps for length in np.hypot(*step.T) if length > 1e-3 * size]
     return float(min(lengths, default=size))
+
+
+def _anchors(load: Shape, symbol: FloatArray) -> FloatArray:
+    """Return places for the name of a load, (k, 2); symbol: points (s, 2) of its lines."""
+    if len(load.points) < 2:
+        return np.vstack([symbol.mean(axis=0), symbol[:: max(len(symbol) // 6, 1)]])
+    a, b = load.points
+    off = symbol.mean(axis=0) - 0.5 * (a + b)  # of a symbol next to others
+    return np.array([a + off + part * (b - a) for part in _NAMED_AT])
 
 
 class Painter:
@@ -187,6 +198,21 @@ class Painter:
         """Paint cylinders: the rod, and over it the barrel with the piston."""
         for barrel, shaft in zip(self._all("barrel"), self._all("shaft"), strict=True):
             self._cylinder(barrel.points, shaft.points)
+
+    def loads(self, texts: Mapping[str, str]) -> None:
+        """Paint the symbols of loads with their texts by name; none for a load without a text."""
+        sheet = self._sheet
+        for load in self._found:
+            if not load.strips:
+                continue
+            places = []
+            for strip, points in details.symbol(load, sheet.ornament):
+                fill = (load.colour if strip.is_solid else PAPER) if strip.is_area else None
+                width = 0.4 if strip.is_solid else _LOAD
+                sheet.line(points, width, load.colour, closed=strip.is_area, fill=fill, matters=1.5)
+                places.append(points)
+            if text := texts.get(load.name):
+                self.names.append(Name(text, _anchors(load, np.vstack(places)), _TO_NAME, load.colour, rank=1))
 
     def _cylinder(self, barrel: FloatArray, shaft: FloatArray) -> None:
         """Paint one cylinder; barrel: from its pin to its end, shaft: from the piston to its own pin."""

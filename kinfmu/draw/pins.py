@@ -16,6 +16,7 @@ from kinfmu.run import FloatArray
 from kinfmu.scene import palette
 from kinfmu.scene.details import box
 from kinfmu.scene.instant import Instant
+from kinfmu.scene.load_shapes import BETWEEN
 from kinfmu.scene.slides import slides
 
 _SAME = 1e-6  # of the size; points that are nearer are one place
@@ -114,7 +115,7 @@ def pins(shown: Instant) -> list[Mark]:
 
 
 def _note_joints(shown: Instant, home: dict[str, _Place]) -> None:
-    """Add the joints and cylinders to the places of their points."""
+    """Add joints, cylinders and springs to the places of their points."""
     for member in (*shown.joints, *shown.drivers):
         if not isinstance(member, Revolute | Fixed | Distance | DistanceDriver):
             continue
@@ -124,6 +125,11 @@ def _note_joints(shown: Instant, home: dict[str, _Place]) -> None:
             place.points.append(point)
             if isinstance(member, Revolute | Fixed) and member.name not in place.joints:
                 place.joints.append(member.name)
+    for load in shown.mechanism.loads:
+        if isinstance(load, BETWEEN) and shown.poses.keys() >= {*load.bodies()}:
+            for point in load.between:
+                home[point].kinds.add("pin")
+                home[point].points.append(point)
     for joint in shown.joints:
         if isinstance(joint, CamRoller):
             home[joint.between[1]].kinds.add("pin")

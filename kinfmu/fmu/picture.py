@@ -131,11 +131,11 @@ def _lines(found: Scene, row: int, size: float) -> Iterator[Line]:
     shapes = sorted(found.shapes, key=lambda shape: shape.kind not in order)
     for shape in shapes:
         if shape.kind != "pitch" and shape.frame in frames:
-            drawn = shape.placed(frames[shape.frame])
+            drawn = shape.placed(frames)
             for face in shapes:
                 if face.kind == "face" and face.frame == shape.frame and shape.kind in ("link", "rib", "rod", "face"):
                     half = 0.5 * _STROKES["link"] * size / _DETAIL
-                    drawn = replace(drawn, points=details.on_face(drawn.points, face.placed(frames[face.frame]), half))
+                    drawn = replace(drawn, points=details.on_face(drawn.points, face.placed(frames), half))
             yield from _of_shape(drawn, size)
     for frame, pins in found.pins.items():
         if frame in frames:
@@ -156,6 +156,9 @@ def _of_shape(shape: Shape, size: float) -> Iterator[Line]:
     elif shape.kind in ("block", "die"):
         corners = details.box(shape.points[0], shape.towards, details.BLOCK * size, details.BLOCK_WIDTH * size)
         yield Line(corners, shape.colour, 1.5, is_filled=True)
+    elif shape.strips:
+        for strip, points in details.symbol(shape, size):
+            yield Line(points, shape.colour, 1.5, is_filled=strip.is_area)
     elif shape.kind == "contact":
         return
     else:

@@ -17,9 +17,10 @@ from kinfmu.analysis import Report
 from kinfmu.analysis.loops import FourBar, Place
 from kinfmu.draw.instant import instant
 from kinfmu.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
-from kinfmu.joints import CamFlatFace, CamRoller, Coordinate, Distance, PointOnLine, Revolute, Translational
+from kinfmu.joints import CamFlatFace, CamRoller, Coordinate, Distance, PointOnLine, Translational
 from kinfmu.joints.joint import Joint
-from kinfmu.measures.placement import body_of
+from kinfmu.loads import ForceAlong, ForceAt
+from kinfmu.measures.placement import body_of, unit_vector
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.expression import Computed, Expression
@@ -34,6 +35,7 @@ from kinfmu.page.opened import AXES, place_text
 from kinfmu.plan.undetermined import undetermined_reactions
 from kinfmu.scene import palette
 from kinfmu.scene.instant import Instant
+from kinfmu.scene.load_shapes import load_text
 from kinfmu.scene.shape import Shape
 from kinfmu.scene.shapes import shapes
 from kinfmu.scene.slides import Slide, slides
@@ -59,7 +61,10 @@ def describe(mechanism: Mechanism, report: Report) -> dict[str, Any]:
     along = {body: iter([slide for slide in sliding if slide.holder == body]) for body in shown.poses}  # of rods
     lines = {slide.name: slide for slide in sliding}
     found = []
-    for shape in shapes(shown):
+    drawn = shapes(shown)
+    for shape in drawn:
+        if shape.strips:
+            continue
         slide = next(along[shape.frame]) if shape.kind == "rod" else lines.get(shape.name)
         found.append(_shape(shown, shape, numbers) | _line(shape, slide, numbers))
     cams = {shape["name"] for shape in found if shape["kind"] in CAM_SHAPES}
@@ -81,7 +86,8 @@ def describe(mechanism: Mechanism, report: Report) -> dict[str, Any]:
             {"name": name, "point": numbers[point], "colour": list(palette.body(len(bodies) - 1 + k))}
             for k, (name, point) in enumerate(mechanism.points.items())
         ],
-        "loads": [_load(load, numbers) for load in mechanism.loads],
+        "loads": [_load(mechanism, shape, numbers) for shape in drawn if shape.strips],
+        "gravity": _gravity(mechanism),
         "cams": [cam_data(mechanism, joint, numbers) for joint in shown.joints if joint.name in cams],
         "shapes": [shape for shape in found if shape["kind"] not in _NOT_DRAWN],
         "loops": list(_loops(report, numbers)),
@@ -248,7 +254,8 @@ def _driver(driver: Driver, shown: Instant, report: Report, numbers: Mapping[str
     else:
         *held, body = driver.bodies()
         against = held[0] if held else GROUND_NAME
-        found |= {"body": body, "against": against, "pivot": _pivot(shown, body, against, numbers)}
+        pin = shown.pivot(body, against)
+        found |= {"body": body, "against": against, "pivot": numbers[pin] if pin else None}
     if isinstance(driver, SlideDriver):
         found["axis"] = float(driver.axis)
     for reach in report.ranges:
@@ -260,17 +267,41 @@ def _driver(driver: Driver, shown: Instant, report: Report, numbers: Mapping[str
     return found
 
 
-def _pivot(shown: Instant, body: str, against: str, numbers: Mapping[str, int]) -> int | None:
-    """Return the number of the driven body's point at the pin about which it turns; None without a pin."""
-    pins = [joint for joint in shown.joints if isinstance(joint, Revolute) and body in joint.bodies()]
-    for joint in sorted(pins, key=lambda joint: against not in joint.bodies()):
-        return next(numbers[point] for point in joint.between if body_of(point) == body)
-    return None
+def _load(mechanism: Mechanism, shape: Shape, numbers: Mapping[str, int]) -> dict[str, Any]:
+    """Return the symbol of a load; its points are numbers, none if the origin of its body has no name."""
+    (load,) = (one for one in mechanism.loads if one.name == shape.name)
+    ends, places = [*zip((shape.frame, shape.other), shape.points.tolist(), strict=False)], mechanism.body_points
+    found: dict[str, Any] = {
+        "name": load.name,
+        "type": load.type,
+        "text": load_text(load),
+        "frame": shape.frame,
+        "axes": shape.other,
+        "points": [
+            next(number for name, number in numbers.items() if body_of(name) == body and tuple(point) == places[name])
+            for body, point in ends
+            if any(body_of(name) == body and tuple(point) == places[name] for name in numbers)
+        ],
+        "strips": [
+            {"points": _rounded(strip.points)}
+            | ({"area": True} if strip.is_area else {})
+            | ({"solid": True} if strip.is_solid else {})
+            for strip in shape.strips
+        ],
+    }
+    if isinstance(load, ForceAt):
+        found["force"] = [float(load.x), float(load.y)]
+    elif isinstance(load, ForceAlong):
+        ahead = float(np.dot(shape.towards, unit_vector(float(load.angle))))
+        found |= {"angle": float(load.angle), "sense": math.copysign(1.0, ahead)}
+    return found
 
 
-def _load(load: Any, numbers: Mapping[str, int]) -> dict[str, Any]:
-    points = [getattr(load, "at", None) or None, *getattr(load, "between", ())]
-    return {"name": load.name, "type": load.type, "points": [numbers[p] for p in points if p in numbers]}
+def _gravity(mechanism: Mechanism) -> list[float] | None:
+    """Return the acceleration of free fall, if bodies have masses."""
+    if not mechanism.gravity or not any(body.mass for body in mechanism.moving_bodies):
+        return None
+    return [float(value) for value in mechanism.gravity]
 
 
 def _shape(shown: Instant, shape: Shape, numbers: Mapping[str, int]) -> dict[str, Any]:

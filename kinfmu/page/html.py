@@ -31,6 +31,7 @@ _SCRIPTS = (
     "linkage",
     "instants",
     "marks",
+    "loads",
     "drawing",
     "design",
     "grips",

@@ -5,11 +5,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from kinfmu.run import FloatArray
 from kinfmu.scene.outline import FLAT
 from kinfmu.scene.shape import Shape
+from kinfmu.scene.symbols import Strip
 
 BLOCK, BLOCK_WIDTH = 11.0, 7.0  # half length and half width of a block
 SUPPORT = 13.0  # height of a support
@@ -94,6 +97,19 @@ def core(block: Shape, size: float) -> FloatArray:
     """Return the line (2, 2) that looks like a block if it is drawn BLOCK_WIDTH to each side with round ends."""
     half = (BLOCK - 0.5 * BLOCK_WIDTH) * size * block.towards
     return np.array([block.points[0] - half, block.points[0] + half])
+
+
+def symbol(load: Shape, size: float) -> Iterator[tuple[Strip, FloatArray]]:
+    """Yield the strips of a load, each with its points (k, 2); parts of a cylinder stay between its ends."""
+    start, along, length = load.points[0], load.direction, 0.0
+    if along is None:
+        length = float(np.hypot(*(load.points[1] - start)))
+        along = (load.points[1] - start) / max(length, 1e-300)
+    across = np.array([-along[1], along[0]])
+    for strip in load.strips:
+        part, own, detail, side = strip.points.T
+        ahead = np.clip(part * length + own, 0.0, length) + size * detail
+        yield strip, start + ahead[:, None] * along + size * side[:, None] * across
 
 
 def teeth_size(radius: float) -> float:

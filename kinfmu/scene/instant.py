@@ -97,6 +97,13 @@ class Instant:
                 return self.point(joint.between[0])
         return None
 
+    def pivot(self, body: str, against: str) -> str | None:
+        """Return the point 'body.point' of a body at its pin, first that to another body; None without a pin."""
+        pins = [joint for joint in self.joints if isinstance(joint, Revolute) and body in joint.bodies()]
+        for joint in sorted(pins, key=lambda joint: against not in joint.bodies()):
+            return next(point for point in joint.between if body_of(point) == body)
+        return None
+
     def value(self, driver: str) -> float:
         """Return the value of a driver as drawn [rad or length]."""
         poses = {name: BodyFrame.of(*pose[0].tolist()) for name, pose in self.poses.items()}

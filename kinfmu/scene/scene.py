@@ -124,6 +124,10 @@ def _bounds(found: Sequence[Shape], poses: Mapping[str, FloatArray]) -> tuple[Fl
     for shape in found:
         if shape.kind == "pitch":  # only figures draw it
             continue
+        if shape.strips:  # a load; its points on bodies are those of links
+            ends = zip((shape.frame, shape.other), shape.points, strict=False)
+            corners += [point[None] for frame, point in ends if frame == GROUND_NAME]
+            continue
         if shape.frame == GROUND_NAME:
             corners.append(shape.extent)
         elif shape.frame in poses:

@@ -14,10 +14,13 @@ of `frames`: bars, cylinders, and the blocks of pins.
     rack             the pitch line; direction: from the teeth to the back
     contact          the point where the bodies of a cam, gear or rack touch
     bar              a joint Distance; barrel, shaft: of a driven distance, at its first and at its second point
+    spring, damper, gas_spring, force_between, force, force_along, torque, torsion_spring, torsion_damper
+                     the symbol of a load of this type: one point, or two; direction: of a force, of a body's x axis
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -32,6 +35,7 @@ from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.run import FloatArray
 from kinfmu.scene import palette
 from kinfmu.scene.placing import world
+from kinfmu.scene.symbols import Strip
 
 _ROUND = np.linspace(0.0, 2.0 * np.pi, 73)  # [rad], corners of a circle
 
@@ -42,7 +46,8 @@ class Shape:
 
     kind: see above; name: of the joint, body or driver it shows; frame: that moves it; points: (k, 2) in the frame;
     colour: of the body, or grey; is_closed: True for a line that returns to its first point; radius: of a circle about
-    the only point; direction: unit vector (2,), as stated with the kinds.
+    the only point; direction: unit vector (2,), as stated with the kinds. Of loads: strips: the lines of the symbol;
+    other: the frame of the second of two points, else that of the direction.
     """
 
     kind: str
@@ -53,6 +58,8 @@ class Shape:
     is_closed: bool = False
     radius: float = 0.0
     direction: FloatArray | None = None
+    strips: tuple[Strip, ...] = ()
+    other: str = ""
 
     @property
     def line(self) -> FloatArray:
@@ -73,13 +80,34 @@ class Shape:
             raise TypeError(f"a shape of kind '{self.kind}' has no direction")
         return self.direction
 
-    def placed(self, pose: FloatArray) -> Shape:
-        """Return the shape in the world, its frame in a pose (3,)."""
-        points = np.array([world(pose[None], (x, y))[0] for x, y in self.points]).reshape(-1, 2)
+    def placed(self, poses: Mapping[str, FloatArray]) -> Shape:
+        """Return the shape in the world; poses: (3,) of all frames."""
+        pose = poses[self.frame]
+        ends = [pose] * len(self.points)
+        if self.other and len(ends) > 1:
+            ends[-1] = poses[self.other]
+        points = np.array([world(end[None], (x, y))[0] for end, (x, y) in zip(ends, self.points, strict=True)])
         if self.direction is None:
-            return replace(self, points=points)
+            return replace(self, points=points.reshape(-1, 2))
         x, y = self.direction
-        return replace(self, points=points, direction=world(np.array([[0.0, 0.0, pose[2]]]), (x, y))[0])
+        turn = poses[self.other or self.frame][2]
+        direction = world(np.array([[0.0, 0.0, turn]]), (x, y))[0]
+        return replace(self, points=points.reshape(-1, 2), direction=direction)
+
+    def ends(self, poses: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the first point (n, 2) of a load, its angle [rad] and the distance of its ends (n,).
+
+        poses: (n, 3) of all frames.
+        """
+        first, *last = [
+            world(poses[frame], (float(x), float(y)))
+            for frame, (x, y) in zip((self.frame, self.other), self.points, strict=False)
+        ]
+        if last:
+            way = last[0] - first
+            return first, np.arctan2(way[:, 1], way[:, 0]), np.hypot(*way.T)
+        angle = math.atan2(self.towards[1], self.towards[0]) + poses[self.other or self.frame][:, 2]
+        return first, angle, np.zeros(len(first))
 
 
 def bar_frame(joint: str) -> str:

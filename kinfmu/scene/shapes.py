@@ -10,12 +10,14 @@ import numpy as np
 from kinfmu.drivers import DistanceDriver, Driver
 from kinfmu.joints import CamRoller, Distance, Fixed, PointOnLine, Revolute
 from kinfmu.joints.joint import Joint
+from kinfmu.loads import Load
 from kinfmu.measures.placement import body_of, point_of
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray
 from kinfmu.scene import palette
 from kinfmu.scene.cams import cam_shapes
 from kinfmu.scene.instant import Instant
+from kinfmu.scene.load_shapes import BETWEEN, lengths_between, load_shapes
 from kinfmu.scene.outline import points_of, ribs, rim
 from kinfmu.scene.shape import Shape, bar_frame, cylinder_frames, die_frame
 from kinfmu.scene.slides import Slide, place, racks_of, rods, slides
@@ -33,7 +35,8 @@ def shapes(shown: Instant) -> list[Shape]:
     """Return everything to draw of the bodies whose poses are known, but for pins, arrows and paths."""
     sliding = slides(shown)
     in_world = [*_cams(shown), *wheels(shown), *_slides(shown, sliding), *_supports(shown)]
-    return [*_links(shown, sliding), *_between(shown), *(_in_frame(shown, shape) for shape in in_world)]
+    acting = load_shapes(shown, _box(shown))
+    return [*_links(shown, sliding), *_between(shown), *(_in_frame(shown, shape) for shape in in_world), *acting]
 
 
 def _in_frame(shown: Instant, shape: Shape) -> Shape:
@@ -78,9 +81,7 @@ def _cylinder(shown: Instant, driver: DistanceDriver) -> tuple[float, float]:
 
     The rod's length follows from the longest pose, so it may project behind the barrel in shorter ones.
     """
-    tracks = [shown.track(end) for end in driver.between]
-    lengths: FloatArray = np.hypot(*(tracks[1] - tracks[0]).T)
-    lengths = lengths[1:] if np.isfinite(lengths[1:]).any() else lengths  # of the run, without the drawn pose
+    lengths = lengths_between(shown, driver.between)
     usual, shortest, longest = (float(of(lengths)) for of in (np.nanmedian, np.nanmin, np.nanmax))
     barrel = max(min(_OF_SHORTEST * shortest, _BARREL * usual), _SMALLEST * usual)
     return barrel, max(longest - (1.0 - _GUIDED) * barrel, 0.0)
@@ -103,7 +104,7 @@ def _cams(shown: Instant) -> Iterator[Shape]:
 
 def _slides(shown: Instant, sliding: Sequence[Slide]) -> Iterator[Shape]:
     """Yield the moving parts of slides, and rails under blocks or under a fixed block through which a rod slides."""
-    racks, middle = racks_of(shown), _middle(shown)
+    racks, middle = racks_of(shown), _box(shown).mean(axis=0)
     for slide in sliding:
         at, along = place(shown, slide)
         is_rack, is_on_ground = slide.slider in racks, slide.holder == GROUND_NAME
@@ -129,7 +130,8 @@ def _supports(shown: Instant) -> Iterator[Shape]:
     """
     joints: dict[str, list[str]] = {}  # by point of the ground
     leaving: dict[tuple[float, float], list[FloatArray]] = {}  # vectors from a place to the points of its bodies
-    members: list[Joint | Driver] = [*shown.mechanism.joints, *shown.mechanism.drivers]
+    mechanism = shown.mechanism
+    members: list[Joint | Driver | Load] = [*mechanism.joints, *mechanism.drivers, *mechanism.loads]
     for member in members:
         for point, body in _held(member):
             at = shown.body_points[point]
@@ -145,10 +147,10 @@ def _supports(shown: Instant) -> Iterator[Shape]:
         yield Shape("support", ", ".join(dict.fromkeys(found)), GROUND_NAME, np.array([at]), direction=side)
 
 
-def _held(member: Joint | Driver) -> list[tuple[str, str]]:
-    """Return the points 'ground.point' that a joint or cylinder loads, each with the other body."""
+def _held(member: Joint | Driver | Load) -> list[tuple[str, str]]:
+    """Return the points 'ground.point' that a joint, a cylinder or a spring loads, each with the other body."""
     pairs: list[tuple[str, str]] = []
-    if isinstance(member, Revolute | Fixed | Distance | DistanceDriver):
+    if isinstance(member, (Revolute, Fixed, Distance, DistanceDriver, *BETWEEN)):
         pairs = [member.between, member.between[::-1]]
     elif isinstance(member, PointOnLine | CamRoller):
         pairs = [member.between[::-1]]
@@ -170,10 +172,10 @@ def _points(shown: Instant, body: str) -> FloatArray:
     return np.array([shown.point(name) for name in names]).reshape(-1, 2)
 
 
-def _middle(shown: Instant) -> FloatArray:
-    """Return the middle of all points as drawn, (2,)."""
+def _box(shown: Instant) -> FloatArray:
+    """Return the lower left and upper right corner (2, 2) of all points as drawn."""
     points = np.vstack([_points(shown, body) for body in shown.poses])
-    return np.asarray((points.min(axis=0) + points.max(axis=0)) / 2.0 if len(points) else np.zeros(2))
+    return np.array([points.min(axis=0), points.max(axis=0)] if len(points) else np.zeros((2, 2)))
 
 
 def _outwards(along: FloatArray, at: FloatArray, middle: FloatArray) -> FloatArray:

@@ -16,7 +16,9 @@ from click.testing import CliRunner
 
 import kinfmu
 from kinfmu.cli import main
+from kinfmu.draw import figure
 from kinfmu.page import page
+from tests.loads.every_load import every_load
 from tests.page.browser import DESKTOP, PHONE
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -95,6 +97,11 @@ def draw_gap() -> None:
             raise SystemExit(result.output)
 
 
+def draw_loads() -> None:
+    """Draw a mechanism with a load of every kind."""
+    figure(every_load(), DOCS / "loads.svg")
+
+
 def draw_pages() -> None:
     """Draw pages of mechanisms as they open, on a screen and on a phone."""
     from playwright.sync_api import sync_playwright
@@ -117,4 +124,5 @@ def draw_pages() -> None:
 if __name__ == "__main__":
     draw_files()
     draw_gap()
+    draw_loads()
     draw_pages()

@@ -11,12 +11,21 @@ from kinfmu import gallery
 from kinfmu.draw import figure
 from tests.draw.picture import differences, picture
 from tests.gallery_members import every_member
+from tests.loads.every_load import every_load
 from tests.mechanisms import fourbar
+
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 @every_member
 def test_the_figure_in_the_gallery_is_current(name: str, gallery_figure: Callable[[str], Path]) -> None:
     there, now = picture(gallery.folder() / name / "figure.svg"), picture(gallery_figure(name))
+    assert not differences(there, now), "scripts/pictures draws it anew"
+
+
+def test_the_figure_of_every_load_in_the_docs_is_current(tmp_path: Path) -> None:
+    figure(every_load(), tmp_path / "now.svg")
+    there, now = picture(DOCS / "loads.svg"), picture(tmp_path / "now.svg")
     assert not differences(there, now), "scripts/pictures draws it anew"
 
 

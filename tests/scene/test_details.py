@@ -57,6 +57,8 @@ def test_a_shape_without_direction_is_reported() -> None:
 
 
 def test_a_placed_shape_turns_with_its_frame() -> None:
-    placed = shape("block", (1.0, 0.0), direction=np.array([1.0, 0.0])).placed(np.array([2.0, 3.0, np.pi / 2]))
+    placed = shape("block", (1.0, 0.0), direction=np.array([1.0, 0.0])).placed(
+        {"ground": np.array([2.0, 3.0, np.pi / 2])}
+    )
     np.testing.assert_allclose(placed.points, [[2.0, 4.0]], atol=1e-15)
     np.testing.assert_allclose(placed.towards, [0.0, 1.0], atol=1e-15)

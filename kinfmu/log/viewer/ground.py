@@ -26,7 +26,9 @@ def log_ground(rec: rr.RecordingStream, root: str, scene: Scene, pin: float) -> 
     import rerun as rr
 
     size = detail(scene)
-    shapes = [shape for shape in scene.shapes if shape.frame == GROUND_NAME and shape.kind != "contact"]
+    shapes = [
+        shape for shape in scene.shapes if shape.frame == GROUND_NAME and shape.kind != "contact" and not shape.strips
+    ]
     strips: list[FloatArray] = []
     for shape in shapes:
         if shape.kind == "support":

@@ -2,6 +2,7 @@
 
 import { edgeOf, fillOf, GREY, paleOf } from "./colours.js";
 import { distance, isSlim, outline, placed } from "./geometry.js";
+import { gravity, loads } from "./loads.js";
 import { marks } from "./marks.js";
 import { grouped, niceStep, number } from "./numbers.js";
 import { BUTTONS } from "./view.js";
@@ -23,7 +24,9 @@ export function draw(pen, linkage, view, theme, show, extra) {
     painter.racks();
     painter.slides();
     painter.cylinders();
+    if (show.loads) loads(painter);
     painter.pins(extra.held);
+    if (show.loads) gravity(painter);
     marks(painter, show, extra);
     if (show.names) painter.names();
     return painter.handles;
@@ -49,9 +52,7 @@ class Painter {
         return this.isGhost ? fillOf(GREY, this.theme) : fillOf(colour, this.theme);
     }
 
-    dot(p) {
-        return this.view.pixel(p);
-    }
+    dot = (p) => this.view.pixel(p);
 
     all(...kinds) {
         return kinds.flatMap((kind) => this.linkage.shapesOf.get(kind) || []);
@@ -321,6 +322,7 @@ class Painter {
             }
         }
         for (const driver of linkage.data.drivers) if (driver.type === "distance") driver.points.forEach((point) => pin(point, ""));
+        for (const { points } of linkage.data.loads) if (points.length > 1) points.forEach((point) => pin(point, ""));
         for (const { name, point, colour } of linkage.data.interest) {
             const p = this.dot(linkage.point(point));
             pen.circle(...p, radius + 0.6, { width: 1.6, colour: theme.ink, fill: this.edge(colour) });

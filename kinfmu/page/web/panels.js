@@ -97,6 +97,7 @@ export function showPanel(page, root) {
         ["centres", "Instant centres", "1 is the ground, then the bodies in the order of the file"],
         ["limits", "Limits and change points", "on the circle of the driver"],
         ...(page.linkage.part.reactions.length ? [["forces", "Forces in the joints", `of the first body on the second${undetermined.length ? `; undetermined: ${undetermined.join(", ")}` : ""}`], ["shaking", "Shaking force", "on the ground, drawn at its origin"]] : []),
+        ...(has.loads.length || has.gravity ? [["loads", "Loads and gravity", "springs, dampers, forces and torques; arrows are not to scale"]] : []),
         ["grid", "Grid", ""],
     ];
     for (const [key, label, note] of rows) {
