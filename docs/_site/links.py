@@ -1,4 +1,4 @@
-"""Check a built site: every link within it leads to a place that exists, and no page loads anything from the net.
+"""Check a built site: every link within it leads to a place that exists, and no page loads anything from the network.
 
 python docs/_site/links.py docs/_build
 """
@@ -35,12 +35,12 @@ class _Page(HTMLParser):
 
 
 def problems(site: Path) -> list[str]:
-    """Return one line for each dead link, missing file and file that would come from the net."""
+    """Return one line for each dead link, missing file and file that would come from the network."""
     pages = {path.resolve(): _Page(path) for path in sorted(site.rglob("*.html")) if "_static" not in path.parts}
     found = [] if pages else [f"{site}: no page"]
     for path, page in pages.items():
         name = path.relative_to(site.resolve())
-        found += [f"{name}: loads {link} from the net" for link in page.loads if urlsplit(link).netloc]
+        found += [f"{name}: loads {link} from the network" for link in page.loads if urlsplit(link).netloc]
         for link in (*page.links, *page.loads):
             parts = urlsplit(link)
             if parts.scheme or parts.netloc:
@@ -53,7 +53,7 @@ def problems(site: Path) -> list[str]:
                 found.append(f"{name}: {link}: no such place in the page")
     for style in site.rglob("*.css"):
         if LOADING_CSS.search(style.read_text(encoding="utf-8")):
-            found.append(f"{style.relative_to(site)}: loads a file from the net")
+            found.append(f"{style.relative_to(site)}: loads a file from the network")
     return found
 
 

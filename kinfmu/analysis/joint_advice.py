@@ -1,4 +1,4 @@
-"""Joints that are probably missing, wrong or of a body too many, where drivers and degrees of freedom do not match."""
+"""Advice where drivers and degrees of freedom do not match: missing pins, an unneeded body, fixed joints too many."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MOST_POINTS = 400  # every pair is compared
 
 
 def missing_pins(system: System, start: FloatArray, pose: FloatArray, free: FloatArray) -> Iterator[Revolute]:
-    """Yield pins of points of two bodies at one place in the start pose, or of one name where a start pose is open.
+    """Yield pins that are probably missing: points at one place, or of one name if a start pose is incomplete.
 
     Args:
         system: The equations of a mechanism with more degrees of freedom than drivers.
@@ -75,7 +75,10 @@ def _pairs(mechanism: Mechanism, start: FloatArray, near: float) -> list[tuple[s
 
 
 def idle_body(mechanism: Mechanism, loose: tuple[str, ...], missing: int) -> str | None:
-    """Return the only body that still moves, if no other would follow it although several joints hold it: a roller."""
+    """Return the only body that can still move if several joints hold it, such as a roller on its pin; else None.
+
+    loose: bodies that can still move; missing: number of missing drivers.
+    """
     if missing != 1 or len(loose) != 1:
         return None
     others = [set(joint.bodies()) - {*loose} for joint in mechanism.joints if loose[0] in joint.bodies()]
@@ -83,7 +86,7 @@ def idle_body(mechanism: Mechanism, loose: tuple[str, ...], missing: int) -> str
 
 
 def stiff_joints(mechanism: Mechanism, redundancy: Redundancy) -> tuple[str, ...]:
-    """Return the fixed joints, each of which as a revolute one would leave a degree of freedom for every driver."""
+    """Return names of fixed joints each of which, as a revolute joint, would give every driver a degree of freedom."""
     wanted = len(mechanism.drivers)
     if redundancy.mobility >= wanted:
         return ()

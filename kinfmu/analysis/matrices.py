@@ -60,7 +60,7 @@ class Matrix:
 
 
 def pose_matrices(plan: SolvePlan, redundancy: Redundancy, reach: DriverRange | None) -> tuple[Matrix, ...]:
-    """Return Phi_K,q and Phi_q at the start pose, Phi_q at each singular point of the range and after a small turn."""
+    """Return Phi_K,q and Phi_q at the assembled pose, Phi_q at each singular point and after a small turn."""
     system = System(localized(plan.mechanism)[0])
     assembled = find_assembly(system).pose
     moving = [name for name in system.coordinates if name not in plan.fixed]

@@ -52,7 +52,7 @@ class Report(Findings, Displayed):
         return find_assemblies(self.mechanism, self.plan)
 
     def matrices(self) -> tuple[Matrix, ...]:
-        """Return Phi_K,q and Phi_q at the start pose, Phi_q at each singular point and after a small turn.
+        """Return Phi_K,q and Phi_q at the assembled pose, Phi_q at each singular point and after a small turn.
 
         Raises:
             KinfmuError: If the mechanism has no plan.

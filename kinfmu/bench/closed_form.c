@@ -1,4 +1,4 @@
-/* What a specialist would write for a four-bar by hand, to be laid side by side by the compiler: the best that there is.
+/* What a specialist would write for a four-bar by hand, and the compiler vectorizes: the fastest known way.
  *
  *     P = a (cos u, sin u),   d = (g, 0) - P,   Q - P = e d + h d_turned_left
  *     e = (b^2 - c^2 + d.d) / (2 d.d),   h^2 = b^2 / d.d - e^2

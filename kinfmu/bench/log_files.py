@@ -1,4 +1,4 @@
-"""Logs of a long run of the four-bar: how fast they are written and read, how large they are, what a logged step costs.
+"""Records of a long run of the four-bar: time to write and read them, their size, and the cost of a recorded step.
 
 Compared with the writer of the package mcap, which gets the same messages, already made, one after another.
 """
@@ -33,7 +33,7 @@ SAMPLES = 1_000_000
 PLAIN_SAMPLES = 100_000  # of them for the package mcap: its time a row does not depend on their number
 TURNS = 0.5  # of the crank
 STEPS = 20_000  # of an FMU, in a round
-TURN = 360.0  # [s] that the crank of the FMU takes for a turn
+STOP = 360.0  # [s]; the crank of the FMU turns once in this time
 PER_DOUBLE, PER_ROW = 9.0, 20.0  # [bytes] that a file may take
 
 
@@ -49,7 +49,7 @@ class LogTask(NamedTuple):
 def run(rounds: int = ROUNDS, samples: int = SAMPLES, steps: int = STEPS) -> str:
     """Return a table of writing and reading records, and one of the steps of an FMU, alone and with their record.
 
-    Of records: rows a second by the clock; processor time a row, and how often it goes into the package mcap's; size.
+    Of records: rows per second by the clock; processor time per row, and the ratio of the package mcap's to it; size.
     """
     long_run = fourbar(samples)
     processor: dict[str, list[float]] = {}
@@ -77,7 +77,7 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES, steps: int = STEPS) -> str
 
 
 def _timed(take: Callable[[], object], seconds: list[float]) -> Callable[[], object]:
-    """The same, with the processor time of each call, in all threads, appended to `seconds`."""
+    """Return `take` as a function that appends the processor time of each call, in all threads, to `seconds`."""
 
     def timed() -> None:
         start = process_time()
@@ -88,7 +88,7 @@ def _timed(take: Callable[[], object], seconds: list[float]) -> Callable[[], obj
 
 
 def fourbar(samples: int) -> Run:
-    """A run of the gallery's four-bar, with all its columns computed."""
+    """Return a run of the gallery's four-bar, with all its columns computed."""
     angle = np.linspace(0.0, TURNS * 2.0 * np.pi, samples)
     found = solve(load("fourbar"), angle / np.radians(1.0))
     return replace(found, margin=found.margin, error=found.error)  # computed when they are read here
@@ -106,7 +106,7 @@ def tasks(long_run: Run, folder: Path) -> tuple[list[LogTask], str]:
         LogTask("MCAP: the record and what viewers draw", n, lambda: write_mcap(long_run, everything), everything),
         LogTask("the record read back", n, lambda: read(record), record),
         LogTask("the record read back from all that", n, lambda: read(everything), everything),
-        LogTask("a record made a Rerun recording", len(reviewed), lambda: write_rrd(read(short), recording), recording),
+        LogTask("a record made into a recording", len(reviewed), lambda: write_rrd(read(short), recording), recording),
     ]
     try:
         return [_plain(long_run, folder / "plain.mcap"), *found], ""
@@ -115,7 +115,7 @@ def tasks(long_run: Run, folder: Path) -> tuple[list[LogTask], str]:
 
 
 def _plain(long_run: Run, file: Path) -> LogTask:
-    """The record by the package mcap: messages that are ready bytes, one call each."""
+    """Return the task of writing a record by the package mcap: messages that are ready bytes, one call each."""
     if find_spec("mcap") is None:
         raise MissingPackageError("mcap is not installed: pip install 'kinfmu[bench]'")
     from mcap.writer import CompressionType, Writer
@@ -164,12 +164,12 @@ def logged_steps(rounds: int, steps: int = STEPS) -> list[str]:
 
 
 def _alone(fmu: Path, steps: int) -> Callable[[], float]:
-    """Return a function that steps an FMU, asks for no channel, and gives the processor time [s]."""
+    """Return a function that steps an FMU without a record, and returns the processor time [s]."""
     return lambda: _measured(fmu, steps, None)
 
 
 def _logged(fmu: Path, steps: int, record: Path) -> Callable[[], float]:
-    """The same with all channels, which are written to a record as `kinfmu simulate` does."""
+    """Return a function that steps an FMU with a record of all channels, and returns the processor time [s]."""
     return lambda: _measured(fmu, steps, McapLog(record))
 
 
@@ -182,5 +182,5 @@ def _measured(fmu: Path, steps: int, record: McapLog | None) -> float:
             start = process_time()
 
     channels = None if record else ["none"]
-    simulate(fmu, start=0.0, stop=TURN, step=TURN / steps, channels=channels, sink=record, progress=after)
+    simulate(fmu, start=0.0, stop=STOP, step=STOP / steps, channels=channels, sink=record, progress=after)
     return process_time() - start

@@ -26,7 +26,7 @@ ROUNDS = 9
 SAMPLES = 360_000  # a thousand turns by one degree
 CHAIN_SAMPLES = 2000
 LENGTHS = (40.0, 20.0, 50.0, 50.0)  # ground, crank, coupler, rocker of the gallery's crank_rocker
-CLOSED = "closed form by hand, laid side by side"
+CLOSED = "closed form by hand, vectorized"
 WHOLE = "crank-rocker, q, qd, qdd"
 ALONE = "the same, q alone"
 LOOP = "closed form in a loop, by numba"
@@ -34,7 +34,7 @@ PYLINKAGE = "pylinkage, by numba: points, not angles"
 
 
 def run(rounds: int = ROUNDS, samples: int = SAMPLES, loops: int = 1000) -> str:
-    """Return a table: nanoseconds of processor time a sample, and how often the closed form's."""
+    """Return a table: nanoseconds of processor time per sample, absolute and relative to the closed form."""
     u = np.linspace(0.0, np.pi / 180.0 * samples, samples, endpoint=False)
     driven = (u[:, None].copy(), np.ones((samples, 1)), np.zeros((samples, 1)))
     crank_rocker, fourbar = (Library(compile_plan(load(name), FOURBAR)) for name in ("crank_rocker", "fourbar"))
@@ -81,7 +81,7 @@ def _allocated(samples: int) -> list[FloatArray]:
 
 
 def _chain(rounds: int, count: int) -> list[str]:
-    """A long chain: microseconds a sample, and seconds to plan and to compile."""
+    """Return lines on a long chain: microseconds per sample, and seconds to plan and to compile."""
     start = perf_counter()
     plan = compile_plan(fourbar_chain(count))
     planned = perf_counter()
@@ -99,7 +99,7 @@ def _chain(rounds: int, count: int) -> list[str]:
 
 
 def closed_form(u: FloatArray, columns: FloatArray) -> Callable[[], object]:
-    """Fills columns (15, n): FOURBAR at u (n,), their rates and accelerations, by hand-written C at speed 1."""
+    """Return a function that fills columns (15, n): FOURBAR at u (n,), rates and accelerations, by hand-written C."""
     files = {"closed_form.c": Path(__file__).with_name("closed_form.c").read_text("utf-8")}
     library = compiler.load(files | compiler.sources(("sincos.h",)), FLAGS)
     ud, udd = np.ones(len(u)), np.zeros(len(u))
@@ -115,7 +115,7 @@ def closed_form(u: FloatArray, columns: FloatArray) -> Callable[[], object]:
 
 
 def _pylinkage(u: FloatArray, columns: FloatArray) -> Callable[[], object]:  # noqa: ARG001  it makes arrays of its own
-    """Positions, velocities and accelerations of the two moving joints."""
+    """Return a function that computes positions, velocities and accelerations of the two moving joints."""
     if find_spec("pylinkage") is None or find_spec("numba") is None:
         raise MissingPackageError("pylinkage with numba is not installed: pip install 'kinfmu[bench]'")
     from pylinkage.actuators import Crank
@@ -152,7 +152,7 @@ def _numba_loop(u: FloatArray, columns: FloatArray) -> Callable[[], object]:
 
 
 def _loop(u: FloatArray, g: float, a: float, b: float, c: float, columns: FloatArray) -> None:
-    """The closed form, sample after sample, at speed 1."""
+    """Fill columns (15, n) by the closed form, sample after sample, at speed 1."""
     for i in range(len(u)):
         s, k = a * np.sin(u[i]), a * np.cos(u[i])
         dx, dy = g - k, -s

@@ -26,7 +26,7 @@ FIGURES = (".svg", ".png", ".pdf")
 @main.command(epilog="Example: kinfmu check fourbar --figure fourbar.svg")
 @mechanism_argument
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON, for programs.")
-@click.option("--matrices", is_flag=True, help="Also print the Jacobians at the start pose and at singular points.")
+@click.option("--matrices", is_flag=True, help="Also print the Jacobians at the assembled pose and at singular points.")
 @click.option("--assemblies", is_flag=True, help="List the ways to assemble the mechanism, and how to choose one.")
 @click.option(
     "--figure", "picture", type=OutputFile(*FIGURES), help="Draw the mechanism with its names: .svg, .png or .pdf."

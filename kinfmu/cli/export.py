@@ -99,7 +99,8 @@ def _on_axis_of(run: Run, text: str) -> float:
     "--columns",
     metavar="NAMES",
     help="Columns of a table or a plot, with the names of simulate --channels: coupler.x, 'coupler.*', q, crank_angle, "
-    "solver.margin, -error. A table always contains time and status. Default: all columns; for plots, all of q.",
+    "solver.margin, -error. A table always contains time and status. Default: all columns; for plots angles, "
+    "points of interest (if there are none, all coordinates), efforts and energies.",
 )
 @click.option(
     "--x",
@@ -154,7 +155,7 @@ def export(
     """Write a run as a table, as plots, as an animation or as a page; or a mechanism as a page.
 
     A page (.html) is the mechanism, to be dragged in a browser, with the parameters and the time of the run; it is one
-    file, needs no net, and computes with the compiled code of the FMU.
+    file, works offline, and computes with the compiled code of the FMU.
 
     RUN is a record (.mcap) of simulate or solve. Tables in Parquet and npz contain the units. Plots (.svg, .png, .pdf)
     show coordinates, velocities and accelerations against time, or against the driver of a solve --angle. With --x,

@@ -22,7 +22,7 @@ from kinfmu.errors import KinfmuError
     "--tolerance",
     type=click.FloatRange(min=0.0, min_open=True, max=1.0, max_open=True),
     help="Largest valid difference, relative to the largest number with the same unit; 1e-5 for hosts that write six "
-    "digits. Default: that in the FMU, 1e-9 but near singular points.",
+    "digits. Default: that in the FMU: 1e-9, larger near singular points.",
 )
 def verify(fmu: Path, results: Path | None, tolerance: float | None) -> None:
     """Check a host by the reference results in an FMU.

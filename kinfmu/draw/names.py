@@ -16,8 +16,9 @@ _DIRECTIONS = 16  # from an anchor to a place for its name
 _FURTHER = (0.0, 4.0, 9.0, 16.0, 26.0, 38.0)  # [pt], additional distances
 _LEADER_FROM = 9.0  # [pt]; a leader line connects a name that is further away with its anchor
 _AIR, _GAP = 1.5, 3.0  # [pt], margins above and below a name, and left and right of it
-_OVERLAP, _OFF_SHEET, _DISTANCE, _TILT = 60.0, 200.0, 0.12, 0.05  # costs, relative to 1 for a covered dot
-_CROWD, _APART = 0.8, 5.0  # cost of another name nearer than that [pt], because they would be read as one
+_OVERLAP, _OFF_SHEET = 60.0, 200.0  # costs of covering another name and of leaving the sheet; of a covered dot: 1
+_DISTANCE, _TILT = 0.12, 0.05  # costs of a distance of 1 pt and of places other than above on the right
+_CROWD, _APART = 0.8, 5.0  # cost of another name within this distance [pt]: both would be read as one
 _BROKEN = 0.6  # cost of a name in several lines
 _ROUNDS = 6  # at most, in which names are placed again
 
@@ -26,8 +27,14 @@ _ROUNDS = 6  # at most, in which names are placed again
 class Name:
     """A name and its possible places.
 
-    anchors: (k, 2) [length], the best first; clearance: distance from an anchor [pt], 0 if the name may be on the first
-    anchor; rank: names of a lower rank are placed first.
+    Attributes:
+        text: The name; ', ' separates the parts of a list.
+        anchors: (k, 2) what it names, in world coordinates [length], the best first.
+        clearance: Distance from an anchor [pt], 0 if the name may be on the first anchor.
+        colour: Of the text.
+        italic: True: in italics.
+        rank: Names of a lower rank are placed first.
+
     """
 
     text: str
@@ -135,12 +142,13 @@ def _spots(
             costs.append(0.0)
         for k in range(_DIRECTIONS):
             angle = 2.0 * np.pi * k / _DIRECTIONS
-            way = np.array([np.cos(angle), np.sin(angle)])
-            edge = way / max(abs(way)) if abs(abs(way[0]) - abs(way[1])) < 1e-9 else way
+            direction = np.array([np.cos(angle), np.sin(angle)])
+            is_diagonal = abs(abs(direction[0]) - abs(direction[1])) < 1e-9
+            edge = direction / max(abs(direction)) if is_diagonal else direction  # a diagonal one leads to a corner
             for further in _FURTHER:
-                spots.append(anchor + way * (clearance + further) + edge * half)
+                spots.append(anchor + direction * (clearance + further) + edge * half)
                 homes.append(home)
-                costs.append(_DISTANCE * further + 0.1 * home + _TILT * (2.0 - way[0] - way[1]))
+                costs.append(_DISTANCE * further + 0.1 * home + _TILT * (2.0 - direction[0] - direction[1]))
     return np.array(spots), homes, np.array(costs)
 
 

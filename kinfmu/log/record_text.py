@@ -21,7 +21,9 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,199}(?:\.[a-z]{1,5})?")
 def lists_of(texts: Mapping[str, str]) -> dict[str, Any]:
     """Return the values in the texts of `record.description`: names by kind, units, constants, counts.
 
-    LogError for values that are missing, of another type or invalid, and for lists that are too long.
+    Raises:
+        LogError: A value is missing, of another type or invalid, or a list is too long.
+
     """
     kinds: dict[str, tuple[Callable[[Any], bool], str]] = {
         "columns": (_are_lines, "names"),
@@ -71,7 +73,7 @@ def _signals(texts: Mapping[str, str]) -> tuple[SignalName, ...]:
 
 
 def samples_of(texts: Mapping[str, str]) -> int:
-    """Return the number of samples in the texts of `record.ending`; LogError if there is none."""
+    """Return the number of samples in the texts of `record.ending`; raise a LogError if it is missing or invalid."""
     count = _value(texts, "samples")
     if not _is_count(count):
         raise LogError(f"samples of the record = {quoted(count)} must be a count")
@@ -79,7 +81,7 @@ def samples_of(texts: Mapping[str, str]) -> int:
 
 
 def events_of(texts: Mapping[str, str]) -> tuple[Event, ...]:
-    """Return the events in the texts of `record.ending`; LogError for entries that are not events."""
+    """Return the events in the texts of `record.ending`; raise a LogError for entries that are not events."""
     entries = _value(texts, "events")
     if not isinstance(entries, list):
         raise LogError(f"events of the record = {quoted(entries)} must be a list")
@@ -90,7 +92,7 @@ def events_of(texts: Mapping[str, str]) -> tuple[Event, ...]:
 
 
 def whole_number(texts: Mapping[str, str], key: str) -> int:
-    """Return a whole number that is written as text, default 0; LogError for any other text."""
+    """Return a whole number that is written as text, default 0; raise a LogError for any other text."""
     text = texts.get(key, "0")
     if not re.fullmatch(r"[+-]?[0-9]{1,12}", text):
         raise LogError(f"{key} of the record = {quoted(text)} must be a whole number")

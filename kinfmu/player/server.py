@@ -1,8 +1,8 @@
 """The server of `kinfmu play`: a page, the changes of its file, and FMUs with the lengths that the page has set.
 
-Only this machine reaches it, and only who knows the token in its address. Requests that a page of another site makes
-are refused: by their Origin, by the browser's Sec-Fetch-Site, and by their Host, which is another one if a name of the
-net leads to this machine (DNS rebinding).
+Only programs of this machine reach it, and only with the token in its address. Requests of pages of other sites are
+refused: by their Origin, by the browser's Sec-Fetch-Site, and by their Host, which differs if a foreign host name
+resolves to this machine (DNS rebinding).
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class PlayServer:
 
     @property
     def url(self) -> str:
-        """Address of the page; who knows it can use the server."""
+        """Address of the page. Whoever knows it can use the server."""
         return f"http://{ADDRESS}:{self.port}/{self._token}/"
 
     def __enter__(self) -> PlayServer:
@@ -109,12 +109,21 @@ class PlayServer:
             )
         return rest
 
-    def built(self, mechanism: Mechanism, fmi: int) -> bytes:
-        """Return the FMU of a mechanism; one is built at a time."""
+    def build_fmu(self, mechanism: Mechanism, fmi: int) -> bytes:
+        """Return the FMU of a mechanism; one is built at a time.
+
+        Args:
+            mechanism: The mechanism.
+            fmi: Version of FMI, 2 or 3.
+
+        Raises:
+            KinfmuError: It cannot be built.
+
+        """
         with self._building, tempfile.TemporaryDirectory() as folder:
             return build(mechanism, folder, fmi=fmi).read_bytes()
 
-    def saved(self, text: str) -> Path:
+    def save(self, text: str) -> Path:
         """Write a mechanism file next to that of the source, under a name that is not in use, and return its path.
 
         Raises:
@@ -221,11 +230,11 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _fmu(self, fmi: int) -> None:
         mechanism, _ = self._mechanism()
-        self._send(HTTPStatus.OK, "application/zip", self.server.play.built(mechanism, fmi))
+        self._send(HTTPStatus.OK, "application/zip", self.server.play.build_fmu(mechanism, fmi))
 
     def _file(self) -> None:
         _, text = self._mechanism()
-        self._send(HTTPStatus.OK, "text/plain", str(self.server.play.saved(text)).encode())
+        self._send(HTTPStatus.OK, "text/plain", str(self.server.play.save(text)).encode())
 
     def _mechanism(self) -> tuple[Mechanism, str]:
         """Return the mechanism in the body of the request, and its text; files that it names are refused."""

@@ -47,7 +47,7 @@ class StudyMotion:
     Attributes:
         t: (n,) times [s], for the laws of the file; None: driver values.
         inputs: Driver values as `solve` takes them; empty: times.
-        over: What it is, as text.
+        over: Description of the motion, such as 'one turn of crank'.
 
     """
 
@@ -163,15 +163,15 @@ def define(
     Args:
         mechanism: The mechanism, or what `kinfmu.load` takes.
         parameters: For each parameter a table, as `read_variation` reads it.
-        measures: Names of measures of the mechanism, and measures.
+        measures: Names of measures of the mechanism, and measures. Default: those of the mechanism.
         sampling: 'sobol' or 'latin_hypercube'.
-        designs: Number of samples.
-        seed: Of the random numbers.
-        t: Times.
-        over: What the motion is, as text.
+        designs: Number of samples of the parameters that are not on a grid.
+        seed: Seed of the random numbers, a whole number from 0.
+        t: (n,) times [s]. Default: `inputs`, or without these one cycle of the driver or the run of the file.
+        over: Description of the motion. Default: made from it.
         engine: 'auto', 'python' or 'native'.
         file_text: Text of the study file.
-        inputs: Driver values.
+        inputs: Driver values and rates by input, such as 'crank_angle': numbers or (n,) [rad or length].
 
     Raises:
         RequestError: An argument is invalid.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 import kinfmu
@@ -28,6 +29,14 @@ def test_the_architecture_lists_every_module_outside_packages() -> None:
     assert set(re.findall(r"(\w+\.py)`", " ".join(rows))) == modules
 
 
+def test_the_architecture_lists_packages_in_the_order_of_imports() -> None:
+    config = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    (layers,) = (each["layers"] for each in config["tool"]["importlinter"]["contracts"] if each["type"] == "layers")
+    level = {name.strip(): k for k, layer in enumerate(reversed(layers)) for name in layer.split("|")}
+    listed = [level[name] for name in re.findall(r"^\| `kinfmu/(\w+)/", ARCHITECTURE, re.MULTILINE)]
+    assert listed == sorted(listed)
+
+
 def test_the_paths_of_the_architecture_exist() -> None:
     paths = re.findall(r"`((?:kinfmu|scripts|fmus|tests|docs)/[\w/.]*)[ `]", ARCHITECTURE)
     assert len(paths) > 30
@@ -44,6 +53,15 @@ def test_the_gallery_page_lists_every_mechanism_with_its_title() -> None:
 def test_the_commands_page_shows_every_command() -> None:
     check_commands(COMMANDS)
     assert set(re.findall(r"^    kinfmu (\w+)", COMMANDS, re.MULTILINE)) == set(main.commands)
+
+
+def test_the_commands_page_explains_every_line_of_the_report() -> None:
+    source = (ROOT / "kinfmu" / "analysis" / "text.py").read_text(encoding="utf-8")
+    subjects = set(re.findall(r"ReportLine\(\s*f?\"([a-z ]+?)(?: \{k\})?\"", source))
+    assert len(subjects) > 20
+    table = COMMANDS.split("## The report of `check`")[1].split("\n## ")[0]
+    explained = re.findall(r"`([^`]+)`", " ".join(re.findall(r"^\| (.+?) \|", table, re.MULTILINE)))
+    assert subjects <= set(explained)
 
 
 def test_every_link_between_the_pages_leads_to_a_file() -> None:

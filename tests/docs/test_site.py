@@ -86,7 +86,7 @@ def test_links_to_folders_of_the_gallery_lead_to_its_pages(site: Any) -> None:
         ('<a href="#there">x</a>', "#there: no such place in the page"),
         ('<a href="index.html#here">x</a><p id="here">', ""),
         ('<a href="https://example.org/">x</a>', ""),
-        ('<script src="https://example.org/a.js"></script>', "loads https://example.org/a.js from the net"),
+        ('<script src="https://example.org/a.js"></script>', "loads https://example.org/a.js from the network"),
         ('<img src="a%20b.png">', "a%20b.png does not exist"),
     ],
 )
@@ -103,4 +103,4 @@ def test_the_check_of_links_finds_fonts_from_the_net(tmp_path: Path) -> None:
     (tmp_path / "index.html").write_text("", encoding="utf-8")
     (tmp_path / "a.css").write_text('@import "https://example.org/font.css";', encoding="utf-8")
     check = runpy.run_path(str(DOCS / "_site" / "links.py"))["problems"]
-    assert check(tmp_path) == ["a.css: loads a file from the net"]
+    assert check(tmp_path) == ["a.css: loads a file from the network"]

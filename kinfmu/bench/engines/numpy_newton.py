@@ -30,7 +30,10 @@ PointOf = tuple[int, float, float]  # number of the body, s_x, s_y
 
 
 def _sampler(case: Case, setting: EngineSetting) -> Sampler | None:
-    """Newton with an analytic Jacobian and `numpy.linalg.solve`, over all coordinates; rates by two more solves."""
+    """Return a sampler: Newton with an analytic Jacobian and `numpy.linalg.solve` over all coordinates.
+
+    None if the case has a joint or driver of another kind.
+    """
     try:
         equations = _Equations(case)
     except NotImplementedError:
@@ -73,10 +76,13 @@ def _sampler(case: Case, setting: EngineSetting) -> Sampler | None:
 
 
 class _Equations:
-    """The rows of a case; the ground is one more body at the end, and what the case leaves out is one more row.
+    """The rows of a case. The ground is an additional last body; rows that the case leaves out share an additional row.
 
-    `position` comes first at a pose: it fills `jacobian`, and keeps the coordinates that the other two need.
-    Raises NotImplementedError for a joint or driver of another kind.
+    Call `position` first at a pose: it fills `jacobian`, and keeps what `velocity` and `acceleration` need.
+
+    Raises:
+        NotImplementedError: The case has a joint or driver of another kind.
+
     """
 
     def __init__(self, case: Case) -> None:
@@ -128,7 +134,7 @@ class _Equations:
             matrix[row, [3 * i + 2, 3 * j + 2]] = -1.0, 1.0
 
     def position(self, coordinates: list[float], u: Sequence[float]) -> list[float]:
-        """Return Phi, and fill Phi_q."""
+        """Return Phi (m,) at all coordinates (n,) and driver values (d,), and fill Phi_q."""
         entries, width = self.entries, self.width
         self.q = q = [*coordinates, 0.0, 0.0, 0.0]
         self.cos = c = list(map(math.cos, q[2::3]))
@@ -157,21 +163,21 @@ class _Equations:
             entries[row * width + 3 * i + 2] += n[0] * dy - n[1] * dx
         for row, i, j, angle in self.angles:
             phi[row] = q[3 * j + 2] - q[3 * i + 2] - angle
-        for row, value in zip(self.driven, u):  # noqa: B905  one a driver, both
+        for row, value in zip(self.driven, u):  # noqa: B905  both have one entry per driver
             phi[row] -= value
         del phi[self.size]
         return phi
 
     def velocity(self, ud: Sequence[float]) -> list[float]:
-        """Return the right side of Phi_q qd = nu."""
+        """Return nu (m,), the right side of Phi_q qd = nu, at driver speeds (d,)."""
         nu = [0.0] * (self.size + 1)
-        for row, speed in zip(self.driven, ud):  # noqa: B905  one a driver, both
+        for row, speed in zip(self.driven, ud):  # noqa: B905  both have one entry per driver
             nu[row] = speed
         del nu[self.size]
         return nu
 
     def acceleration(self, speeds: list[float], udd: Sequence[float]) -> list[float]:
-        """Return the right side of Phi_q qdd = gamma."""
+        """Return gamma (m,), the right side of Phi_q qdd = gamma, at velocities (n,) and driver accelerations (d,)."""
         qd = [*speeds, 0.0, 0.0, 0.0]
         c, s = self.cos, self.sin
         squares = [omega * omega for omega in qd[2::3]]
@@ -193,7 +199,7 @@ class _Equations:
             nx, ny, omega = c[i] * n_x - s[i] * n_y, s[i] * n_x + c[i] * n_y, qd[3 * i + 2]
             turning = omega * (omega * (nx * dx + ny * dy) - 2.0 * (nx * vy - ny * vx))
             gamma[row] = nx * px + ny * py + turning
-        for row, value in zip(self.driven, udd):  # noqa: B905  one a driver, both
+        for row, value in zip(self.driven, udd):  # noqa: B905  both have one entry per driver
             gamma[row] += value
         del gamma[self.size]
         return gamma

@@ -17,7 +17,7 @@ MOST = 60  # iterations
 
 
 def _sampler(case: Case, setting: EngineSetting) -> Sampler:
-    """Newton and the two linear solves with numpy on the rows kept, as `equations.reference` does."""
+    """Return a sampler: Newton and two linear solves with numpy on the rows kept, as in `equations.reference`."""
     system, rows, q0 = case.system, case.rows, case.start_coordinates
     chosen = [system.coordinates.index(name) for name in case.columns]
     gap = (GAP,) * (3 * len(chosen))
@@ -49,7 +49,22 @@ def solved(
     udd: FloatArray,
     setting: EngineSetting,
 ) -> Solution:
-    """One sample from a predicted q; at round-off that of `equations.reference`. Raises PoseError, LinAlgError."""
+    """Return one sample, solved from a predicted pose; at round-off it is that of `equations.reference`.
+
+    Args:
+        system: The equations.
+        rows: Numbers of the rows to solve.
+        q: (n,) predicted pose.
+        u: (d,) driver values.
+        ud: (d,) their rates.
+        udd: (d,) their accelerations.
+        setting: Tolerance, or number of corrections, and chord or full Newton.
+
+    Raises:
+        PoseError: Newton's method does not converge.
+        LinAlgError: The Jacobian is singular.
+
+    """
     chosen = list(rows)
     bound = max(setting.tolerance, FLOOR) * system.size
     jacobian: FloatArray | None = None
@@ -65,11 +80,11 @@ def solved(
         if jacobian is None or not setting.chord:
             jacobian = system.jacobian(q)[chosen]
         q = q + np.linalg.solve(jacobian, -residual)
-    raise PoseError(f"Newton did not end: residual {np.abs(residual).max():.2g}")
+    raise PoseError(f"Newton did not converge: residual {np.abs(residual).max():.2g}")
 
 
 def _predicted(last: Solution, h: float, order: int) -> FloatArray:
-    """q + h qd + h^2 qdd / 2, as many terms as the order says."""
+    """Return q + h qd + h^2 qdd / 2 up to the term of this order."""
     terms = (last.q, h * last.qd, 0.5 * h * h * last.qdd)
     return np.asarray(sum(terms[1 : order + 1], start=terms[0]))
 
@@ -77,5 +92,5 @@ def _predicted(last: Solution, h: float, order: int) -> FloatArray:
 READABLE = BenchEngine(
     "readable reference",
     _sampler,
-    settings=newton(tolerances=(1e-3, 1e-9, ROUND_OFF), chord=(2,)),  # the slowest
+    settings=newton(tolerances=(1e-3, 1e-9, ROUND_OFF), chord=(2,)),  # few, because this engine is the slowest
 )

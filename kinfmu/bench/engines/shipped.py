@@ -1,4 +1,4 @@
-"""kinfmu as shipped: the generated code behind a Solver, which guards the branch and bridges singular points."""
+"""kinfmu as shipped: generated code and a Solver, which stays on the branch and bridges singular points."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from kinfmu.solver.python import Solver
 
 
 def _sampler(case: Case, _setting: EngineSetting) -> Sampler:
-    """What `kinfmu.solve` and the FMU run on: second order prediction, Newton to round-off, every step judged."""
+    """Return a sampler with the solver of `kinfmu.solve` and of the FMU, with its step control."""
     solver = Solver(load_model(case.plan))
     start = solver.solve(solver.anchor, case.u[0])
     gap = (GAP,) * (3 * len(case.columns))

@@ -7,7 +7,7 @@
 #include "sweeping.h"
 #include "internal.h"
 
-#define LARGEST_RATE 1e100 /* of drivers; squares of much larger numbers are infinite */
+#define LARGEST_RATE 1e100 /* [per s, per s^2] of drivers: squares of much larger numbers are infinite */
 
 bool kf_sweep_starts(kf_sweep *sweep, const double *constants, double time)
 {
@@ -33,7 +33,7 @@ static void drive(const kf_model *model, const double *times, const double *cons
     }
 }
 
-/* Fill the tables of a design that is not reached. */
+/* Fill the tables of a design that is not reached with NaN. */
 static void leave_out(kf_job *job)
 {
     int64_t sample;

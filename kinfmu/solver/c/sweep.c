@@ -1,10 +1,10 @@
 /* Sweep: the motion at many samples.
  *
- * With several drivers, or where the model has no lanes, each sample is followed from the last good one. With one
- * driver samples are predicted from segments, in whatever order they come, corrected side by side in lanes, and
- * checked: residual, determinants, corrections and watches. Samples that fail a check are left for later:
- * samples in the window of a bridge are read from it side by side too, and closed; those then left, near a singular
- * point or a limit, are solved one by one.
+ * With several drivers, or where the model has no lanes, each sample is followed from the last good one.
+ *
+ * With one driver, samples in any order are predicted from segments, corrected side by side in lanes, and checked: residual,
+ * determinants, corrections and watches. Samples that fail a check are left for later. Of these, samples in the window of a
+ * bridge are interpolated side by side and closed; the others, near a singular point or a limit, are solved one by one.
  */
 #include "sweep.h"
 
@@ -78,8 +78,8 @@ void kf_put_gap(kf_job *job, int64_t sample, kf_status status)
     }
 }
 
-/* Store why a sample failed, if it is the first of its interval; it was the last one to be solved. */
-static void tell_failure(const kf_sweep *sweep, kf_job *job, int64_t sample)
+/* Store why the sample that was solved last failed, if it is the first of its interval. */
+static void store_failure(const kf_sweep *sweep, kf_job *job, int64_t sample)
 {
     if (sample > 0 && !KF_GOOD((kf_status)job->outcomes[sample - 1].status)) {
         return;
@@ -91,7 +91,7 @@ static void tell_failure(const kf_sweep *sweep, kf_job *job, int64_t sample)
     ++job->failure_count;
 }
 
-/* Return the pose moved by whole turns of the driver, where the mechanism repeats; a pose that is not good as it is. */
+/* Return the pose moved by whole turns of the driver, after which the mechanism repeats; a pose that is not good, unchanged. */
 static kf_pose *turned(kf_sweep *sweep, kf_pose *pose, const double *u, double turns)
 {
     kf_pose *const there = &sweep->raised_pose;
@@ -110,7 +110,7 @@ static kf_pose *turned(kf_sweep *sweep, kf_pose *pose, const double *u, double t
     return there;
 }
 
-/* Solve a sample of its own, `turns` before where it lies: true if it can be reached. */
+/* Solve one sample: follow the driver value `turns` before its own and move the pose; return true if it is reached. */
 static bool solve_alone(kf_sweep *sweep, kf_job *job, int64_t sample, double turns)
 {
     double rows[3][KF_ROOM(KF_OUTPUTS)];
@@ -173,8 +173,8 @@ static int in_order(const void *a, const void *b)
     return (left > right) - (left < right);
 }
 
-/* Samples from..to (excluded) of those that are left, followed from the anchor. Samples beyond an unreachable one are
- * unreachable, too.
+/* Solve the samples from..to (excluded) of those that are left, followed from the anchor. Samples beyond one that is
+ * outside are outside, too.
  */
 static void solve_on_one_side(kf_sweep *sweep, kf_job *job, int64_t from, int64_t to)
 {
@@ -192,7 +192,7 @@ static void solve_on_one_side(kf_sweep *sweep, kf_job *job, int64_t from, int64_
     }
 }
 
-/* Sort by driver values; the number of the first one that is not before the anchor. */
+/* Sort samples by driver value; return the number of the first one that is not before the anchor. */
 static int64_t put_in_order(kf_list *list)
 {
     int64_t middle = 0;
@@ -203,7 +203,7 @@ static int64_t put_in_order(kf_list *list)
     return middle;
 }
 
-/* Those that are left, in the order of their driver values: from the anchor up, and from there down. */
+/* Solve the samples that are left in the order of their driver values: from the anchor up, then from there down. */
 static void solve_those_left(kf_sweep *sweep, kf_job *job)
 {
     const int64_t middle = put_in_order(&sweep->alone);
@@ -215,7 +215,7 @@ static void solve_those_left(kf_sweep *sweep, kf_job *job)
             if (job->failure_count < job->most_failures && solve_alone(sweep, job, k, 0.0)) {
                 continue;
             }
-            tell_failure(sweep, job, k);
+            store_failure(sweep, job, k);
         }
     }
 }
@@ -239,7 +239,7 @@ bool kf_sweep_run(kf_sweep *sweep, kf_job *job)
                 return false;
             }
         }
-        if (sample < job->count && kf_takes_again(job)) { /* the last ones, with some that are solved already */
+        if (sample < job->count && kf_takes_again(job)) { /* the last ones, together with some that are solved already */
             if (!kf_side_by_side(sweep, job, job->count - KF_LANES)) {
                 return false;
             }
@@ -258,7 +258,7 @@ bool kf_sweep_run(kf_sweep *sweep, kf_job *job)
 #endif
     for (; sample < job->count; ++sample) {
         if (!solve_alone(sweep, job, sample, 0.0)) {
-            tell_failure(sweep, job, sample);
+            store_failure(sweep, job, sample);
         }
     }
     return true;
@@ -279,7 +279,9 @@ bool kf_drive_all(int64_t count, const double *times, const double *parameters, 
     return true;
 }
 
-/* Estimate a good sample; if it is not good when followed on another path, as may happen at a limit, nothing is known. */
+/* Compute margin and error estimates of a good sample. Followed on another path it may not be good, as can happen at a
+ * limit: then its margin is 0 and its errors are infinite.
+ */
 static void diagnose(kf_sweep *sweep, const kf_job *job, int64_t sample, double *margin, double *errors)
 {
     kf_pose *const pose = kf_followed(&sweep->follower, job->u + sample * KF_DRIVERS);
@@ -294,7 +296,7 @@ static void diagnose(kf_sweep *sweep, const kf_job *job, int64_t sample, double 
 
 #if KF_HAS_LANES
 
-/* The good ones of a job that went side by side, in the order in which those left were solved; false: no memory. */
+/* Diagnose the good samples in the order of their driver values, from the anchor up, then down; false if memory ran out. */
 static bool diagnose_in_order(kf_sweep *sweep, const kf_job *job, double *margin, double *errors)
 {
     int64_t middle, k;

@@ -36,26 +36,26 @@ typedef struct {
     int64_t gaps;         /* how many are NaN */
 } kf_job;
 
-/* Memory for a sweep, to be given back by kf_sweep_free; NULL if there is none. */
+/* Memory for a sweep, to be freed by kf_sweep_free; NULL if memory ran out. */
 typedef struct kf_sweep kf_sweep;
 kf_sweep *kf_sweep_new(double tolerance);
 void kf_sweep_free(kf_sweep *sweep);
 
-/* Start again with the parameters of the mechanism, as with new memory. */
+/* Reset: the parameters of the mechanism, and nothing known of its path. */
 void kf_sweep_start(kf_sweep *sweep, double tolerance);
 
 /* Set the parameters, followed from those of the mechanism; false: no solution, kf_sweep_message states why. */
 bool kf_sweep_bind(kf_sweep *sweep, const double *parameters);
 const char *kf_sweep_message(const kf_sweep *sweep);
 
-/* All samples of a job; false if memory ran out. */
+/* Solve all samples of a job; false if memory ran out. */
 bool kf_sweep_run(kf_sweep *sweep, kf_job *job);
 
-/* margin (count) and errors (count, 3) of the samples of a job whose outcomes are known; false if memory ran out. */
+/* Fill margin (count) and errors (count, 3) of a job that was run: NaN where a sample is not good; false if memory ran out. */
 bool kf_sweep_diagnose(kf_sweep *sweep, const kf_job *job, double *margin, double *errors);
 
-/* (count, KF_DRIVERS) driver values, speeds and accelerations at times, by the laws, with these parameters; false if
- * they have no solution.
+/* Compute driver values, speeds and accelerations (count, KF_DRIVERS) by the laws at times [s]; false if the parameters have
+ * no solution.
  */
 bool kf_drive_all(int64_t count, const double *times, const double *parameters, const double *constants, double *u,
                   double *ud, double *udd);

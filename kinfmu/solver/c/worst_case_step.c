@@ -41,7 +41,7 @@ bool kf_worst_case_step(const kf_model *model, const kf_found *found, int block,
         if (!(m == k ? kf_lu(k, matrix, factors, &determinant) : kf_qr(m, k, matrix, factors, &determinant))) {
             return false;
         }
-        for (i = 0; i < m; ++i) { /* of the least-squares inverse if J is tall */
+        for (i = 0; i < m; ++i) { /* columns of the inverse, or of the least-squares inverse if J is tall */
             for (j = 0; j < m; ++j) {
                 unit[j] = i == j ? rows[i] : 0.0;
             }
@@ -73,7 +73,7 @@ bool kf_worst_case_step(const kf_model *model, const kf_found *found, int block,
     return true;
 }
 
-/* Return the error of the rows of a block, relative to their scales. */
+/* Return the error to which the rows of a block are known, relative to their scales. */
 double kf_known_to(const kf_found *found, int block)
 {
     const int first = kf_first_of(block), k = kf_block_ends[block] - first;
@@ -81,8 +81,8 @@ double kf_known_to(const kf_found *found, int block)
     return KF_ROUNDINGS * KF_EPS + found->residual + KF_EPS * largest;
 }
 
-/* Find the blocks that move farthest, the worst first, and the factor by which the sum over them is too small; return
- * their number, -1 if a block is singular.
+/* Find the blocks whose worst-case steps are longest, the longest first, and the weight that makes up for the others in a sum
+ * over them; return their number, -1 if a block is singular.
  */
 int kf_worst_blocks(const kf_model *model, const kf_found *found, const bool *held, int *worst, double *weight)
 {

@@ -14,16 +14,16 @@
 #include <stdio.h>
 #include <string.h>
 
-#define SAFETY 0.9
-#define SHRINKS 0.2    /* a step is at least so much of the refused one */
-#define GROWS 10.0     /* and at most so much of the one before */
+#define SAFETY 0.9       /* of the step size that the error estimate allows */
+#define SHRINKS 0.2      /* least size of a step, relative to the refused one */
+#define GROWS 10.0       /* largest size of a step, relative to the one before */
 #define ORDER 8.0
-#define STEEP 1.0      /* reaches that a driver moves in a step at most, so that no limit is passed in it */
-#define FIRST 0.01     /* reaches that it moves in the first step */
-#define DETERMINED 1e-12 /* of a span between jumps: laws are read on that side of a jump */
-#define ROUNDED 2e-14  /* of the times at its ends: a jump is known so well */
-#define LEAST 10.0     /* roundings of the time that a step is long at least */
-#define MOST 1000000   /* steps of the integrator in one step of the host */
+#define STEEP 1.0        /* most that a driver moves in a step, in units of kf_reach, so that no limit is passed in it */
+#define FIRST 0.01       /* the same in the first step */
+#define DETERMINED 1e-12 /* of a span between jumps: laws are read so far inside it */
+#define ROUNDED 2e-14    /* of the times at its ends: rounding of the time of a jump */
+#define LEAST 10.0       /* shortest step, in roundings of the time */
+#define MOST 1000000     /* steps of the integrator in one step of the host */
 
 static kf_answer check_count(const kf_instance *instance, const double *numbers, size_t count)
 {
@@ -90,7 +90,7 @@ bool kf_follow(kf_course *course, const double *u)
     return true;
 }
 
-/* Efforts and external loads some time after the start of a step of the host: sum of d^n t^n / n!. */
+/* Compute efforts and external loads at a time after the start of a step of the host, by their derivatives: Taylor's formula. */
 void kf_move_efforts(const kf_state *s, double after, double *efforts, double *loads)
 {
     const double *const given = s->real;
@@ -108,7 +108,7 @@ void kf_move_efforts(const kf_state *s, double after, double *efforts, double *l
     }
 }
 
-/* f: the derivative of a state y at t. */
+/* Compute f, the derivative of a state y at t; false if the pose is not reached. */
 static bool derive(kf_course *course, double t, const double *y, double *f)
 {
     const double at = fmin(fmax(t, course->low), course->high);
@@ -138,7 +138,9 @@ static bool complete(kf_course *course, kf_end *end)
     return true;
 }
 
-/* Try a step of size h to `to`, whose time is given; return its error, 1 is that allowed; infinite if a pose is not reached. */
+/* Try a step of size h to `to`, whose time is given. Return its error relative to the tolerance, infinite if a pose is not
+ * reached.
+ */
 static double attempt(kf_course *course, const kf_end *from, double h, kf_end *to)
 {
     double k[KF_STAGES][KF_NUMBERS], y[KF_NUMBERS], fifth = 0.0, third = 0.0, error;
@@ -178,7 +180,7 @@ static double attempt(kf_course *course, const kf_end *from, double h, kf_end *t
     return error < 1.0 && !complete(course, to) ? INFINITY : error;
 }
 
-/* The size of a step in which no driver moves by more than `share` of its reach, with its speed and acceleration. */
+/* Return the size of a step in which no driver moves by more than `share` of its kf_reach, by its speed and acceleration. */
 static double size_for(const kf_end *at, double share)
 {
     double fastest = 0.0;
@@ -200,7 +202,7 @@ static bool fail(kf_course *course, const kf_end *at)
     return false;
 }
 
-/* Step to the end of a span without jumps. */
+/* Step to the end of a span without jumps; false if the motion ends before. */
 static bool advance(kf_course *course, kf_end *at, double last)
 {
     while (at->t < last) {
@@ -253,7 +255,7 @@ static bool advance(kf_course *course, kf_end *at, double last)
     return true;
 }
 
-/* Why a motion ended early, in the state's message. */
+/* Write into the state's message why a motion ended early. */
 static void explain(kf_state *s, const kf_course *course)
 {
     const char *const why = course->is_limit ? "the motion ends at a limit"
