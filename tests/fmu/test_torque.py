@@ -17,9 +17,10 @@ from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 
 import kinfmu
-from kinfmu import Mechanism
-from kinfmu.errors import RequestError
-from kinfmu.laws import External, MotionSequence
+from kinfmu import Body, Mechanism, Revolute
+from kinfmu.drivers import AngleDriver
+from kinfmu.errors import KinfmuError, RequestError
+from kinfmu.laws import ConstantValue, External, MotionSequence
 from kinfmu.laws.sequence import Segment
 from kinfmu.loads import Damper, ForceAlong, TorqueOn
 from kinfmu.solver.python.status import Status
@@ -331,6 +332,20 @@ def test_wrong_values_are_refused(flavour: str, fmi: int, start: Callable[..., H
 def test_a_mechanism_that_no_effort_determines_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RequestError, match=r"mechanism 'fourbar_general' has no masses, so that efforts"):
         kinfmu.build(fourbar(2.0, 0.7, 1.9, 1.5), tmp_path / "a.fmu", drive="torque", flavour="native")
+
+
+@of_each_flavour
+def test_the_driver_without_reduced_inertia_is_named(flavour: str, fmi: int, tmp_path: Path) -> None:
+    heavy_crank = pendulum()
+    light = Mechanism(
+        "light",
+        [*heavy_crank.bodies, Body("wheel", {"W": (0, 0)}, (1, 1, 0))],
+        [*heavy_crank.joints, Revolute("W", ("ground.W", "wheel.W"))],
+        [*heavy_crank.drivers, AngleDriver("second", "wheel", ConstantValue(0.0))],
+    )
+    path = kinfmu.build(light, tmp_path / "a.fmu", flavour=flavour, fmi=fmi, drive="torque")
+    with pytest.raises(KinfmuError, match="driver second: its reduced inertia is 0"):
+        kinfmu.simulate(path)
 
 
 def test_settings_of_a_torque_driven_fmu_are_for_these_alone(fmu_of: Callable[..., Path]) -> None:

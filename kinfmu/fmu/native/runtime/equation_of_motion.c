@@ -11,15 +11,15 @@
 #include <math.h>
 #include <string.h>
 
+#define FOUND (KF_DRIVERS + KF_DRIVERS * (KF_DRIVERS + 1) / 2)
+
 static const double resting[KF_DRIVERS];
 
-/* The accelerations of the drivers at a good pose; false: reduced inertias do not determine them. */
-bool kf_accelerations(const kf_solver *solver, kf_pose *pose, double t, const double *ud, const double *efforts,
-                      const double *loads, double *udd)
+/* Compute bias efforts, then the upper triangle of the reduced inertia, row by row (FOUND), at a good pose. */
+static void find_inertia(const kf_solver *solver, kf_pose *pose, double t, const double *ud, const double *loads, double *found)
 {
     const kf_model *const model = &solver->model;
     const double *const u = KF_POSE_U(pose);
-    double found[KF_DRIVERS + KF_DRIVERS * (KF_DRIVERS + 1) / 2];
     int k;
 #if KF_DRIVERS == 1
     double zd[KF_ROOM(KF_UNKNOWNS)], zdd[KF_ROOM(KF_UNKNOWNS)];
@@ -29,13 +29,8 @@ bool kf_accelerations(const kf_solver *solver, kf_pose *pose, double t, const do
         zdd[k] = pose->x2[k] * (ud[0] * ud[0]);
     }
     kf_inertia(t, u, ud, resting, pose->found.x, zd, zdd, pose->x1, loads, model->parameters, found);
-    udd[0] = (efforts[0] - found[0]) / found[1] / kf_in_si[0];
-    return found[1] > 0.0 && isfinite(udd[0]);
 #else
     double slopes[KF_ROOM(KF_DRIVERS * KF_UNKNOWNS)], unit[KF_DRIVERS];
-    double matrix[KF_DRIVERS * KF_DRIVERS], right[KF_DRIVERS], factors[KF_LU_ROOM(KF_DRIVERS)], determinant;
-    int j, place = KF_DRIVERS;
-    bool good = true;
     for (k = 0; k < KF_DRIVERS; ++k) {
         memset(unit, 0, sizeof unit);
         unit[k] = 1.0;
@@ -44,6 +39,23 @@ bool kf_accelerations(const kf_solver *solver, kf_pose *pose, double t, const do
     }
     kf_rates_in_time(model, pose, ud, resting);
     kf_inertia(t, u, ud, resting, pose->found.x, pose->x1, pose->x2, slopes, loads, model->parameters, found);
+#endif
+}
+
+/* Compute the accelerations of the drivers (KF_DRIVERS) at a good pose; false if the reduced inertia does not determine them. */
+bool kf_accelerations(const kf_solver *solver, kf_pose *pose, double t, const double *ud, const double *efforts,
+                      const double *loads, double *udd)
+{
+    double found[FOUND];
+#if KF_DRIVERS == 1
+    find_inertia(solver, pose, t, ud, loads, found);
+    udd[0] = (efforts[0] - found[0]) / found[1] / kf_in_si[0];
+    return found[1] > 0.0 && isfinite(udd[0]);
+#else
+    double matrix[KF_DRIVERS * KF_DRIVERS], right[KF_DRIVERS], factors[KF_LU_ROOM(KF_DRIVERS)], determinant;
+    int j, k, place = KF_DRIVERS;
+    bool good = true;
+    find_inertia(solver, pose, t, ud, loads, found);
     for (k = 0; k < KF_DRIVERS; ++k) {
         right[k] = efforts[k] - found[k];
         for (j = k; j < KF_DRIVERS; ++j) {
@@ -63,23 +75,22 @@ bool kf_accelerations(const kf_solver *solver, kf_pose *pose, double t, const do
 #endif
 }
 
-/* Return the first driver without reduced inertia at a good pose, or -1. */
+/* Return the first driver without reduced inertia at a good pose, or 0. */
 int kf_massless(const kf_solver *solver, kf_pose *pose, double t, const double *ud, const double *loads)
 {
-    double none[KF_DRIVERS], one[KF_DRIVERS], a[KF_DRIVERS], b[KF_DRIVERS];
-    int k;
-    memset(none, 0, sizeof none);
+    double found[FOUND];
+    int k, place = KF_DRIVERS; /* of the diagonal */
+    find_inertia(solver, pose, t, ud, loads, found);
     for (k = 0; k < KF_DRIVERS; ++k) {
-        memset(one, 0, sizeof one);
-        one[k] = 1.0;
-        if (!kf_accelerations(solver, pose, t, ud, none, loads, a) || !kf_accelerations(solver, pose, t, ud, one, loads, b)) {
+        if (!(found[place] > 0.0)) {
             return k;
         }
+        place += KF_DRIVERS - k;
     }
-    return -1;
+    return 0;
 }
 
-/* u, ud, udd of the states; the accelerations are NaN where the reduced inertia does not determine them. */
+/* Read u and ud from the states and compute udd, NaN where the reduced inertia does not determine it. */
 void kf_state_drive(kf_state *s, double *u, double *ud, double *udd)
 {
     int k;

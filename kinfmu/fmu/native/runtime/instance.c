@@ -91,7 +91,7 @@ kf_answer kf_exit_initialization(kf_instance *instance)
     if (!isfinite(s->udd[0])) {
         const int k = kf_massless(&s->solver, kf_shown(s), s->time, s->ud, KF_REAL(s, KF_PART_LOADS));
         return kf_answered(instance, KF_ERROR, "initialization fails: driver %s: its reduced inertia is 0, so that efforts do "
-                      "not determine its motion; give a body that it moves a mass or an inertia", kf_driver_names[k < 0 ? 0 : k]);
+                      "not determine its motion; give a body that it moves a mass or an inertia", kf_driver_names[k]);
     }
     kf_commit(s, s->time, 0.0);
 #endif
