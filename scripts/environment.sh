@@ -67,7 +67,7 @@ is_installed_by_hand() {
 }
 
 install() {
-    local kind="$1" python what=".[figures]"
+    local kind="$1" python what=".[figures,viewer]"
     if [[ "$kind" == dev ]]; then what=".[dev]"; fi
     if must_be_made; then
         python="$(find_python)"

@@ -1,9 +1,13 @@
-"""Try the installed kinfmu: check, FMU, simulation, record and table, by its command and in Python."""
+"""Try the installed kinfmu: check, FMU, simulation, record and tables, by its command and in Python.
+
+With the extra `viewer` also a recording; without it the record alone.
+"""
 
 from __future__ import annotations
 
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +22,9 @@ CALLS = (
     ("build", "mine.toml", "--flavour", "python", "-o", "mine.fmu"),
     ("simulate", "mine.fmu"),
     ("export", "logs/mine.mcap", "-o", "mine.csv"),
+    ("export", "logs/mine.mcap", "-o", "mine.parquet"),
 )
+SAVE = ("review", "logs/mine.mcap", "--save", "saved.rrd")
 
 
 def main() -> int:
@@ -32,6 +38,11 @@ def main() -> int:
     record = kinfmu.log.read("logs/mine.mcap")
     np.testing.assert_array_equal(table["time"], record.t)
     assert record.good.all()
+    has_viewer = find_spec("rerun") is not None
+    saved = subprocess.run([COMMAND, *SAVE], check=False, capture_output=True, text=True)
+    assert (saved.returncode == 0) == has_viewer
+    assert has_viewer or saved.stderr.endswith(" needs the Rerun viewer: pip install 'kinfmu[viewer]'\n")
+    assert Path("saved.rrd").exists() == Path("logs/mine.rrd").exists() == has_viewer
     return 0
 
 

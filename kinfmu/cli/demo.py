@@ -77,13 +77,17 @@ def main() -> int:
 
     logs = Path("logs")
     write_mcap(run, logs / "fourbar.mcap")
-    write_rrd(run, logs / "fourbar.rrd")
     command = "kinfmu" if shutil.which("kinfmu") else quote(str(Path(sys.executable).with_name("kinfmu")))
-    print(
-        "\nwrote logs/fourbar.mcap and logs/fourbar.rrd; to review them:\n"
-        f"  {command} review logs/fourbar.mcap\n"
-        f"  {command} review logs/fourbar.mcap --screenshot fourbar.png    # needs no screen; after scripts/graphics"
-    )
+    try:
+        write_rrd(run, logs / "fourbar.rrd")
+        print(
+            "\nwrote logs/fourbar.mcap and logs/fourbar.rrd; to review them:\n"
+            f"  {command} review logs/fourbar.mcap\n"
+            f"  {command} review logs/fourbar.mcap --screenshot fourbar.png"
+            "    # needs no screen; after scripts/graphics"
+        )
+    except MissingPackageError as missing:
+        print(f"\nwrote logs/fourbar.mcap; no recording: {missing}")
     moving = logs / "fourbar.gif"
     try:
         animate(run, moving)

@@ -90,13 +90,15 @@ def simulate(
 ) -> None:
     """Step an FMU or an SSP and write logs; build an FMU first from a MECH.
 
-    Steps an FMU with fmpy, of kinfmu or of another tool, or the connected FMUs of an SSP, and writes an MCAP record and
-    a Rerun recording. The record grows during the run; kinfmu recover restores that of a killed run.
+    Steps an FMU with fmpy, of kinfmu or of another tool, or the connected FMUs of an SSP, and writes an MCAP record
+    and, with the extra viewer, a Rerun recording. The record grows during the run; kinfmu recover restores that of a
+    killed run.
     """
     from tempfile import TemporaryDirectory
 
     from kinfmu.fmu import simulate as simulated
     from kinfmu.log import LiveView, McapLog, write_rrd
+    from kinfmu.log.viewer.package import INSTALL, has_viewer, require_viewer
     from kinfmu.run.channels import is_drawn
 
     if wrap and inputs is None:
@@ -106,9 +108,14 @@ def simulate(
     for path in (mcap, rrd):
         if path is not None and not is_logged:
             raise click.UsageError(f"--channels none leaves nothing to write to {path}")
+    if rrd is not None:
+        require_viewer(f"{rrd}: a recording")
+    if live:
+        require_viewer("--live")
     with TemporaryDirectory(prefix="kinfmu_") as folder:
         fmu, parameters = _fmu(model, settings, Path(folder), drive, has_inputs=inputs is not None)
         record, recording = _logs(model, mcap, rrd) if is_logged else (None, None)
+        has_recording = rrd is not None or has_viewer()
         is_replaced = record is not None and record.exists()
         sinks: list[Sink] = [McapLog(record, drawn=is_drawn(names))] if record else []
         if live:
@@ -129,12 +136,15 @@ def simulate(
                 progress=progress,
                 exchange=exchange,
             )
-    if recording:
+    if recording and has_recording:
         with on_interrupt(f"stopped before the recording was written; the run is in {record}"):
             write_rrd(run, recording)
     replaced = " (an older run of that name was replaced)" if is_replaced else ""
-    written = [f"written to {record} and {recording}{replaced}", f"to review it: kinfmu review {quote(str(record))}"]
-    report(run, *(written if record else ()))
+    files, review = f"{record} and {recording}", f"to review it: kinfmu review {quote(str(record))}"
+    if recording and not has_recording:
+        older = f"; {recording} is of an older run" if recording.exists() else ""
+        files, review = f"{record}", f"no recording, which needs the Rerun viewer: {INSTALL}{older}"
+    report(run, *((f"written to {files}{replaced}", review) if record else ()))
 
 
 class _Sinks:

@@ -22,7 +22,7 @@ def test_a_first_call_makes_the_environment_installs_and_runs(miniature: Miniatu
     assert status == 0, printed
     assert miniature.asked == [
         f"python3 -m venv {miniature.root}/.venv",
-        f"{INSTALL}.[figures]",
+        f"{INSTALL}.[figures,viewer]",
         "python -m kinfmu.cli.demo",
     ]
 
@@ -61,11 +61,11 @@ def test_a_failed_installation_is_reported_and_started_again(miniature: Miniatur
     status, printed = miniature.run("demo", PIP_FAILS="1")
     assert status == 1
     assert printed.splitlines()[-1] == "kinfmu: installing into .venv failed, see above"
-    assert miniature.asked[-1] == f"{INSTALL}.[figures]"
+    assert miniature.asked[-1] == f"{INSTALL}.[figures,viewer]"
     assert miniature.run("demo")[0] == 0
     assert miniature.asked == [
         f"python3 -m venv {miniature.root}/.venv",
-        f"{INSTALL}.[figures]",
+        f"{INSTALL}.[figures,viewer]",
         "python -m kinfmu.cli.demo",
     ]
 
@@ -76,7 +76,7 @@ def test_an_interrupted_update_is_begun_again(miniature: Miniature) -> None:
     miniature.run("demo")
     assert miniature.asked == [
         f"python3 -m venv {miniature.root}/.venv",
-        f"{INSTALL}.[figures]",
+        f"{INSTALL}.[figures,viewer]",
         "python -m kinfmu.cli.demo",
     ]
 
@@ -94,7 +94,7 @@ def test_an_environment_that_somebody_made_by_hand_is_kept(miniature: Miniature)
     shutil.copy(miniature.python, tools / "python")
     (tools / "theirs").touch()
     miniature.run("demo")
-    assert miniature.asked == [f"{INSTALL}.[figures]", "python -m kinfmu.cli.demo"]
+    assert miniature.asked == [f"{INSTALL}.[figures,viewer]", "python -m kinfmu.cli.demo"]
     assert (tools / "theirs").exists()
 
 
@@ -107,7 +107,7 @@ def test_a_copy_installed_by_hand_is_replaced_with_a_word(miniature: Miniature) 
     )
     shown = "Name: kinfmu\\nVersion: 1.0\\n"
     assert printed in miniature.run("demo", PIP_SHOWS=shown)[1].splitlines()
-    assert miniature.asked == [f"{INSTALL}.[figures]", "python -m kinfmu.cli.demo"]
+    assert miniature.asked == [f"{INSTALL}.[figures,viewer]", "python -m kinfmu.cli.demo"]
     (miniature.root / ".venv" / "installed").unlink()
     for other in (shown + "Editable project location: /here\\n", ""):
         assert printed not in miniature.run("demo", PIP_SHOWS=other)[1]

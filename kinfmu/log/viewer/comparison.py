@@ -15,6 +15,7 @@ from kinfmu.log.viewer.card import plain
 from kinfmu.log.viewer.decimated import decimated
 from kinfmu.log.viewer.differences import common, difference_of, differs, loads_of, most_apart, parameters_apart
 from kinfmu.log.viewer.linkage import Linkage
+from kinfmu.log.viewer.package import require_viewer
 from kinfmu.log.viewer.rerun_file import application, left_out, log_card, log_group, log_status, recording
 from kinfmu.log.viewer.series import Group, groups
 from kinfmu.log.viewer.timeline import Timeline, timeline_of
@@ -56,8 +57,10 @@ def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = 
 
     Raises:
         LogError: The runs cannot be compared, a time is outside the range of a log, or the file cannot be written.
+        MissingPackageError: The viewer is not installed.
 
     """
+    require_viewer(f"{path}: a recording")
     if a.length_unit != b.length_unit:
         raise LogError(
             f"{path}: the runs measure lengths in {a.length_unit} and {b.length_unit}; they need the same unit"

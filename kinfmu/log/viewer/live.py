@@ -26,6 +26,7 @@ from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.decimated import decimated
 from kinfmu.log.viewer.headless import executable, last_error
 from kinfmu.log.viewer.linkage import APPLICATION, Linkage
+from kinfmu.log.viewer.package import require_viewer
 from kinfmu.log.viewer.rerun_file import drawn_linkages, left_out, log_card, log_group, log_status
 from kinfmu.log.viewer.series import Group, accuracy, efforts, error_estimates, groups, iterations, margin, signals
 from kinfmu.log.viewer.timeline import timeline_of
@@ -53,10 +54,12 @@ class LiveView:
 
     Raises:
         LogError: There is no display to open a viewer on, or it does not open.
+        MissingPackageError: The viewer is not installed.
 
     """
 
     def __init__(self, stream: rr.RecordingStream | None = None) -> None:
+        require_viewer("the live view")
         self._stream = _stream_to_viewer() if stream is None else stream
         self._paths: dict[str, dict[str, list[FloatArray]]] = {}  # by linkage and path
         self._has_layout = False

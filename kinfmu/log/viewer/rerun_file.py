@@ -40,6 +40,7 @@ from kinfmu.log.viewer.blueprint import Drawn, single
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.decimated import decimated
 from kinfmu.log.viewer.linkage import APPLICATION, Linkage, send
+from kinfmu.log.viewer.package import require_viewer
 from kinfmu.log.viewer.reactions import reactions
 from kinfmu.log.viewer.series import Group, accuracy, efforts, error_estimates, groups, iterations, margin, signals
 from kinfmu.log.viewer.timeline import Timeline, timeline_of
@@ -72,8 +73,10 @@ def write_rrd(run: Run, path: str | Path) -> None:
 
     Raises:
         LogError: The file cannot be written, or a time is outside the range of a log.
+        MissingPackageError: The viewer is not installed.
 
     """
+    require_viewer(f"{path}: a recording")
     nanoseconds(run.t)  # reports invalid times before a file is made
     timeline = timeline_of([run])
     shown = timeline.placed(decimated(run))

@@ -15,6 +15,7 @@ from kinfmu.files.whole_file import suffix_of
 from kinfmu.log.reading import read
 from kinfmu.log.target import replacing
 from kinfmu.log.viewer.headless import Cursor, CursorOn, executable, last_error, shoot
+from kinfmu.log.viewer.package import require_viewer
 from kinfmu.log.viewer.rerun_file import write_rrd
 from kinfmu.log.viewer.timeline import Timeline, timeline_named, timeline_of
 from kinfmu.run.axis import axis_of
@@ -56,10 +57,12 @@ def review(
     Raises:
         RequestError: Invalid files or time.
         LogError: A run cannot be read, a file cannot be written, or the viewer cannot open or draw.
+        MissingPackageError: The viewer is not installed.
 
     """
     run = Path(run)
     _check(run, other, save, screenshot, at)
+    require_viewer(f"{run}: a review")
     moment: Cursor | CursorOn | None
     if not save and not screenshot:
         _need_display(run)

@@ -1,0 +1,88 @@
+"""An installation without the extra `viewer`: records are written, and what needs the viewer is refused in one line."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from kinfmu.log import read
+
+BASE = (  # a process in which the packages of the extras cannot be imported
+    "import sys; sys.modules.update(dict.fromkeys(('rerun', 'rerun_bindings', 'rerun_cli', 'PIL', 'matplotlib')))\n"
+)
+INSTALL = "needs the Rerun viewer: pip install 'kinfmu[viewer]'"
+
+
+def kinfmu(folder: Path, *arguments: str) -> tuple[int, str, str]:
+    """Return exit status, output and errors of a command."""
+    code = f"{BASE}from kinfmu.cli import main; main(prog_name='kinfmu')"
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments], cwd=folder, capture_output=True, text=True, check=False
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_simulate_writes_the_record_alone_and_says_so(tmp_path: Path) -> None:
+    status, out, err = kinfmu(tmp_path, "simulate", "fourbar", "--stop", "3")
+    assert (status, err) == (0, "")
+    first, second = out.splitlines()
+    assert first.endswith("; written to logs/fourbar.mcap")
+    assert second == f"no recording, which {INSTALL}"
+    assert [path.name for path in (tmp_path / "logs").iterdir()] == ["fourbar.mcap"]
+    assert len(read(tmp_path / "logs" / "fourbar.mcap")) == 4
+    (tmp_path / "logs" / "fourbar.rrd").write_bytes(b"older")
+    status, out, err = kinfmu(tmp_path, "simulate", "fourbar", "--stop", "2")
+    assert (status, err) == (0, "")
+    assert out.splitlines()[1] == f"no recording, which {INSTALL}; logs/fourbar.rrd is of an older run"
+    status, out, err = kinfmu(tmp_path, "simulate", "fourbar", "--stop", "2", "--channels", "none")
+    assert (status, err, len(out.splitlines())) == (0, "", 1)
+    for name in ("run.csv", "run.parquet"):
+        assert kinfmu(tmp_path, "export", "logs/fourbar.mcap", "-o", name) == (0, f"written: {name}\n", "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "what"),
+    [
+        (["simulate", "fourbar", "--rrd", "a.rrd"], "a.rrd: a recording"),
+        (["simulate", "fourbar", "--live"], "--live"),
+        (["review", "run.mcap"], "run.mcap: a review"),
+        (["review", "run.mcap", "--screenshot", "a.png"], "run.mcap: a review"),
+    ],
+)
+def test_what_needs_the_viewer_is_refused_before_anything_is_written(
+    arguments: list[str], what: str, tmp_path: Path
+) -> None:
+    (tmp_path / "run.mcap").touch()
+    assert kinfmu(tmp_path, *arguments) == (1, "", f"kinfmu: {what} {INSTALL}\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["run.mcap"]
+
+
+def test_so_are_the_functions_of_the_log(tmp_path: Path) -> None:
+    code = f"""{BASE}
+import kinfmu
+from kinfmu.errors import MissingPackageError
+from kinfmu.log.viewer.comparison import write_comparison
+run = kinfmu.solve(kinfmu.load("fourbar"), [0.0, 1.0])
+for call in (
+    lambda: kinfmu.log.write_rrd(run, "a.rrd"), lambda: write_comparison(run, run, "a.rrd"), kinfmu.log.LiveView
+):
+    try:
+        call()
+    except MissingPackageError as error:
+        print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+    recording = f"a.rrd: a recording {INSTALL}"
+    assert done.stdout.splitlines() == [recording, recording, f"the live view {INSTALL}"]
+    assert not list(tmp_path.iterdir())
+
+
+def test_so_is_the_recording_of_the_demo(tmp_path: Path) -> None:
+    code = f"{BASE}from kinfmu.cli import demo; sys.exit(demo.main())"
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"wrote logs/fourbar.mcap; no recording: logs/fourbar.rrd: a recording {INSTALL}" in done.stdout
+    assert "no picture: logs/fourbar.gif: " in done.stdout
