@@ -10,6 +10,7 @@ import numpy as np
 from kinfmu.equations.blocks import Ordered, ordered_blocks
 from kinfmu.equations.closing import CLOSED, branches, close, dependent_rows, followed, margin, reaches
 from kinfmu.equations.part import Part
+from kinfmu.equations.reach import cannot_close
 from kinfmu.equations.start_poses import StartValues, distance_from_start, law_targets, start_from_poses, with_angles
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import AssemblyError, listed
@@ -104,6 +105,8 @@ def _assembled(system: System, start: StartValues) -> Assembled | None:
     u = start.u
     order = in_order(system)
     found, trouble = _assembled_in_order(system, u, start.q, order)
+    if found is None and len(system.coordinates) <= MOST_DENSE and cannot_close(Part(system), u):
+        return None
     if order.blocks and (found is None or distance_from_start(system, start, found.q) > NEAR):
         found = assemble_from_random_starts(system, start, found, order)
     if found is not None:

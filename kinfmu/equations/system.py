@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
-from functools import cached_property
+from contextlib import suppress
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinfmu.drivers import Driver
 from kinfmu.equations.dual import Dual
+from kinfmu.equations.row_code import RowCode, row_code
 from kinfmu.equations.taylor import Taylor
 from kinfmu.joints import Joint
 from kinfmu.measures.placement import GROUND, BodyFrame, Placement
@@ -19,6 +22,7 @@ from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.units import METRES
 
 FloatArray = NDArray[np.float64]
+RARELY = 50  # evaluations of a gradient; more are faster by code, which is made in the time of as many
 
 
 class Row(NamedTuple):
@@ -73,6 +77,8 @@ class System:
         self.scales: FloatArray = np.array([row.scale for row in rows])  # (m,)
         is_angle = [name.is_angle for name in self.coordinates]
         self.column_scales: FloatArray = np.where(is_angle, 1.0, self.size)  # (n,) coordinates per unit of motion
+        self._evaluations = Counter[tuple[int, ...]]()  # of joints and drivers, by their rows
+        self._codes: dict[tuple[int, ...], RowCode] = {}
 
     def evaluate(self, q: Sequence[Any], u: Sequence[Any]) -> list[Any]:
         """Return Phi, one value per row, in the arithmetic of q and u."""
@@ -112,18 +118,42 @@ class System:
         """Number of the joint or driver to which each row belongs, by index into `members`."""
         return tuple(number for number, member in enumerate(self.members) for _ in member.rows)
 
-    def values(self, member: Member, q: FloatArray, u: FloatArray) -> list[float]:
+    def values(self, member: Member, q: FloatArray, u: FloatArray) -> Sequence[float]:
         """Return Phi of one joint or driver, a value per row; q: (n,) all coordinates."""
         target = 0.0 if member.driver is None else float(u[member.driver])
-        return [float(value) for value in self._alone(member, q[list(member.columns)].tolist(), target)]
+        coordinates = q[list(member.columns)].tolist()
+        code = self._codes.get(member.rows)
+        return code.values(coordinates, target) if code else list(map(float, self._alone(member, coordinates, target)))
 
     def gradients(self, member: Member, q: FloatArray) -> FloatArray:
         """Return Phi_q of one joint or driver, (its rows, its columns); q: (n,) all coordinates."""
-        along = list(map(Dual, q[list(member.columns)].tolist(), np.eye(len(member.columns))))
-        gradients = np.zeros((len(member.rows), len(along)))
+        coordinates = q[list(member.columns)].tolist()
+        shape = len(member.rows), len(coordinates)
+        code = self._code(member)
+        if code is not None:
+            with suppress(ZeroDivisionError):
+                return np.array(code.gradients(coordinates, 0.0)).reshape(shape)
+        along = list(map(Dual, coordinates, np.eye(len(coordinates))))
+        gradients = np.zeros(shape)
         for row, phi in enumerate(self._alone(member, along, 0.0)):
             gradients[row] = phi.g if isinstance(phi, Dual) else 0.0
         return gradients
+
+    def _code(self, member: Member) -> RowCode | None:
+        """Return the code of a joint or driver; None as long as its formulas are evaluated rarely."""
+        code = self._codes.get(member.rows)
+        if code is None:
+            self._evaluations[member.rows] += 1
+            if self._evaluations[member.rows] > RARELY:
+                code = self._codes[member.rows] = self._new_code(member)
+        return code
+
+    def use_code(self) -> None:
+        """Evaluate all joints and drivers by code from now on."""
+        self._codes = {member.rows: self._new_code(member) for member in self.members}
+
+    def _new_code(self, member: Member) -> RowCode:
+        return row_code(partial(self._alone, member), len(member.columns))
 
     def _alone(self, member: Member, coordinates: Sequence[Any], target: Any) -> Sequence[Any]:
         """Return the rows of one joint or driver, in the arithmetic of its bodies' coordinates."""

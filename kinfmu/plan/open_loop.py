@@ -11,6 +11,7 @@ import numpy as np
 from kinfmu.equations.assembly import in_order
 from kinfmu.equations.closing import CLOSED, close
 from kinfmu.equations.part import Part
+from kinfmu.equations.reach import cannot_close
 from kinfmu.equations.start_poses import StartValues
 from kinfmu.equations.system import FloatArray, Member, System
 from kinfmu.errors import listed
@@ -112,6 +113,8 @@ def _closes_elsewhere(
     """Return True if a loop closes from one of some random poses of its bodies."""
     rng = np.random.default_rng(1989)
     part, width = Part(system, rows, columns, at), np.pi * system.column_scales[list(columns)]
+    if cannot_close(part, u):
+        return False
     starts = (at[list(columns)] + width * rng.uniform(-1.0, 1.0, len(columns)) for _ in range(_RESTARTS))
     return any(close(part, rough, u)[1] <= CLOSED for rough in starts)
 

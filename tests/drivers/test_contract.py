@@ -57,6 +57,19 @@ def test_the_jacobian_is_the_complex_step_derivative_and_the_traced_graph_gives_
 
 
 @every_driver
+@given(data=st.data(), u=coordinates)
+def test_code_of_its_row_gives_the_numbers_of_its_formula(cls: type[Driver], data: st.DataObject, u: float) -> None:
+    """The value to the bit."""
+    system = data.draw(systems(cls))
+    q, target = data.draw(poses(system)), np.array([u])
+    (member,) = system.members
+    values, gradients = list(system.values(member, q, target)), system.gradients(member, q)
+    system.use_code()
+    assert list(system.values(member, q, target)) == values
+    np.testing.assert_allclose(system.gradients(member, q), gradients, rtol=1e-14, atol=1e-15 * size(system, q))
+
+
+@every_driver
 @given(data=st.data(), u=coordinates, ud=coordinates, udd=coordinates)
 def test_velocity_and_acceleration_equations_hold_along_any_motion(
     cls: type[Driver], data: st.DataObject, u: float, ud: float, udd: float

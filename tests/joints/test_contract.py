@@ -189,3 +189,16 @@ def test_a_body_displaced_by_d_gives_a_residual_of_d_times_the_scale(
         residual = system.residual(displaced, NO_DRIVERS)
         assert residual[k] / scale == pytest.approx(d, rel=1e-4)
         assert joint.gaps(tuple(residual))[k] == pytest.approx(d, rel=1e-4)
+
+
+@every_joint
+@given(data=st.data())
+def test_code_of_its_rows_gives_the_numbers_of_its_formulas(cls: type[Joint], data: st.DataObject) -> None:
+    """Values to the bit; gradients to the rounding of a root."""
+    system = data.draw(systems(cls))
+    q = data.draw(regular_poses(system))
+    (member,) = system.members
+    values, gradients = list(system.values(member, q, NO_DRIVERS)), system.gradients(member, q)
+    system.use_code()
+    assert list(system.values(member, q, NO_DRIVERS)) == values
+    np.testing.assert_allclose(system.gradients(member, q), gradients, rtol=1e-14, atol=1e-15 * size(system, q))
