@@ -1,4 +1,4 @@
-"""What `import kinfmu` costs over bare Python, each in a fresh process."""
+"""Time of `import kinfmu` compared with bare Python, each in a fresh process."""
 
 from __future__ import annotations
 

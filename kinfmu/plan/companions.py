@@ -219,7 +219,7 @@ def _regular_only_with(
 def _motion(part: Part, q: FloatArray, rank: int, count: int) -> Iterator[FloatArray]:
     """Yield poses along the motion that rows of a rank leave free: in one direction, then in the other.
 
-    Random directions (seeded) where the motion has several freedoms. It ends where all rows together are singular.
+    Directions are random (seeded) with several degrees of freedom. It ends where all rows together are singular.
     """
     rng = np.random.default_rng(1989)
     free = _free(part, q, rank)

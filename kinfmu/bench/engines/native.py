@@ -9,13 +9,14 @@ from kinfmu.bench.engine import BenchEngine, EngineSetting, Sampler
 from kinfmu.errors import CompilerError, MissingPackageError
 from kinfmu.sweep.library import Library
 
-LAPS = 50  # how often a call takes the samples
+LAPS = 50  # how often a call solves the samples
 
 
 def _sampler(case: Case, _setting: EngineSetting) -> Sampler:
-    """What `kinfmu.solve(engine="native")` runs on: a call takes the samples there and back, again and again.
+    """Return a sampler by the library of `kinfmu.solve(engine="native")`.
 
-    What a call costs once, such as the path from the anchor to the first sample, counts as little as in a long sweep.
+    A call solves the samples forwards and backwards, LAPS times in all, so that its fixed cost, such as the path from
+    the anchor to the first sample, counts as little as in a long sweep.
     """
     try:
         library = Library(case.plan)

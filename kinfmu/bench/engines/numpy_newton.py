@@ -1,4 +1,4 @@
-"""What a skilled user of numpy writes: the equations of each kind of constraint, and their derivatives, by hand.
+"""Code as a skilled user of numpy writes it: equations of each kind of constraint and their derivatives, by hand.
 
     a = A s                                           from the origin of a body's frame to its point
     d = r_j + a_j - r_i - a_i                         between two points

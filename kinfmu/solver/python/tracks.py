@@ -82,11 +82,11 @@ class TrackModel:
         return there
 
     def of(self, whole: Sequence[Any]) -> tuple[Any, ...]:
-        """Return the track's items of a row with one item for each unknown of the model."""
+        """Return the track's items of a sequence with one item for each unknown of the model."""
         return tuple([whole[k] for k in self.places])
 
     def put(self, own: Sequence[float], whole: Sequence[float]) -> Vector:
-        """Return the row with the track's items in it."""
+        """Return `whole`, one item for each unknown of the model, with the track's items replaced by `own`."""
         values = list(whole)
         for k, value in zip(self.places, own, strict=True):
             values[k] = value
@@ -278,7 +278,7 @@ class Tracks:
 
 
 def tracks_of(model: Model, u: Vector, z: Vector) -> tuple[TrackModel | None, ...]:
-    """Return the track of each driver, None where no block depends on it alone; an empty row if there is no track."""
+    """Return the track of each driver, None where no block depends on it alone; an empty tuple if there is no track."""
     by = getattr(model, "BLOCK_DRIVERS", ())
     if not by or max(by) == MIXED:
         return ()

@@ -1,9 +1,9 @@
-/* Derivatives over time: of outputs, which a host reads; of inputs, which a step follows. */
+/* Derivatives with respect to time: of outputs, which a host reads; of inputs, which are followed in a step. */
 #include "instance.h"
 
 #include <math.h>
 
-/* Of positions orders 1 and 2, of rates order 1. */
+/* Read the derivative of an output: of positions orders 1 and 2, of rates order 1. */
 kf_answer kf_output_derivative(kf_instance *instance, unsigned reference, int order, double *value)
 {
     const unsigned place = KF_PLACE(reference);
@@ -20,7 +20,7 @@ kf_answer kf_output_derivative(kf_instance *instance, unsigned reference, int or
     return answer;
 }
 
-/* Of an input, which follows it during the next step. */
+/* Set the derivative of an input, which the input follows during the next step. */
 kf_answer kf_set_input_derivative(kf_instance *instance, unsigned reference, int order, double value)
 {
     kf_state *const s = &instance->now;
@@ -62,8 +62,8 @@ kf_answer kf_set_input_derivative(kf_instance *instance, unsigned reference, int
 }
 
 #if !KF_TORQUE
-/* The inputs at the end of a step that follows their derivatives: sum of d^n h^n / n!. Beyond KF_LARGEST of them
- * or their rates there is no pose.
+/* Move the inputs along their derivatives to the end of a step: Taylor's formula. There is no pose where an input or its
+ * rates exceed KF_LARGEST.
  */
 KF_RARE void kf_move_inputs(kf_state *s, double step)
 {
