@@ -82,7 +82,8 @@ def animate(run: Run, path: str | Path) -> None:
     film = _film(run, poses, path)
     with figure_style(path):
         images = list(_images(run, mechanism, poses, film))
-    write_bytes(path, mp4(images, film.seconds, path) if is_video else _gif(images, film))
+    own = [*PAPER, *_LOST, *(palette.LOAD if mechanism.loads else ())]
+    write_bytes(path, mp4(images, film.seconds, path) if is_video else _gif(images, film, own))
 
 
 def placed_run(run: Run, path: Path) -> tuple[Mechanism, dict[str, FloatArray]]:
@@ -205,8 +206,11 @@ def _picture(sheet: Sheet) -> Image:
     return Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy())  # type: ignore[no-untyped-call]
 
 
-def _gif(images: Sequence[Image], film: _Film) -> bytes:
-    """Return the pictures as a GIF with their COLOURS most important colours, without dithering."""
+def _gif(images: Sequence[Image], film: _Film, own: Sequence[int]) -> bytes:
+    """Return the pictures as a GIF with their COLOURS most important colours, without dithering.
+
+    own: red, green and blue of colours that are kept as they are; quantizing would mix them with others.
+    """
     from PIL import Image
 
     width, height = images[0].size
@@ -214,9 +218,8 @@ def _gif(images: Sequence[Image], film: _Film) -> bytes:
     together = Image.new("RGB", (width, height * len(some)))
     for k, image in enumerate(some):
         together.paste(image, (0, k * height))
-    fixed = [*PAPER, *_LOST]  # quantizing would mix them with others
-    mixed = together.quantize(COLOURS - len(fixed) // 3, method=Image.Quantize.MEDIANCUT).getpalette() or []
-    colours = np.array([*fixed, *mixed[: 3 * COLOURS - len(fixed)]], int).reshape(-1, 3)
+    mixed = together.quantize(COLOURS - len(own) // 3, method=Image.Quantize.MEDIANCUT).getpalette() or []
+    colours = np.array([*own, *mixed[: 3 * COLOURS - len(own)]], int).reshape(-1, 3)
     nearest = _nearest(colours)
     flat = []
     for image in images:

@@ -17,6 +17,7 @@ GROUND: Colour = (150, 150, 150)
 BAR: Colour = (190, 190, 190)
 PIN: Colour = (235, 235, 235)
 LOAD: Colour = (126, 34, 206)
+LOAD_ON_DARK: Colour = (168, 85, 247)  # in recordings
 RUNS: tuple[Colour, Colour] = ((213, 94, 0), (86, 180, 233))  # two runs compared
 BACKDROP: Colour = (13, 16, 17)  # background of a recording's linkage
 OUT_OF_REACH: Colour = (110, 110, 110)

@@ -94,6 +94,9 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
     for shape in found:
         if shape.kind in ("barrel", "shaft"):
             pins[shape.frame] = [(shape.name, np.zeros(2))]
+        elif shape.strips and len(shape.points) > 1:
+            for frame, point in zip((shape.frame, shape.other), shape.points, strict=True):
+                pins.setdefault(frame, []).append((shape.name, point))
     points: dict[str, list[tuple[str, FloatArray]]] = {}
     for name, point in mechanism.points.items():
         points.setdefault(body_of(point), []).append((name, shown.at(point)))

@@ -103,7 +103,16 @@ def test_an_animation_shows_the_spring_as_it_changes(tmp_path: Path, monkeypatch
         for k in range(pictures.n_frames):
             pictures.seek(k)
             page = np.asarray(pictures.convert("RGB"), dtype=int)
-            violet = (np.abs(page - np.array(palette.LOAD)) < 60).all(axis=2)
+            violet = (page == np.array(palette.LOAD)).all(axis=2)
             assert violet.sum() > 50
             widths.append(int(np.ptp(np.flatnonzero(violet.any(axis=0)))))
     assert max(widths) > 1.3 * min(widths)
+
+
+def test_small_arrows_keep_their_colour_in_an_animation_of_many_colours(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(animation, "MOST", 4)
+    animate(kinfmu.solve(kinfmu.load("excavator_loaded"), np.linspace(0.0, 5.0, 21)), tmp_path / "run.gif")
+    with image.open(tmp_path / "run.gif") as pictures:
+        assert (np.asarray(pictures.convert("RGB")) == np.array(palette.LOAD)).all(axis=2).sum() > 20

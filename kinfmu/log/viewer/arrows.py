@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kinfmu.log.viewer.linkage import MARGIN, Linkage, send
+from kinfmu.scene import palette
 from kinfmu.scene.forces import arrows
 from kinfmu.scene.scene import Scene
 
 if TYPE_CHECKING:
     import rerun as rr
 
-_JOINT, _LOAD = (185, 28, 28), (168, 85, 247)
+_JOINT = (185, 28, 28)
 _ORDER = 50.0  # above the linkage
 _PLACES, _LOWEST_PART = 9, 0.2  # places of the legend; part of the size above the lowest point, in which names matter
 _RADIUS = 0.004  # as a part of the scene's size, however thin its links are
@@ -33,21 +34,24 @@ def legend_start(scene: Scene, length: float) -> float:
     return float(starts[int(np.argmax(np.round(apart / scene.size, 6)))])
 
 
-def log_arrows(linkage: Linkage) -> None:
-    """Log the forces of joints and loads, as the scene scales them; samples without numbers have no arrows."""
+def log_arrows(linkage: Linkage) -> frozenset[str]:
+    """Log the forces of joints and loads, as the scene scales them, and return the names of these loads.
+
+    Samples without numbers have no arrows.
+    """
     import rerun as rr
 
     run, scene, path = linkage.run, linkage.scene, f"{linkage.root}/forces"
     found = arrows(run, run.mechanism, scene) if (run.reaction_names or run.force_names) and run.mechanism else None
     if found is None:
-        return
+        return frozenset()
     look: dict[str, Any] = {
         "radii": [_RADIUS * max(linkage.size, scene.size)],
         "draw_order": linkage.layer + _ORDER,
     }
     for name, along in found.along.items():
         kind, _, label = name.partition(".")
-        entity, colour = f"{path}/{kind}/{label}", _LOAD if kind == "loads" else _JOINT
+        entity, colour = f"{path}/{kind}/{label}", palette.LOAD_ON_DARK if kind == "loads" else _JOINT
         known = np.asarray(np.isfinite(along + found.at[name]).all(axis=1))
         linkage.rec.log(
             entity, rr.Arrows2D.from_fields(**look, colors=[colour], labels=[label], show_labels=False), static=True
@@ -75,3 +79,4 @@ def log_arrows(linkage: Linkage) -> None:
         ),
         static=True,
     )
+    return frozenset(name.removeprefix("loads.") for name in found.along if name.startswith("loads."))

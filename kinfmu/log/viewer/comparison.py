@@ -15,6 +15,7 @@ from kinfmu.log.viewer.card import plain
 from kinfmu.log.viewer.decimated import decimated
 from kinfmu.log.viewer.differences import common, difference_of, differs, loads_of, most_apart, parameters_apart
 from kinfmu.log.viewer.linkage import Linkage
+from kinfmu.log.viewer.loads import log_loads
 from kinfmu.log.viewer.package import require_viewer
 from kinfmu.log.viewer.rerun_file import application, left_out, log_card, log_group, log_status, recording
 from kinfmu.log.viewer.series import Group, groups
@@ -88,7 +89,11 @@ def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = 
             zip((a, b), shown, scenes, curves, _LOOKS, strict=True)
         ):
             if scene:
-                Linkage(rec, f"{look.root}/linkage", timeline, drawn, scene, look.colour, look.bars, look.layer).log()
+                linkage = Linkage(
+                    rec, f"{look.root}/linkage", timeline, drawn, scene, look.colour, look.bars, look.layer
+                )
+                linkage.log()
+                log_loads(linkage)
             for group in (*own.values(), *loads[number].values()):
                 log_group(rec, look.root, timeline, drawn, _named(group, look), look.curves)
             log_status(rec, look.root, timeline, timeline.placed(run))

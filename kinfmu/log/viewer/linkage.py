@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -278,8 +278,11 @@ class Frames:
         self._good = np.flatnonzero(run.good)
         self._always = 0 < len(self._good) == len(run.good)  # every sample holds numbers
 
-    def move(self, path: str, pose: FloatArray) -> None:
-        """Send poses (n, 3) of the frame of an entity, x, y [length], phi [rad], at the samples that hold numbers."""
+    def move(self, path: str, pose: FloatArray, stretch: FloatArray | None = None) -> None:
+        """Send poses (n, 3) of the frame of an entity, x, y [length], phi [rad], at the samples that hold numbers.
+
+        stretch: factors (n,) of lengths along its first axis. Default: none.
+        """
         import rerun as rr
 
         known = pose[self._good]
@@ -287,12 +290,17 @@ class Frames:
         half = 0.5 * known[:, 2]
         turn = np.column_stack([zero, zero, np.sin(half), np.cos(half)]).astype(np.float32)
         shift = np.column_stack([known[:, :2], zero]).astype(np.float32)
+        scale = None
+        if stretch is not None and not (stretch == 1.0).all():
+            scale = np.column_stack([stretch[self._good], zero + 1.0, zero + 1.0]).astype(np.float32)
         send(
             self._rec,
             path,
             self._timeline,
             self._run.t[self._good],
-            lambda rows: rr.Transform3D.columns(translation=shift[rows], quaternion=turn[rows]),
+            lambda rows: rr.Transform3D.columns(
+                translation=shift[rows], quaternion=turn[rows], scale=None if scale is None else scale[rows]
+            ),
         )
 
     def line(
@@ -309,15 +317,28 @@ class Frames:
 
         radius: relative to the size; label: its name, if it has one; shown: True if the name is always shown.
         """
+        self.lines(path, [points], radius * self._size, colour, order, label, shown)
+
+    def lines(
+        self,
+        path: str,
+        points: Sequence[FloatArray],
+        radius: Any,
+        colour: palette.Colour,
+        order: float,
+        label: str | None = None,
+        shown: bool = False,
+    ) -> None:
+        """Log lines, each (k, 2), of one colour and name, as `line` does; radius: of the plane or of the screen."""
         import rerun as rr
 
         look = self._look(radius, order, [label] if label else [], shown)
-        strip = [points.astype(np.float32)]
+        strips = [line.astype(np.float32) for line in points]
         if self._always:
-            self._rec.log(path, rr.LineStrips2D(strip, colors=[colour], **look), static=True)
+            self._rec.log(path, rr.LineStrips2D(strips, colors=[colour], **look), static=True)
         elif len(self._good):
             self._rec.log(path, rr.LineStrips2D.from_fields(**look), static=True)
-            self._with_first_pose(path, rr.LineStrips2D.columns(strips=strip))
+            self._with_first_pose(path, rr.LineStrips2D.columns(strips=strips).partition([len(strips)]))
             switches = self.switches()
             colours = np.array(
                 [colour if good else palette.OUT_OF_REACH for good in self._run.good[switches]], np.uint8
@@ -338,7 +359,7 @@ class Frames:
         """Log points (k, 2) with their names, fixed in their frame, from the first pose on."""
         import rerun as rr
 
-        look = {"colors": [colour], **self._look(radius, order, names, shown)}
+        look = {"colors": [colour], **self._look(radius * self._size, order, names, shown)}
         at = points.astype(np.float32)
         if self._always:
             self._rec.log(path, rr.Points2D(at, **look), static=True)
@@ -353,10 +374,10 @@ class Frames:
     def _with_first_pose(self, path: str, columns: Any) -> None:
         send(self._rec, path, self._timeline, self._run.t[self._good[:1]], lambda _: columns)
 
-    def _look(self, radius: float, order: float, names: list[str], shown: bool) -> dict[str, Any]:
+    def _look(self, radius: Any, order: float, names: list[str], shown: bool) -> dict[str, Any]:
         """Return the style that lines and points have in common."""
         return {
-            "radii": [radius * self._size],
+            "radii": [radius],
             "labels": names or None,
             "show_labels": shown if names else None,
             "draw_order": self._layer + order,

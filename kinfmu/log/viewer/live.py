@@ -26,6 +26,7 @@ from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.decimated import decimated
 from kinfmu.log.viewer.headless import executable, last_error
 from kinfmu.log.viewer.linkage import APPLICATION, Linkage
+from kinfmu.log.viewer.loads import FORCES, log_loads
 from kinfmu.log.viewer.package import require_viewer
 from kinfmu.log.viewer.rerun_file import drawn_linkages, left_out, log_card, log_group, log_status
 from kinfmu.log.viewer.series import Group, accuracy, efforts, error_estimates, groups, iterations, margin, signals
@@ -101,6 +102,7 @@ class LiveView:
             if one.scene:
                 linkage = Linkage(self._stream, one.root, timeline, one.run, one.scene)
                 linkage.log()
+                log_loads(linkage, [load.name for load in one.scene.shapes if load.kind in FORCES])
                 paths = self._paths.setdefault(one.root, {})
                 for name, points in one.scene.paths.items():
                     paths.setdefault(name, []).append(points)
@@ -131,7 +133,7 @@ class LiveView:
             if one.scene:
                 linkage = Linkage(self._stream, one.root, timeline, one.run, one.scene)
                 linkage.log_paths(one.scene.paths)
-                log_arrows(linkage)
+                log_loads(linkage, log_arrows(linkage))
         log_card(self._stream, card(run, " ".join([*left_out(run, shown), note]).strip()))
         self._stream.send_blueprint(single(timeline, shown, drawn, groups(shown), forces, solver))
         self._flush()

@@ -40,6 +40,7 @@ from kinfmu.log.viewer.blueprint import Drawn, single
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.decimated import decimated
 from kinfmu.log.viewer.linkage import APPLICATION, Linkage, send
+from kinfmu.log.viewer.loads import log_loads
 from kinfmu.log.viewer.package import require_viewer
 from kinfmu.log.viewer.reactions import reactions
 from kinfmu.log.viewer.series import Group, accuracy, efforts, error_estimates, groups, iterations, margin, signals
@@ -92,7 +93,7 @@ def write_rrd(run: Run, path: str | Path) -> None:
             if one.scene:
                 linkage = Linkage(rec, one.root, timeline, one.run, one.scene)
                 linkage.log()
-                log_arrows(linkage)
+                log_loads(linkage, log_arrows(linkage))
         for group in (*curves.values(), *forces, *solver):
             log_group(rec, "", timeline, shown, group)
         log_status(rec, "", timeline, timeline.placed(run))
