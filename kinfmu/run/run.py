@@ -245,7 +245,7 @@ class Run(Tabular, Displayed):
         return len(self.values)
 
     def part(self, rows: slice | NDArray[Any], events: tuple[Event, ...] = ()) -> Run:
-        """Return some of the samples, with these events; lazy tables stay lazy."""
+        """Return the samples `rows`, a slice, indices or a mask (n,), with these events; lazy tables stay lazy."""
 
         def part(name: str) -> Any:
             table = self.__dict__[name]

@@ -349,7 +349,7 @@ class Model:
         return Library(self.plan)
 
     def is_native(self, count: int) -> bool:
-        """Return whether so many samples are solved by the native engine; its library is compiled then."""
+        """Return whether `count` samples are solved by the native engine; its library is compiled then."""
         work = count * max(1, len(self.plan.blocks))
         if self.engine == "python" or (self.engine == "auto" and work < WORTH_COMPILING):
             return False

@@ -1,4 +1,4 @@
-"""What a fit found: the mechanism, its errors, what its constraints say, and the other optima."""
+"""What a fit found: the mechanism, its errors, how far constraints are met, and the other optima."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ class TargetErrors:
         units: Their units.
         argument: Name of the driver, or 'time'.
         at: (m,) its values at the points; empty for a measure.
-        wanted: (m, d).
-        reached: (m, d).
+        wanted: (m, d) targets, in `units`.
+        reached: (m, d) what the mechanism reaches, in `units`.
         errors: (m, d) reached minus wanted; of angles without whole turns.
         rms: Root of the mean square of the points' errors; angles of poses count times their length.
         largest: Largest error of a point.

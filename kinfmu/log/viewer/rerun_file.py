@@ -2,7 +2,7 @@
 
     /linkage/...        of a system with several mechanisms /linkage/<component>/..., each in a view of its own
     /linkage/...        bodies with what joints add to them, pins, bars, cylinders, supports, rails; y up
-    /linkage/paths/...  where points of interest go; /linkage/trails/...: where they just came from
+    /linkage/paths/...  paths of points of interest over the run; /linkage/trails/...: over the last moments
     /position/angle     and /position/length, /velocity/..., /acceleration/...: one entity for each kind of quantity,
                         one curve a coordinate, in rad and the mechanism's unit of length
     /forces/torque      efforts of drivers, with /forces/force, /forces/power, /forces/energy [N m, N, W, J]
@@ -16,8 +16,8 @@
     /card               mechanism, run and verdict
 
 The viewer keeps one blueprint per application and ignores the blueprint of a second recording. So runs of the same
-mechanism and time, which need the same blueprint, belong to one application: what a person arranges for one stays for
-the next. Other runs belong to another application.
+mechanism and time, which need the same blueprint, belong to one application: a layout that you arrange for one is kept
+for the next. Other runs belong to another application.
 """
 
 from __future__ import annotations
