@@ -43,7 +43,9 @@ class TargetErrors:
         wanted: (m, d) targets, in `units`.
         reached: (m, d) what the mechanism reaches, in `units`.
         errors: (m, d) reached minus wanted; of angles without whole turns.
-        rms: Root of the mean square of the points' errors; angles of poses count times their length.
+        sizes: (m,) sizes of the points' errors, in the unit of the first column; angles of poses count times their
+            length.
+        rms: Root of the mean of their squares.
         largest: Largest error of a point.
         display: The units of the columns in reports.
 
@@ -58,6 +60,7 @@ class TargetErrors:
     wanted: FloatArray
     reached: FloatArray
     errors: FloatArray
+    sizes: FloatArray
     rms: float
     largest: float
     display: tuple[DisplayUnit, ...]

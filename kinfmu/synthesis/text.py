@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -72,14 +71,12 @@ def _target(one: TargetErrors, unit: str) -> Iterable[str]:
         f"{one.argument} [{'deg' if degrees else unit}]",
         *(f"{name}, wanted" for name in columns),
         *(f"{name}, reached" for name in columns),
-        "error",
+        f"error [{first.unit}]",
     )
     at = np.degrees(one.at) if degrees else one.at
     rows = []
-    tables = (at, one.wanted / factors, one.reached / factors, one.errors / factors)
-    for k, row in enumerate(zip(*tables, strict=True), start=1):
-        u, wanted, reached, error = row
-        size = math.sqrt(float(error @ error)) if len(set(one.units)) == 1 else float(np.abs(error).max())
+    tables = (at, one.wanted / factors, one.reached / factors, one.sizes / first.factor)
+    for k, (u, wanted, reached, size) in enumerate(zip(*tables, strict=True), start=1):
         rows.append((f"{k}", f"{u:.4f}", *(f"{n:.6g}" for n in wanted), *(f"{n:.6g}" for n in reached), f"{size:.3g}"))
     yield from aligned([titles, *rows[:_MOST_POINTS]])
     if len(rows) > _MOST_POINTS:

@@ -181,6 +181,19 @@ def test_the_report_shows_numbers_in_the_units_in_which_they_are_written() -> No
     assert f">{np.degrees(function.rms):.6g}<" in str(result._repr_html_())
 
 
+def test_errors_of_poses_are_lengths_in_the_report_too() -> None:
+    poses = [(1.0, 0.5, "30 deg"), (0.8, 0.9, "35 deg")]
+    target = PoseTarget(name="part", of="coupler", poses=poses, length="50 cm", step="20 deg", start="60 deg")
+    result = kinfmu.fit(_problem(targets=[target]), starts=1, engine="python")
+    (found,) = result.errors
+    sizes = np.sqrt(found.errors**2 @ [1.0, 1.0, 0.25])
+    np.testing.assert_allclose(found.sizes, sizes, rtol=1e-12)
+    assert found.largest == found.sizes.max()
+    lines = str(result).splitlines()
+    (k,) = (k for k, line in enumerate(lines) if line.endswith("error [m]"))
+    assert [line.split()[-1] for line in lines[k + 1 : k + 3]] == [f"{size:.3g}" for size in sizes]
+
+
 def test_an_unknown_without_effect_is_noted() -> None:
     written = four_bar()
     mechanism = replace(written, parameters={**written.parameters, "spare": Parameter(1.0)})
