@@ -13,7 +13,8 @@ from itertools import chain
 
 from kinfmu.errors import MechanismError, listed
 from kinfmu.mechanism.dimension import UNKNOWN, Dimension
-from kinfmu.mechanism.expression import OPERATIONS, Expression, Step
+from kinfmu.mechanism.expression import Expression
+from kinfmu.mechanism.operations import OPERATIONS, Step
 from kinfmu.mechanism.valid import quoted
 from kinfmu.units import KINDS, METRES, Quantity, every_unit, length_power
 

@@ -8,8 +8,9 @@ from decimal import Decimal
 from typing import TYPE_CHECKING, Any
 
 from kinfmu.mechanism.dimension import NUMBER, Dimension, DimensionError
-from kinfmu.mechanism.expression import OPERATIONS, Computed, Expression, Step
+from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.members import Members
+from kinfmu.mechanism.operations import OPERATIONS, Step
 from kinfmu.mechanism.parameters import NUMBER as PURE
 from kinfmu.mechanism.parameters import Parameter, dimensions_of
 from kinfmu.units import METRES, Quantity, every_unit, length_power

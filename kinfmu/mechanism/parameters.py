@@ -11,8 +11,9 @@ from kinfmu.errors import MechanismError, listed
 from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.conversion import converted
 from kinfmu.mechanism.dimension import UNKNOWN, Dimension
-from kinfmu.mechanism.expression import WORDS, Computed, Expression
+from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.number import read_number
+from kinfmu.mechanism.operations import WORDS
 from kinfmu.mechanism.valid import check_line, check_name, check_number, quoted
 from kinfmu.units import Quantity, every_unit
 

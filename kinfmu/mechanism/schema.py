@@ -18,7 +18,7 @@ from kinfmu.measures import POSE_QUANTITIES
 from kinfmu.measures.placement import Reference
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
-from kinfmu.mechanism.expression import LONGEST
+from kinfmu.mechanism.expression_text import LONGEST
 from kinfmu.mechanism.number import EXAMPLES
 from kinfmu.mechanism.repeats import LARGEST_COUNT, REPEATED
 from kinfmu.mechanism.toml_tables import table_keys

@@ -15,7 +15,8 @@ from kinfmu.equations.taylor import Taylor
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism import toml_file
 from kinfmu.mechanism.dimension import Dimension
-from kinfmu.mechanism.expression import DEEPEST, LARGEST_POWER, LONGEST, Expression
+from kinfmu.mechanism.expression import Expression
+from kinfmu.mechanism.expression_text import DEEPEST, LARGEST_POWER, LONGEST
 from kinfmu.units import Quantity
 
 VALUES = {"a": 2.0, "b": -0.75, "long_name_2": 1e3}
