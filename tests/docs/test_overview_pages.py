@@ -37,6 +37,13 @@ def test_the_architecture_lists_packages_in_the_order_of_imports() -> None:
     assert listed == sorted(listed)
 
 
+def test_the_first_page_lists_every_extra_for_users() -> None:
+    page = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    config = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    extras = set(config["project"]["optional-dependencies"]) - {"dev", "docs", "hosts"}  # those of a checkout
+    assert set(re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE)) == extras
+
+
 def test_the_paths_of_the_architecture_exist() -> None:
     paths = re.findall(r"`((?:kinfmu|scripts|fmus|tests|docs)/[\w/.]*)[ `]", ARCHITECTURE)
     assert len(paths) > 30
