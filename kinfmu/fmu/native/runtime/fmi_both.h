@@ -58,7 +58,7 @@ FMI(Status) FMI(SetDebugLogging)(void *c, FMI(Boolean) loggingOn, size_t nCatego
     return c ? (FMI(Status))kf_set_logging(common(c), loggingOn, nCategories, categories) : FMI(Error);
 }
 
-/* Life */
+/* Life cycle */
 
 void FMI(FreeInstance)(void *c)
 {
