@@ -13,7 +13,7 @@ from kinfmu import gallery
 from kinfmu.cli.arguments import STANDARD_OUTPUT, InputFile, OutputFile, RecordOrMechanism, names_in
 from kinfmu.cli.cams import export_cam
 from kinfmu.cli.group import errors_of, main
-from kinfmu.cli.pages import PAGES, driver_of, mechanism_of, write_page
+from kinfmu.cli.pages import PAGES, mechanism_of, write_page
 from kinfmu.cli.quantities import on_axis
 from kinfmu.errors import RequestError, listed
 from kinfmu.files.whole_file import suffix_of
@@ -236,7 +236,7 @@ def _export_page(given: str, output: Path, start: str | None, stop: str | None) 
         from kinfmu.log import read
 
         run = _between(read(Path(given)), start, stop)
-        write_page(mechanism_of(run), output, driver_of(run))
+        write_page(mechanism_of(run), output, run)
     else:
         mechanism = gallery.load(given)
         with errors_of(given):

@@ -17,17 +17,20 @@ if TYPE_CHECKING:
 PAGES = (".html",)
 
 
-def write_page(mechanism: Mechanism, path: Path, over: tuple[str, float, float] | None = None) -> None:
-    """Write the page of a mechanism; over: a driver and its first and last value, if they are its axis.
+def write_page(mechanism: Mechanism, path: Path, run: Run | None = None) -> None:
+    """Write the page of a mechanism, or of a run of it, whose motion the page shows.
 
     Raises:
         KinfmuError: There is no page, or it cannot be written.
 
     """
     from kinfmu.page import page
+    from kinfmu.page.samples import samples_of
 
+    over = driver_of(run) if run else None
+    samples = samples_of(run, mechanism) if run and not over else None
     with patience():
-        text = page(mechanism, over=over)
+        text = page(mechanism, over=over, samples=samples)
     try:
         write_whole(path, text.encode())
     except OSError as error:

@@ -7,6 +7,7 @@ import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from kinfmu.analysis import Report, check
 from kinfmu.mechanism import Mechanism
@@ -52,6 +53,7 @@ _SCRIPTS = (
 MOST_NUMBERS = 400  # of a file that its page can change: the C code of more is too long for a small page
 _IMPORT = re.compile(r"^import .*\n", re.MULTILINE)
 _EXPORT = re.compile(r"^export ", re.MULTILINE)
+_COMMENT = re.compile(r"^ *//.*\n", re.MULTILINE)  # a line of its own
 
 
 def page(
@@ -60,6 +62,7 @@ def page(
     report: Report | None = None,
     script: str = "",
     over: tuple[str, float, float] | None = None,
+    samples: Mapping[str, Any] | None = None,
 ) -> str:
     """Return a page in which a mechanism is dragged: one HTML file that works offline, without any request.
 
@@ -72,6 +75,7 @@ def page(
         report: Its report, if `check` was called already. Default: `check` is called.
         over: A driver and its values from and to which the page shows the motion, in the file's unit or in radians.
             Default: the time of the run, and the whole range of a single driver.
+        samples: Driver values that the page shows in place of the laws, as `samples_of` returns them. Default: none.
         script: JavaScript after that of the page, which `started.then((page) => ...)` calls. Default: none.
 
     Returns:
@@ -97,11 +101,15 @@ def page(
     drivers = [driver.name for driver in mechanism.drivers]
     data = describe(mechanism, report) | {
         "over": over and {"driver": drivers.index(over[0]), "from": over[1], "to": over[2]},
+        "samples": samples,
         "size": as_written.plan.size,
         "modules": modules,
         "closedNumbers": len(change.places) if is_large else 0,
         "file": written_file(mechanism, as_written, places),
     }
+    if samples:
+        first, *_, last = samples["t"]
+        data["run"] = {"from": first, "to": last, "step": (last - first) / (len(samples["t"]) - 1)}
     return _filled(
         (_WEB / "index.html").read_text("utf-8"),
         {
@@ -114,8 +122,8 @@ def page(
 
 
 def _script(name: str) -> str:
-    """Return a module of web/ as a part of one script: without imports, and without the word export."""
-    return _EXPORT.sub("", _IMPORT.sub("", (_WEB / f"{name}.js").read_text("utf-8")))
+    """Return a module of web/ as a part of one script: without comments, imports, and the word export."""
+    return _EXPORT.sub("", _IMPORT.sub("", _COMMENT.sub("", (_WEB / f"{name}.js").read_text("utf-8"))))
 
 
 def _filled(text: str, values: Mapping[str, str]) -> str:

@@ -62,6 +62,82 @@ def test_the_page_of_a_run_over_an_angle_has_the_axis_of_the_driver(tmp_path: Pa
         assert page.errors == []
 
 
+def test_the_page_of_a_run_over_two_drivers_shows_its_samples(tmp_path: Path, command: Command) -> None:
+    left, right = np.linspace(2.0, 2.6, 31), 0.8 + 0.2 * np.sin(np.linspace(0.0, 6.0, 31))
+    run = kinfmu.solve(kinfmu.load("five_bar"), left_angle=left, right_angle=right, right_speed=0.5)
+    write_mcap(run, tmp_path / "run.mcap")
+    assert command("export", "run.mcap", "-o", "run.html").exit_code == 0
+    data = data_of(tmp_path / "run.html")
+    assert data["over"] is None
+    assert data["run"] == {"from": 0.0, "to": 30.0, "step": 1.0}
+    assert data["samples"]["columns"][0] == [pytest.approx(left), 1.0, 0.0]
+    assert data["samples"]["columns"][1] == [pytest.approx(right), 0.5, 0.0]
+    if CHROMIUM is None:
+        return
+    with browser(tmp_path) as chromium, chromium.open_at((tmp_path / "run.html").as_uri()) as page:
+        assert page.get("Array.from(k.linkage.u)") == pytest.approx([left[0], right[0]])
+        names = page.get("[...k.linkage.index.keys()]")
+        for row in (0, 11, 30):
+            page.get(f"k.refresh(() => k.linkage.goToTime({row}))")
+            page.settle()
+            shown = dict(zip(names, page.get("Array.from(k.linkage.pose.q)"), strict=True))
+            rates = dict(zip(names, page.get("Array.from(k.linkage.pose.qd)"), strict=True))
+            for k, name in enumerate(run.outputs):
+                assert shown[name] == pytest.approx(run[name][row], abs=1e-9)
+                assert rates[name] == pytest.approx(run.rates[row, k], abs=1e-7)
+            assert page.tab.text_content("#clock") == f"sample {row}"
+        assert page.tab.get_by_label("Sample", exact=True).get_attribute("max") == "30"
+        assert page.tab.get_by_text("Laws of the drivers").count() == 0
+        page.tab.click("#tab-plots")
+        assert page.tab.get_by_label("Horizontal axis").locator("option").all_inner_texts() == ["sample"]
+        page.tab.click("#tab-files")
+        with page.tab.expect_download() as saved:
+            page.tab.click("#save-time")
+        lines = Path(saved.value.path()).read_text("utf-8").splitlines()
+        assert lines[0].startswith("sample,")
+        assert [float(line.split(",")[0]) for line in lines[1:]] == [*range(31)]
+        page.get("k.refresh(() => k.linkage.goToTime(3))")
+        page.settle()
+        page.tab.click("#play")
+        page.tab.wait_for_function("window.kinfmu.linkage.t > 4")
+        assert page.get("k.linkage.u[0] > 2.06 && k.linkage.u[0] < 2.4")
+        assert page.errors == []
+
+
+def test_the_page_of_a_run_over_time_shows_samples_only_where_laws_do_not_give_them(
+    tmp_path: Path, command: Command
+) -> None:
+    mech = kinfmu.load("crank_rocker")
+    times = np.linspace(0.0, 1.0, 901)
+    by_laws = kinfmu.solve(mech, times)
+    inputs = by_laws.inputs.copy()
+    inputs[:, 0] = 0.3 + times**2
+    driven = kinfmu.solve(mech, crank_angle=inputs[:, 0], crank_speed=2.0 * times, crank_acceleration=2.0)
+    write_mcap(by_laws, tmp_path / "laws.mcap")
+    write_mcap(driven.replaced(axis="time", t=times), tmp_path / "inputs.mcap")
+    for name in ("laws", "inputs"):
+        assert command("export", f"{name}.mcap", "-o", f"{name}.html").exit_code == 0
+    assert data_of(tmp_path / "laws.html")["samples"] is None
+    samples = data_of(tmp_path / "inputs.html")["samples"]
+    assert samples["isTime"] is True
+    assert len(samples["t"]) == 400
+    assert samples["t"][-1] == 1.0
+    (angle, speed, acceleration), *_ = samples["columns"]
+    np.testing.assert_allclose(angle, 0.3 + np.array(samples["t"]) ** 2, atol=1e-11)
+    np.testing.assert_allclose(speed, 2.0 * np.array(samples["t"]), atol=1e-11)
+    assert acceleration == 2.0
+
+
+def test_the_page_of_a_run_without_the_values_of_its_drivers_is_refused(
+    tmp_path: Path, fails: Callable[..., str]
+) -> None:
+    angles = np.linspace(2.0, 2.5, 6)
+    run = kinfmu.solve(kinfmu.load("five_bar"), left_angle=angles, right_angle=angles - 1.2)
+    write_mcap(run.without(["right_angle"]), tmp_path / "run.mcap")
+    assert "does not hold right_angle" in fails("export", "run.mcap", "-o", "run.html")
+    assert not (tmp_path / "run.html").exists()
+
+
 def test_a_mechanism_is_exported_as_a_page_only(command: Command, refuses: Callable[..., str], tmp_path: Path) -> None:
     assert command("export", "crank_rocker", "-o", "mech.html").stdout == "written: mech.html\n"
     assert data_of(tmp_path / "mech.html")["run"]["to"] == 2.0

@@ -38,10 +38,11 @@ function startPoses(linkage) {
 
 export function table(linkage, over) {
     const all = quantities(linkage);
-    const { x, columns } = sampled(linkage, over, all);
+    const { samples } = linkage.data;
+    const { x, columns } = sampled(linkage, over, all, over === "time" && samples ? samples.t.length - 1 : undefined);
     const isAngle = over === "driver" && linkage.data.drivers[0].kind === "angle";
     const unit = over === "time" ? "s" : isAngle ? "deg" : linkage.data.unit;
-    const head = [over === "time" ? `time [${unit}]` : `${linkage.data.drivers[0].inputs[0]} [${unit}]`, ...all.map((one) => `${one.label} [${one.unit}]`)];
+    const head = [over === "time" ? (linkage.hasTime ? `time [${unit}]` : "sample") : `${linkage.data.drivers[0].inputs[0]} [${unit}]`, ...all.map((one) => `${one.label} [${one.unit}]`)];
     const lines = [head.map((text) => (text.includes(",") ? `"${text}"` : text)).join(",")];
     x.forEach((at, k) => {
         const first = isAngle ? (at * 180) / Math.PI : at;

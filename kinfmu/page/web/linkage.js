@@ -13,6 +13,20 @@ const FORCES = 90; // poses of a run that decide the scale of forces
 const USUAL = 0.99; // part of the forces that are not outliers
 const LAW = 400; // times at which the laws are tabled
 
+// Return driver values, speeds and accelerations between the samples of a record.
+function between({ t, columns }, at) {
+    let [low, high] = [0, t.length - 1];
+    while (high - low > 1) {
+        const middle = (low + high) >> 1;
+        if (t[middle] <= at) low = middle;
+        else high = middle;
+    }
+    const part = Math.min(Math.max((at - t[low]) / (t[high] - t[low]), 0), 1);
+    const value = (all) => (typeof all === "number" ? all : part === 1 ? all[high] : all[low] + part * (all[high] - all[low]));
+    const [u, ud, udd] = [0, 1, 2].map((order) => Float64Array.from(columns, (one) => value(one[order])));
+    return { u, ud, udd };
+}
+
 export class Linkage {
     // engines: { written: [shown, probe], opened: [shown, probe] or null }, data: of the page
     constructor(data, engines) {
@@ -25,7 +39,7 @@ export class Linkage {
         this.bound = new Map(this.parameters.map((one) => [one.name, one.value]));
         this.failure = "";
         this.#use("written");
-        this.u = Float64Array.from(this.shown.driven(data.run.from).u);
+        this.u = Float64Array.from(this.driven(data.run.from).u);
         this.t = data.run.from;
         this.pose = null;
         this.changed = 0; // counts new lengths
@@ -73,7 +87,7 @@ export class Linkage {
             return all;
         };
         const { locals, triples } = this;
-        const forces = engine.forces?.(t);
+        const forces = engine.forces?.(this.hasTime ? t : NaN); // NaN: loads by a law over time are unknown
         return {
             q: joined(engine.q, fixed),
             qd: joined(engine.qd),
@@ -116,7 +130,7 @@ export class Linkage {
     }
 
     goToTime(t, offset = null) {
-        const law = this.shown.driven(t);
+        const law = this.driven(t);
         const u = offset ? law.u.map((value, k) => value + offset[k]) : law.u;
         this.t = t;
         return this.goTo(Float64Array.from(u), { ud: Float64Array.from(law.ud), udd: Float64Array.from(law.udd) });
@@ -156,11 +170,21 @@ export class Linkage {
 
     // ---- laws
 
+    // Return driver values, speeds and accelerations at a time: those of the laws, or of the samples of a record.
+    driven(t, engine = this.shown) {
+        return this.data.samples ? between(this.data.samples, t) : engine.driven(t);
+    }
+
+    // Return whether the horizontal axis of the motion is time, not the number of a sample.
+    get hasTime() {
+        return !this.data.samples || this.data.samples.isTime;
+    }
+
     #tableLaws() {
         const { from, to } = this.data.run;
         this.law = Array.from({ length: LAW + 1 }, (_, k) => {
             const t = from + ((to - from) * k) / LAW;
-            return { t, u: Float64Array.from(this.shown.driven(t).u) };
+            return { t, u: Float64Array.from(this.driven(t).u) };
         });
     }
 
@@ -181,7 +205,7 @@ export class Linkage {
         let [low, high] = [best.t - step, best.t + step];
         for (let k = 0; k < 40; k++) {
             const [a, b] = [low + (high - low) / 3, high - (high - low) / 3];
-            if (gap({ u: this.shown.driven(a).u.slice() }) < gap({ u: this.shown.driven(b).u.slice() })) high = b;
+            if (gap({ u: this.driven(a).u.slice() }) < gap({ u: this.driven(b).u.slice() })) high = b;
             else low = a;
         }
         return Math.min(Math.max(0.5 * (low + high), this.data.run.from), this.data.run.to);
@@ -189,7 +213,7 @@ export class Linkage {
 
     // Return speeds and accelerations of the drivers: those of their laws at the time that is shown.
     ratesNear() {
-        const { ud, udd } = this.shown.driven(this.t);
+        const { ud, udd } = this.driven(this.t);
         return { ud: Float64Array.from(ud), udd: Float64Array.from(udd) };
     }
 
@@ -260,7 +284,7 @@ export class Linkage {
         const { drivers, run } = this.data;
         if (drivers.length !== 1) {
             return Array.from({ length: count + 1 }, (_, k) =>
-                Float64Array.from(this.probe.driven(run.from + ((run.to - run.from) * k) / count).u),
+                Float64Array.from(this.driven(run.from + ((run.to - run.from) * k) / count, this.probe).u),
             );
         }
         const [low, high] = this.ranges[0];
@@ -353,7 +377,7 @@ export class Linkage {
 
     // Return reactions by name: of joints, and shaking force and moment; null without masses and loads.
     #reactionsOf(engine, t) {
-        const values = engine.reactions(t);
+        const values = engine.reactions(this.hasTime ? t : NaN);
         return values && new Map(this.part.reactions.map(({ name }, k) => [name, values[k]]));
     }
 
@@ -366,7 +390,7 @@ export class Linkage {
         this.probe.restart();
         for (let k = 0; k <= FORCES; k++) {
             const t = run.from + ((run.to - run.from) * k) / FORCES;
-            const { u, ud, udd } = this.probe.driven(t);
+            const { u, ud, udd } = this.driven(t, this.probe);
             if (!isGood(this.probe.at(u, ud, udd))) continue;
             sizes.push(...read(this.poseOf(this.probe, t)).filter(Number.isFinite));
         }
@@ -385,7 +409,7 @@ export class Linkage {
         probe.restart();
         for (let k = 0; k <= count; k++) {
             const x = low + ((high - low) * k) / count;
-            const law = over === "time" ? probe.driven(x) : { u: Float64Array.of(x), ...rates };
+            const law = over === "time" ? this.driven(x, probe) : { u: Float64Array.of(x), ...rates };
             visit(x, isGood(probe.at(law.u, law.ud, law.udd)) ? this.poseOf(probe, over === "time" ? x : this.t) : null);
         }
     }

@@ -25,7 +25,7 @@ export class Motion {
         }
         const t = linkage.timeNear(linkage.u);
         linkage.t = t >= linkage.data.run.to - 1e-9 ? linkage.data.run.from : t;
-        const law = linkage.shown.driven(linkage.t).u;
+        const law = linkage.driven(linkage.t).u;
         this.glide = linkage.u.map((value, k) => (linkage.data.drivers[k].turns ? value - law[k] - TURN * Math.round((value - law[k]) / TURN) : value - law[k]));
         this.page.refresh();
     }
@@ -40,7 +40,7 @@ export class Motion {
             this.#advanceDriver(elapsed * this.page.transport.speed);
             return;
         }
-        let t = linkage.t + elapsed * this.page.transport.speed;
+        let t = linkage.t + elapsed * this.page.transport.pace;
         if (t > to) {
             t = from + ((t - from) % (to - from));
             if (!this.#repeats()) this.glide = null;

@@ -17,7 +17,7 @@ export class Plots {
         this.list = element("div");
         this.plots = [];
         const choice = element("select", { "aria-label": "Horizontal axis" });
-        if (!page.linkage.data.over) choice.append(element("option", { value: "time", textContent: "time" }));
+        if (!page.linkage.data.over) choice.append(element("option", { value: "time", textContent: page.linkage.hasTime ? "time" : "sample" }));
         if (this.over === "driver") choice.prepend(element("option", { value: "driver", textContent: page.linkage.data.drivers[0].name }));
         choice.value = this.over;
         choice.addEventListener("change", () => {
@@ -76,7 +76,7 @@ export class Plots {
             const one = wanted[k];
             const now = one.read(linkage, linkage.pose);
             plot.value.textContent = `${number(now)} ${one.unit}`;
-            const xLabel = this.over === "time" ? "s" : isAngle ? "" : linkage.data.unit;
+            const xLabel = this.over === "time" ? (linkage.hasTime ? "s" : "") : isAngle ? "" : linkage.data.unit;
             plot.painter.draw({ x: this.table.x, values: this.table.columns[k], label: one.label, unit: one.unit, cursor, now, theme, isAngle, xLabel });
         });
     }
@@ -129,7 +129,7 @@ export function filesPanel(page, root) {
     };
     add("Mechanism file with the values as set (TOML)", "save-file", () => download(`${name}.toml`, mechanismFile(linkage, design), "application/toml"));
     if (linkage.data.drivers.length === 1) add(`Table over ${linkage.data.drivers[0].name} (CSV)`, "save-driver", () => download(`${name}.csv`, table(linkage, "driver"), "text/csv"));
-    if (!linkage.data.over) add("Table over time (CSV)", "save-time", () => download(`${name}.csv`, table(linkage, "time"), "text/csv"));
+    if (!linkage.data.over) add(`Table over ${linkage.hasTime ? "time" : "the samples"} (CSV)`, "save-time", () => download(`${name}.csv`, table(linkage, "time"), "text/csv"));
     add("Drawing as shown (SVG)", "save-svg", () => download(`${name}.svg`, drawing(linkage, page.view, page.show, page.extra()), "image/svg+xml"));
     root.append(element("h2", { textContent: "Save" }), buttons);
     const { command } = buildCommand(linkage, design);

@@ -16,11 +16,12 @@ export class Transport {
         const { run, drivers } = linkage.data;
         const speed = $("speed");
         SPEEDS.forEach((value) => speed.append(element("option", { value, textContent: `${value}\u00d7` })));
-        const wanted = (run.to - run.from) / Math.min(Math.max(run.to - run.from, 2), LONGEST_PLAY);
+        const wanted = linkage.hasTime ? (run.to - run.from) / Math.min(Math.max(run.to - run.from, 2), LONGEST_PLAY) : 1;
         speed.value = SPEEDS.reduce((best, value) => (Math.abs(Math.log(value / wanted)) < Math.abs(Math.log(best / wanted)) ? value : best));
         $("play").addEventListener("click", () => page.motion.play());
         const time = $("time");
         [time.min, time.max] = [run.from, run.to];
+        if (!linkage.hasTime) [time.previousElementSibling.textContent, time.ariaLabel] = ["Sample", "Sample"];
         if (linkage.data.over) for (const one of [time.parentElement, $("clock")]) one.hidden = true; // the driver's slider is the axis
         time.addEventListener("input", () => {
             page.motion.play(false);
@@ -53,6 +54,12 @@ export class Transport {
         return Number($("speed").value);
     }
 
+    // Return by how much the time, or the number of the sample, grows in a second.
+    get pace() {
+        const { run } = this.linkage.data;
+        return this.speed * (this.linkage.hasTime ? 1 : (run.to - run.from) / LONGEST_PLAY);
+    }
+
     showPlaying(isPlaying) {
         $("play").setAttribute("aria-label", isPlaying ? "Pause" : "Play");
         $("play").innerHTML = isPlaying ? PAUSE : PLAY;
@@ -70,7 +77,7 @@ export class Transport {
         const { linkage } = this;
         const { isPlaying } = this.page.motion;
         const { run } = linkage.data;
-        $("clock").textContent = `${linkage.t.toFixed(run.to - run.from < 10 ? 2 : 1)} s`;
+        $("clock").textContent = linkage.hasTime ? `${linkage.t.toFixed(run.to - run.from < 10 ? 2 : 1)} s` : `sample ${Math.round(linkage.t)}`;
         if (document.activeElement !== $("time") || isPlaying) $("time").value = linkage.t;
         this.sliders.forEach(({ slider, field, factor }, k) => {
             const value = linkage.wrapped(k);

@@ -11,7 +11,8 @@ export class Values {
         const { linkage } = page;
         const own = linkage.parameters.filter((one) => !one.isPlace && !one.isLaw);
         const places = linkage.parameters.filter((one) => one.isPlace);
-        const laws = linkage.parameters.filter((one) => one.isLaw);
+        const { samples, drivers } = linkage.data; // of a record: the laws of its drivers do not move it
+        const laws = linkage.parameters.filter((one) => one.isLaw && !(samples && drivers.some(({ name }) => one.name.startsWith(`${name}.`))));
         if (!linkage.parameters.length && !linkage.data.closedNumbers) root.append(element("p", { className: "quiet", textContent: "This mechanism has no numbers to change." }));
         own.forEach((one) => root.append(this.#row(one)));
         const groups = grouped(places, (one) => one.group);
