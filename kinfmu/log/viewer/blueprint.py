@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 SHORTEST_SHOW, LONGEST_SHOW = 5.0, 30.0  # [s], limits of the time to play the whole run
 SWEEP_SHOW = 10.0  # [s] to play a run that has no time
 EDGE = 0.01  # of the run's time, left free before and after the curves
+LABEL = 30.0  # [points], half of the label of a tick such as +100 ms; most runs end at a tick
 LEGEND_EDGE, LETTER = 34.0, 7.0  # [points]; width of a legend around its names, and of a letter
 ABREAST = 4  # most plots of efforts and signals in a row
 FEW = 4  # plots of two runs, up to which they are wide
@@ -218,7 +219,7 @@ def plot(
         name=title,
         origin="/",
         contents=[f"{root}/{group.path}" for root, group in groups],
-        axis_x=time_axis(timeline, runs, _legend_part(names, width) if has_legend else EDGE),
+        axis_x=time_axis(timeline, runs, _legend_part(names, width) if has_legend else LABEL / width),
         axis_y=axis_y,
         plot_legend=rrb.PlotLegend(corner="RightTop", visible=has_legend),
     )

@@ -71,7 +71,10 @@ def review(
             recording, moment = run, _on_shown(at)
             if suffix_of(run) == ".mcap":
                 recording = Path(folder) / f"{run.stem}.rrd"
-                moment = _record(run, other, recording, at, report)
+                try:
+                    moment = _record(run, other, recording, at, report)
+                except LogError as error:  # under the user's file name
+                    raise LogError(str(error).replace(str(recording), str(screenshot)), **error.data) from None
             _shoot(recording, screenshot, moment)
         return None
     if suffix_of(run) == ".rrd":

@@ -39,6 +39,14 @@ def test_two_runs_are_saved_as_one_recording(mcap: Path, tmp_path: Path) -> None
     assert (tmp_path / "both.rrd").stat().st_size > 10_000
 
 
+def test_runs_that_cannot_be_compared_are_reported_under_the_users_file_name(mcap: Path, tmp_path: Path) -> None:
+    write_mcap(kinfmu.solve(kinfmu.load("slider_crank")), tmp_path / "other.mcap")
+    for asked in ({"screenshot": "a.png"}, {"save": "a.rrd"}):
+        (name,) = asked.values()
+        with pytest.raises(LogError, match=rf"^{name}: the runs measure lengths in m and mm; they need the same unit$"):
+            review(mcap, tmp_path / "other.mcap", **asked)
+
+
 def test_without_a_display_the_alternatives_are_reported(mcap: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
