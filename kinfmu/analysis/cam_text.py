@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kinfmu.analysis.cams import CamFindings
 from kinfmu.analysis.values import degrees
-from kinfmu.cams import Critical, Extreme, PlacedCam
+from kinfmu.cams import CamExtreme, Critical, PlacedCam
 
 _WIDE = 1e6  # of the distance from the axle; a larger radius of curvature is that of a straight line
 
@@ -47,7 +47,7 @@ def _pressure(cam: CamFindings, found: Critical) -> str:
     return f"pressure angle {_angle(cam, low)} to {_angle(cam, high)}: {verdict} {degrees(cam.limit)}"
 
 
-def _angle(cam: CamFindings, extreme: Extreme) -> str:
+def _angle(cam: CamFindings, extreme: CamExtreme) -> str:
     return f"{degrees(extreme.value)} ({cam.place(extreme.at)})"
 
 

@@ -15,10 +15,10 @@ from kinfmu.analysis.driver_path import DriverPath, follow
 from kinfmu.analysis.values import degrees
 from kinfmu.cams import (
     CAM_JOINTS,
+    CamExtreme,
     CamJoint,
     CamProfile,
     Critical,
-    Extreme,
     PlacedCam,
     critical_values,
     placed_cam,
@@ -74,7 +74,7 @@ class CamFindings:
         return self.problem() is not None
 
     @property
-    def steepest(self) -> Extreme | None:
+    def steepest(self) -> CamExtreme | None:
         """The largest size of the pressure angle."""
         return None if self.critical is None else max(self.critical.pressure, key=lambda one: abs(one.value))
 
@@ -178,7 +178,7 @@ class CamFindings:
         """Return the findings as plain data."""
         found = self.critical
 
-        def one(extreme: Extreme | None) -> dict[str, float] | None:
+        def one(extreme: CamExtreme | None) -> dict[str, float] | None:
             return None if extreme is None else {"value": extreme.value, "at": self.at(extreme.at)}
 
         values: dict[str, Any] = {"reason": self.reason or None}

@@ -35,7 +35,7 @@ EQUAL = 1e-9  # relative: of two sizes that differ by less, the first is reporte
 
 
 @dataclass(frozen=True)
-class Peak:
+class ForcePeak:
     """The largest size of a force, with its sign, and where it occurs.
 
     name: Of a column, such as 'crank.torque', or of a joint; driver: in whose values `at` is; 'time' if several move;
@@ -81,10 +81,10 @@ class Loading:
     """
 
     over: str
-    efforts: tuple[Peak, ...] = ()
+    efforts: tuple[ForcePeak, ...] = ()
     inertias: tuple[InertiaRange, ...] = ()
-    reaction: Peak | None = None
-    shaking: tuple[Peak, ...] = ()
+    reaction: ForcePeak | None = None
+    shaking: tuple[ForcePeak, ...] = ()
     undetermined: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = ()
     reason: str = ""
     missing: int = 0
@@ -197,7 +197,7 @@ class _Forces:
         with suppress(RequestError):  # too few samples, or they are not in the order of one argument
             self._motion = Motion.of_run(run, with_margin=False)
 
-    def peak(self, name: str) -> Peak:
+    def peak(self, name: str) -> ForcePeak:
         """Return the largest size of a force, of those that measures read; NaN if it has no numbers."""
         low, high = self._extremes(name)
         value, at = low if -low[0] > high[0] + EQUAL * abs(high[0]) else high
@@ -208,7 +208,7 @@ class _Forces:
         if len(run.input_names) == 3:
             driver, at_unit = run.input_names[0].driver, unit_of(run.input_names[0].quantity, run.length_unit)
         unit = next((place.unit for place in run.places() if place.name == name), "N")
-        return Peak(name, value, unit, driver, at, at_unit, _rms(run, force_of(run, name)))
+        return ForcePeak(name, value, unit, driver, at, at_unit, _rms(run, force_of(run, name)))
 
     def inertias(self) -> Iterator[InertiaRange]:
         """Yield the ranges of the reduced inertias."""
@@ -217,7 +217,7 @@ class _Forces:
                 (low, _), (high, _) = self._extremes(name)
                 yield InertiaRange(name, low, high, unit_of(name.quantity, self._run.length_unit))
 
-    def largest_reaction(self) -> Peak | None:
+    def largest_reaction(self) -> ForcePeak | None:
         """Return the largest force that a joint transmits; None if there is none that is determined."""
         names = [name for name in self._run.reaction_names if name.owner and name.quantity.kind == "force"]
         joints = dict.fromkeys(name.owner for name in names)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from kinfmu.analysis.cam_text import cam_lines
 from kinfmu.analysis.findings import Findings
 from kinfmu.analysis.lift_off import LiftOff
-from kinfmu.analysis.loading import Peak
+from kinfmu.analysis.loading import ForcePeak
 from kinfmu.analysis.loops import FourBar, Link, SliderCrank
 from kinfmu.analysis.named_loops import NamedLoop
 from kinfmu.analysis.singular import DriverRange, LimitPosition
@@ -297,7 +297,7 @@ def _lift_off_text(lift: LiftOff) -> str:
     )
 
 
-def _peak_text(peak: Peak) -> str:
+def _peak_text(peak: ForcePeak) -> str:
     """Return a peak with its unit and where it occurs: '-12.3 N m (crank at 45 deg)'."""
     if not math.isfinite(peak.value):
         return "without a finite value"

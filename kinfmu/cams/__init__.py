@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from kinfmu.cams.critical import Critical, Cut, Extreme, critical_values
+from kinfmu.cams.critical import CamExtreme, Critical, Cut, critical_values
 from kinfmu.cams.placed import CAM_JOINTS, CamJoint, PlacedCam, placed_cam
 from kinfmu.cams.profile import CamProfile, profile_at, turn_of
 from kinfmu.cams.traced import pressing_sign
 
 __all__ = [
     "CAM_JOINTS",
+    "CamExtreme",
     "CamJoint",
     "CamProfile",
     "Critical",
     "Cut",
-    "Extreme",
     "PlacedCam",
     "critical_values",
     "placed_cam",

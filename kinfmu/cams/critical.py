@@ -21,7 +21,7 @@ _TOUCH = 1e-9  # of the size; smaller radii of curvature and overlaps are roundi
 
 
 @dataclass(frozen=True)
-class Extreme:
+class CamExtreme:
     """A value and the angle of the cam where it occurs [rad]."""
 
     value: float
@@ -48,14 +48,14 @@ class Critical:
     ends along the face from its point.
     """
 
-    pressure: tuple[Extreme, Extreme]
-    convex: Extreme | None
-    concave: Extreme | None
-    pitch: Extreme | None
-    nearest: Extreme
+    pressure: tuple[CamExtreme, CamExtreme]
+    convex: CamExtreme | None
+    concave: CamExtreme | None
+    pitch: CamExtreme | None
+    nearest: CamExtreme
     undercut: tuple[Cut, ...]
-    gouge: Extreme | None
-    width: tuple[Extreme, Extreme] | None
+    gouge: CamExtreme | None
+    width: tuple[CamExtreme, CamExtreme] | None
 
     @property
     def is_cut(self) -> bool:
@@ -87,10 +87,10 @@ def critical_values(placed: PlacedCam) -> Critical:
     else:
         sharpest, hollow = search.most(bend), search.least(bend)
         if sharpest.value > 0.0:
-            pitch = Extreme(1.0 / sharpest.value, sharpest.at)
-            convex = Extreme(pitch.value - radius, pitch.at)
+            pitch = CamExtreme(1.0 / sharpest.value, sharpest.at)
+            convex = CamExtreme(pitch.value - radius, pitch.at)
         if hollow.value < 0.0:
-            concave = Extreme(radius - 1.0 / hollow.value, hollow.at)
+            concave = CamExtreme(radius - 1.0 / hollow.value, hollow.at)
         cuts = search.below(lambda at: 1.0 - radius * bend(at) - _TOUCH) if radius else ()
     nearest, width = search.least(lambda at: np.abs(at.curve)), None
     if placed.normal is not None:
@@ -133,12 +133,12 @@ class _Search:
     def _at(self, x: float) -> Traced:
         return traced(self.placed, np.array([x]))
 
-    def most(self, of: Callable[[Traced], FloatArray]) -> Extreme:
+    def most(self, of: Callable[[Traced], FloatArray]) -> CamExtreme:
         """Return the largest value of a quantity."""
         least = self.least(lambda at: -of(at))
-        return Extreme(-least.value, least.at)
+        return CamExtreme(-least.value, least.at)
 
-    def least(self, of: Callable[[Traced], FloatArray]) -> Extreme:
+    def least(self, of: Callable[[Traced], FloatArray]) -> CamExtreme:
         """Return the smallest value of a quantity: that of the samples, improved between their neighbours."""
         values = of(self.found)
         noise = _NOISE * float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
@@ -154,7 +154,7 @@ class _Search:
             )
             if refined.fun < best - noise:
                 best, at = float(refined.fun), float(refined.x)
-        return Extreme(best, _in_turn(float(self._at(at).angle[0])))
+        return CamExtreme(best, _in_turn(float(self._at(at).angle[0])))
 
     def below(self, of: Callable[[Traced], FloatArray]) -> tuple[Cut, ...]:
         """Return the parts of the turn where a quantity is negative, their ends by Brent's method."""
@@ -190,13 +190,13 @@ def _in_turn(angle: float) -> float:
     return 0.0 if TURN - angle < _SAME_ANGLE else angle
 
 
-def _gouge(placed: PlacedCam, found: Traced) -> Extreme | None:
+def _gouge(placed: PlacedCam, found: Traced) -> CamExtreme | None:
     """Return where the roller cuts a part of the profile that it touches at another angle, and how deep; else None."""
     radius = placed.radius or 0.0
     profile, size = envelope(placed, found), float(np.abs(found.curve).max())
     depths = cut_depths(found.curve, profile, radius)
     k = int(np.argmax(depths))
-    return Extreme(float(depths[k]), float(found.angle[k]) % TURN) if depths[k] > _TOUCH * size else None
+    return CamExtreme(float(depths[k]), float(found.angle[k]) % TURN) if depths[k] > _TOUCH * size else None
 
 
 def cut_depths(curve: ComplexArray, profile: ComplexArray, radius: float) -> FloatArray:

@@ -22,10 +22,10 @@ def play(mechanism: str, port: int, no_browser: bool) -> None:
     The page follows the file while you edit it; errors in the file are shown in the page. The page saves FMUs, tables,
     drawings and mechanism files with the lengths as set. Only this machine can open the address. Ctrl-C ends it.
     """
-    from kinfmu.player import PlayServer, Source
+    from kinfmu.player import PlayServer, PlaySource
 
     with patience():
-        source = Source(mechanism)
+        source = PlaySource(mechanism)
     with PlayServer(source, port) as server:
         click.echo(server.url)
         if not no_browser and not webbrowser.open(server.url):

@@ -40,7 +40,7 @@ LEAST = 1e-18  # smallest value on such a scale: zeros have no logarithm
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class Overlay:
     """What an overlay shows.
 
     runs: one or two; names: of the two runs; columns: of the panels; xs: columns of the horizontal axis, one or one for
@@ -81,7 +81,7 @@ def is_logarithmic(column: str) -> bool:
 
 def overlay(
     runs: Sequence[Run], names: tuple[str, str], columns: Sequence[str], xs: Sequence[str], **how: bool
-) -> Shown:
+) -> Overlay:
     """Return what an overlay shows after checking it; arguments and errors as in `plot`."""
     first = runs[0]
     chosen = chosen_columns(first, columns) if columns else tuple(first.names or first.outputs)
@@ -89,7 +89,7 @@ def overlay(
         raise FigureError(
             f"x names {len(xs)} columns for {len(chosen)} curves; name one for all curves, or one for each of them"
         )
-    shown = Shown(tuple(runs), names, chosen, tuple(xs), **how)
+    shown = Overlay(tuple(runs), names, chosen, tuple(xs), **how)
     for run in runs:
         if not len(run) or not chosen:
             raise FigureError(f"the run has no {'samples' if chosen else 'columns'} to plot")
@@ -127,7 +127,7 @@ def _check_angle(run: Run, across: Abscissa) -> None:
     raise FigureError(f"a polar plot needs an angle, not {across.label}{cure}")
 
 
-def overlay_sheet(shown: Shown) -> Figure:
+def overlay_sheet(shown: Overlay) -> Figure:
     """Return the figure of an overlay: the panels of all units below each other, with a legend above each."""
     from matplotlib.figure import Figure
 
@@ -189,7 +189,7 @@ def sheet_title(runs: Sequence[Run], names: tuple[str, str]) -> str:
     return f"{title}{': ' if title else ''}{a} (wide), {b} (narrow)"
 
 
-def _x_label(shown: Shown) -> str:
+def _x_label(shown: Overlay) -> str:
     first = shown.x(shown.runs[0], shown.columns[0])
     if len(shown.xs) <= 1:
         return first.label
@@ -197,14 +197,14 @@ def _x_label(shown: Shown) -> str:
     return labelled(axes.pop() if len(axes) == 1 else "", first.unit).strip()
 
 
-def _is_map(shown: Shown, panel: Sequence[str]) -> bool:
+def _is_map(shown: Overlay, panel: Sequence[str]) -> bool:
     """Return True if both axes are positions in the plane: then a length has the same size on both."""
     run = shown.runs[0]
     lengths = {str(name) for name in (*run.outputs, *run.fixed) if not name.is_angle}
     return not shown.polar and bool(shown.xs) and lengths.issuperset((*panel, *shown.xs))
 
 
-def _size(shown: Shown, panel: Sequence[str], *, is_map: bool) -> tuple[float, float]:
+def _size(shown: Overlay, panel: Sequence[str], *, is_map: bool) -> tuple[float, float]:
     """Return width and height of a panel [pt]; one with equal scales is as long and as high as its paths need."""
     if shown.polar:
         return _SQUARE, _SQUARE
@@ -222,12 +222,12 @@ def _size(shown: Shown, panel: Sequence[str], *, is_map: bool) -> tuple[float, f
     return _SQUARE * max(wide / longest, least), _SQUARE * max(high / longest, least)
 
 
-def _legend_height(shown: Shown, panel: Sequence[str]) -> float:
+def _legend_height(shown: Overlay, panel: Sequence[str]) -> float:
     rows = -(-len(panel) // _LEGEND_COLUMNS) if len(panel) > 1 or shown.polar else 0
     return rows * _LEGEND_LINE + (6.0 if rows else 0.0)
 
 
-def _panel(axes: Any, shown: Shown, panel: Sequence[str]) -> None:
+def _panel(axes: Any, shown: Overlay, panel: Sequence[str]) -> None:
     """Draw the curves of one unit."""
     unit, factor = shown.unit(panel[0])
     is_log = is_logarithmic(panel[0])
@@ -256,7 +256,7 @@ def _panel(axes: Any, shown: Shown, panel: Sequence[str]) -> None:
         _legend(axes, shown, panel)
 
 
-def _scales(axes: Any, shown: Shown, panel: Sequence[str], values: FloatArray, unit: str) -> None:
+def _scales(axes: Any, shown: Overlay, panel: Sequence[str], values: FloatArray, unit: str) -> None:
     """Give a panel its scales, names and grid."""
     x = shown.x(shown.runs[0], panel[0])
     grey = ink(GREY)
@@ -291,7 +291,7 @@ def range_of(values: FloatArray) -> tuple[float, float] | None:
     return shown_range(known, 0.0)
 
 
-def _legend(axes: Axes, shown: Shown, panel: Sequence[str], centre: float = 0.0) -> None:
+def _legend(axes: Axes, shown: Overlay, panel: Sequence[str], centre: float = 0.0) -> None:
     """Write the names of the curves above their panel; in a polar plot with the unit, and the value of the centre."""
     handles, labels = axes.get_legend_handles_labels()
     if shown.polar:

@@ -11,7 +11,7 @@ from kinfmu.analysis.singular import DriverRange
 from kinfmu.drivers import Driver
 from kinfmu.fmu.interface import Interface, Variable
 from kinfmu.fmu.layout import UNKNOWN_ERROR
-from kinfmu.fmu.reference import FOLDER, Reference
+from kinfmu.fmu.reference import FOLDER, ReferenceResults
 from kinfmu.plan import SolvePlan
 from kinfmu.solver.python.status import Status
 from kinfmu.units import Quantity, unit_of
@@ -78,7 +78,7 @@ def page(
     *,
     picture: str = "",
     reach: DriverRange | None = None,
-    reference: Reference | None = None,
+    reference: ReferenceResults | None = None,
     metadata: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
     """Return the page as HTML.
@@ -203,7 +203,7 @@ def _port(plan: SolvePlan, interface: Interface) -> str:
     )
 
 
-def _reference(name: str, found: Reference | None) -> str:
+def _reference(name: str, found: ReferenceResults | None) -> str:
     if found is None:
         return "<p>This FMU holds no reference results.</p>"
     name = escape(name)

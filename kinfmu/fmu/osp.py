@@ -30,15 +30,15 @@ _ORDER = (  # in which the schema wants the groups
 )
 
 
-class Group(NamedTuple):
+class VariableGroup(NamedTuple):
     """A group of variables: a quantity with its variables, or a port with its quantities."""
 
     kind: str
     name: str
-    members: tuple[Variable | Group, ...]
+    members: tuple[Variable | VariableGroup, ...]
 
 
-def groups(interface: Interface) -> list[Group]:
+def groups(interface: Interface) -> list[VariableGroup]:
     """Return the groups of the drivers of an FMU.
 
     A driver `crank` with forces has the port `crank`, of its effort and its speed, whose causalities are opposite: an
@@ -47,7 +47,7 @@ def groups(interface: Interface) -> list[Group]:
     generic group, `crank coupling`, holds what the coupling by bias and reduced inertia needs. External loads are
     groups of their own name.
     """
-    found: list[Group] = []
+    found: list[VariableGroup] = []
     by_name = {variable.name: variable for variable in interface}
     motion = interface.motion
     for k in range(0, len(motion), 3):
@@ -57,21 +57,21 @@ def groups(interface: Interface) -> list[Group]:
         displacement, velocity, rate, effort_kind, port = _KINDS[kind]
         effort_noun = effort_kind.lower()
         effort = by_name.get(f"{driver}_{effort_noun}") or by_name.get(f"{driver}.{effort_noun}")
-        found.append(Group(displacement, f"{driver} {noun}", (value,)))
-        of_speed = Group(velocity, f"{driver} speed", (speed,))
+        found.append(VariableGroup(displacement, f"{driver} {noun}", (value,)))
+        of_speed = VariableGroup(velocity, f"{driver} speed", (speed,))
         if effort is None:
             found.append(of_speed)
         else:
-            of_effort = Group(effort_kind, f"{driver} {effort_noun}", (effort,))
-            found.append(Group(port, driver, (of_effort, of_speed)))
-        found.append(Group(rate, f"{driver} acceleration", (acceleration,)))
+            of_effort = VariableGroup(effort_kind, f"{driver} {effort_noun}", (effort,))
+            found.append(VariableGroup(port, driver, (of_effort, of_speed)))
+        found.append(VariableGroup(rate, f"{driver} acceleration", (acceleration,)))
         coupled = [by_name.get(f"{driver}.{name}") for name in (f"bias_{effort_noun}", "reduced_inertia")]
         if all(coupled):
             members = (value, speed, acceleration, *(one for one in coupled if one is not None))
-            found.append(Group("Generic", f"{driver} coupling", members))
+            found.append(VariableGroup("Generic", f"{driver} coupling", members))
     for variable in interface.part("loads"):
         kind = "Torque" if variable.name.endswith("_torque") else "Force"
-        found.append(Group(kind, variable.name, (variable,)))
+        found.append(VariableGroup(kind, variable.name, (variable,)))
     return sorted(found, key=lambda group: _ORDER.index(group.kind))
 
 
@@ -108,18 +108,18 @@ def write_osp(fmu: Path) -> Path:
     return path
 
 
-def _variables(group: Group) -> Iterator[Variable]:
+def _variables(group: VariableGroup) -> Iterator[Variable]:
     for member in group.members:
-        if isinstance(member, Group):
+        if isinstance(member, VariableGroup):
             yield from _variables(member)
         else:
             yield member
 
 
-def _write(parent: Element, group: Group) -> None:
+def _write(parent: Element, group: VariableGroup) -> None:
     element = SubElement(parent, group.kind, name=group.name)
     for member in group.members:
-        if isinstance(member, Group):
+        if isinstance(member, VariableGroup):
             _write(element, member)
         else:
             attributes = {"ref": member.name} | ({"unit": member.unit} if member.unit else {})

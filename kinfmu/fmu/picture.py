@@ -35,7 +35,7 @@ _LOWEST, _HIGHEST = 160, 480  # [px] of the height
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class PictureLine:
     """A line of the picture: points (k, 2) in px, y down; colour, width [px]; filled: an area in a lighter colour."""
 
     points: FloatArray
@@ -49,7 +49,7 @@ class Line:
 class Picture:
     """Lines, in the order in which they are drawn, and the size of the picture [px]."""
 
-    lines: tuple[Line, ...]
+    lines: tuple[PictureLine, ...]
     width: float
     height: float
 
@@ -69,7 +69,7 @@ def picture(run: Run) -> Picture | None:
         return np.asarray((points - middle) * [scale, -scale] + [0.5 * width, 0.5 * height])
 
     lines = [
-        Line(placed(points), line.colour, line.width, line.is_filled, line.is_dashed)
+        PictureLine(placed(points), line.colour, line.width, line.is_filled, line.is_dashed)
         for line in _lines(found, row, _DETAIL / scale)
         if np.isfinite(points := line.points).all()
     ]
@@ -120,12 +120,12 @@ def png(drawn: Picture, size: int = ICON) -> bytes:
     return _encoded(np.rint(image).astype(np.uint8))
 
 
-def _lines(found: Scene, row: int, size: float) -> Iterator[Line]:
+def _lines(found: Scene, row: int, size: float) -> Iterator[PictureLine]:
     """Yield the lines in the world, in order; size: of a unit of details."""
     for path in found.paths.values():
         good = path[np.isfinite(path).all(axis=1)]
         if len(good) > 1 and np.ptp(good, axis=0).max() > 1e-3 * found.size:
-            yield Line(good, palette.GROUND, 1.2, is_dashed=True)
+            yield PictureLine(good, palette.GROUND, 1.2, is_dashed=True)
     order = ("support", "rail", "bed", "slot", "belt")
     frames = {name: pose[row] for name, pose in found.frames.items()}
     shapes = sorted(found.shapes, key=lambda shape: shape.kind not in order)
@@ -142,34 +142,34 @@ def _lines(found: Scene, row: int, size: float) -> Iterator[Line]:
             for _, point in pins:
                 centre = world(frames[frame][None], (point[0], point[1]))[0]
                 circle = centre + _PIN * size / _DETAIL * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
-                yield Line(circle, (60, 60, 60), 1.2, is_filled=True)
+                yield PictureLine(circle, (60, 60, 60), 1.2, is_filled=True)
 
 
-def _of_shape(shape: Shape, size: float) -> Iterator[Line]:
+def _of_shape(shape: Shape, size: float) -> Iterator[PictureLine]:
     """Yield the lines of a shape that is placed in the world."""
     if shape.kind == "support":
         triangle, foot = details.support(shape, size)
-        yield Line(triangle, palette.GROUND, 1.5, is_filled=True)
+        yield PictureLine(triangle, palette.GROUND, 1.5, is_filled=True)
         yield from _ground(foot, shape, size)
     elif shape.kind in ("rail", "bed"):
         yield from _ground(details.rail(shape, size), shape, size)
     elif shape.kind in ("block", "die"):
         corners = details.box(shape.points[0], shape.towards, details.BLOCK * size, details.BLOCK_WIDTH * size)
-        yield Line(corners, shape.colour, 1.5, is_filled=True)
+        yield PictureLine(corners, shape.colour, 1.5, is_filled=True)
     elif shape.strips:
         for strip, points in details.symbol(shape, size):
-            yield Line(points, shape.colour, 1.5, is_filled=strip.is_area)
+            yield PictureLine(points, shape.colour, 1.5, is_filled=strip.is_area)
     elif shape.kind == "contact":
         return
     else:
         is_area = shape.kind in ("cam", "wheel") or (shape.kind == "link" and shape.is_closed)
-        yield Line(shape.line, shape.colour, _STROKES.get(shape.kind, 1.5), is_filled=is_area)
+        yield PictureLine(shape.line, shape.colour, _STROKES.get(shape.kind, 1.5), is_filled=is_area)
 
 
-def _ground(line: FloatArray, shape: Shape, size: float) -> Iterator[Line]:
-    yield Line(line, palette.GROUND, 1.5)
+def _ground(line: FloatArray, shape: Shape, size: float) -> Iterator[PictureLine]:
+    yield PictureLine(line, palette.GROUND, 1.5)
     for stroke in details.hatching(line, shape.towards, size):
-        yield Line(stroke, palette.GROUND, 1.0)
+        yield PictureLine(stroke, palette.GROUND, 1.0)
 
 
 def _hex(colour: palette.Colour) -> str:

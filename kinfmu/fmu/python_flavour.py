@@ -53,7 +53,7 @@ CAPABILITIES = {
 }
 RUN_TIME = ("slave.py", "slave_settings.py", "slave_outputs.py", "layout.py", "estimated_rates.py")  # of this package
 BASE_CLASS = ("_version.py", "default_experiment.py", "enums.py", "fmi2slave.py", "logmsg.py", "variables.py")
-WITH_FORCES = ("loaded_slave.py",)
+WITH_FORCES = ("force_slave.py",)
 WITH_EFFORTS = ("equation_of_motion.py", "torque_limits.py", "torque_steps.py", "torque_slave.py", "dormand_prince.py")
 PARTS_WITH_START = (
     *("inputs", "constants", "parameters", "tolerance", "fixed", "drive", "rate_source", "loads"),
@@ -217,7 +217,7 @@ def _entry(variables: Interface, token: str, in_si: Sequence[float], package: st
         attributes += ["inertia = staticmethod(inertia.forces)", "jumps = staticmethod(jumps.jumps)"]
         attributes += ["law_counts = laws.COUNTS", "laws = staticmethod(laws.forces)"]
         attributes.append(f"in_si = {tuple(in_si)!r}")
-    base, module = ("LoadedSlave", "loaded_slave") if stages else ("MechanismSlave", "slave")
+    base, module = ("ForceSlave", "force_slave") if stages else ("MechanismSlave", "slave")
     if in_si:
         base, module = "TorqueSlave", "torque_slave"
     return _ENTRY.format(

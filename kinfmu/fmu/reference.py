@@ -35,7 +35,7 @@ _SWING = {"angle": 0.1, "length": 0.02}  # [rad], of the size: motion of drivers
 _HALVINGS = 6  # of that motion, near a limit
 
 
-class Reference(NamedTuple):
+class ReferenceResults(NamedTuple):
     """Reference results: times (n,) [s], outputs (n, k), inputs (n, i), their names, and the relative tolerance."""
 
     t: FloatArray
@@ -65,7 +65,7 @@ def reference_run(plan: SolvePlan) -> Run | None:
     return run.replaced(t=t, axis=TIME)
 
 
-def reference(run: Run, variables: Interface) -> Reference | None:
+def reference(run: Run, variables: Interface) -> ReferenceResults | None:
     """Return the reference results of an FMU; None if the first two samples have no solution.
 
     They are at most 21 of the samples of a run by `reference_run`, as far as these can be reached.
@@ -84,7 +84,7 @@ def reference(run: Run, variables: Interface) -> Reference | None:
     if run.status[:count].any():  # not all regular
         error = run.error[:count]
         worst = float(np.max(error[np.isfinite(error)], initial=0.0))
-    return Reference(
+    return ReferenceResults(
         t[:count],
         tuple(name for name, known in zip(names, is_known.tolist(), strict=True) if known),
         table[:, is_known],
@@ -124,7 +124,7 @@ def _swung(plan: SolvePlan, t: FloatArray, still: FloatArray, share: float) -> d
     return inputs
 
 
-def files(name: str, found: Reference | None) -> dict[str, bytes]:
+def files(name: str, found: ReferenceResults | None) -> dict[str, bytes]:
     """Return the files of the reference results by path in the FMU; none without results."""
     if found is None:
         return {}
@@ -138,7 +138,7 @@ def files(name: str, found: Reference | None) -> dict[str, bytes]:
     return {path: text.encode() for path, text in contents.items()}
 
 
-def read(name: str, texts: Mapping[str, str]) -> Reference:
+def read(name: str, texts: Mapping[str, str]) -> ReferenceResults:
     """Return reference results from the texts of their files, by the names of the files; inverse of `files`.
 
     Raises:
@@ -157,7 +157,7 @@ def read(name: str, texts: Mapping[str, str]) -> Reference:
         _, input_names, inputs = _table(texts[f"{name}_in.csv"])
     if len(t) < 2 or not (np.diff(t) > 0.0).all():
         raise ValueError(f"{name}_ref.csv needs two or more samples at increasing times")
-    return Reference(t, names, values, input_names, inputs, tolerance)
+    return ReferenceResults(t, names, values, input_names, inputs, tolerance)
 
 
 def _csv(t: FloatArray, names: Sequence[str], values: FloatArray) -> str:

@@ -16,11 +16,11 @@ from pythonfmu.enums import Fmi2Status
 
 from kinfmu.fmu.equation_of_motion import EquationOfMotion, Given
 from kinfmu.fmu.estimated_rates import LARGEST
+from kinfmu.fmu.force_slave import ForceSlave
 from kinfmu.fmu.layout import Numbers
-from kinfmu.fmu.loaded_slave import LoadedSlave
 from kinfmu.fmu.slave import as_numbers
 from kinfmu.fmu.torque_limits import Ended
-from kinfmu.fmu.torque_steps import LedLaws, TorqueSteps
+from kinfmu.fmu.torque_steps import EmittedLaws, TorqueSteps
 from kinfmu.solver.python import Pose, Status
 from kinfmu.solver.python.pose import failed
 
@@ -28,7 +28,7 @@ LEAST_TOLERANCE, MOST_TOLERANCE = 1e-13, 1e-4  # see torque_variables.py
 _UNDETERMINED = "the reduced inertia is singular, or a number is not finite"
 
 
-class TorqueSlave(LoadedSlave):
+class TorqueSlave(ForceSlave):
     """A mechanism that efforts drive as an FMI 2.0 co-simulation slave.
 
     A subclass defines `inertia` (emitted: bias efforts and reduced inertia), `jumps` (emitted: of loads over time),
@@ -113,7 +113,7 @@ class TorqueSlave(LoadedSlave):
             self._equation,
             self._solver,
             self._given(),
-            LedLaws(self.law_counts, self.laws),
+            EmittedLaws(self.law_counts, self.laws),
             tolerance=self._integrator_tolerance,
             size=self._step_size,
         )

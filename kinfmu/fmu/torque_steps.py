@@ -50,7 +50,7 @@ def next_jump(t: float, jumps: Sequence[tuple[float, float]]) -> float:
     return found
 
 
-class LedLaws(NamedTuple):
+class EmittedLaws(NamedTuple):
     """Laws over quantities: how many breaks each has, and an emitted function that gives arguments and breaks."""
 
     counts: tuple[int, ...]
@@ -79,7 +79,7 @@ class TorqueSteps:
         equation: EquationOfMotion,
         solver: Solver,
         given: Given,
-        laws: LedLaws,
+        laws: EmittedLaws,
         *,
         tolerance: float,
         size: float,

@@ -13,7 +13,7 @@ import numpy as np
 
 from kinfmu.errors import FmuError, RequestError, listed
 from kinfmu.fmu import description, reference
-from kinfmu.fmu.reference import FOLDER, Reference
+from kinfmu.fmu.reference import FOLDER, ReferenceResults
 from kinfmu.fmu.simulate import simulate
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, text_in, unpacked
 from kinfmu.mechanism.valid import quoted
@@ -126,7 +126,7 @@ def verify(fmu: str | Path, results: str | Path | None = None, *, tolerance: flo
     return _compared(wanted, units, *found, wanted.tolerance if tolerance is None else tolerance)
 
 
-def _stepped(path: Path, wanted: Reference) -> tuple[tuple[str, ...], FloatArray]:
+def _stepped(path: Path, wanted: ReferenceResults) -> tuple[tuple[str, ...], FloatArray]:
     """Return outputs and their values (n, k) of the FMU, stepped through fmpy's low-level calls."""
     t, step = wanted.t, wanted.step
     inputs = None
@@ -141,7 +141,7 @@ def _stepped(path: Path, wanted: Reference) -> tuple[tuple[str, ...], FloatArray
 
 
 def _table_of_host(
-    path: Path, wanted: Reference, units: dict[str, str], length_unit: str
+    path: Path, wanted: ReferenceResults, units: dict[str, str], length_unit: str
 ) -> tuple[tuple[str, ...], FloatArray]:
     """Return outputs and their values (n, k) at the times of the reference, NaN where a host's table has none."""
     try:
@@ -199,7 +199,7 @@ def _factor(path: Path, title: str, unit: str, length_unit: str) -> float:
 
 
 def _compared(
-    wanted: Reference, units: dict[str, str], names: tuple[str, ...], found: FloatArray, tolerance: float
+    wanted: ReferenceResults, units: dict[str, str], names: tuple[str, ...], found: FloatArray, tolerance: float
 ) -> Verification:
     values = wanted.values[:, [wanted.names.index(name) for name in names]]
     sizes = _sizes(wanted, units)
@@ -226,7 +226,7 @@ def _compared(
     )
 
 
-def _sizes(wanted: Reference, units: dict[str, str]) -> dict[str, float]:
+def _sizes(wanted: ReferenceResults, units: dict[str, str]) -> dict[str, float]:
     """Return the largest numbers by unit; rates count at least as their values over the time of the reference.
 
     A mechanism at constant speed has accelerations of 0, which co-simulation estimates with rounding errors.

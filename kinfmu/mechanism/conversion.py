@@ -14,7 +14,7 @@ from itertools import chain
 from kinfmu.errors import MechanismError, listed
 from kinfmu.mechanism.dimension import UNKNOWN, Dimension
 from kinfmu.mechanism.expression import Expression
-from kinfmu.mechanism.operations import OPERATIONS, Step
+from kinfmu.mechanism.operations import OPERATIONS, ExpressionStep
 from kinfmu.mechanism.valid import quoted
 from kinfmu.units import KINDS, METRES, Quantity, every_unit, length_power
 
@@ -51,7 +51,7 @@ def converted(
             f"give a number or a parameter ({listed(expression.names)}) its unit, such as '1 {KINDS[wanted.kind].unit}'"
         )
     units = every_unit(expression.length_unit)
-    stack: list[tuple[Dimension, list[Step]]] = []
+    stack: list[tuple[Dimension, list[ExpressionStep]]] = []
     for step in expression.steps:
         if step.operation == "number":
             power = _power(units[step.unit][0] if step.unit else None)
@@ -79,10 +79,10 @@ def _power(quantity: Quantity | None) -> int:
     return 0 if quantity is None else length_power(quantity)
 
 
-def _times(metre: float, power: int, at: int) -> tuple[Step, ...]:
+def _times(metre: float, power: int, at: int) -> tuple[ExpressionStep, ...]:
     """Return the steps that multiply by a power of the unit of length [m]."""
     factor = metre**power if power >= 0 else 1.0 / metre**-power
-    return (Step("number", at, factor), Step("*", at)) if power else ()
+    return (ExpressionStep("number", at, factor), ExpressionStep("*", at)) if power else ()
 
 
 def _has_a_unit(expression: Expression, dimensions: Mapping[str, Dimension]) -> bool:

@@ -13,7 +13,7 @@ from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism import dimension
 from kinfmu.mechanism.dimension import Dimension, DimensionError
 from kinfmu.mechanism.expression_text import error_at, steps_of
-from kinfmu.mechanism.operations import OPERATIONS, WORDS, Step
+from kinfmu.mechanism.operations import OPERATIONS, WORDS, ExpressionStep
 from kinfmu.mechanism.valid import quoted
 
 T = TypeVar("T")
@@ -38,7 +38,7 @@ class Expression:
 
     text: str
     length_unit: str = "m"
-    steps: tuple[Step, ...] = field(default=(), compare=False)
+    steps: tuple[ExpressionStep, ...] = field(default=(), compare=False)
     is_converted: bool = field(default=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -52,7 +52,7 @@ class Expression:
     def __add__(self, shift: float) -> Expression:
         """Return the expression plus a length, such as a shift of the origin."""
         end = len(self.text)
-        steps = (*self.steps, Step("number", end, shift), Step("+", end))
+        steps = (*self.steps, ExpressionStep("number", end, shift), ExpressionStep("+", end))
         return Expression(f"({self.text}) + {shift!r}", self.length_unit, steps)
 
     @cached_property
@@ -72,7 +72,7 @@ class Expression:
         return first.value if first.operation == "name" and all(one.operation == "sign" for one in signs) else None
 
     @property
-    def literal(self) -> Step | None:
+    def literal(self) -> ExpressionStep | None:
         """The number if the expression is only a number with its sign and unit, else None."""
         number, *signs = self.steps
         if number.operation != "number" or any(step.operation != "sign" for step in signs):
@@ -91,14 +91,14 @@ class Expression:
 
         """
 
-        def leaf(step: Step) -> Value:
+        def leaf(step: ExpressionStep) -> Value:
             if step.operation == "number":
                 return step.value
             if step.value not in values:
                 raise self._unknown(step, values)
             return values[step.value]
 
-        def apply(step: Step, operands: Sequence[Value]) -> Value:
+        def apply(step: ExpressionStep, operands: Sequence[Value]) -> Value:
             try:
                 result = OPERATIONS[step.operation].value(*operands)
                 if isinstance(result, float) and not math.isfinite(result):
@@ -117,10 +117,10 @@ class Expression:
     def dimension(self, dimensions: Mapping[str, Dimension]) -> Dimension:
         """Return the dimension of the expression, or raise a MechanismError where dimensions are incompatible."""
 
-        def leaf(step: Step) -> Dimension:
+        def leaf(step: ExpressionStep) -> Dimension:
             return step.dimension if step.operation == "number" else dimensions.get(step.value, dimension.UNKNOWN)
 
-        def apply(step: Step, operands: Sequence[Any]) -> Dimension:
+        def apply(step: ExpressionStep, operands: Sequence[Any]) -> Dimension:
             try:
                 return OPERATIONS[step.operation].dimension(*operands)
             except DimensionError as error:
@@ -128,7 +128,7 @@ class Expression:
 
         return self._evaluated(leaf, apply)
 
-    def _evaluated(self, leaf: Callable[[Step], T], apply: Callable[[Step, Sequence[Any]], T]) -> T:
+    def _evaluated(self, leaf: Callable[[ExpressionStep], T], apply: Callable[[ExpressionStep, Sequence[Any]], T]) -> T:
         """Return the result of the steps; `apply` gets the operands, and of a power also the exponent."""
         stack: list[T] = []
         for step in self.steps:
@@ -146,7 +146,7 @@ class Expression:
             if step.operation == "name" and step.value not in names:
                 raise self._unknown(step, names)
 
-    def _unknown(self, step: Step, known: Iterable[str]) -> MechanismError:
+    def _unknown(self, step: ExpressionStep, known: Iterable[str]) -> MechanismError:
         known = list(known)
         what = f"no parameter '{step.value}'{suggestion(step.value, [*known, *WORDS])}; parameters: {listed(known)}"
         return error_at(self.text, step.at, what)

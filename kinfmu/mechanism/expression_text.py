@@ -19,7 +19,7 @@ from typing import NamedTuple
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.mechanism import dimension
 from kinfmu.mechanism.dimension import Dimension
-from kinfmu.mechanism.operations import CONSTANTS, FUNCTIONS, Step
+from kinfmu.mechanism.operations import CONSTANTS, FUNCTIONS, ExpressionStep
 from kinfmu.mechanism.valid import quoted
 from kinfmu.units import every_unit, spelled
 
@@ -28,7 +28,7 @@ DEEPEST = 40  # parentheses within parentheses
 LARGEST_POWER = 20  # exponent; a polynomial of a higher degree loses its digits to rounding
 
 
-def steps_of(text: str, length_unit: str) -> tuple[Step, ...]:
+def steps_of(text: str, length_unit: str) -> tuple[ExpressionStep, ...]:
     """Return the steps of an expression in postfix order.
 
     Args:
@@ -71,12 +71,12 @@ class _Parser:
     def __init__(self, text: str, length_unit: str) -> None:
         self._text = text
         self._units = every_unit(length_unit)
-        self._steps: list[Step] = []
+        self._steps: list[ExpressionStep] = []
         self._depth = 0
         self._at = 0
         self._token = _Token("end", "", 0)
 
-    def parsed(self) -> tuple[Step, ...]:
+    def parsed(self) -> tuple[ExpressionStep, ...]:
         if len(self._text) > LONGEST:
             raise MechanismError(f"{quoted(self._text)} is too long for an expression; {LONGEST} characters at most")
         self._next()
@@ -116,7 +116,7 @@ class _Parser:
             operator = self._token
             self._next()
             operand()
-            self._steps.append(Step(operator.text, operator.at))
+            self._steps.append(ExpressionStep(operator.text, operator.at))
 
     def _factor(self) -> None:
         signs = []
@@ -127,8 +127,8 @@ class _Parser:
         if self._is("**"):
             operator = self._token
             self._next()
-            self._steps.append(Step("power", operator.at, self._exponent()))
-        self._steps.extend(Step("sign", sign.at) for sign in signs if sign.text == "-")
+            self._steps.append(ExpressionStep("power", operator.at, self._exponent()))
+        self._steps.extend(ExpressionStep("sign", sign.at) for sign in signs if sign.text == "-")
 
     def _exponent(self) -> int:
         sign = 1
@@ -156,7 +156,7 @@ class _Parser:
             if not self._is("("):
                 raise self._wrong(f"'(' after {token.text}")
             self._inside(token, FUNCTIONS[token.text].arity)
-            self._steps.append(Step(token.text, token.at))
+            self._steps.append(ExpressionStep(token.text, token.at))
         elif token.kind == "name":
             self._next()
             if self._is("("):
@@ -164,7 +164,7 @@ class _Parser:
                 what = f"no function '{token.text}'{near}; functions: {listed(FUNCTIONS)}"
                 raise error_at(self._text, token.at, what)
             is_constant = token.text in CONSTANTS
-            self._steps.append(Step(token.text if is_constant else "name", token.at, token.text))
+            self._steps.append(ExpressionStep(token.text if is_constant else "name", token.at, token.text))
         else:
             raise self._wrong("a number, a name or '('")
 
@@ -187,7 +187,7 @@ class _Parser:
             value, measures, self._at = value * factor, Dimension.of(quantity), end
         if not math.isfinite(value):
             raise error_at(self._text, token.at, "the number is too large")
-        self._steps.append(Step("number", token.at, value, unit, measures))
+        self._steps.append(ExpressionStep("number", token.at, value, unit, measures))
         self._next()
 
     def _refuse_signs_in_unit(self) -> None:

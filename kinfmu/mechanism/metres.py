@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from kinfmu.mechanism.dimension import NUMBER, Dimension, DimensionError
 from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.members import Members
-from kinfmu.mechanism.operations import OPERATIONS, Step
+from kinfmu.mechanism.operations import OPERATIONS, ExpressionStep
 from kinfmu.mechanism.parameters import NUMBER as PURE
 from kinfmu.mechanism.parameters import Parameter, dimensions_of
 from kinfmu.units import METRES, Quantity, every_unit, length_power
@@ -109,7 +109,7 @@ def _text(expression: Expression, dimensions: Mapping[str, Dimension], needed: D
     return f"{_inside(stack[0], _PRODUCT)}*{times}" if times else stack[0][0]
 
 
-def _applied(step: Step, operands: list[tuple[str, int]]) -> tuple[str, int]:
+def _applied(step: ExpressionStep, operands: list[tuple[str, int]]) -> tuple[str, int]:
     """Return the text of an operation on texts."""
     if step.operation in _PRECEDENCE:
         own = _PRECEDENCE[step.operation]

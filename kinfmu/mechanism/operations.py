@@ -12,7 +12,7 @@ from kinfmu.mechanism import dimension
 from kinfmu.mechanism.dimension import Dimension
 
 
-class Step(NamedTuple):
+class ExpressionStep(NamedTuple):
     """One step of an expression in postfix order, and its position in the text."""
 
     operation: str  # "number", "name", or a key of OPERATIONS

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from kinfmu.player.server import PlayServer
-from kinfmu.player.source import Source
+from kinfmu.player.source import PlaySource
 from kinfmu.player.widget import play
 
-__all__ = ["PlayServer", "Source", "play"]
+__all__ = ["PlayServer", "PlaySource", "play"]

@@ -21,7 +21,7 @@ from kinfmu.errors import KinfmuError
 from kinfmu.fmu import build
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import parse
-from kinfmu.player.source import Source
+from kinfmu.player.source import PlaySource
 
 ADDRESS = "127.0.0.1"
 LARGEST_BODY = 4_000_000  # [bytes] of a mechanism file
@@ -60,7 +60,7 @@ class PlayServer:
 
     """
 
-    def __init__(self, source: Source, port: int = 0) -> None:
+    def __init__(self, source: PlaySource, port: int = 0) -> None:
         self.source = source
         self._token = secrets.token_urlsafe(24)
         try:

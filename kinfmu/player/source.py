@@ -31,7 +31,7 @@ class State(NamedTuple):
     problem: str
 
 
-class Source:
+class PlaySource:
     """A mechanism and its page, made again when its file changes.
 
     Args:

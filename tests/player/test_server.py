@@ -16,7 +16,7 @@ import pytest
 import kinfmu
 from kinfmu.errors import KinfmuError
 from kinfmu.mechanism.toml_file import parse
-from kinfmu.player import PlayServer, Source
+from kinfmu.player import PlayServer, PlaySource
 from kinfmu.player.server import LARGEST_BODY
 from tests.page.browser import browser, needs_browser
 
@@ -34,7 +34,7 @@ def file(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def server(file: Path) -> Iterator[PlayServer]:
-    with PlayServer(Source(str(file))) as served:
+    with PlayServer(PlaySource(str(file))) as served:
         yield served
 
 

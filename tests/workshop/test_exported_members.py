@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
+from collections import Counter
 from types import ModuleType
 
 import pytest
@@ -52,6 +53,18 @@ def test_every_module_or_the_class_it_is_named_after_is_documented(name: str) ->
     namesake = name.rpartition(".")[2].replace("_", "")
     classes = [value for key, value in vars(module).items() if inspect.isclass(value) and key.lower() == namesake]
     assert module.__doc__ or any(value.__doc__ for value in classes)
+
+
+def test_no_two_classes_have_one_name() -> None:
+    modules = {name: vars(importlib.import_module(name)) for name in MODULES}
+    names = [
+        value.__name__
+        for name, members in modules.items()
+        for value in members.values()
+        if inspect.isclass(value) and value.__module__ == name and not value.__name__.startswith("_")
+    ]
+    twice = {name for name, count in Counter(names).items() if count > 1}
+    assert twice == {"EquationOfMotion"}  # of kinfmu.dynamics with numpy, of the Python FMU without
 
 
 def test_the_api_of_the_contract_is_exported() -> None:

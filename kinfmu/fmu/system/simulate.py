@@ -20,7 +20,7 @@ from kinfmu.fmu.system.exchange import check_exchange, exchange_of, ordered
 from kinfmu.fmu.system.ports import Port
 from kinfmu.fmu.system.samples import SystemSamples
 from kinfmu.fmu.system.slave import AnySlave, foreign_slave
-from kinfmu.fmu.system.structure import STRUCTURE, Component, Structure, of_fmu, of_ssp
+from kinfmu.fmu.system.structure import STRUCTURE, Component, SystemStructure, of_fmu, of_ssp
 from kinfmu.fmu.unpacked import unpacked
 from kinfmu.mechanism import Mechanism, toml_file, toml_text
 from kinfmu.run import Event, Run
@@ -79,13 +79,13 @@ def simulate_system(
         interrupted.deliver()
 
 
-def _units(system: Structure) -> dict[str, dict[str, float]]:
+def _units(system: SystemStructure) -> dict[str, dict[str, float]]:
     """Return the units that columns of a table of inputs may have."""
     return {name: ends[0][1].units() for name, ends in system.inputs.items()}
 
 
 def _values(
-    path: Path, system: Structure, parameters: Mapping[str, float | str | bool], table: InputTable | None
+    path: Path, system: SystemStructure, parameters: Mapping[str, float | str | bool], table: InputTable | None
 ) -> dict[str, dict[str, float]]:
     """Return what is set before initialization, by component and variable."""
     found = {one.name: dict(one.values) for one in system.components}
@@ -120,7 +120,7 @@ def _values(
 
 
 def _run(
-    system: Structure,
+    system: SystemStructure,
     t: NDArray[np.float64],
     kept: NDArray[np.int64],
     table: InputTable | None,
@@ -258,7 +258,7 @@ def _samples_of(one: Component, count: int, values: Mapping[str, Mapping[str, fl
     return Samples(one.own, count, settings=values[one.name], mechanism=mechanism, model_description=text)
 
 
-def _info(system: Structure, values: Mapping[str, Mapping[str, float]], main: Component | None) -> dict[str, str]:
+def _info(system: SystemStructure, values: Mapping[str, Mapping[str, float]], main: Component | None) -> dict[str, str]:
     """Return what the record states of the system."""
     given = [f"{one.column(name)} = {value:g}" for one in system.components for name, value in values[one.name].items()]
     if len(system.components) == 1:

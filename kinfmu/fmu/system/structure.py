@@ -77,7 +77,7 @@ class Connection:
 
 
 @dataclass(frozen=True, eq=False)
-class Structure:
+class SystemStructure:
     """Components and connections of a system.
 
     Attributes:
@@ -110,14 +110,14 @@ def component(name: str, path: Path, folder: Path) -> Component:
     return Component(name, path, folder, about, ports_of(about), own, mechanism, {})
 
 
-def of_fmu(path: Path, folder: Path) -> Structure:
+def of_fmu(path: Path, folder: Path) -> SystemStructure:
     """Return the system of a single unpacked FMU."""
     only = component("", path, folder)
     name = str(only.about.modelName or path.stem)
     return _structure((name, str(only.about.description or name)), (only,), (), {}, None)
 
 
-def of_ssp(path: Path, folder: Path, opened: Any) -> Structure:
+def of_ssp(path: Path, folder: Path, opened: Any) -> SystemStructure:
     """Return the system of an unpacked SSP; opened: an ExitStack that keeps the unpacked FMUs.
 
     Raises:
@@ -179,7 +179,7 @@ def _structure(
     outer: Mapping[str, tuple[tuple[Component, Port], ...]],
     span: Any,
     path: Path | None = None,
-) -> Structure:
+) -> SystemStructure:
     """Return the structure after checking that every input has one source."""
     taken = [(wire.target.name, wire.input.name) for wire in connections]
     taken += [(target.name, port.name) for ends in outer.values() for target, port in ends]
@@ -198,7 +198,9 @@ def _structure(
         for name in unlogged(one.about, one.ports)
         if one.own is None
     ]
-    return Structure(*names, components, connections, {**outer, **free}, _experiment(components, span), tuple(notes))
+    return SystemStructure(
+        *names, components, connections, {**outer, **free}, _experiment(components, span), tuple(notes)
+    )
 
 
 def _experiment(components: tuple[Component, ...], span: Any) -> RunSettings:

@@ -20,7 +20,7 @@ from kinfmu.solver.python.status import Status
 from kinfmu.solver.python.tracks import sample_rates
 
 
-class LoadedSlave(MechanismSlave):
+class ForceSlave(MechanismSlave):
     """A mechanism with forces as an FMI 2.0 co-simulation slave.
 
     A subclass defines `stages` (emitted, by part) and `positive` (names of the constants of loads' laws that must be
