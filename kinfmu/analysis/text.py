@@ -10,7 +10,7 @@ from typing import NamedTuple
 from kinfmu.analysis.cam_text import cam_lines
 from kinfmu.analysis.findings import Findings
 from kinfmu.analysis.lift_off import LiftOff
-from kinfmu.analysis.loading import ForcePeak
+from kinfmu.analysis.loading import ForcePeak, UnknownContact
 from kinfmu.analysis.loops import FourBar, Link, SliderCrank
 from kinfmu.analysis.named_loops import NamedLoop
 from kinfmu.analysis.singular import DriverRange, LimitPosition
@@ -272,14 +272,19 @@ def _forces(report: Findings) -> Iterator[ReportLine]:
     for lift in loading.lift_offs:
         yield ReportLine("", _lift_off_text(lift))
     for contact in loading.unknown_contacts:
-        loaded = _names(contact.reactions)
-        yield ReportLine("", f"{contact.joint}: contact force unknown, {contact.reason}; without a value: {loaded}")
+        yield ReportLine("", contact_text(contact))
     redundant = {row.row.name: row.row.owner for row in report.redundant}
     for names, rows in loading.undetermined:
         others = [row for row in rows if row in redundant]
         joints = {redundant[row] for row in others}
         shared = [name for name in names if name.partition(".")[0] not in joints]
         yield ReportLine("", f"statically indeterminate: {_names(shared)} share the load with {_names(others)}")
+
+
+def contact_text(contact: UnknownContact) -> str:
+    """Return why the contact force of a cam is unknown, and which reactions have no value for this reason."""
+    loaded = _names(contact.reactions)
+    return f"{contact.joint}: contact force unknown, {contact.reason}; without a value: {loaded}"
 
 
 def _lift_off_text(lift: LiftOff) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 
 from kinfmu.analysis import Report
 from kinfmu.analysis.loops import FourBar, Place
+from kinfmu.analysis.text import contact_text
 from kinfmu.draw.instant import instant
 from kinfmu.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
 from kinfmu.joints import CamFlatFace, CamRoller, Coordinate, Distance, PointOnLine, Translational
@@ -92,6 +93,7 @@ def describe(mechanism: Mechanism, report: Report) -> dict[str, Any]:
         "shapes": [shape for shape in found if shape["kind"] not in _NOT_DRAWN],
         "loops": list(_loops(report, numbers)),
         "notes": list(report.notes),
+        "unknownContacts": [*map(contact_text, report.loading.unknown_contacts)] if report.loading else [],
         "mobility": report.mobility,
         "redundant": [row.row.owner for row in report.redundant],
     }

@@ -67,6 +67,22 @@ class Opened:
         mouse.up()
         self.settle()
 
+    def touch(self, *ways: list[tuple[float, float]]) -> None:
+        """Draw fingers over the screen, each along its places, by events as a touch screen sends them."""
+        session = self.tab.context.new_cdp_session(self.tab)
+
+        def send(kind: str, places: list[tuple[float, float]]) -> None:
+            points = [{"x": x, "y": y, "id": number} for number, (x, y) in enumerate(places)]
+            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+            self.settle()
+
+        kind = "touchStart"
+        for places in zip(*ways, strict=True):
+            send(kind, list(places))
+            kind = "touchMove"
+        send("touchEnd", [])
+        session.detach()
+
 
 @cache
 def text_of(name: str) -> str:

@@ -15,6 +15,7 @@ from kinfmu.errors import KinfmuError
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.page import page as page_of
 from tests.page.browser import PHONE, Browser, Opened, browser, needs_browser, text_of
+from tests.sweep.test_cam_reactions import HEAD, JOINTS, SLIDING
 
 pytestmark = needs_browser
 
@@ -265,3 +266,17 @@ def test_cam_that_does_not_turn_all_the_way_is_left_out(cams: Opened) -> None:
         "Not drawn with these values: the cam of lift, which no driver turns all the way round."
         in cams.tab.text_content("#note")
     )
+
+
+def test_the_page_states_why_a_contact_force_is_unknown(chromium: Browser) -> None:
+    text = HEAD + JOINTS["up"] + SLIDING
+    line = "lift: contact force unknown, the key 'roller_radius' or 'normal' is missing; without a value: O.force_x, "
+    with chromium.open(page_of(parse(text.replace("roller_radius = 0.01", "")))) as page:
+        page.tab.click("#tab-show")
+        (shown,) = page.tab.get_by_text("contact force unknown").all_inner_texts()
+        assert shown == f"{line}O.force_y, guide.force, guide.moment."
+        assert "undetermined: O, guide" in page.tab.inner_text("#show")
+        assert page.errors == []
+    with chromium.open(page_of(parse(text))) as page:
+        page.tab.click("#tab-show")
+        assert page.tab.get_by_text("contact force unknown").count() == 0

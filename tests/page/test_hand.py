@@ -58,6 +58,41 @@ def test_handle_of_a_driver_drags_it_in_both_modes_and_the_view_stays(chromium: 
         assert page.errors == []
 
 
+def test_a_finger_drags_the_handle_and_two_fingers_zoom(chromium: Browser) -> None:
+    with chromium.open(text_of("crank_rocker"), has_touch=True, is_mobile=True) as page:
+        page.tab.set_viewport_size(PHONE)
+        page.settle()
+        before = page.get("[k.view.x, k.view.y, k.view.scale]")
+        x, y = on_screen(page, "k.handles[0].at")
+        cx, cy = page.at("crank.O")
+        radius = math.dist((x, y), (cx, cy))
+        way = [math.radians(10 * k) for k in range(13)]
+        off = 14  # [px] next to the handle, as fingers are
+        page.touch([(cx + (radius + off) * math.cos(a), cy - (radius + off) * math.sin(a)) for a in way])
+        assert page.get("k.linkage.u[0]") == pytest.approx(math.radians(120), abs=0.02)
+        assert page.get("k.hand.held") is None  # let go
+        assert page.get("[k.view.x, k.view.y, k.view.scale]") == before
+        assert page.tab.evaluate("scrollY") == 0  # neither the view nor the page moves with the finger
+        assert page.get("location.hash").startswith("#@crank=")
+        angle = page.get("k.linkage.u[0]")
+        box = page.tab.locator("#drawing").bounding_box()
+        mx, my = box["x"] + 0.5 * box["width"], box["y"] + 0.8 * box["height"]
+        page.touch([(mx - 20 - 4 * k, my) for k in range(11)], [(mx + 20 + 4 * k, my) for k in range(11)])
+        assert page.get("k.view.scale") == pytest.approx(3.0 * before[2], rel=0.05)
+        assert page.get("k.linkage.u[0]") == angle
+        assert page.errors == []
+
+
+def test_a_finger_drags_the_slider_of_a_driver(chromium: Browser) -> None:
+    with chromium.open(text_of("crank_rocker"), has_touch=True) as page:
+        slider = page.tab.get_by_label("crank, slider")
+        box = slider.bounding_box()
+        y = box["y"] + 0.5 * box["height"]
+        page.touch([(box["x"] + 8 + part * (box["width"] - 16), y) for part in (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)])
+        assert page.get("k.linkage.u[0]") == pytest.approx(math.pi, abs=0.05)
+        assert page.errors == []
+
+
 def test_banner_names_the_joint_and_goes_with_what_it_was_about(chromium: Browser) -> None:
     with chromium.open(text_of("crank_rocker")) as page:
         page.tab.click("#edit")

@@ -110,6 +110,7 @@ export function showPanel(page, root) {
         if (note) text.append(element("small", { textContent: note }));
         root.append(element("label", { className: "check" }, box, text));
     }
+    for (const text of has.unknownContacts) root.append(element("p", { className: "quiet", textContent: `${text}.` }));
     if (externals.length) root.append(element("p", { className: "quiet", textContent: `Loads from outside are 0 in this page: ${externals.join(", ")}.` }));
     if (page.linkage.bodies.length <= 13) {
         const numbers = page.linkage.bodies.map((name, k) => `${k + 1} ${name}`).join(", ");
