@@ -348,6 +348,13 @@ def test_the_driver_without_reduced_inertia_is_named(flavour: str, fmi: int, tmp
         kinfmu.simulate(path)
 
 
+def test_a_four_bar_keeps_its_energy_over_a_thousand_turns(tmp_path: Path) -> None:
+    path = kinfmu.build(heavy(fourbar(2.0, 0.7, 1.9, 1.5)), tmp_path / "a.fmu", flavour="native", drive="torque")
+    run = kinfmu.simulate(path, stop=950.0, step=1.0, state={"crank_speed": 7.0}, tolerance=1e-13)
+    assert run["crank_angle"][-1] > 1000 * 2 * math.pi
+    assert np.abs(run["kinetic_energy"] / run["kinetic_energy"][0] - 1).max() < 2e-10
+
+
 def test_settings_of_a_torque_driven_fmu_are_for_these_alone(fmu_of: Callable[..., Path]) -> None:
     path = fmu_of("rocker", "native", 2)
     with pytest.raises(RequestError, match=r"crank_speed = '3 mm': unit 'mm' must be one of rad/s"):
