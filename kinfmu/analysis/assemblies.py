@@ -65,7 +65,7 @@ class Assemblies:
     is_complete: bool
 
     def as_json(self) -> dict[str, Any]:
-        """As plain data: drivers, complete, distinguished_by, found: chosen, coordinates, start (x, y, phi by body)."""
+        """Return plain data: drivers, complete, distinguished_by, found (chosen, coordinates, start by body)."""
         return {
             "drivers": dict(self.drivers),
             "complete": self.is_complete,

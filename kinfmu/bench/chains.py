@@ -48,7 +48,7 @@ def run(rounds: int = ROUNDS) -> str:
 
 
 def _ready(mechanism: Mechanism, outputs: Sequence[str] | None = None) -> tuple[Callable[[int], None], float]:
-    """A function that takes some samples, each a step further, and the seconds it took to compile."""
+    """Return a function that takes some samples, each a step further, and the seconds it took to compile."""
     start = time.process_time()
     model = load_model(compile_plan(mechanism, outputs))
     seconds = time.process_time() - start

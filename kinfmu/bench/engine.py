@@ -44,7 +44,7 @@ def newton(
     tolerances: Sequence[float] = TOLERANCES,
     chord: Sequence[int] = CHORD,
 ) -> tuple[EngineSetting, ...]:
-    """Each predictor with numbers of corrections, with tolerances, and with chord Newton, to round-off too."""
+    """Return settings: each predictor with numbers of corrections, with tolerances, and with chord Newton."""
     return tuple(
         setting
         for order in range(len(PREDICTORS))

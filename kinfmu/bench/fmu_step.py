@@ -40,7 +40,7 @@ def run(mechanism: Mechanism, rounds: int = ROUNDS) -> str:
 
 
 def _fifteen(fmu: Path) -> list[str]:
-    """Position, velocity and acceleration of the first five outputs of an FMU."""
+    """Return names of position, velocity and acceleration of the first five outputs of an FMU."""
     from fmpy import read_model_description
 
     names = [v.name for v in read_model_description(str(fmu)).modelVariables if v.causality == "output"]
@@ -56,7 +56,7 @@ def _toy(folder: Path) -> Path:
 
 @contextmanager
 def _stepper(fmu: Path, input_name: str, outputs: list[str] | None) -> Iterator[Callable[[], None]]:
-    """A function that steps an FMU through a round, each going on where the last one ended."""
+    """Return a function that steps an FMU through a round, each of which continues the last one."""
     from fmpy import extract, read_model_description
     from fmpy.fmi2 import FMU2Slave
 

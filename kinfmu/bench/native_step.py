@@ -49,14 +49,14 @@ def run(mechanism: Mechanism, rounds: int = ROUNDS) -> str:
 
 
 def _row(name: str, ns: Sequence[float], others: Sequence[float]) -> tuple[str, ...]:
-    """A row of the table: medians, and the ratio with its quartiles."""
+    """Return a row of the table: medians, and the ratio with its quartiles."""
     ratio = spread([a / b for a, b in zip(ns, others, strict=True)])
     quartiles = f"{ratio.lower:.2f} to {ratio.upper:.2f}"
     return name, f"{spread(ns).median:.0f} ns", f"{spread(others).median:.0f} ns", f"{ratio.median:.2f}", quartiles
 
 
 def with_masses(mechanism: Mechanism) -> Mechanism:
-    """The mechanism with gravity, and bodies of 1 kg whose centres of mass are away from their origins."""
+    """Return the mechanism with gravity, and bodies of 1 kg whose centres of mass are away from their origins."""
     bodies = [
         body if body.is_ground else replace(body, mass=1.0, center_of_mass=Point(0.3, 0.1), inertia=0.1)
         for body in mechanism.bodies
@@ -65,7 +65,7 @@ def with_masses(mechanism: Mechanism) -> Mechanism:
 
 
 def _ours(mechanism: Mechanism, fmi: int, folder: Path, *, forces: int = 0) -> tuple[Callable[[], None], float]:
-    """A round of the mechanism's FMU, and the seconds that an instance takes; forces: how many of them are read."""
+    """Return a round of the mechanism's FMU, and the seconds that an instance takes; forces: number of those read."""
     folder.mkdir()
     fmu = build(mechanism, folder / "ours.fmu", flavour="native", fmi=fmi, drive="inputs")
     with zipfile.ZipFile(fmu) as zipped:
@@ -103,7 +103,7 @@ def _ours(mechanism: Mechanism, fmi: int, folder: Path, *, forces: int = 0) -> t
 
 
 def _closed_form(fmi: int) -> Callable[[], None]:
-    """A round of the closed forms, compiled as the FMU is."""
+    """Return a round of the closed forms, compiled as the FMU is."""
     sources = {"closed_form.c": (_SOURCES / "closed_form.c").read_text("utf-8")}
     library = compiler.load(sources, (*OPTIMIZED, f"-DFMI={fmi}"))
     library.instantiate.restype = ctypes.c_void_p
@@ -111,7 +111,7 @@ def _closed_form(fmi: int) -> Callable[[], None]:
 
 
 def _rounds(fmi: int, library: Any, instance: ctypes.c_void_p, outputs: Sequence[int]) -> Callable[[], None]:
-    """A function that steps an FMU through a round in C, each going on where the last one ended."""
+    """Return a function that steps an FMU through a round in C, each of which continues the last one."""
     host = compiler.load({"host.c": (_SOURCES / "host.c").read_text("utf-8")})
     step = getattr(host, f"host_run{fmi}")
     word = _WORDS[fmi]

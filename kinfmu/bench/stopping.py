@@ -28,7 +28,7 @@ MOST = 60  # iterations of chord Newton, which converges linearly
 
 
 def model_with(plan: SolvePlan, setting: EngineSetting) -> Any:
-    """The generated model of a plan, its parameters as written, whose `position` stops as the setting says."""
+    """Return the generated model of a plan, its parameters as written, whose `position` stops by the setting."""
     rewriter = _Rewriter(setting)
     tree = rewriter.visit(ast.parse(emit(plan)))
     if not rewriter.loops and any(block.unknowns for block in plan.blocks):
@@ -45,7 +45,7 @@ class _Rewriter(ast.NodeTransformer):
         self.loops = 0
 
     def visit_For(self, loop: ast.For) -> ast.For:
-        """A loop of Newton; nothing else in a model is called `iteration`."""
+        """Change a loop of Newton; nothing else in a model is called `iteration`."""
         if not (isinstance(loop.target, ast.Name) and loop.target.id == "iteration"):
             return loop
         self.loops += 1
@@ -66,7 +66,7 @@ class _Rewriter(ast.NodeTransformer):
 
 
 def _chord(body: list[ast.stmt], place: int, stop: ast.If) -> list[ast.stmt]:
-    """The body of a loop with what its correction takes from the Jacobian as it was in the first iteration."""
+    """Return the body of a loop whose correction uses the Jacobian of the first iteration."""
     evaluation, last, correction = body[:place], body[place + 1], body[place + 2 :]
     is_factored = any(_assigned(line).startswith("factors") for line in evaluation)
     factoring = [line for line in evaluation if is_factored and _assigned(line).startswith(("factors", "det"))]
@@ -90,7 +90,7 @@ class _Renamer(ast.NodeTransformer):
 
 
 def _assigned(line: ast.stmt) -> str:
-    """The name that a statement assigns to, or nothing."""
+    """Return the name that a statement assigns to, or an empty text."""
     if isinstance(line, ast.Assign) and isinstance(line.targets[0], ast.Name):
         return line.targets[0].id
     return ""

@@ -215,7 +215,7 @@ class SolvePlan:
 
     @cached_property
     def _behind_coordinates(self) -> dict[str, frozenset[str]]:
-        """The same behind each coordinate that moves."""
+        """Inputs and parameters, by the names of their symbols, behind each coordinate that moves."""
         behind: dict[str, frozenset[str]] = {}
         for block in self.blocks:
             own = set(block.coordinates)

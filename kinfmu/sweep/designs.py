@@ -171,7 +171,7 @@ class Batch:
         return {name: float(array[design % len(array)]) for name, array in self.parameters.items()}
 
     def invalid(self) -> NDArray[np.bool_]:
-        """(m,) True for designs with a number that is not finite or too large, or not positive where it must be."""
+        """Return (m,): True if a number of a design is not finite, too large, or not positive where it must be."""
         constants = np.hstack([self.constants, self._of_loads])
         positive = [one.is_positive for one in (*self.plan.law_constants, *self.plan.load_constants)]
         found = ~np.logical_and.reduce(

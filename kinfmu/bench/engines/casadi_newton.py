@@ -16,7 +16,7 @@ FINEST = 1e-13
 
 
 def _sampler(case: Case, setting: EngineSetting) -> Sampler:
-    """`fast_newton` from the last pose, rates by linear solves; the tolerance is `abstol` of the relative residual."""
+    """Return a sampler: `fast_newton` from the last pose, rates by linear solves; tolerance: `abstol`."""
     try:
         import casadi
     except ImportError:
@@ -40,7 +40,7 @@ def _sampler(case: Case, setting: EngineSetting) -> Sampler:
 
 
 def _step(casadi: Any, case: Case, tolerance: float) -> Any:
-    """(q, u, ud, udd) -> (q, [q, qd, qdd]): a sample from the last pose."""
+    """Return (q, u, ud, udd) -> (q, [q, qd, qdd]), a sample from the last pose."""
     system = case.system
     n, d = len(system.coordinates), len(system.mechanism.drivers)
     q, u, ud, udd, qd = (casadi.SX.sym(name, k) for name, k in (("q", n), ("u", d), ("ud", d), ("udd", d), ("qd", n)))

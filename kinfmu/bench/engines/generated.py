@@ -8,7 +8,7 @@ from kinfmu.bench.stopping import model_with
 
 
 def _sampler(case: Case, setting: EngineSetting) -> Sampler:
-    """`position` of the generated model from one sample to the next, and the rates as it gives them."""
+    """Return a sampler: `position` of the generated model from one sample to the next, and its rates."""
     model = model_with(case.plan, setting)
     start = case.start
     alone = len(case.u[0]) == 1

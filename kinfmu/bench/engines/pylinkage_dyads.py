@@ -21,7 +21,7 @@ Bodies = Mapping[str, tuple[str, str]]  # two points of each moving body, its fr
 
 
 def _sampler(case: Case, _setting: EngineSetting) -> Sampler | None:
-    """`step_fast_with_kinematics`; it has no tolerance, and takes crank-driven chains of dyads only."""
+    """Return a sampler: `step_fast_with_kinematics`, without a tolerance, of crank-driven chains of dyads only."""
     if case.name not in _LINKAGES:
         return None
     try:
@@ -58,7 +58,7 @@ def _ready(named: Mapping[str, Any], speed: float, acceleration: float) -> Any:
 
 
 def _rows(columns: Sequence[CoordinateName], points: Mapping[str, Sequence[FloatArray]], bodies: Bodies) -> Motion:
-    """(n, 3 m) from positions, velocities and accelerations (n, 2) of points."""
+    """Return (n, 3 m) from positions, velocities and accelerations (n, 2) of points."""
     tables: list[list[FloatArray]] = [[], [], []]
     for column in columns:
         origin, other = bodies[column.owner]
@@ -74,13 +74,13 @@ def _rows(columns: Sequence[CoordinateName], points: Mapping[str, Sequence[Float
 
 
 def _length(case: Case, body: str, a: str, b: str) -> float:
-    """Distance of two points of a body."""
+    """Return the distance of two points of a body."""
     points = case.mechanism.body_points
     return math.dist(points[f"{body}.{a}"], points[f"{body}.{b}"])
 
 
 def _start(case: Case, body: str, point: str) -> tuple[float, float]:
-    """Where a body's point lies at the first sample: the circles meet in two places, the nearer one is taken."""
+    """Return the position of a body's point at the first sample: of the two where circles meet, the nearer one."""
     pose: dict[str, float] = {**case.plan.fixed, **dict(zip(case.columns, case.exact[0, 0].tolist(), strict=True))}
     x, y, phi = (pose[f"{body}.{letter}"] for letter in ("x", "y", "phi"))
     s_x, s_y = case.mechanism.body_points[f"{body}.{point}"]

@@ -25,14 +25,14 @@ UNREAD = "unread"  # a parameter on which nothing depends: only models with para
 
 @lru_cache(maxsize=1)
 def _distinct(case: Case) -> Any:
-    """The generated model of a case, with a function that gives its residuals."""
+    """Return the generated model of a case, with a function that gives its residuals."""
     mechanism = case.mechanism
     distinct = replace(mechanism, parameters={**mechanism.parameters, UNREAD: Parameter(1.0)})
     return load_model(compile_plan(distinct, case.columns))
 
 
 def _sampler(case: Case, setting: EngineSetting) -> Sampler:
-    """MINPACK's hybrid method with its own difference quotients; the tolerance is `xtol`."""
+    """Return a sampler: MINPACK's hybrid method with its own difference quotients; the tolerance is `xtol`."""
     from scipy.optimize import fsolve
 
     model = _distinct(case)

@@ -270,7 +270,7 @@ void kf_drive(const kf_model *model, double time, const double *constants, doubl
 
 
 def drive(parts: Parts) -> list[str]:
-    """The function, over the constants of the laws and the parameters."""
+    """Return the function, over the constants of the laws and the parameters."""
     laws = parts.plan.laws
     orders = [[getattr(law, order) for law in laws] for order in ("position", "rate", "acceleration")]
     writer = Writer(Names(curves=parts.curves, functions=FUNCTIONS), ())
