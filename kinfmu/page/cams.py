@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from kinfmu.cams import CamJoint
 from kinfmu.cams.placed import members_of
 from kinfmu.joints import CamFlatFace, CamRoller, Revolute
 from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism
-from kinfmu.page.dependencies import parameters_of
+from kinfmu.page.dependencies import number_data
 
 CAM_SHAPES = ("cam", "pitch", "face")  # kinds; a cam with one of them is known
 
@@ -31,7 +30,7 @@ def cam_data(mechanism: Mechanism, joint: Any, numbers: Mapping[str, int]) -> di
     for key in ("roller_radius", "normal"):
         value = getattr(joint, key, None)
         if value is not None:
-            found[key] = _number(mechanism, joint, key, float(value))
+            found[key] = number_data(mechanism, ("joints", joint.name, key), float(value))
     if isinstance(joint, CamRoller | CamFlatFace):  # the file has the curve
         return found | {"centre": numbers[joint.between[0]], "bodies": [], "joints": [joint.name]}
     bodies = joint.bodies()
@@ -39,11 +38,3 @@ def cam_data(mechanism: Mechanism, joint: Any, numbers: Mapping[str, int]) -> di
     axle = next(one for one in among if isinstance(one, Revolute) and {*one.bodies()} == {cam, joint.holder()})
     own = next(point for point in axle.between if body_of(point) == cam)
     return found | {"centre": numbers[own], "bodies": list(bodies), "joints": [one.name for one in among]}
-
-
-def _number(mechanism: Mechanism, joint: CamJoint, key: str, value: float) -> dict[str, Any]:
-    """Return a number of a joint, the parameters on which it depends, and that one which is its whole expression."""
-    expression = mechanism.expressions.get(("joints", joint.name, key))
-    names = parameters_of(mechanism, joint, key)
-    alone = expression.alone if expression and names == [expression.alone] else None
-    return {"value": value, "names": names, "alone": alone}

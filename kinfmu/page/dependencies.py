@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from kinfmu.joints.joint import Joint
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.expression import Expression
+from kinfmu.mechanism.members import NumberPath
 
 
 def dependent_points(mechanism: Mechanism) -> dict[str, list[str]]:
@@ -25,6 +28,14 @@ def parameters_of(mechanism: Mechanism, joint: Joint, key: str = "") -> list[str
     path = ("joints", joint.name, key) if key else ("joints", joint.name)
     found = [one for place, one in mechanism.expressions.items() if place[: len(path)] == path]
     return sorted({name for expression in found for name in parameters_behind(mechanism, expression)})
+
+
+def number_data(mechanism: Mechanism, path: NumberPath, value: float) -> dict[str, Any]:
+    """Return a number of the file, the parameters on which it depends, and that one which is its whole expression."""
+    expression = mechanism.expressions.get(path)
+    names = sorted(parameters_behind(mechanism, expression)) if expression else []
+    alone = expression.alone if expression and names == [expression.alone] else None
+    return {"value": value, "names": names, "alone": alone}
 
 
 def parameters_behind(mechanism: Mechanism, expression: Expression) -> set[str]:

@@ -20,7 +20,8 @@ from kinfmu.draw.instant import instant
 from kinfmu.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
 from kinfmu.joints import CamFlatFace, CamRoller, Coordinate, Distance, PointOnLine, Translational
 from kinfmu.joints.joint import Joint
-from kinfmu.loads import ForceAlong, ForceAt
+from kinfmu.laws import ConstantValue
+from kinfmu.loads import Following, ForceAlong, ForceAt
 from kinfmu.measures.placement import body_of, unit_vector
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
@@ -30,13 +31,13 @@ from kinfmu.mechanism.members import NumberPath
 from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.toml_text import text
 from kinfmu.page.cams import CAM_SHAPES, cam_data
-from kinfmu.page.dependencies import dependent_points, parameters_of
+from kinfmu.page.dependencies import dependent_points, number_data, parameters_of
 from kinfmu.page.module import PageModule
 from kinfmu.page.opened import AXES, place_text
 from kinfmu.plan.undetermined import undetermined_reactions
 from kinfmu.scene import palette
 from kinfmu.scene.instant import Instant
-from kinfmu.scene.load_shapes import load_text
+from kinfmu.scene.load_shapes import EFFORT_UNITS, load_text
 from kinfmu.scene.shape import Shape
 from kinfmu.scene.shapes import shapes
 from kinfmu.scene.slides import Slide, slides
@@ -291,12 +292,17 @@ def _load(mechanism: Mechanism, shape: Shape, numbers: Mapping[str, int]) -> dic
             for strip in shape.strips
         ],
     }
-    if isinstance(load, ForceAt):
-        found["force"] = [float(load.x), float(load.y)]
-    elif isinstance(load, ForceAlong):
-        ahead = float(np.dot(shape.towards, unit_vector(float(load.angle))))
-        found |= {"angle": float(load.angle), "sense": math.copysign(1.0, ahead)}
-    return found
+    numbers_of = {key: getattr(load, key) for key in ("x", "y") if isinstance(load, ForceAt)}
+    if isinstance(load, ForceAlong):
+        numbers_of["angle"] = load.angle
+        found["isAgainst"] = float(np.dot(shape.towards, unit_vector(float(load.angle)))) < 0.0
+    law = getattr(load, "law", None)
+    if isinstance(load, Following) and isinstance(law, ConstantValue):
+        found["level"] = number_data(mechanism, ("loads", load.name, "law", "level"), float(law.level))
+        found["unit"] = EFFORT_UNITS[load.noun]
+    return found | {
+        key: number_data(mechanism, ("loads", load.name, key), float(value)) for key, value in numbers_of.items()
+    }
 
 
 def _gravity(mechanism: Mechanism) -> list[float] | None:

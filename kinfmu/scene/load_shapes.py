@@ -10,7 +10,7 @@ import numpy as np
 
 from kinfmu.drivers import DistanceDriver
 from kinfmu.joints import Distance
-from kinfmu.laws import External
+from kinfmu.laws import ConstantValue, External
 from kinfmu.loads import (
     Damper,
     Following,
@@ -35,6 +35,7 @@ from kinfmu.scene.symbols import Strip
 BETWEEN = (Spring, Damper, GasSpring, ForceBetween)  # classes of loads between two points
 _ARGUMENTS = 200  # of a law, in which its largest effort is looked for
 _BARREL, _OF_SHORTEST = 0.62, 0.92  # length of a barrel: of the usual length, and at most of the shortest one
+EFFORT_UNITS = {"force": "N", "torque": "N m"}
 _TURNS, _FEWEST_MOST = 18.0, (4, 14)  # of a spring as long as the mechanism; limits of other springs
 
 
@@ -69,10 +70,12 @@ def load_shapes(shown: Instant, box: FloatArray) -> Iterator[Shape]:
 
 
 def load_text(load: Load) -> str:
-    """Return the name of a load as figures show it: with the value of a constant force, or what gives its effort."""
+    """Return the name of a load as figures show it: with its size if it is constant, or with what gives its effort."""
     if isinstance(load, ForceAt):
         return f"{load.name} = {math.hypot(load.x, load.y):.6g} N"
     if isinstance(load, Following):
+        if isinstance(load.law, ConstantValue):
+            return f"{load.name} = {abs(float(load.law.level)):.6g} {EFFORT_UNITS[load.noun]}"
         return f"{load.name} ({'input' if isinstance(load.law, External) else 'law'})"
     return load.name
 
@@ -173,6 +176,6 @@ def _arguments(shown: Instant, load: Following) -> Iterator[float]:
     """Yield the arguments of the law of a load over the run."""
     bodies = load.over.bodies() if load.over else ()
     rows = np.flatnonzero(np.isfinite(np.hstack([shown.poses[body] for body in bodies])).all(axis=1))
-    for row in rows[:: -(-len(rows) // _ARGUMENTS)].tolist():
+    for row in rows[:: max(-(-len(rows) // _ARGUMENTS), 1)].tolist():
         poses = {body: BodyFrame.of(*shown.poses[body][row].tolist()) for body in bodies}
         yield float(load.argument(Placement(poses, shown.body_points)) or 0.0)

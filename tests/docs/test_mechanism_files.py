@@ -15,7 +15,7 @@ from kinfmu.laws import LAWS
 from kinfmu.loads import LOADS
 from kinfmu.mechanism import RunSettings
 from kinfmu.mechanism.checks import MOST_BODIES
-from kinfmu.mechanism.expression import DEEPEST, LONGEST
+from kinfmu.mechanism.expression_text import DEEPEST, LONGEST
 from kinfmu.mechanism.resolve import MOST_PARAMETERS
 from kinfmu.mechanism.toml_file import LARGEST_FILE, parse
 from kinfmu.mechanism.valid import LARGEST_NUMBER

@@ -42,7 +42,7 @@ def test_a_figure_names_every_load_next_to_its_symbol() -> None:
     shown = instant(mechanism)
     sheet = sheet_of(shown)
     found = texts(sheet)
-    wanted = {"coil", "oil", "strut", "muscle (input)", "weight = 50 N", "wind (input)", "brake (law)", "clock"}
+    wanted = {"coil", "oil", "strut", "muscle (input)", "weight = 50 N", "wind (input)", "brake = 2 N m", "clock"}
     assert wanted | {"grease"} <= set(found)
     drawn = lines(sheet)
     for name in ("coil", "strut", "weight = 50 N", "clock"):

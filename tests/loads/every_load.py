@@ -75,8 +75,8 @@ angle = "-90 deg"
 [loads.brake]
 type = "torque"
 on = "rocker"
-law = "polynomial"
-coefficients = [-2]
+law = "constant"
+level = -2
 [loads.clock]
 type = "torsion_spring"
 between = ["ground", "crank"]

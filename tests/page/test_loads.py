@@ -81,7 +81,16 @@ def test_every_kind_of_load_is_drawn_at_its_points_with_its_name(chromium: Brows
             everything = np.vstack(found.lines)
             for point in ("ground.E", "ground.F", "rocker.Q", "rocker.T"):
                 assert np.hypot(*(everything - pixel(page, point)).T).min() < 4.0, point
-            wanted = {"strut", "muscle (input)", "weight = 50 N", "wind (input)", "brake (law)", "clock", "grease", "g"}
+            wanted = {
+                "strut",
+                "muscle (input)",
+                "weight = 50 N",
+                "wind (input)",
+                "brake = 2 N m",
+                "clock",
+                "grease",
+                "g",
+            }
             assert wanted <= set(found.texts)
         assert page.errors == []
 
@@ -148,3 +157,50 @@ def test_gravity_is_not_drawn_over_other_things(chromium: Browser) -> None:
 
 def test_the_page_of_a_loaded_mechanism_stays_small() -> None:
     assert len(text_of("excavator_loaded").encode()) <= 300_000
+
+
+def test_constant_loads_show_their_values_as_set_and_turn_with_their_sign(chromium: Browser) -> None:
+    loads = (
+        '[loads.push]\ntype = "force_along"\nat = "coupler.M"\nlaw = "constant"\nlevel = 20\n'
+        '[loads.brake]\ntype = "torque"\non = "rocker"\nlaw = "constant"\nlevel = -3\n'
+    )
+    with chromium.open(page_of(fourbar(loads))) as page:
+        found = drawn(page)
+        assert {"push = 20 N", "brake = 3 N m"} <= set(found.texts)
+        np.testing.assert_allclose(ahead(found.lines, pixel(page, "coupler.M")), [1.0, 0.0], atol=0.01)
+        before = turn_of(found, pixel(page, "rocker.C"))
+        assert before > 1.0  # clockwise: y is down
+        page.get("k.design.set({'loads.push.law.level': -8, 'loads.brake.law.level': 4}) && k.reshape()")
+        page.settle()
+        found = drawn(page)
+        assert {"push = 8 N", "brake = 4 N m"} <= set(found.texts)
+        np.testing.assert_allclose(ahead(found.lines, pixel(page, "coupler.M")), [-1.0, 0.0], atol=0.01)
+        assert turn_of(found, pixel(page, "rocker.C")) == pytest.approx(-before, abs=0.01)
+        assert page.errors == []
+
+
+def turn_of(found: Drawn, centre: FloatArray) -> float:
+    """The angle of the circular arrow about a place, y down [rad]."""
+    arc = next(line for line in found.lines if len(line) > 12 and np.ptp(np.hypot(*(line - centre).T)) < 0.1)
+    angles = np.unwrap(np.arctan2(*(arc - centre).T[::-1]))
+    return float(angles[-1] - angles[0])
+
+
+def test_a_force_by_an_expression_of_changed_parameters_is_left_out_by_name(chromium: Browser) -> None:
+    parameters = '[parameters]\nF = "30 N"\na = "20 deg"\n'
+    loads = (
+        '[loads.weight]\ntype = "force"\nat = "coupler.M"\nx = "F"\ny = "-2*F"\n'
+        '[loads.push]\ntype = "force_along"\nat = "rocker.T"\nangle = "a"\nlaw = "constant"\nlevel = "F"\n'
+    )
+    with chromium.open(page_of(fourbar(parameters + loads))) as page:
+        (text_of_weight,) = (text for text in drawn(page).texts if text.startswith("weight = "))
+        assert float(text_of_weight.split()[2]) == pytest.approx(30.0 * math.sqrt(5.0), rel=1e-4)
+        page.get("k.design.set({ F: 40, a: -0.5 }) && k.reshape()")
+        page.settle()
+        found = drawn(page)
+        assert not any(text.startswith("weight") for text in found.texts)
+        assert "the load weight, whose numbers are changed" in page.tab.inner_text("#note")
+        assert "push = 40 N" in found.texts
+        way = [math.cos(-0.5), -math.sin(-0.5)]
+        np.testing.assert_allclose(ahead(found.lines, pixel(page, "rocker.T")), way, atol=0.01)
+        assert page.errors == []

@@ -6,17 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import kinfmu
 from kinfmu.loads import LOADS as CLASSES
-from kinfmu.loads import ForceAt, Spring
+from kinfmu.loads import ForceAt, Load, Spring
 from kinfmu.run import FloatArray
 from kinfmu.scene import details, symbols
+from kinfmu.scene.instant import Instant
 from kinfmu.scene.load_shapes import load_text
 from kinfmu.scene.placing import poses_of, world
 from kinfmu.scene.scene import Scene, scene
 from kinfmu.scene.shape import Shape
+from kinfmu.scene.shapes import shapes
 from tests.gallery_members import every_member
+from tests.loads.drawn import mechanisms
 from tests.loads.every_load import every_load, fourbar
 
 SIZE = 0.5  # [mm] of a unit of details
@@ -213,7 +218,7 @@ def test_loads_of_bodies_that_a_run_does_not_hold_are_left_out() -> None:
 def test_texts_state_the_constant_force_and_what_gives_other_ones() -> None:
     texts = [load_text(load) for load in every_load().loads]
     assert texts[:4] == ["coil", "oil", "strut", "muscle (input)"]
-    assert texts[4:] == ["weight = 50 N", "wind (input)", "brake (law)", "clock", "grease"]
+    assert texts[4:] == ["weight = 50 N", "wind (input)", "brake = 2 N m", "clock", "grease"]
 
 
 def test_parts_of_a_cylinder_stay_between_its_ends() -> None:
@@ -222,3 +227,27 @@ def test_parts_of_a_cylinder_stay_between_its_ends() -> None:
     everything = np.vstack([points for _, points in details.symbol(strut, 0.01)])
     assert (everything[:, 0] >= 0.0).all()
     assert (everything[:, 0] <= 1.0).all()
+
+
+@pytest.mark.parametrize("cls", CLASSES, ids=lambda cls: cls.type)
+@given(data=st.data())
+def test_any_load_has_a_symbol_of_finite_lines(cls: type[Load], data: st.DataObject) -> None:
+    mechanism = data.draw(mechanisms(cls))
+    poses = {body.name: np.zeros((2, 3)) for body in mechanism.bodies}
+    drawn = [shape for shape in shapes(Instant(mechanism, poses, {})) if shape.strips]
+    (load,) = mechanism.loads
+    assert [shape.name for shape in drawn] == [load.name] * (not isinstance(load, ForceAt) or bool(load.x or load.y))
+    for shape in drawn:
+        placed = shape.placed({frame: pose[0] for frame, pose in poses.items()})
+        assert all(np.isfinite(points).all() for _, points in details.symbol(placed, SIZE))
+
+
+def test_a_run_without_numbers_has_symbols_too() -> None:
+    mechanism = fourbar(
+        '[loads.gas]\ntype = "force_along"\nat = "coupler.M"\nlaw = "polynomial"\ncoefficients = [0, 1]\n'
+        'over = { measure = "angle", of = "rocker" }\n'
+    )
+    poses = {body: np.full((3, 3), np.nan) for body in ("ground", "crank", "coupler", "rocker")}
+    poses["ground"] = np.zeros((3, 3))
+    drawn = [shape.name for shape in shapes(Instant(mechanism, poses, {"crank": 1.0})) if shape.strips]
+    assert drawn == ["gas"]

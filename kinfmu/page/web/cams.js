@@ -61,8 +61,12 @@ function camOf(linkage, cam) {
 
 // Return a number of a cam's joint: null if the file has none, undefined if an expression of changed parameters gives it.
 function numberOf(linkage, cam, key) {
-    const { value, names, alone } = cam[key] || { value: null, names: [] };
-    const place = linkage.bound.get(`joints.${cam.name}.${key}`);
+    return valueOf(linkage, `joints.${cam.name}.${key}`, cam[key] || { value: null, names: [] });
+}
+
+// Return a number of the file as set, by its place; undefined if an expression of changed parameters gives it.
+export function valueOf(linkage, name, { value, names, alone }) {
+    const place = linkage.bound.get(name);
     if (place !== undefined) return place;
     if (alone) return linkage.bound.get(alone) ?? value;
     return changed(linkage).some((one) => names.includes(one.name)) ? undefined : value;

@@ -2,6 +2,7 @@
 
 import { camsOf, isJointChanged, OF_CAMS } from "./cams.js";
 import { distance, placed, seen } from "./geometry.js";
+import { loadsLeftOut } from "./loads.js";
 
 const POSES = 120; // that decide how far slides reach
 const BEYOND = 0.35; // of the pinion's radius, additional length at both ends of a rack
@@ -28,7 +29,7 @@ export function formsOf(linkage) {
     const wheels = [...new Set(unknown.map(({ name }) => name))].map((name) => `the wheels of ${name}, whose numbers are changed`);
     return {
         shapes: [...kept, ...cams.flatMap((cam) => cam.shapes)],
-        leftOut: [...wheels, ...cams.map((cam) => cam.leftOut).filter(Boolean)],
+        leftOut: [...wheels, ...cams.map((cam) => cam.leftOut).filter(Boolean), ...loadsLeftOut(linkage)],
     };
 }
 

@@ -1,5 +1,6 @@
 // Symbols of loads, as the scene has them: springs, dampers, forces and torques; the direction of gravity.
 
+import { valueOf } from "./cams.js";
 import { css, edgeOf, GREY } from "./colours.js";
 import { distance } from "./geometry.js";
 import { number } from "./numbers.js";
@@ -14,12 +15,12 @@ export function loads(painter) {
     for (const load of painter.linkage.data.loads) {
         const found = baseOf(painter, load);
         if (!found) continue;
-        const { at, along: [x, y], length, text } = found;
+        const { at, along: [x, y], length, text, flips } = found;
         const all = [];
         for (const { points, area, solid } of load.strips) {
             const line = points.map(([part, own, detail, across]) => {
-                const ahead = Math.min(Math.max(part * length + own * painter.view.scale, 0), length) + 1.3 * size * detail;
-                const side = 1.3 * size * across;
+                const ahead = Math.min(Math.max(part * length + own * painter.view.scale, 0), length) + 1.3 * size * detail * flips[0];
+                const side = 1.3 * size * across * flips[1];
                 return [at[0] + ahead * x + side * y, at[1] + ahead * y - side * x];
             });
             pen.line(line, { width: solid ? 0.5 : 1.8, colour: ink, closed: Boolean(area), fill: area ? (solid ? ink : theme.paper) : null });
@@ -32,26 +33,48 @@ export function loads(painter) {
     }
 }
 
-// Return where a load is, in pixels: { at, along, length, text }; null for one without a direction.
-function baseOf({ linkage, dot }, { name, text, points, frame, axes, force, angle, sense }) {
+// Return where a load is, in pixels: { at, along, length, text, flips }; null for one without a direction.
+function baseOf({ linkage, dot }, load) {
+    const { name, type, points, frame, axes, isAgainst, unit } = load;
     const places = points.map((point) => dot(linkage.point(point)));
+    const set = numbersOf(linkage, load);
+    if (Object.values(set).includes(undefined)) return null;
+    const { x, y, angle, level } = set;
+    const isTurned = level !== undefined && level * load.level.value < 0; // the other way than in the file
+    const text = level === undefined ? load.text : `${name} = ${number(Math.abs(level))} ${unit}`;
     if (places.length > 1) {
         const [at, end] = places;
         const length = distance(at, end);
-        return length ? { at, along: [0, 1].map((axis) => (end[axis] - at[axis]) / length), length, text } : null;
+        const along = [0, 1].map((axis) => (end[axis] - at[axis]) / length);
+        return length ? { at, along, length, text, flips: [isTurned ? -1 : 1, 1] } : null;
     }
-    const set = (key, value) => linkage.bound.get(`loads.${name}.${key}`) ?? value;
-    const pose = (body) => (body && linkage.body(body) >= 0 ? linkage.bodyPose(linkage.body(body)) : [0, 0, 0]);
-    let turn = pose(axes || frame)[2];
-    if (force) {
-        const [x, y] = [set("x", force[0]), set("y", force[1])];
+    const body = linkage.body(frame);
+    const pose = body < 0 ? [0, 0, 0] : linkage.bodyPose(body);
+    const turned = axes ? linkage.body(axes) : body;
+    let turn = turned < 0 ? 0 : linkage.bodyPose(turned)[2];
+    const flips = [1, type === "torque" && isTurned ? -1 : 1];
+    const base = { at: places[0] || dot(pose), length: 0, flips, text };
+    if (x !== undefined) {
         if (!x && !y) return null;
         turn += Math.atan2(y, x);
-        text = `${name} = ${number(Math.hypot(x, y))} N`;
+        base.text = `${name} = ${number(Math.hypot(x, y))} N`;
     } else if (angle !== undefined) {
-        turn += set("angle", angle) + (sense < 0 ? Math.PI : 0);
+        turn += angle + (isAgainst !== isTurned ? Math.PI : 0);
     }
-    return { at: places[0] || dot(pose(frame)), along: [Math.cos(turn), -Math.sin(turn)], length: 0, text };
+    return { ...base, along: [Math.cos(turn), -Math.sin(turn)] };
+}
+
+// Return the numbers of a load as set, by key; undefined where an expression of changed parameters gives one.
+function numbersOf(linkage, load) {
+    const own = `${load.name}.level`; // where it is a constant of a law, not a plain number of the file
+    const level = linkage.bound.has(own) ? own : `loads.${load.name}.law.level`;
+    const keys = ["x", "y", "angle", "level"].filter((key) => load[key]);
+    return Object.fromEntries(keys.map((key) => [key, valueOf(linkage, key === "level" ? level : `loads.${load.name}.${key}`, load[key])]));
+}
+
+// Return in words which loads cannot be drawn with the values as set.
+export function loadsLeftOut(linkage) {
+    return linkage.data.loads.filter((load) => Object.values(numbersOf(linkage, load)).includes(undefined)).map(({ name }) => `the load ${name}, whose numbers are changed`);
 }
 
 // Draw the direction of gravity in the upper right corner, if nothing is there.
