@@ -306,7 +306,7 @@ class BranchPath:
         part = np.linspace(0.0, FAR, FAR_PLACES)
         with np.errstate(all="ignore"):
             for _ in range(PASSES):
-                values = _lowest(self.drawn.places(here + direction * part[:, None]).closing.limits, len(part))
+                values = _lowest(self.drawn.closing(here + direction * part[:, None]).limits, len(part))
                 bad = _first_bad(values)
                 if bad is None or bad == 0:
                     return None
@@ -334,8 +334,8 @@ class BranchPath:
                 left, right = parts[max(k - 1, 0)], parts[min(k + 1, last)]
                 for _ in range(PASSES):
                     part = left + (right - left) * np.arange(PIECES + 1) / PIECES
-                    exact = self.drawn.places(here + (target - here) * part[:, None])
-                    found = _each(exact.closing.limits, len(part))[number]
+                    closing = self.drawn.closing(here + (target - here) * part[:, None])
+                    found = _each(closing.limits, len(part))[number]
                     best = int(np.argmin(found))
                     least = min(least, float(found[best]))
                     if 0 < best < PIECES and 2 * found[best] - max(found[best - 1], found[best + 1]) > CLEAR:

@@ -98,11 +98,22 @@ class Drawn:
         """Coordinates without their derivatives, in long doubles."""
         return self._columns(LONG, [Value(LONG, LONG.array(column)) for column in u.T])
 
+    def closing(self, u: Array) -> Closing:
+        """What must stay positive and what changes its sign, in long doubles."""
+        closing = Closing()
+        self.sketch.poses(LONG, self._local(LONG, [Value(LONG, LONG.array(column)) for column in u.T]), closing)
+        return closing
+
+    def _local(self, numbers: Numbers, given: Sequence[Jet]) -> list[Jet]:
+        """Return driver values in the frame and the unit of the sketch."""
+        theta, scale = numbers.angle(self.frame.direction), numbers.number(self.frame.scale)
+        kinds = zip(given, self.sketch.kinds, strict=True)
+        return [one - theta if kind == "angle" else one / scale for one, kind in kinds]
+
     def _columns(self, numbers: Numbers, given: Sequence[Jet]) -> Exactly:
         value = numbers.number
         theta, scale = numbers.angle(self.frame.direction), value(self.frame.scale)
-        kinds = zip(given, self.sketch.kinds, strict=True)
-        local = [one - theta if kind == "angle" else one / scale for one, kind in kinds]
+        local = self._local(numbers, given)
         closing = Closing()
         poses = self.sketch.poses(numbers, local, closing)
         c, s = (value(part) * scale for part in self.frame.direction)
