@@ -89,7 +89,7 @@ def driver_advice(system: System, redundancy: Redundancy) -> DriverAdvice | None
     """
     if len(system.coordinates) > _LARGE:
         return None
-    poses = motion_samples(Part(system, redundancy.kept), redundancy.assembly.start.q, _SAMPLES)
+    poses = list(motion_samples(Part(system, redundancy.kept), redundancy.assembly.start.q, _SAMPLES))
     if not poses:
         return None
     gradients = [system.scaled_jacobian(pose) for pose in poses]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.linalg import solve_triangular
 
@@ -85,24 +87,25 @@ def _straight(part: Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray, Flo
     return (there, left, None) if is_linear else (q.copy(), residual, jacobian)
 
 
-def motion_samples(part: Part, q: FloatArray, count: int, step: float = 0.2) -> list[FloatArray]:
-    """Return up to `count` poses along the motion that the rows of a part leave, starting with the one nearest to q.
+def motion_samples(part: Part, q: FloatArray, count: int, step: float = 0.2) -> Iterator[FloatArray]:
+    """Yield up to `count` poses along the motion that the rows of a part leave, starting with the one nearest to q.
 
     Random directions of the null space of its Jacobian (seeded), `step` in radians and sizes. Where the motion ends or
-    comes to a singular point, where other branches cross, it is followed from the first pose the other way. Empty if
+    comes to a singular point, where other branches cross, it is followed from the first pose the other way. No pose if
     the rows do not close near q; one pose if they leave no motion. Drivers among the rows are at 0.
     """
     start, gap = close(part, q, np.zeros(len(part.system.mechanism.drivers)))
     if gap > CLOSED:
-        return []
+        return
+    yield start
+    found = 1
     rng = np.random.default_rng(1989)
-    samples = [start]
     free, least = _freedom(part.jacobian(start))  # (n, free directions)
     least = min(_FAR_FROM_SINGULAR, 0.3 * least)
     first = free @ rng.standard_normal(free.shape[1])
     for direction in (first, -first):
         pose = start
-        while free.shape[1] > 0 and len(samples) < count:
+        while free.shape[1] > 0 and found < count:
             free, _ = _freedom(part.jacobian(pose))
             direction = free @ (free.T @ direction) + 0.3 * free @ rng.standard_normal(free.shape[1])
             direction /= np.abs(direction).max()
@@ -110,8 +113,8 @@ def motion_samples(part: Part, q: FloatArray, count: int, step: float = 0.2) -> 
             if onward is None:
                 break
             pose = onward
-            samples.append(pose)
-    return samples
+            found += 1
+            yield pose
 
 
 def _onward(

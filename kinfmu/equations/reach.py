@@ -29,7 +29,7 @@ def cannot_close(part: Part, u: FloatArray) -> bool:
         |ab| <= |ac| + |cb|        for all points, so |ab| <= the length of the shortest way from a to b
 
     Known poses are those of the ground, of bodies that are not among the coordinates of the part, and of bodies pinned
-    to these with an angle that is held or driven.
+    to these with an angle that is held or driven. Of a body whose angle alone is among them the origin is known.
 
     Args:
         part: The rows and their coordinates.
@@ -51,11 +51,14 @@ def cannot_close(part: Part, u: FloatArray) -> bool:
         elif isinstance(member.owner, Held):
             targets.append(member.owner.measured())
     bars = [(quantity.between, abs(target)) for quantity, target in targets if isinstance(quantity, DistanceBetween)]
+    columns = set(part.columns)
+    poses = _known_poses(system, whole, columns, targets, pins)
+    origins = _known_origins(system, whole, columns)
     names = list(dict.fromkeys(name for between in (*pins, *(ends for ends, _ in bars)) for name in between))
+    names += [origin for origin in origins if body_of(origin) not in poses]
     if not 1 < len(names) <= _MOST_POINTS:
         return False
-    poses = _known_poses(system, whole, set(part.columns), targets, pins)
-    distances = _distances(system, names, poses)
+    distances = _distances(system, names, poses, origins)
     place = {name: k for k, name in enumerate(names)}
     least, most = distances.copy(), distances.copy()  # two bars may join the same points
     for (a, b), length in (*((pin, 0.0) for pin in pins), *bars):
@@ -103,18 +106,32 @@ def _known_poses(
     return poses
 
 
-def _distances(system: System, names: Sequence[str], poses: dict[str, Pose]) -> FloatArray:
-    """Return the distances (k, k) of points on one body or on bodies whose poses are known; infinite for others."""
-    groups: dict[str, list[int]] = {}
-    places = np.empty((len(names), 2))
+def _known_origins(system: System, q: FloatArray, columns: set[int]) -> dict[str, tuple[float, float]]:
+    """Return where the origins of frames are that are known, by 'body.': those outside of `columns`."""
+    bodies = enumerate(system.mechanism.moving_bodies)
+    known = [(body.name, 3 * k) for k, body in bodies if not {3 * k, 3 * k + 1} & columns]
+    return {f"{name}.": (float(q[x]), float(q[x + 1])) for name, x in known}
+
+
+def _distances(
+    system: System, names: Sequence[str], poses: dict[str, Pose], origins: dict[str, tuple[float, float]]
+) -> FloatArray:
+    """Return the distances (k, k) of points on one body, or whose places are known; infinite for others."""
+    fixed: list[tuple[int, tuple[float, float]]] = []
+    of_bodies: dict[str, list[tuple[int, tuple[float, float]]]] = {}
     for k, name in enumerate(names):
         body = body_of(name)
-        places[k] = _world(system, name, poses[body]) if body in poses else system.mechanism.body_points[name]
-        groups.setdefault(GROUND_NAME if body in poses else body, []).append(k)
+        if body in poses:
+            fixed.append((k, _world(system, name, poses[body])))
+            continue
+        if name in origins:
+            fixed.append((k, origins[name]))
+        of_bodies.setdefault(body, []).append((k, system.mechanism.body_points.get(name, (0.0, 0.0))))
     distances = np.full((len(names), len(names)), np.inf)
-    for group in groups.values():
-        apart = places[group][:, None] - places[group]
-        distances[np.ix_(group, group)] = np.hypot(apart[..., 0], apart[..., 1])
+    for group in (fixed, *of_bodies.values()):
+        numbers, places = [k for k, _ in group], np.array([place for _, place in group]).reshape(-1, 2)
+        apart = places[:, None] - places
+        distances[np.ix_(numbers, numbers)] = np.hypot(apart[..., 0], apart[..., 1])
     return distances
 
 

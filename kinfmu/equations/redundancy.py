@@ -124,10 +124,12 @@ def _poses_of_dependence(
     members = {system.member_of[row] for row in (*others, index)}
     columns = sorted({column for number in members for column in system.members[number].columns})
     part = Part(system, others, columns, start)
-    poses = [part.whole(q) for q in motion_samples(part, start[columns], _SAMPLES)]
-    if not poses or not all(_in_span(system, pose, index, others) for pose in poses):
-        return None
-    return poses, others
+    poses = []
+    for q in motion_samples(part, start[columns], _SAMPLES):
+        poses.append(part.whole(q))
+        if not _in_span(system, poses[-1], index, others):
+            return None
+    return (poses, others) if poses else None
 
 
 def _suspects(system: System, closed: FloatArray | None) -> dict[int, list[int]]:

@@ -64,7 +64,7 @@ def unknown_contacts(plan: SolvePlan) -> dict[str, tuple[ForceName, ...]]:
         return {}
     system = System(localized(mechanism)[0])
     part = Part(system, range(system.joint_row_count))
-    poses = motion_samples(part, plan.anchor.q, _POSES) or [plan.anchor.q]
+    poses = list(motion_samples(part, plan.anchor.q, _POSES)) or [plan.anchor.q]
     rows, shared = row_names(plan), shared_reactions(plan)
     found = {}
     for cam in unknown:

@@ -130,6 +130,18 @@ def test_bodies_outside_of_a_part_are_where_they_are() -> None:
         assert cannot_close(Part(system, rows, columns, at), np.zeros(1)) == is_open
 
 
+def test_of_a_loop_in_its_block_the_origins_of_frames_are_known() -> None:
+    """The block of a four-bar's loop has the rows of Q and the angles of coupler and rocker alone."""
+    system = System(bars(4.0, 1.0, 3.5, 3.0, pinned=True))
+    rows = [k for k, row in enumerate(system.rows) if row.owner == "Q"]
+    columns = [k for k, name in enumerate(system.coordinates) if name.owner in ("coupler", "rocker") and name.is_angle]
+    at = np.zeros(len(system.coordinates))
+    at[system.coordinates.index("rocker.x")] = 4.0
+    for x, is_open in ((1.0, False), (-2.4, False), (-2.6, True), (3.4, False), (3.6, True)):
+        at[system.coordinates.index("coupler.x")] = x
+        assert cannot_close(Part(system, rows, columns, at), np.zeros(1)) == is_open
+
+
 def test_a_design_that_is_proved_open_is_reported_as_before_without_random_starts(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
