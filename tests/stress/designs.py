@@ -83,12 +83,13 @@ def compared(name: str, count: int, seed: int, engines: Sequence[str] = ENGINES,
     with _failures_planned_once():
         batches = {engine: kinfmu.compile(mechanism, engine=engine).solve_designs(values, t) for engine in engines}
         for k, place in enumerate(places):
-            file = continued(mechanism, {key: float(array[k]) for key, array in values.items()}).mechanism
+            design = {key: float(array[k]) for key, array in values.items()}
             runs: dict[str, Run | None] = {}
             for engine in ("python", "native") if "native" in engines and place < FILES_IN_C else ("python",):
                 try:
+                    file = continued(mechanism, design).mechanism
                     runs[engine] = kinfmu.compile(file, parameters=(), engine=engine).solve(t)
-                except KinfmuError:
+                except KinfmuError:  # or there is no such file: the root of a negative number
                     runs[engine] = None
             run = runs["python"]
             samples.update(Status(status).name.lower() for status in ([] if run is None else run.status.tolist()))
