@@ -37,6 +37,20 @@ class Opened:
         """Wait until the page has drawn what was asked for."""
         self.tab.wait_for_function("!window.kinfmu.isAsked")
 
+    def resize(self, size: dict[str, int]) -> None:
+        """Give the window a size, and wait until the drawing has its own."""
+        self.tab.set_viewport_size(size)
+        self.tab.wait_for_function(
+            """([width, height]) => {
+                const { view } = window.kinfmu;
+                const stage = document.querySelector("#stage").getBoundingClientRect();
+                return innerWidth === width && innerHeight === height
+                    && view.width === stage.width && view.height === stage.height;
+            }""",
+            arg=[size["width"], size["height"]],
+        )
+        self.settle()
+
     def move(self, value: float) -> None:
         """Move the only driver."""
         self.get(f"k.refresh(() => k.move(0, {value!r}))")
@@ -74,6 +88,7 @@ class Opened:
         def send(kind: str, places: list[tuple[float, float]]) -> None:
             points = [{"x": x, "y": y, "id": number} for number, (x, y) in enumerate(places)]
             session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+            self.tab.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
             self.settle()
 
         kind = "touchStart"
@@ -81,6 +96,8 @@ class Opened:
             send(kind, list(places))
             kind = "touchMove"
         send("touchEnd", [])
+        self.tab.wait_for_function("!window.kinfmu.canvas.classList.contains('dragging')")
+        self.settle()
         session.detach()
 
 

@@ -60,8 +60,7 @@ def test_handle_of_a_driver_drags_it_in_both_modes_and_the_view_stays(chromium: 
 
 def test_a_finger_drags_the_handle_and_two_fingers_zoom(chromium: Browser) -> None:
     with chromium.open(text_of("crank_rocker"), has_touch=True, is_mobile=True) as page:
-        page.tab.set_viewport_size(PHONE)
-        page.settle()
+        page.resize(PHONE)
         before = page.get("[k.view.x, k.view.y, k.view.scale]")
         x, y = on_screen(page, "k.handles[0].at")
         cx, cy = page.at("crank.O")

@@ -88,8 +88,7 @@ def test_dragged_bucket_moves_three_cylinders_whose_sliders_end_at_their_limits(
 
 def test_page_fits_a_phone(chromium: Browser) -> None:
     with chromium.open(text_of("jansen_leg"), has_touch=True) as page:
-        page.tab.set_viewport_size(PHONE)
-        page.settle()
+        page.resize(PHONE)
         assert page.tab.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
         x, y = page.at("crank.X")
         page.tab.touchscreen.tap(x, y)
