@@ -116,3 +116,18 @@ def test_small_arrows_keep_their_colour_in_an_animation_of_many_colours(
     animate(kinfmu.solve(kinfmu.load("excavator_loaded"), np.linspace(0.0, 5.0, 21)), tmp_path / "run.gif")
     with image.open(tmp_path / "run.gif") as pictures:
         assert (np.asarray(pictures.convert("RGB")) == np.array(palette.LOAD)).all(axis=2).sum() > 20
+
+
+def test_gravity_is_left_out_where_no_corner_is_free() -> None:
+    corners = {"A": (0.0, 0.0), "B": (4.0, 0.0), "C": (4.0, 3.0), "D": (0.0, 3.0)}
+    plate = kinfmu.Body("plate", corners, mass=1.0)
+    held = kinfmu.Revolute("A", ("ground.A", "plate.A"))
+    mechanism = kinfmu.Mechanism(
+        "plate",
+        [kinfmu.Body("ground", {"A": (0.0, 0.0)}), plate],
+        [held],
+        [kinfmu.AngleDriver("plate", "plate", kinfmu.ConstantSpeed(0.0, 1.0))],
+        run=kinfmu.RunSettings(0.0, 0.01),
+        gravity=(0.0, -9.81),
+    )
+    assert "g" not in texts(sheet_of(instant(mechanism)))

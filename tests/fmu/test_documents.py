@@ -18,9 +18,13 @@ from kinfmu.cli import main
 from kinfmu.errors import RequestError
 from kinfmu.fmu.documents import documents
 from kinfmu.fmu.interface import Drive
+from kinfmu.fmu.picture import picture
 from kinfmu.fmu.variables import interface
 from kinfmu.plan import compile_plan
+from kinfmu.scene import palette
+from kinfmu.scene.scene import scene
 from tests.fmu.conftest import Build
+from tests.loads.every_load import every_load, fourbar
 
 Built = Callable[[str, Drive], Path]
 
@@ -141,3 +145,15 @@ _OPTIONS = {"version": "model-version"}
 def test_invalid_metadata_have_one_line(metadata: dict[str, str], message: str, tmp_path: Path) -> None:
     with pytest.raises(RequestError, match=message):
         kinfmu.build(kinfmu.load("double_pendulum"), tmp_path, flavour="python", metadata=metadata)
+
+
+def test_the_picture_of_an_fmu_shows_loads() -> None:
+    run = kinfmu.solve(every_load(), [0.0, 0.1])
+    drawn = picture(run)
+    assert drawn is not None
+    violet = [line for line in drawn.lines if line.colour == palette.LOAD]
+    strips = [shape.strips for shape in scene(run, every_load()).shapes]
+    assert len(violet) == sum(map(len, strips)) > 20
+    bare = picture(kinfmu.solve(fourbar(), [0.0, 0.1]))
+    assert bare is not None
+    assert not [line for line in bare.lines if line.colour == palette.LOAD]
