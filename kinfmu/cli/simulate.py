@@ -23,6 +23,7 @@ from kinfmu.cli.settings import (
     checked_settings,
     set_option,
 )
+from kinfmu.files.temporary_folder import temporary_folder
 from kinfmu.files.whole_file import suffix_of
 
 if TYPE_CHECKING:
@@ -94,8 +95,6 @@ def simulate(
     and, with the extra viewer, a Rerun recording. The record grows during the run; kinfmu recover restores that of a
     killed run.
     """
-    from tempfile import TemporaryDirectory
-
     from kinfmu.fmu import simulate as simulated
     from kinfmu.log import LiveView, McapLog, write_rrd
     from kinfmu.log.viewer.package import INSTALL, has_viewer, require_viewer
@@ -112,8 +111,8 @@ def simulate(
         require_viewer(f"{rrd}: a recording")
     if live:
         require_viewer("--live")
-    with TemporaryDirectory(prefix="kinfmu_") as folder:
-        fmu, parameters = _fmu(model, settings, Path(folder), drive, has_inputs=inputs is not None)
+    with temporary_folder() as folder:
+        fmu, parameters = _fmu(model, settings, folder, drive, has_inputs=inputs is not None)
         record, recording = _logs(model, mcap, rrd) if is_logged else (None, None)
         has_recording = rrd is not None or has_viewer()
         is_replaced = record is not None and record.exists()

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinfmu.errors import FigureError, MissingPackageError
+from kinfmu.files.temporary_folder import temporary_folder
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -33,8 +33,8 @@ def mp4(images: Sequence[Image], seconds: float, path: Path) -> bytes:
     same version of ffmpeg.
     """
     width, height = images[0].size
-    with tempfile.TemporaryDirectory() as folder:
-        made = Path(folder) / "video.mp4"
+    with temporary_folder() as folder:
+        made = folder / "video.mp4"
         command = [
             encoder(path), "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
             "-r", f"{len(images) / seconds:.6f}", "-i", "-", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white",

@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from importlib.util import find_spec
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from kinfmu.errors import CompilerError, FmuError, RequestError, listed, suggestion
+from kinfmu.files.temporary_folder import temporary_folder
 from kinfmu.files.whole_file import suffix_of, write_whole
 from kinfmu.fmu.description import FmiVersion
 from kinfmu.fmu.interface import DRIVES, Drive
@@ -130,8 +130,8 @@ def _written(path: Path, data: bytes, page: str, *, osp: bool) -> Path:
     if suffix_of(path) == ".ssp":
         from kinfmu.fmu.ssp import write_ssp
 
-        with TemporaryDirectory(prefix="kinfmu_", ignore_cleanup_errors=True) as folder:
-            return write_ssp(_written(Path(folder) / "model.fmu", data, page, osp=False), path)
+        with temporary_folder() as folder:
+            return write_ssp(_written(folder / "model.fmu", data, page, osp=False), path)
     _write(path, data)
     if page:
         from kinfmu.fmu.played import add_page

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import lzma
 import struct
-import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -12,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from kinfmu.errors import FmuError
+from kinfmu.files.temporary_folder import temporary_folder
 from kinfmu.mechanism.toml_file import LARGEST_FILE
 from kinfmu.mechanism.valid import quoted
 
@@ -47,7 +47,7 @@ def unpacked(path: Path, needed: str = DESCRIPTION) -> Iterator[Path]:
         FmuError: If the file is not an FMU, is damaged, or is larger than LARGEST when unpacked.
 
     """
-    with tempfile.TemporaryDirectory(prefix="kinfmu_", ignore_cleanup_errors=True) as folder:
+    with temporary_folder() as folder:
         try:
             with zipfile.ZipFile(path) as zipped:
                 _check(path, zipped, needed)
@@ -58,7 +58,7 @@ def unpacked(path: Path, needed: str = DESCRIPTION) -> Iterator[Path]:
             raise FmuError(f"{path}: is no FMU ({reason})") from None
         except OSError as error:
             raise FmuError(f"{path}: cannot be read ({error.strerror or error})") from None
-        yield Path(folder)
+        yield folder
 
 
 def text_in(path: Path, folder: Path, name: str, largest: int = LARGEST_FILE) -> str:
@@ -101,10 +101,10 @@ def _check(path: Path, zipped: zipfile.ZipFile, needed: str) -> None:
         raise FmuError(f"{path}: is no {'FMU' if needed == DESCRIPTION else 'SSP'} ({needed} is missing)")
 
 
-def _extract(path: Path, zipped: zipfile.ZipFile, entry: zipfile.ZipInfo, folder: str) -> None:
+def _extract(path: Path, zipped: zipfile.ZipFile, entry: zipfile.ZipInfo, folder: Path) -> None:
     """Write one file below `folder`; raise an FmuError for a path outside it."""
-    target = Path(folder, entry.filename).resolve()
-    if not target.is_relative_to(Path(folder).resolve()):
+    target = (folder / entry.filename).resolve()
+    if not target.is_relative_to(folder.resolve()):
         raise FmuError(f"{path}: is no FMU (file {quoted(entry.filename)} lies outside its folder)")
     if entry.flag_bits & _ENCRYPTED:
         raise FmuError(f"{path}: file {quoted(entry.filename)} is encrypted; FMUs are not")

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import secrets
-import tempfile
 import threading
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -18,6 +17,7 @@ from types import TracebackType
 from urllib.parse import urlsplit
 
 from kinfmu.errors import KinfmuError
+from kinfmu.files.temporary_folder import temporary_folder
 from kinfmu.fmu import build
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import parse
@@ -120,7 +120,7 @@ class PlayServer:
             KinfmuError: It cannot be built.
 
         """
-        with self._building, tempfile.TemporaryDirectory() as folder:
+        with self._building, temporary_folder() as folder:
             return build(mechanism, folder, fmi=fmi).read_bytes()
 
     def save(self, text: str) -> Path:

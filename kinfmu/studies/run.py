@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from kinfmu import VERSION
 from kinfmu.errors import MechanismError, MissingPackageError, RequestError, StudyError
+from kinfmu.files.temporary_folder import temporary_folder
 from kinfmu.files.whole_file import replacement, suffix_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.processes import cores, require_workers
@@ -118,8 +118,8 @@ def run_study(
         workers = cores()
     require_workers(workers)
     if output is None:
-        with tempfile.TemporaryDirectory(prefix="kinfmu-study-") as folder:
-            path = Path(folder) / f"study{RESULTS}"
+        with temporary_folder() as folder:
+            path = folder / f"study{RESULTS}"
             _run(study, path, workers, dask, progress or _quiet, restart=False)
             return StudyResult.of_bytes(path.read_bytes())
     if not isinstance(output, str | Path):

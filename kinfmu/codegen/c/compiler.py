@@ -14,7 +14,6 @@ import re
 import shutil
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -24,6 +23,7 @@ from pathlib import Path
 
 from kinfmu.codegen.c import library_cache
 from kinfmu.errors import CompilerError
+from kinfmu.files.temporary_folder import temporary_folder
 
 RUNTIME = Path(__file__).parents[2] / "solver" / "c"
 MODEL = ("kinfmu.h", "curve.h", "sincos.h", "position.c", "linear.c", "curve.c")  # what a model needs of the run time
@@ -178,8 +178,8 @@ class _Build:
     def compile(self) -> bytes:
         """Return the compiled library."""
         try:
-            with tempfile.TemporaryDirectory() as scratch:
-                made = Path(scratch) / f"{self.key}{self.suffix}"
+            with temporary_folder() as scratch:
+                made = scratch / f"{self.key}{self.suffix}"
                 compile_files(self._compiler, self._files, self._flags, made, self._rare)
                 return made.read_bytes()
         except OSError as error:
@@ -195,9 +195,9 @@ def compile_files(
         CompilerError: It fails; the message has its first error.
 
     """
-    with tempfile.TemporaryDirectory() as scratch:
+    with temporary_folder() as scratch:
         for name, text in files.items():
-            (Path(scratch) / name).write_text(text, "utf-8", newline="\n")
+            (scratch / name).write_text(text, "utf-8", newline="\n")
         names = units(files)
         libraries = [] if os.name == "nt" else ["-lm"]
         if tuple(compiler[: len(_ZIG)]) != _ZIG:  # zig compiles in parallel itself
@@ -206,7 +206,7 @@ def compile_files(
 
 
 def _objects(
-    compiler: Sequence[str], files: Mapping[str, str], flags: Sequence[str], rare: Sequence[str], folder: str
+    compiler: Sequence[str], files: Mapping[str, str], flags: Sequence[str], rare: Sequence[str], folder: Path
 ) -> list[str]:
     """Compile units in a folder that holds the files; return their objects.
 
@@ -231,7 +231,7 @@ def _objects(
     _run(commands, folder)
     for made, key in keys.items():
         with suppress(CompilerError):  # the library is made without a cache too
-            library_cache.store(key, ".o", (Path(folder) / made).read_bytes())
+            library_cache.store(key, ".o", (folder / made).read_bytes())
     return objects
 
 
@@ -262,7 +262,7 @@ def _included(text: str) -> set[str]:
     return set(re.findall(r'^ *# *include "([\w.]+)"', text, re.MULTILINE))
 
 
-def _run(commands: Sequence[Sequence[str]], folder: str) -> None:
+def _run(commands: Sequence[Sequence[str]], folder: Path) -> None:
     """Run compilers, as many at once as there are cores; raise a CompilerError with the first error if one fails."""
 
     def run(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
@@ -327,7 +327,7 @@ def _suffix(target: str | None) -> str:
 @cache
 def _version(compiler: tuple[str, ...]) -> tuple[str, ...]:
     """Return the command of a compiler and the version that it states."""
-    with tempfile.TemporaryDirectory() as scratch:  # for some platforms zig leaves a file behind
+    with temporary_folder() as scratch:  # for some platforms zig leaves a file behind
         done = subprocess.run(  # noqa: S603  a compiler that we looked up
             [*compiler, "--version"], cwd=scratch, capture_output=True, text=True, check=False
         )

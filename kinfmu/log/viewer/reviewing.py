@@ -7,10 +7,11 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from tempfile import TemporaryDirectory, TemporaryFile
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING
 
 from kinfmu.errors import LogError, RequestError
+from kinfmu.files.temporary_folder import temporary_folder
 from kinfmu.files.whole_file import suffix_of
 from kinfmu.log.reading import read
 from kinfmu.log.target import replacing
@@ -67,10 +68,10 @@ def review(
     if not save and not screenshot:
         _need_display(run)
     if screenshot and not save:
-        with TemporaryDirectory() as folder:
+        with temporary_folder() as folder:
             recording, moment = run, _on_shown(at)
             if suffix_of(run) == ".mcap":
-                recording = Path(folder) / f"{run.stem}.rrd"
+                recording = folder / f"{run.stem}.rrd"
                 try:
                     moment = _record(run, other, recording, at, report)
                 except LogError as error:  # under the user's file name
