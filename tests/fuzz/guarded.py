@@ -26,19 +26,29 @@ _CHANGED = ("os.mkdir", "os.remove", "os.rename", "os.rmdir", "os.symlink", "os.
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 COMPILERS = ("cc", "gcc", "clang", "uname")  # which builds start, with no text of the input on their command line
+ZIG = (sys.executable, "-m", "ziglang", "cc")  # as these: it compiles the page of an FMU
 
 Trial = Callable[[int, Summary], None]  # does the trial of a seed, counts it and keeps what it finds
 
 
-def guarded(part: str, seed: int, seconds: float, memory: int = MEMORY, patience: float = PATIENCE) -> Summary:
-    """Run `trial(seed, summary)` of the module tests.fuzz.<part> for seeds from `seed` on, in a guarded process."""
+def guarded(
+    part: str,
+    seed: int,
+    seconds: float,
+    memory: int = MEMORY,
+    patience: Callable[[int], float] = lambda _: PATIENCE,
+) -> Summary:
+    """Run `trial(seed, summary)` of the module tests.fuzz.<part> for seeds from `seed` on, in a guarded process.
+
+    Each trial gets `patience(seed)` seconds.
+    """
     summary = Summary(part)
     worker: _Worker | None = None
     with tempfile.TemporaryDirectory(prefix="kinfmu_fuzz_") as folder:
         try:
             for one in seeds(seed, seconds):
                 worker = worker or _Worker(part, Path(folder), memory)
-                if not worker.run(one, summary, patience):
+                if not worker.run(one, summary, patience(one)):
                     worker.end()
                     worker = None
         finally:
@@ -122,6 +132,13 @@ def failure(error: BaseException) -> str:
     return f"{type(error).__name__} at {where}:{ours.lineno}: {error}"[:500]
 
 
+def _compiles(program: object, command: object) -> bool:
+    """True for a compiler without any text of the input on its command line."""
+    if not isinstance(command, list | tuple) or any(CANARY in str(argument) for argument in command):
+        return False
+    return Path(str(program)).name in COMPILERS or (program == ZIG[0] and tuple(command[: len(ZIG)]) == ZIG)
+
+
 class Watch:
     """What Python reports of processes started, of classes found by pickles and of writing outside a folder."""
 
@@ -136,8 +153,7 @@ class Watch:
         if not self.is_on:
             return
         if event in _STARTED:
-            name = Path(str(arguments[0])).name
-            if name not in COMPILERS or CANARY in str(arguments[1]):
+            if not _compiles(arguments[0], arguments[1]):
                 self.seen.append(f"{event} {arguments[0]!r}"[:300])
         elif event == "pickle.find_class":
             self.seen.append(f"a pickle asks for {arguments}")

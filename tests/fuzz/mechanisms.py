@@ -20,13 +20,16 @@ from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.sweep import solve
 from tests.fuzz.generated import faults
-from tests.fuzz.guarded import failure, guarded
+from tests.fuzz.guarded import PATIENCE, failure, guarded
 from tests.fuzz.hostile_text import CANARY, IDENTIFIERS, hostile, toml
 from tests.fuzz.summary import Summary
 
 QUICK = 1.0  # [s] of the processor that a refusal may take
 LONGEST = 3000  # characters of a message
+BUILDING = 120.0  # [s] for a trial that may build an FMU, of which a compiler makes the page
 SAMPLES = np.linspace(0.0, 2.0, 5)  # [s]
+Find = Callable[[str], None]
+Kind = Callable[[random.Random, Find], None]  # does one trial
 
 FILE = """\
 name = <name>
@@ -84,17 +87,21 @@ TITLES = ("title", "description")  # slots that take nearly every text
 
 def run(seed: int, seconds: float) -> Summary:
     """Trials from `seed` on for about so many seconds."""
-    return guarded("mechanisms", seed, seconds)
+    return guarded("mechanisms", seed, seconds, patience=lambda one: BUILDING if _rare(one) in BUILDS else PATIENCE)
 
 
 def trial(seed: int, summary: Summary) -> None:
     """One trial."""
     drawn = random.Random(seed)  # noqa: S311  # no secret
-    kinds = {0: _large, 1: _paths, 2: _commands} if seed % 10 == 9 else {}
-    kind = kinds.get(seed // 10 % 8) or (_titles, _words, _names, _expressions, _bytes)[seed % 5]
+    kind = _rare(seed) or (_titles, _words, _names, _expressions, _bytes)[seed % 5]
     name = kind.__name__.strip("_")
     summary.count(name)
     kind(drawn, lambda text: summary.find(seed, name, text[:500]))
+
+
+def _rare(seed: int) -> Kind | None:
+    """The kind of trial of few seeds, None for all others."""
+    return RARE.get(seed // 10 % 8) if seed % 10 == 9 else None
 
 
 def written(changes: dict[str, str]) -> str:
@@ -106,9 +113,6 @@ def written(changes: dict[str, str]) -> str:
     slots.setdefault("arm_text", f'"{slots["arm"]}"')
     slots["expression"] = slots["expression"].replace("crank", slots["crank"])
     return re.sub(r"<(\w+)>", lambda match: slots[match[1]], FILE)
-
-
-Find = Callable[[str], None]
 
 
 def read(text: str, find: Find) -> Mechanism | None:
@@ -315,3 +319,7 @@ def invoke(runner: CliRunner, command: list[str], find: Find) -> None:
     odd = {c for c in result.output if unicodedata.category(c) == "Cc"} - {"\n", "\t", *"".join(command)}
     if odd:
         find(f"{command}: control characters are printed: {result.output[:300]!r}")
+
+
+RARE: dict[int, Kind] = {0: _large, 1: _paths, 2: _commands}
+BUILDS = (_paths, _commands)
