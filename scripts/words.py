@@ -9,16 +9,29 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 WORDS = ROOT / "scripts" / "words.txt"
-ENDINGS = {".py", ".pyi", ".c", ".h", ".md", ".toml", ".sh", ".txt", ""}
+ENDINGS = {".py", ".pyi", ".c", ".h", ".js", ".html", ".css", ".md", ".toml", ".sh", ".txt", ".yml", ""}
 EXAMPLES = ROOT / "tests" / "workshop" / "test_words.py"
 NAMES = "(?# names"  # patterns with this comment distinguish capitals
 
 
+def rules() -> list[tuple[re.Pattern[str], str]]:
+    """Return the patterns of `words.txt`, and for each what to write instead."""
+    lines = [line for line in WORDS.read_text("utf-8").splitlines() if line and not line.startswith("#")]
+    pairs = [line.rsplit(" => ", 1) for line in lines]
+    return [(re.compile(p, 0 if NAMES in p else re.IGNORECASE), words) for p, words in pairs]
+
+
+def found_in(pattern: re.Pattern[str], text: str) -> re.Match[str] | None:
+    """Return what a pattern finds in a line, also within identifiers, whose words '_' or a capital separates."""
+    found = pattern.search(text)
+    if found or not pattern.flags & re.IGNORECASE:
+        return found
+    return pattern.search(re.sub("(?<=[a-z])(?=[A-Z])", " ", text).replace("_", " "))
+
+
 def main(paths: list[str]) -> int:
     """Print each line that holds such a word, with its place and the replacement; 1 if there is any."""
-    lines = [line for line in WORDS.read_text("utf-8").splitlines() if line and not line.startswith("#")]
-    rules = [line.rsplit(" => ", 1) for line in lines]
-    compiled = [(re.compile(p, 0 if NAMES in p else re.IGNORECASE), words) for p, words in rules]
+    compiled = rules()
     command = ["git", "ls-files", *paths]
     listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)  # noqa: S603
     count = 0
@@ -28,7 +41,8 @@ def main(paths: list[str]) -> int:
             continue
         for number, text in enumerate(path.read_text("utf-8").splitlines(), start=1):
             for pattern, words in compiled:
-                if (found := pattern.search(text)) and "words: " not in text:
+                found = found_in(pattern, text)
+                if found and "words: " not in text:
                     count += 1
                     print(f"{name}:{number}: '{found[0]}': write: {words}")
     print(f"{count} words to replace" if count else "All words are plain")

@@ -111,7 +111,7 @@ def _options(name: Name, sheet: Sheet) -> _Options:
     found = []
     for broken, text in enumerate(dict.fromkeys([name.text, name.text.replace(", ", ",\n")])):
         half = _half_size(text, italic=name.italic)
-        spots, homes, costs = _spots(anchors, half, name.clearance, can_stand_on=name.clearance == 0.0)
+        spots, homes, costs = _spots(anchors, half, name.clearance, can_cover=name.clearance == 0.0)
         costs = costs + _covering(spots, half, sheet.covered, corner) + _BROKEN * broken
         found.append((spots, np.tile(half, (len(spots), 1)), [text] * len(spots), anchors[homes], costs))
     spots_, halves, texts, homes_, costs_ = zip(*found, strict=True)
@@ -131,12 +131,12 @@ def _half_size(text: str, *, italic: bool) -> FloatArray:
 
 
 def _spots(
-    anchors: FloatArray, half: FloatArray, clearance: float, *, can_stand_on: bool
+    anchors: FloatArray, half: FloatArray, clearance: float, *, can_cover: bool
 ) -> tuple[FloatArray, list[int], FloatArray]:
     """Return possible middles (s, 2) [pt] of a name, the anchor of each, and the cost of its distance."""
     spots, homes, costs = [], [], []
     for home, anchor in enumerate(anchors):
-        if can_stand_on and home == 0:
+        if can_cover and home == 0:
             spots.append(anchor)
             homes.append(home)
             costs.append(0.0)

@@ -105,8 +105,8 @@ def open_joints(system: System, q: FloatArray) -> list[OpenJoint]:
 
 
 def open_joints_text(system: System, q: FloatArray) -> str:
-    """Return 'joint B is open by 82 mm' for the joints that complete start poses leave open; '' if there are none."""
+    """Return 'joint B has a gap of 82 mm' for the joints that complete start poses leave open; '' if there are none."""
     found, unit = open_joints(system, q), system.mechanism.length_unit
-    shown = [f"joint {one.name} is open by {one.gap:.4g} {unit}" for one in found[:_MOST_LISTED]]
+    shown = [f"joint {one.name} has a gap of {one.gap:.4g} {unit}" for one in found[:_MOST_LISTED]]
     more = len(found) - len(shown)
     return ", ".join([*shown, *([f"and {more} more"] if more else [])])

@@ -159,7 +159,7 @@ def test_matrices_are_the_reports() -> None:
     np.testing.assert_array_equal(near.reduced, np.eye(5))
 
 
-def test_rank_is_lost_at_a_dead_centre_and_restored_beside_it() -> None:
+def test_rank_is_lost_at_a_dead_centre_and_restored_next_to_it() -> None:
     ranks = [matrix.rank for matrix in kinfmu.check(kinfmu.load("double_pendulum")).matrices()]
     assert ranks == [5, 6, 5, 6, 5, 6]
 

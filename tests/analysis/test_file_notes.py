@@ -186,7 +186,7 @@ def test_joints_that_the_start_poses_leave_wide_open_are_reported() -> None:
     assert _open_in_start_poses(SIX_BAR) == []
     wrong = SIX_BAR.replace('"coupler.B", "rocker.B"', '"coupler.P", "rocker.B"')
     assert _open_in_start_poses(wrong) == [
-        "in the start poses of the file joint B is open by 1.414 m; assembly closed it"
+        "in the start poses of the file joint B has a gap of 1.414 m; assembly closed it"
     ]
     rough = SIX_BAR.replace("B = [3, 2], P", "B = [3.1, 2.2], P")  # as read off a sketch
     assert _open_in_start_poses(rough) == []
@@ -198,7 +198,7 @@ def test_an_error_of_a_later_loop_names_an_earlier_joint_that_the_start_poses_le
     wrong = SIX_BAR.replace("B = [3, 2], P", "B = [-1, 0], P").replace("R = [5, 3]", "R = [4, 2]")
     problem = str(check(parse(wrong)).problem)
     assert "the loop of bodies bar, flap with joints P, R, G does not close" in problem
-    assert problem.endswith("; in the start poses of the file joint B is open by 4.472 m")
+    assert problem.endswith("; in the start poses of the file joint B has a gap of 4.472 m")
 
 
 EFFORT = '[measures.motor]\ntype = "peak"\nof = "crank.torque"\n'

@@ -136,7 +136,7 @@ def test_a_place_where_the_solver_stops_at_crossing_branches_is_not_called_a_dea
     assert "where branches cross and the motion cannot continue" in str(report)
 
 
-def test_a_crossing_beside_a_dead_centre_is_bridged_and_the_dead_centre_is_the_limit() -> None:
+def test_a_crossing_near_a_dead_centre_is_bridged_and_the_dead_centre_is_the_limit() -> None:
     (reach,) = kinfmu.check(kinfmu.load("parallel_jaw")).ranges
     dead_centre = math.sqrt((20 + 40) ** 2 - 25**2)  # crank and rod in line
     assert (reach.low, reach.high) == (pytest.approx(-dead_centre, abs=1e-9), pytest.approx(dead_centre, abs=1e-9))

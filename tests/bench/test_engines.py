@@ -148,7 +148,7 @@ def test_every_engine_has_a_name_and_a_look_of_its_own_and_its_usual_setting_amo
 
 
 @pytest.mark.parametrize("u", [0.4, 2.0, 3.1, 3.2, 5.0])
-def test_the_oracle_of_the_change_point_is_the_closed_form_beside_it(u: float) -> None:
+def test_the_oracle_of_the_change_point_is_the_closed_form_near_it(u: float) -> None:
     exact = fourbar(4, 1, 3, 2, u, branch=1 if u < math.pi else -1)
     ours = exact_fourbar(4, 1, 3, 2, u)
     columns = [0, 3, 4]

@@ -139,9 +139,7 @@ def test_simulate_takes_inputs_from_a_csv(command: Command, tmp_path: Path) -> N
     assert log.read(tmp_path / "logs" / "fourbar.mcap")["crank.phi"] == pytest.approx([0.5, 1.0, 1.5])
 
 
-def test_simulate_follows_wrapped_angles_the_short_way_with_wrap(
-    command: Command, refuses: Callable[..., str], tmp_path: Path
-) -> None:
+def test_simulate_unwraps_angles_with_wrap(command: Command, refuses: Callable[..., str], tmp_path: Path) -> None:
     (tmp_path / "inputs.csv").write_text("time,crank_angle [deg]\n0,350\n2,10\n")
     assert command("simulate", "fourbar", "--stop", "2", "--input", "inputs.csv", "--wrap").exit_code == 0
     angles = log.read(tmp_path / "logs" / "fourbar.mcap")["crank.phi"]

@@ -33,9 +33,7 @@ def test_driver_values_in_degrees_go_all_the_way_round(command: Command, tmp_pat
         assert set(table["solver.status"]) <= {0, 2}
 
 
-def test_driver_values_may_be_followed_the_short_way(
-    command: Command, refuses: Callable[..., str], tmp_path: Path
-) -> None:
+def test_driver_values_are_unwrapped_with_wrap(command: Command, refuses: Callable[..., str], tmp_path: Path) -> None:
     assert command("solve", "fourbar", "-o", "run.csv", "--angle", "0deg:700deg:3", "--wrap").exit_code == 0
     assert np.degrees(read_csv(tmp_path / "run.csv")["crank.phi"]) == pytest.approx([0.0, -10.0, -20.0])
     assert "--wrap needs --angle" in refuses("solve", "fourbar", "-o", "run.csv", "--wrap")

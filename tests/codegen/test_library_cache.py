@@ -306,7 +306,7 @@ def test_a_relative_folder_is_not_looked_up_among_the_system_s_libraries(
     assert compiler.shared_library(SEVEN).parent == tmp_path
 
 
-def test_without_a_home_folder_one_line_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_home_folder_one_line_reports_it(monkeypatch: pytest.MonkeyPatch) -> None:
     def homeless() -> Path:
         raise RuntimeError("Could not determine home directory.")
 
@@ -343,7 +343,7 @@ def test_a_process_killed_while_it_writes_leaves_no_library(cache: Path) -> None
 
 
 @pytest.mark.usefixtures("cache")
-def test_libraries_that_were_not_used_for_a_day_make_room(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_libraries_that_were_not_used_for_a_day_are_removed_for_new_ones(monkeypatch: pytest.MonkeyPatch) -> None:
     old, used = compiler.shared_library(SEVEN), compiler.shared_library(EIGHT)
     for path in (old, used):
         os.utime(path, (time.time() - 2 * library_cache.UNUSED,) * 2)

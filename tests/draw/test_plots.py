@@ -209,7 +209,7 @@ def test_four_stacks_are_two_rows_of_two(run: Run) -> None:
     assert (len(made.axes), len(lefts)) == (12, 2)
 
 
-def test_reactions_without_values_say_so() -> None:
+def test_reactions_without_values_are_reported() -> None:
     run = kinfmu.solve(loaded("fourbar"), np.arange(5.0))
     (axes,) = _sheet([run], stacks_of(run, ["AB.force"])).axes
     assert [text.get_text() for text in axes.texts] == ["not determined"]

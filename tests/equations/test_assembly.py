@@ -44,7 +44,7 @@ def near_its_limit() -> Mechanism:
     )
 
 
-def test_an_anchor_beside_the_start_lies_on_the_branch_of_the_start() -> None:
+def test_an_anchor_near_the_start_lies_on_the_branch_of_the_start() -> None:
     start = -2.7290198238695482
     mechanism = near_its_limit()
     run = kinfmu.solve(mechanism, drive_angle=[start, start - 0.05, start])
@@ -202,7 +202,7 @@ def test_a_start_between_limits_close_to_each_other_is_reached(seed: int) -> Non
 
 @pytest.mark.parametrize("miss", [1e-13, 1e-10, 1e-8, 1e-6, 1e-5, 1e-3])
 @pytest.mark.parametrize(("bars", "angle"), [((2, 1, 2, 1), 0.0), ((4, 1, 3, 2), math.pi), ((3, 3, 2, 2), 0.0)])
-def test_a_start_that_misses_a_change_point_is_assembled_or_said_to_be_ambiguous(
+def test_a_start_that_misses_a_change_point_is_assembled_or_reported_as_ambiguous(
     bars: tuple[int, ...], angle: float, miss: float
 ) -> None:
     for side in (1.0, -1.0):

@@ -87,7 +87,7 @@ def test_of_two_equal_bars_the_later_one_is_set_aside() -> None:
     assert "first" in row.implied_by_joints
 
 
-def test_a_redundant_bar_in_every_loop_of_a_chain_is_found_beside_its_own_loop() -> None:
+def test_a_redundant_bar_in_every_loop_of_a_chain_is_found_with_its_own_loop() -> None:
     count = 12
     chain, bodies = fourbar_chain(count), []
     for body in chain.bodies:

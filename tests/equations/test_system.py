@@ -130,7 +130,7 @@ def test_rank_is_lost_at_multiples_of_pi_and_a_small_turn_restores_it(u: float) 
     assert np.linalg.matrix_rank(system.jacobian(fourbar_motion(u + 0.01)[0])[WITHOUT_AB], tol=1e-12) == 9
 
 
-def test_a_bar_too_long_by_a_hundredth_is_open_by_a_hundredth() -> None:
+def test_a_bar_too_long_by_a_hundredth_has_a_gap_of_a_hundredth() -> None:
     bars = [dataclasses.replace(j, length=1.01) if isinstance(j, kinfmu.Distance) else j for j in FOURBAR.joints]
     system = System(dataclasses.replace(FOURBAR, joints=tuple(bars)))
     gaps = system.gaps(system.residual(fourbar_motion(1.0)[0], [1.0]))

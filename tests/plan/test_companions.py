@@ -50,7 +50,7 @@ def test_rods_in_line_keep_their_change_points() -> None:
 @pytest.mark.parametrize("rods", [LOCOMOTIVE, ROW])
 @pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize("second", [False, pytest.param(True, marks=pytest.mark.long)])
-def test_coupled_wheels_turn_alike_at_every_angle(
+def test_coupled_wheels_turn_by_equal_angles(
     rods: dict[str, tuple[int, int, float]], engine: str, second: bool
 ) -> None:
     """Closed form: every wheel turns as the first, every rod stays parallel to itself."""

@@ -34,7 +34,7 @@ def test_a_rail_is_as_far_from_its_line_as_its_block_is_wide() -> None:
 
 
 @pytest.mark.parametrize("towards", [(0.0, -1.0), (1.0, 0.0), (-0.6, 0.8)])
-def test_a_support_stands_on_its_line_with_the_pin_at_its_tip(towards: tuple[float, float]) -> None:
+def test_a_support_ends_at_its_line_with_the_pin_at_its_tip(towards: tuple[float, float]) -> None:
     direction = np.array(towards)
     triangle, line = details.support(shape("support", (2.0, 3.0), direction=direction), 0.1)
     np.testing.assert_array_equal(triangle[0], [2.0, 3.0])

@@ -133,7 +133,7 @@ def test_loads_at_one_pair_of_points_are_drawn_next_to_each_other(found: Scene) 
     assert gap > 2.0 * SIZE
 
 
-def test_a_load_next_to_a_cylinder_is_beside_it() -> None:
+def test_a_load_near_a_cylinder_is_next_to_it() -> None:
     mechanism = kinfmu.load("excavator")
     assist = Spring("assist", ("ground.boom_foot", "boom.boom_eye"), 1.0, 1.0)
     shown = scene_of(replace(mechanism, loads=(assist,)))

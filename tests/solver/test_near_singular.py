@@ -387,7 +387,7 @@ def test_a_limit_of_one_driver_gives_no_such_reason_where_others_are_mixed() -> 
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_there_and_back_beside_a_machine_ends_where_it_began(engine: Engine) -> None:
+def test_there_and_back_next_to_a_machine_ends_where_it_began(engine: Engine) -> None:
     """Before a mixed crossing, with the machine in its window: the next way starts from the last regular pose."""
     gaps = [0.3, 1e-2, 1e-3, 1e-4, 1e-5]
     there_and_back = np.array([*gaps, *gaps[-2::-1]])

@@ -16,7 +16,7 @@ from tests.stress.families import FAMILIES
 from tests.stress.report import Report, details
 from tests.stress.trial import judged, trial
 
-CHUNK = 10  # trials handed to a process at a time
+CHUNK = 10  # trials that a process gets at a time
 COUNTS = {"python": 10_000, "native": 300}  # mechanisms; a compiler takes its time with each
 PROGRESS_INTERVAL = 5.0  # [s] between two lines of progress
 

@@ -40,7 +40,7 @@ def test_so_they_are_by_the_native_engine(family: str, monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize(("seed", "family"), [(136, "pins in slots"), (299, "near change points")])
-def test_what_can_be_had_on_one_way_and_not_on_another_has_an_estimate(
+def test_a_sample_solved_in_one_order_and_not_in_another_has_an_estimate(
     seed: int, family: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """At a limit the order of the samples decides: errors are estimated in the order in which samples were solved."""

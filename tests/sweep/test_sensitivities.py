@@ -520,6 +520,6 @@ def test_an_argument_written_as_an_expression_follows_unless_given() -> None:
         np.testing.assert_allclose(follows.of(output, "rocker"), every.of(output, "rocker"), rtol=0, atol=1e-13)
 
 
-def test_a_model_without_parameters_says_so() -> None:
+def test_a_model_without_parameters_is_reported() -> None:
     with pytest.raises(RequestError, match="the model has no parameters"):
         kinfmu.compile(kinfmu.load("fourbar")).sensitivities(crank_angle=ANGLES)

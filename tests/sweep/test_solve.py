@@ -43,7 +43,7 @@ def test_angles_keep_their_turns() -> None:
     np.testing.assert_allclose(run["rocker.phi"], [0.5, 0.5 + 40 * np.pi, 0.5], rtol=1e-14)
 
 
-def test_times_and_inputs_drive_alike() -> None:
+def test_times_and_inputs_drive_equally() -> None:
     mechanism = kinfmu.load("fourbar")
     t = np.linspace(10.0, 20.0, 5)
     by_time = kinfmu.solve(mechanism, t, parameters={"crank.speed": 0.1, "crank.start": 0.2})

@@ -136,7 +136,7 @@ def test_a_python_without_venv_is_reported_with_what_to_install(miniature: Minia
     assert printed.endswith("python3 is 3.11 without venv (Debian: apt-get install python3.11-venv)\n")
 
 
-def test_a_newer_python_beside_an_old_one_is_found(miniature: Miniature) -> None:
+def test_a_newer_python_next_to_an_old_one_is_found(miniature: Miniature) -> None:
     newer = miniature.bin / "python3.12"
     miniature.python.rename(newer)
     miniature.python.write_text("#!/bin/sh\ncase $2 in *print*) echo 3.9 ;; *) exit 1 ;; esac\n")

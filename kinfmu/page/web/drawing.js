@@ -89,7 +89,7 @@ class Painter {
         this.wanted.push({ text, places, colour, off, rank });
     }
 
-    // Keep names off a line of a width, if there is room elsewhere.
+    // Keep names off a line of a width, if there is space elsewhere.
     cover(a, b, width) {
         const count = Math.min(Math.ceil(distance(a, b) / 10), 100);
         for (let k = 0; k <= count; k++) {

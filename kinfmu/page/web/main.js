@@ -1,4 +1,4 @@
-// The page: one mechanism, its drawing, the hand on it, motion over time, panels.
+// The page: one mechanism, its drawing, the hand on the drawing, motion over time, panels.
 
 import { Address } from "./address.js";
 import { arrows } from "./arrows.js";

@@ -25,7 +25,7 @@ def kinfmu(folder: Path, *arguments: str) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
-def test_simulate_writes_the_record_alone_and_says_so(tmp_path: Path) -> None:
+def test_simulate_writes_the_record_alone_and_reports_it(tmp_path: Path) -> None:
     status, out, err = kinfmu(tmp_path, "simulate", "fourbar", "--stop", "3")
     assert (status, err) == (0, "")
     first, second = out.splitlines()
