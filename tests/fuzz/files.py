@@ -43,18 +43,23 @@ OUTSIDE = (f"../{CANARY}", f"/tmp/{CANARY}", f"a/../../{CANARY}", f"resources/..
 
 def run(seed: int, seconds: float) -> Summary:
     """Trials from `seed` on for about so many seconds."""
-    return guarded("files", seed, seconds)
+    return guarded("files", seed, seconds, kind=kind_of)
 
 
 def trial(seed: int, summary: Summary) -> None:
     """One trial."""
     drawn = random.Random(seed)  # noqa: S311  # no secret
-    rare = {0: _bombs, 1: _others}.get(seed // 12 % 6) if seed % 12 == 11 else None
-    usual = (_fmu_bytes, _fmu_texts, _fmu_files, _record_bytes, _record_texts, _record_samples, _inputs, _tables)
-    kind = rare or usual[seed % len(usual)]
+    kind = kind_of(seed)
     name = kind.__name__.strip("_")
     summary.count(name)
     kind(drawn, lambda text: summary.find(seed, name, text[:500]))
+
+
+def kind_of(seed: int) -> Callable[[random.Random, Find], None]:
+    """The kind of a trial."""
+    rare = {0: _bombs, 1: _others}.get(seed // 12 % 6) if seed % 12 == 11 else None
+    usual = (_fmu_bytes, _fmu_texts, _fmu_files, _record_bytes, _record_texts, _record_samples, _inputs, _tables)
+    return rare or usual[seed % len(usual)]
 
 
 @cache

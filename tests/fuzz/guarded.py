@@ -10,7 +10,7 @@ import sys
 import tempfile
 import traceback
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -37,16 +37,17 @@ def guarded(
     seconds: float,
     memory: int = MEMORY,
     patience: Callable[[int], float] = lambda _: PATIENCE,
+    kind: Callable[[int], Hashable] = lambda _: None,
 ) -> Summary:
     """Run `trial(seed, summary)` of the module tests.fuzz.<part> for seeds from `seed` on, in a guarded process.
 
-    Each trial gets `patience(seed)` seconds.
+    Each trial gets `patience(seed)` seconds; one of each `kind(seed)` is done whatever the time.
     """
     summary = Summary(part)
     worker: _Worker | None = None
     with tempfile.TemporaryDirectory(prefix="kinfmu_fuzz_") as folder:
         try:
-            for one in seeds(seed, seconds):
+            for one in seeds(seed, seconds, kind):
                 worker = worker or _Worker(part, Path(folder), memory)
                 if not worker.run(one, summary, patience(one)):
                     worker.end()

@@ -87,21 +87,27 @@ TITLES = ("title", "description")  # slots that take nearly every text
 
 def run(seed: int, seconds: float) -> Summary:
     """Trials from `seed` on for about so many seconds."""
-    return guarded("mechanisms", seed, seconds, patience=lambda one: BUILDING if _rare(one) in BUILDS else PATIENCE)
+    return guarded("mechanisms", seed, seconds, patience=_patience, kind=kind_of)
+
+
+def _patience(seed: int) -> float:
+    """Time that a trial has [s]."""
+    return BUILDING if kind_of(seed) in BUILDS else PATIENCE
 
 
 def trial(seed: int, summary: Summary) -> None:
     """One trial."""
     drawn = random.Random(seed)  # noqa: S311  # no secret
-    kind = _rare(seed) or (_titles, _words, _names, _expressions, _bytes)[seed % 5]
+    kind = kind_of(seed)
     name = kind.__name__.strip("_")
     summary.count(name)
     kind(drawn, lambda text: summary.find(seed, name, text[:500]))
 
 
-def _rare(seed: int) -> Kind | None:
-    """The kind of trial of few seeds, None for all others."""
-    return RARE.get(seed // 10 % 8) if seed % 10 == 9 else None
+def kind_of(seed: int) -> Kind:
+    """The kind of a trial."""
+    rare = RARE.get(seed // 10 % 8) if seed % 10 == 9 else None
+    return rare or (_titles, _words, _names, _expressions, _bytes)[seed % 5]
 
 
 def written(changes: dict[str, str]) -> str:

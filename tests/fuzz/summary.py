@@ -5,9 +5,11 @@ from __future__ import annotations
 import itertools
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
+
+SEEDS_OF_ALL_KINDS = 100  # among so many seeds in a row, every kind of trial is found
 
 
 class Finding(NamedTuple):
@@ -44,10 +46,24 @@ class Summary:
         return [f"{self.part}: {self.tried.total()} trials ({counts}), {len(found)} findings", *found]
 
 
-def seeds(first: int, seconds: float) -> Iterator[int]:
-    """Seeds from `first` on until `seconds` have passed; at least one."""
+def seeds(first: int, seconds: float, kind: Callable[[int], Hashable] = lambda _: None) -> Iterator[int]:
+    """Seeds from `first` on until `seconds` have passed: one of each kind in any case; only `first` if 0 seconds."""
+    if seconds <= 0:
+        yield first
+        return
+    found = one_of_each(first, kind)
+    yield from found
     end = time.monotonic() + seconds
     for seed in itertools.count(first):
-        yield seed
         if time.monotonic() >= end:
             return
+        if seed not in found:
+            yield seed
+
+
+def one_of_each(first: int, kind: Callable[[int], Hashable]) -> tuple[int, ...]:
+    """The first seed of each kind, from `first` on."""
+    found: dict[Hashable, int] = {}
+    for seed in range(first, first + SEEDS_OF_ALL_KINDS):
+        found.setdefault(kind(seed), seed)
+    return tuple(found.values())
