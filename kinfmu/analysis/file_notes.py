@@ -11,7 +11,7 @@ import numpy as np
 from kinfmu.analysis.singular import DriverRange
 from kinfmu.analysis.values import LOOKS, law_values, value_text
 from kinfmu.drivers import AngleDriver, DistanceDriver
-from kinfmu.equations.start_poses import StartValues, open_joints_text, start_from_poses
+from kinfmu.equations.start_poses import StartValues, is_in_world_coordinates, open_joints_text, start_from_poses
 from kinfmu.equations.system import System
 from kinfmu.errors import KinfmuError, listed
 from kinfmu.joints.cam import Cam
@@ -178,7 +178,9 @@ def start_notes(system: System, values: StartValues) -> Iterator[str]:
     """
     opened = open_joints_text(system, start_from_poses(system).q)
     if opened:
-        yield f"in the start poses of the file {opened}; assembly closed {'it' if ', ' not in opened else 'them'}"
+        them, their = ("them", "their") if ", " in opened else ("it", "its")
+        cure = f"; check the coordinates of {their} points" if is_in_world_coordinates(system.mechanism) else ""
+        yield f"in the start poses of the file {opened}; assembly closed {them}{cure}"
     if not values.is_moved:
         return
     given, unit = start_from_poses(system).u, system.mechanism.length_unit

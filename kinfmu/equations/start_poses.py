@@ -8,8 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from kinfmu.equations.system import FloatArray, System
+from kinfmu.joints.cam import Cam
+from kinfmu.mechanism import Mechanism
 
 ROUGH = 0.1  # sizes; poses read off a sketch close the joints more narrowly
+DRAWN = 1e-3  # sizes; points in coordinates of the world close the joints to the digits of the drawing
 _MOST_LISTED = 3  # joints in a message
 
 
@@ -84,8 +87,16 @@ class OpenJoint(NamedTuple):
     gap: float
 
 
+def is_in_world_coordinates(mechanism: Mechanism) -> bool:
+    """Return True if the frames of several bodies coincide with that of the world in the start poses."""
+    bodies = mechanism.moving_bodies
+    return len(bodies) > 1 and all(value == 0.0 for body in bodies for value in body.start)
+
+
 def open_joints(system: System, q: FloatArray) -> list[OpenJoint]:
     """Return the joints that complete start poses leave open by more than what a sketch is rounded by, widest first.
+
+    Where all points are in coordinates of the world, more than the digits of a drawing counts.
 
     Args:
         system: The equations of the mechanism.
@@ -95,11 +106,16 @@ def open_joints(system: System, q: FloatArray) -> list[OpenJoint]:
     mechanism = system.mechanism
     complete = {body.name for body in mechanism.moving_bodies if all(value is not None for value in body.start)}
     gaps = system.gaps(system.residual(q, np.zeros(len(mechanism.drivers))))
+    computed = {path[1] for path in mechanism.expressions if path[0] in {"bodies", "joints"}}  # change with parameters
+    is_drawn = is_in_world_coordinates(mechanism)
     found = []
     for member in system.members[: len(mechanism.joints)]:
         lengths = [gaps[k] for k in member.rows if system.rows[k].kind == "length"]
         gap = math.hypot(*lengths)
-        if member.bodies and complete.issuperset(member.bodies) and gap > ROUGH * system.size:
+        is_exact = is_drawn and not isinstance(member.owner, Cam)
+        is_exact = is_exact and computed.isdisjoint({*member.owner.bodies(), member.owner.name})
+        allowed = (DRAWN if is_exact else ROUGH) * system.size
+        if member.bodies and complete.issuperset(member.bodies) and gap > allowed:
             found.append(OpenJoint(member.owner.name, gap))
     return sorted(found, key=lambda one: -one.gap)
 

@@ -186,12 +186,27 @@ def test_joints_that_the_start_poses_leave_wide_open_are_reported() -> None:
     assert _open_in_start_poses(SIX_BAR) == []
     wrong = SIX_BAR.replace('"coupler.B", "rocker.B"', '"coupler.P", "rocker.B"')
     assert _open_in_start_poses(wrong) == [
-        "in the start poses of the file joint B has a gap of 1.414 m; assembly closed it"
+        "in the start poses of the file joint B has a gap of 1.414 m; assembly closed it; check the coordinates of "
+        "its points"
     ]
-    rough = SIX_BAR.replace("B = [3, 2], P", "B = [3.1, 2.2], P")  # as read off a sketch
+    posed = SIX_BAR.replace(
+        "start = { x = 0, y = 0, phi = 0 }\n[bodies.coupler]", "start = { x = 0, y = 0, phi = 0.05 }\n[bodies.coupler]"
+    )
+    assert posed != SIX_BAR
+    rough = posed.replace("B = [3, 2], P", "B = [3.1, 2.2], P")  # as read off a sketch
     assert _open_in_start_poses(rough) == []
     incomplete = wrong.replace("start = { x = 0, y = 0, phi = 0 }\n[bodies.bar]", "start = { phi = 0 }\n[bodies.bar]")
     assert _open_in_start_poses(incomplete) == []
+
+
+def test_points_in_coordinates_of_the_world_close_the_joints_to_the_digits_of_the_drawing() -> None:
+    assert _open_in_start_poses(SIX_BAR.replace("B = [3, 2], P", "B = [3.001, 2.001], P")) == []
+    assert _open_in_start_poses(SIX_BAR.replace("B = [3, 2], P", "B = [3.02, 2], P")) == [
+        "in the start poses of the file joint B has a gap of 0.02 m; assembly closed it; check the coordinates of "
+        "its points"
+    ]
+    computed = SIX_BAR.replace("B = [3, 2], P", 'B = ["x", 2], P') + "[parameters]\nx = 3.02\n"
+    assert _open_in_start_poses(computed) == []  # parameters change lengths after the drawing
 
 
 def test_an_error_of_a_later_loop_names_an_earlier_joint_that_the_start_poses_leave_open() -> None:
