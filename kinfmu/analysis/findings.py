@@ -33,7 +33,7 @@ class Findings:
     ranges: one per driver, in file order; loops: the four-bars and slider-cranks among the joints; advice: on drivers,
     None where drivers and degrees of freedom match; notes: further findings, one line each;
     measured: values of the measures, None without measures; loading: efforts and reactions, None without masses, loads;
-    cams: one per cam joint.
+    cams: one per cam joint; left_out: invalid entries of a file that is reported in part, such as '[drivers.crank]'.
     """
 
     mechanism: Mechanism
@@ -47,6 +47,7 @@ class Findings:
     measured: Measurements | None = None
     loading: Loading | None = None
     cams: tuple[CamFindings, ...] = ()
+    left_out: tuple[str, ...] = ()
 
     @property
     def mobility(self) -> int:

@@ -71,8 +71,10 @@ def _count(report: Findings) -> Iterator[ReportLine]:
         "bodies", f"{len(mechanism.moving_bodies)} moving: {_names(b.name for b in mechanism.moving_bodies)}"
     )
     yield ReportLine("joint rows", f"{rows} over {len(mechanism.coordinate_names)} coordinates")
-    drivers = f"driven by {_names(driver.name for driver in mechanism.drivers)}" if mechanism.drivers else "no driver"
-    yield ReportLine("mobility", f"{report.mobility}, {drivers}")
+    driven = [f"driven by {_names(driver.name for driver in mechanism.drivers)}"] if mechanism.drivers else []
+    invalid = [name for name in report.left_out if name.startswith("[drivers")]
+    without = [f"without {listed(invalid)}"] if invalid else []
+    yield ReportLine("mobility", f"{report.mobility}, {listed([*driven, *without] or ['no driver'])}")
     if report.gruebler != report.mobility:
         yield ReportLine("", f"Gruebler's count gives {report.gruebler}, because it counts redundant rows")
 

@@ -99,7 +99,9 @@ def _print_part(path: str, problem: MechanismError, *, as_json: bool) -> None:
         return
     reason = type(problem)(str(problem).removeprefix(f"{path}: "), **problem.data)
     text = f"this report leaves out {listed(part.left_out)}, because of the problem"
-    report = replace(report, problem=reason, notes=(text,))
+    lacks_driver = any(name.startswith("[drivers") for name in part.left_out)  # then none is missing in the file
+    advice = None if lacks_driver else report.advice
+    report = replace(report, problem=reason, notes=(text,), advice=advice, left_out=part.left_out)
     click.echo(json.dumps(report.as_json(), indent=2) if as_json else str(report))
 
 

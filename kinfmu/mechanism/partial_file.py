@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,10 +19,14 @@ _STEPS = (  # what is left out, until the rest is valid
     ("measures", "loads", "gravity", _MASSES),
     ("measures", "loads", "gravity", _MASSES, "drivers", "run", "points", "outputs"),
 )
+_FORCES = ("loads", "gravity", _MASSES)  # all or none of them: some alone give wrong forces
+_ENTRY = re.compile(r"\[(?:(measures|drivers)\.|(points)\] )([\w-]+)")
+_TABLE = re.compile(rf"\[(?:bodies\.[\w-]+\] (?:{'|'.join(MASS_KEYS)})\b|(loads|gravity|run|outputs)\b)")
+_MOST_ENTRIES = 20  # left out one by one
 
 
 class PartialFile(NamedTuple):
-    """The valid part of a mechanism file, and names of what is left out, such as '[measures]' and 'masses'."""
+    """The valid part of a mechanism file, and names of what is left out, such as '[measures.peak]' and 'masses'."""
 
     mechanism: Mechanism
     left_out: tuple[str, ...]
@@ -34,14 +39,54 @@ def read_partially(path: str | Path) -> PartialFile | None:
         document = expanded(document_of(text_in(path, "a mechanism file"), str(path)))
     except MechanismError:
         return None
+    found = _without_entries(document, path.parent)
+    if found is not None:
+        return found
     for names in _STEPS:
-        there = [name for name in names if name in document or (name == _MASSES and _has_masses(document))]
+        there = _present(document, names)
         try:
             mechanism = mechanism_of(_without(document, there), path.parent)
         except MechanismError:
             continue
-        return PartialFile(mechanism, tuple(name if name == _MASSES else f"[{name}]" for name in there))
+        return PartialFile(mechanism, tuple(map(_title, there)))
     return None
+
+
+def _without_entries(document: Mapping[str, Any], folder: Path) -> PartialFile | None:
+    """Return a file without the measures, drivers, points and tables that its errors name; None for other errors."""
+    left_out: list[str] = []
+    rest = dict(document)
+    for _ in range(_MOST_ENTRIES):
+        try:
+            return PartialFile(mechanism_of(rest, folder), tuple(left_out))
+        except MechanismError as problem:
+            message = str(problem)
+        if entry := _ENTRY.match(message):
+            table, name = entry[1] or entry[2], entry[3]
+            entries = rest.get(table)
+            if not isinstance(entries, Mapping) or name not in entries:
+                return None
+            rest[table] = {key: value for key, value in entries.items() if key != name}
+            left_out.append(f"[points] {name}" if table == "points" else f"[{table}.{name}]")
+        elif part := _TABLE.match(message):
+            names = ("run", "measures") if part[1] == "run" else ("outputs",) if part[1] == "outputs" else _FORCES
+            there = _present(rest, names)
+            if not there:
+                return None
+            rest = _without(rest, there)
+            left_out += map(_title, there)
+        else:
+            return None
+    return None
+
+
+def _present(document: Mapping[str, Any], names: Collection[str]) -> list[str]:
+    """Return those of the tables that a document has."""
+    return [name for name in names if name in document or (name == _MASSES and _has_masses(document))]
+
+
+def _title(name: str) -> str:
+    return name if name == _MASSES else f"[{name}]"
 
 
 def _has_masses(document: Mapping[str, Any]) -> bool:

@@ -166,6 +166,7 @@ law = "constant_speed"
 start = 0
 speed = "1 deg/s"
 """
+_SWING = '[measures.swing]\ntype = "range"\nof = "rocker.phi"\n'
 _PEAK = '[measures.peak]\ntype = "maximum"\nof = "crank.torque"\n'
 
 
@@ -177,7 +178,7 @@ _PEAK = '[measures.peak]\ntype = "maximum"\nof = "crank.torque"\n'
             f"{_PEAK}[points]",
             "[measures.peak] of: 'crank.torque' is not there: without masses and loads there are no forces; give a "
             "body a mass, such as mass = '1.2 kg'",
-            "[measures]",
+            "[measures.peak]",
             ["mobility    1, driven by crank", "redundant   AB (row AB.length)", "range       crank turns all the way"],
         ),
         (
@@ -198,7 +199,7 @@ _PEAK = '[measures.peak]\ntype = "maximum"\nof = "crank.torque"\n'
             _DRIVER,
             _PEAK,
             "[measures.peak] of: 'crank.torque' is not there: there is no driver 'crank'; drivers: none",
-            "[measures]",
+            "[measures.peak]",
             [
                 "mobility    1, no driver",
                 "loose       crank.phi, ",
@@ -209,8 +210,31 @@ _PEAK = '[measures.peak]\ntype = "maximum"\nof = "crank.torque"\n'
             _DRIVER,
             '[drivers.crank]\ntype = "angle"\nlaw = "constant_speed"\n',
             "[drivers.crank] needs the key 'of'; keys: of, law",
-            "[drivers], [run], [points]",
-            ["mobility    1, no driver", 'could add   [drivers] crank = { type = "angle", of = "crank", law'],
+            "[drivers.crank]",
+            ["mobility    1, without [drivers.crank]\n", "loop        four-bar"],
+        ),
+        (
+            'speed = "1 deg/s"',
+            'speed = "60 rmp"',
+            "[drivers.crank] speed = '60 rmp': unit 'rmp' must be one of rad/s, rad/min, deg/s, deg/min, rev/s, "
+            "rev/min, rpm, Hz; did you mean 'rpm'?",
+            "[drivers.crank]",
+            ["mobility    1, without [drivers.crank]\n", "loop        four-bar"],
+        ),
+        (
+            "[points]",
+            f"{_SWING}[points]\nrocker = 'coupler.P'",
+            "[points] rocker: a body has this name already, so 'rocker.x' would be ambiguous",
+            "[points] rocker",
+            ["mobility    1, driven by crank", "range       crank turns all the way", "swing = "],
+        ),
+        (
+            "[points]",
+            f"{_SWING}{_PEAK}[points]",
+            "[measures.peak] of: 'crank.torque' is not there: without masses and loads there are no forces; give a "
+            "body a mass, such as mass = '1.2 kg'",
+            "[measures.peak]",
+            ["range       crank turns all the way", "swing = "],
         ),
     ],
 )
@@ -229,6 +253,8 @@ def test_what_is_valid_of_a_file_is_reported_before_its_problem(
     assert result.stderr == f"kinfmu: mine.toml: {problem}\n"
     for line in [*lines, f"note        this report leaves out {left_out}, because", f"problem     {problem}\n"]:
         assert line in result.stdout
+    if "[drivers" in left_out:
+        assert "could add" not in result.stdout
     found = json.loads(command("check", path.name, "--json").stdout)
     assert (found["mobility"], found["problem"]) == (1, problem)
 
