@@ -287,6 +287,11 @@ def read_coordinate(text: str) -> CoordinateName | None:
     return CoordinateName(owner, axis) if owner and axis in _DERIVATIVES else None
 
 
+def is_of_angle(text: str) -> bool:
+    """Return whether a name in a file, such as 'rocker.omega', is of an angle or a derivative of one."""
+    return text.rpartition(".")[2] in _DERIVATIVES["phi"]
+
+
 def read_inputs(texts: Sequence[str]) -> tuple[InputName, ...] | None:
     """Return the inputs that names in a file state, three for each driver; None if the texts are no such names."""
     inputs: list[InputName] = []

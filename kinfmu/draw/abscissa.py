@@ -8,7 +8,8 @@ import numpy as np
 
 from kinfmu.errors import FigureError
 from kinfmu.run import FloatArray, Run
-from kinfmu.run.axis import DEGREE, axis_of
+from kinfmu.run.axis import DEGREE, axis_of, rates_per
+from kinfmu.units import unit_of
 
 TICK_STEPS = (1, 1.5, 3, 4.5, 6, 9, 10)  # of degrees: 30, 45, 60, 90; of other quantities matplotlib chooses
 
@@ -58,8 +59,10 @@ def unit_in(run: Run, name: str) -> str:
     """Return the unit of a column, also of one that never moves; KinfmuError for an unknown name."""
     units = {place.name: place.unit for place in run.places(kept=False)}
     if name not in units:
+        per = rates_per(run)
+        held = {one.derivative(order): one.quantity(order, per) for one in run.fixed for order in range(3)}
         run[name]  # reports an unknown name
-        return "rad" if name.endswith(".phi") else run.length_unit
+        return unit_of(held[name], run.length_unit)
     return units[name]
 
 

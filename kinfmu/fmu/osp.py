@@ -18,12 +18,14 @@ from kinfmu.fmu import description
 from kinfmu.fmu.description.common import base_unit
 from kinfmu.fmu.interface import Interface, Variable
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, text_in, unpacked
+from kinfmu.units import Quantity, unit_of
 
 NAMESPACE = "https://open-simulation-platform.com/OspModelDescription/1.0.1"
 _KINDS = {  # of a driver: word of its value, and the groups of OSP-IS for value, speed, acceleration, effort and port
     "angle": ("AngularDisplacement", "AngularVelocity", "AngularAcceleration", "Torque", "AngularMechanicalPort"),
     "length": ("LinearDisplacement", "LinearVelocity", "LinearAcceleration", "Force", "LinearMechanicalPort"),
 }
+_TORQUE = Quantity("torque")
 _ORDER = (  # in which the schema wants the groups
     *("Generic", "Force", "Torque", "LinearVelocity", "AngularVelocity", "LinearDisplacement", "AngularDisplacement"),
     *("LinearAcceleration", "AngularAcceleration", "LinearMechanicalPort", "AngularMechanicalPort"),
@@ -70,7 +72,7 @@ def groups(interface: Interface) -> list[VariableGroup]:
             members = (value, speed, acceleration, *(one for one in coupled if one is not None))
             found.append(VariableGroup("Generic", f"{driver} coupling", members))
     for variable in interface.part("loads"):
-        kind = "Torque" if variable.name.endswith("_torque") else "Force"
+        kind = "Torque" if variable.unit == unit_of(_TORQUE, "m") else "Force"
         found.append(VariableGroup(kind, variable.name, (variable,)))
     return sorted(found, key=lambda group: _ORDER.index(group.kind))
 

@@ -16,7 +16,7 @@ from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.body import Body, Gravity, Point, Start
 from kinfmu.mechanism.declared import keys_of
 from kinfmu.readings import Reading
-from kinfmu.units import CoordinateName, Quantity
+from kinfmu.units import CoordinateName, Quantity, is_of_angle
 
 if TYPE_CHECKING:
     from kinfmu.mechanism.body import RunSettings
@@ -166,7 +166,7 @@ def kind_of_measured(of: object) -> str:
     """Return 'length' or 'angle': what a measured quantity is, a coordinate by its name or a PoseQuantity."""
     if isinstance(of, PoseQuantity):
         return of.kind
-    return "angle" if isinstance(of, str) and of.rpartition(".")[2] in ("phi", "omega", "alpha") else "length"
+    return "angle" if isinstance(of, str) and is_of_angle(of) else "length"
 
 
 def _law(law: Law, kinds: tuple[str, str], place: NumberPath, change: Change) -> Law:

@@ -18,6 +18,7 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import TIME
 from kinfmu.solver.python.status import Status
+from kinfmu.units import CoordinateName
 
 SAME = 1e-9  # of the largest value; by how much inputs may differ from the law of their driver
 LEAST_MARGIN = 1e-6  # 1 / condition of the scaled Jacobian; below it a third derivative has no digits
@@ -81,7 +82,6 @@ def motion_of(run: Run, name: str) -> tuple[FloatArray, str]:
 
 def _quantity(mechanism: Mechanism, name: str, at: Placement) -> tuple[Any, str]:
     """Return a coordinate or the lift of a cam as a jet, and its kind."""
-    owner, _, axis = name.rpartition(".")
     cams = {joint.name: joint for joint in mechanism.joints if isinstance(joint, Cam | CamRoller | CamFlatFace)}
     cam = cams.get(name)
     if isinstance(cam, Cam):
@@ -89,15 +89,20 @@ def _quantity(mechanism: Mechanism, name: str, at: Placement) -> tuple[Any, str]
     if cam is not None:
         law, argument = cam.led_by(at)
         return law.at(argument), cam.law_kinds[0]
-    bodies = [body.name for body in mechanism.moving_bodies]
-    if axis == "phi" and owner in bodies:
-        return at.angle(owner), "angle"
-    if axis in ("x", "y") and (owner in bodies or owner in mechanism.points):
-        pose = at.poses.get(owner)
-        xy = (pose.x, pose.y) if pose is not None else at.point(mechanism.points[owner])
-        return xy["xy".index(axis)], "length"
-    known = [*cams, *mechanism.coordinate_names, *(f"{point}.{axis}" for point in mechanism.points for axis in "xy")]
-    raise RequestError(f"'{name}' is neither a coordinate nor a cam{suggestion(name, known)}; known: {listed(known)}")
+    of_points = [CoordinateName(point, axis) for point in mechanism.points for axis in "xy"]
+    coordinates = [*mechanism.coordinate_names, *of_points]
+    coordinate = next((one for one in coordinates if one == name), None)
+    if coordinate is None:
+        known = [*cams, *coordinates]
+        raise RequestError(
+            f"'{name}' is neither a coordinate nor a cam{suggestion(name, known)}; known: {listed(known)}"
+        )
+    kind = coordinate.quantity().kind
+    if coordinate.is_angle:
+        return at.angle(coordinate.owner), kind
+    pose = at.poses.get(coordinate.owner)
+    xy = (pose.x, pose.y) if pose is not None else at.point(mechanism.points[coordinate.owner])
+    return xy["xy".index(coordinate.axis)], kind
 
 
 def _whole(run: Run, columns: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:

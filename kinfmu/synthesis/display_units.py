@@ -20,12 +20,9 @@ def of_unknown(problem: FitProblem, name: str) -> DisplayUnit:
     own, _, key = name.rpartition(".")
     target: Any = next(one for one in problem.targets if one.name == own)
     sampled = next(one for one in problem.sampled if one.name == own)
-    is_angle = {str(name): name.is_angle for name in problem.mechanism.coordinate_names}
     quantity = _ANGLE if sampled.angles[0] else _LENGTH
     if key == "start":
-        quantity = problem.argument.quantity
-        if sampled.over:
-            quantity = _ANGLE if is_angle.get(sampled.over) else _LENGTH
+        quantity = sampled.argument
     length = problem.mechanism.length_unit
     return display_unit(quantity, length, written_unit(_flat(getattr(target, key)), length))
 

@@ -11,8 +11,9 @@ import numpy as np
 from kinfmu.draw.fitted import Chart, Curve, Fitted, fitted
 from kinfmu.run import FloatArray
 from kinfmu.sweep import solve
-from kinfmu.synthesis.outcome import FitOutcome, TargetErrors, argument_unit
+from kinfmu.synthesis.outcome import FitOutcome, TargetErrors
 from kinfmu.synthesis.sampled import Sampled
+from kinfmu.units import unit_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,9 +66,7 @@ def _chart(result: FitOutcome, target: Sampled, errors: TargetErrors) -> Chart:
     x = table[:, 0] if target.over else values
     start = result.parameters.get(f"{target.name}.start", target.start)
     wanted_x = target.at + start  # type: ignore[operator]  # functions have values, and a start
-    unit = "rad" if target.over.endswith(".phi") else result.problem.mechanism.length_unit
-    if not target.over:
-        unit = argument_unit(result.problem)
+    unit = unit_of(target.argument, result.problem.mechanism.length_unit)
     y = table[:, 1] - (errors.reached - errors.errors - errors.wanted)[0, 0]
     scale = [np.degrees(1.0) if one == "rad" else 1.0 for one in (unit, errors.units[0])]
     shown = ["deg" if one == "rad" else one for one in (unit, errors.units[0])]

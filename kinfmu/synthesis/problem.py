@@ -20,6 +20,7 @@ from kinfmu.synthesis.measuring import Measuring, measuring_of
 from kinfmu.synthesis.numbers import Bounds, read_bounds
 from kinfmu.synthesis.sampled import Sampled, TracedPoints, sampled
 from kinfmu.synthesis.targets import TARGETS, MeasureTarget, Target
+from kinfmu.units import CoordinateName
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +73,8 @@ class FitProblem:
             raise MechanismError(f"two targets or constraints have the name '{doubled}'")
         unit, traced = self.mechanism.length_unit, TracedPoints(self.mechanism)
         argument = argument_of(self.mechanism, self.over)
-        known = {str(name): name.is_angle for name in self.mechanism.coordinate_names}
-        known |= {f"{point}.{axis}": False for point in self.mechanism.points for axis in ("x", "y")}
+        of_points = [CoordinateName(point, axis) for point in self.mechanism.points for axis in "xy"]
+        known: dict[str, CoordinateName] = {name: name for name in (*self.mechanism.coordinate_names, *of_points)}
         own = [
             sampled(target, f"[targets.{target.name}]", traced, known, argument, unit)
             for target in self.targets

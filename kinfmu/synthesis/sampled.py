@@ -17,7 +17,7 @@ from kinfmu.run import FloatArray
 from kinfmu.synthesis.argument import Argument
 from kinfmu.synthesis.numbers import Bounds, read_free, read_rows, read_weights
 from kinfmu.synthesis.targets import FunctionTarget, PathTarget, PoseTarget
-from kinfmu.units import Quantity
+from kinfmu.units import CoordinateName, Quantity
 
 LENGTH, ANGLE = Quantity("length"), Quantity("angle")
 
@@ -36,6 +36,7 @@ class Sampled:
         scale: (d,) factors of the errors: 1, of an angle among lengths a length.
         roots: (m, 1) square roots of the weights.
         at: (m,) values of the argument, or of `over`, counted from `start`; None: the nearest point counts.
+        argument: What the values of `at` measure: a value of `over` or of the argument of the motion.
         start: Value at which `at` begins, or its bounds.
         offset: Added to the wanted values, or its bounds.
         over: The output whose values `at` are; '' for the argument of the motion.
@@ -53,6 +54,7 @@ class Sampled:
     scale: FloatArray
     roots: FloatArray
     at: FloatArray | None
+    argument: Quantity
     start: float | Bounds
     offset: float | Bounds
     over: str
@@ -83,7 +85,7 @@ class TracedPoints:
         self._written = mechanism
         self.points = dict(mechanism.points)
 
-    def outputs(self, where: str, of: object) -> tuple[str, str]:
+    def outputs(self, where: str, of: object) -> tuple[CoordinateName, ...]:
         """Return the names of a point's coordinates.
 
         Raises:
@@ -92,7 +94,7 @@ class TracedPoints:
         """
         known = self._written.body_points
         if of in self.points:
-            return f"{of}.x", f"{of}.y"
+            return tuple(CoordinateName(str(of), axis) for axis in "xy")
         if of not in known:
             names = [*self._written.points, *known]
             near = suggestion(of, names) if isinstance(of, str) else ""
@@ -102,14 +104,14 @@ class TracedPoints:
             taken = {*self.points, *(body.name for body in self._written.bodies)}
             name = next(name for k in range(len(taken) + 1) if (name := f"traced_{k}") not in taken)
             self.points[name] = str(of)
-        return f"{name}.x", f"{name}.y"
+        return tuple(CoordinateName(name, axis) for axis in "xy")
 
 
 def sampled(
     target: PathTarget | FunctionTarget | PoseTarget,
     where: str,
     traced: TracedPoints,
-    coordinates: Mapping[str, bool],
+    coordinates: Mapping[str, CoordinateName],
     argument: Argument,
     unit: str,
 ) -> Sampled:
@@ -119,7 +121,7 @@ def sampled(
         target: As declared.
         where: Its table in messages, such as '[targets.foot]'.
         traced: Names of the outputs of points.
-        coordinates: Known outputs, and whether they are angles.
+        coordinates: Known outputs, by their names.
         argument: What the samples go by.
         unit: Unit of length.
 
@@ -131,6 +133,7 @@ def sampled(
         "name": target.name,
         "type": target.type,
         "over": "",
+        "argument": argument.quantity,
         "offset": 0.0,
         "begin": _optional(f"{where} begin", target.begin, argument, unit),
         "end": _optional(f"{where} end", target.end, argument, unit),
@@ -138,13 +141,13 @@ def sampled(
     if isinstance(target, FunctionTarget):
         return _function(target, where, coordinates, argument, unit, common)
     if isinstance(target, PathTarget):
-        outputs: tuple[str, ...] = traced.outputs(f"{where} of", target.of)
+        outputs = traced.outputs(f"{where} of", target.of)
         wanted = read_rows(f"{where} points", target.points, (LENGTH, LENGTH), unit, "[[x, y], ...]")
         scale = np.ones(2)
     else:
-        outputs = tuple(f"{target.of}.{axis}" for axis in ("x", "y", "phi"))
+        outputs = tuple(CoordinateName(str(target.of), axis) for axis in ("x", "y", "phi"))
         if outputs[2] not in coordinates:
-            bodies = sorted({name.rpartition(".")[0] for name, is_angle in coordinates.items() if is_angle})
+            bodies = sorted({name.owner for name in coordinates.values() if name.is_angle})
             near = suggestion(target.of, bodies)
             raise MechanismError(
                 f"{where} of = {quoted(target.of)} is not a moving body{near}; bodies: {listed(bodies)}"
@@ -158,8 +161,8 @@ def sampled(
     return Sampled(
         **common,
         outputs=outputs,
-        shown=tuple(f"{target.of}.{name.rpartition('.')[2]}" for name in outputs),
-        angles=tuple(name.endswith(".phi") for name in outputs),
+        shown=tuple(f"{target.of}.{name.axis}" for name in outputs),
+        angles=tuple(name.is_angle for name in outputs),
         wanted=wanted,
         scale=scale,
         roots=_roots(where, target.weight, len(wanted)),
@@ -171,7 +174,7 @@ def sampled(
 def _function(
     target: FunctionTarget,
     where: str,
-    coordinates: Mapping[str, bool],
+    coordinates: Mapping[str, CoordinateName],
     argument: Argument,
     unit: str,
     common: Mapping[str, Any],
@@ -181,30 +184,28 @@ def _function(
         if name is not None and name not in coordinates:
             near = suggestion(name, coordinates) if isinstance(name, str) else ""
             raise MechanismError(f"{where} {key} = {quoted(name)} is not an output{near}; valid: {listed(coordinates)}")
-    x = argument.quantity if target.over is None else _quantity(coordinates[target.over])
-    y = _quantity(coordinates[target.of])
+    x = argument.quantity if target.over is None else coordinates[target.over].quantity()
+    of = coordinates[target.of]
+    y = of.quantity()
     points = read_rows(f"{where} points", target.points, (x, y), unit, "[[x, y], ...]")
     if target.over is None and (target.begin is not None or target.end is not None):
         raise MechanismError(f"{where} begin and end are for a function over another output: write 'over'")
     more = {
         "over": target.over or "",
+        "argument": x,
         "start": read_free(f"{where} start", target.start, x, unit),
         "offset": read_free(f"{where} offset", target.offset, y, unit),
     }
     return Sampled(
         **{**common, **more},
-        outputs=(target.of,),
-        shown=(target.of,),
-        angles=(coordinates[target.of],),
+        outputs=(of,),
+        shown=(of,),
+        angles=(of.is_angle,),
         wanted=points[:, 1:],
         scale=np.ones(1),
         roots=_roots(where, target.weight, len(points)),
         at=points[:, 0],
     )
-
-
-def _quantity(is_angle: bool) -> Quantity:
-    return ANGLE if is_angle else LENGTH
 
 
 def _optional(where: str, value: object, argument: Argument, unit: str) -> float | None:

@@ -13,10 +13,11 @@ from matplotlib.figure import Figure
 
 import kinfmu
 from kinfmu.draw import figure, plot
+from kinfmu.draw.abscissa import unit_in
 from kinfmu.draw.drawing import sheet_of
 from kinfmu.draw.instant import instant
 from kinfmu.draw.writing import figure_style
-from kinfmu.errors import FigureError, RequestError
+from kinfmu.errors import FigureError, KinfmuError, RequestError
 from kinfmu.run import Run
 from tests.draw.picture import differences, picture
 from tests.log.runs import fourbar, with_gap
@@ -134,3 +135,14 @@ def test_without_matplotlib_axes_cannot_be_given() -> None:
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout == "figure: drawing needs matplotlib: pip install 'kinfmu[figures]'\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("piston.phi", "rad"), ("piston.omega", "rad/s"), ("piston.alpha", "rad/s2"), ("piston.vy", "mm/s")],
+)
+def test_a_coordinate_that_a_joint_holds_has_the_unit_of_its_derivative(name: str, unit: str) -> None:
+    run = kinfmu.solve(kinfmu.load("slider_crank"), t=[0.0, 0.1])
+    assert unit_in(run, name) == unit
+    with pytest.raises(KinfmuError, match=r"the run has no column 'piston\.beta'"):
+        unit_in(run, "piston.beta")
