@@ -19,15 +19,12 @@ from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.forces import effort_noun
 from kinfmu.run import Event, FloatArray, Run
 from kinfmu.run.axis import TIME
+from kinfmu.solver.python.law_breaks import LEAST_TOLERANCE, MOST_TOLERANCE, STEP_TOLERANCE
 from kinfmu.solver.python.pose import Vector
 from kinfmu.solver.python.status import Status
 from kinfmu.sweep.continued import Settings, continued
 from kinfmu.sweep.forces import ForceModel, LoadedRun, applied_efforts, force_plan
 from kinfmu.sweep.model import Model
-
-TOLERANCE = 1e-9  # of a step
-LEAST_TOLERANCE = 1e-13  # smaller ones are rounding
-MOST_TOLERANCE = 1e-4  # larger ones do not tell a limit from a turn before it
 
 
 def torque_driven(
@@ -64,7 +61,7 @@ def torque_driven(
         KinfmuError: The mechanism cannot be solved.
 
     """
-    tolerance = TOLERANCE if tolerance is None else tolerance
+    tolerance = STEP_TOLERANCE if tolerance is None else tolerance
     method = METHODS[0] if method is None else method
     if not (is_number(tolerance) and LEAST_TOLERANCE <= tolerance <= MOST_TOLERANCE):
         raise RequestError(f"tolerance = {quoted(tolerance)} must be {LEAST_TOLERANCE:g} to {MOST_TOLERANCE:g}")

@@ -22,9 +22,9 @@ from kinfmu.fmu.slave import as_numbers
 from kinfmu.fmu.torque_limits import Ended
 from kinfmu.fmu.torque_steps import EmittedLaws, TorqueSteps
 from kinfmu.solver.python import Pose, Status
+from kinfmu.solver.python.law_breaks import LEAST_TOLERANCE, MOST_TOLERANCE
 from kinfmu.solver.python.pose import failed
 
-LEAST_TOLERANCE, MOST_TOLERANCE = 1e-13, 1e-4  # see torque_variables.py
 _UNDETERMINED = "the reduced inertia is singular, or a number is not finite"
 
 

@@ -17,6 +17,7 @@ from kinfmu.loads.following import Following
 from kinfmu.mechanism import Mechanism
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import effort_noun
+from kinfmu.solver.python.law_breaks import LEAST_TOLERANCE, MOST_TOLERANCE, STEP_TOLERANCE
 from kinfmu.units import Quantity, unit_of
 
 STATES, EFFORTS, INPUTS = "states", "efforts", "inputs"  # parts
@@ -28,9 +29,9 @@ INTEGRATOR_TOLERANCE = Variable(
     "Error of a step of the integrator: relative to 1 rad or the mechanism's size, and to the speed. Co-simulation",
     initial="exact",
     unit="1",
-    start=1e-9,
-    minimum=1e-13,  # smaller ones are rounding
-    maximum=1e-4,  # larger ones do not tell a limit from a turn before it
+    start=STEP_TOLERANCE,
+    minimum=LEAST_TOLERANCE,
+    maximum=MOST_TOLERANCE,
 )
 _LEFT_OUT = ("driven", "drive", "rate_source")
 _GONE = ("driven_by_time", "rates")
