@@ -107,7 +107,6 @@ def build(
     """
     from kinfmu.fmu import build as built
     from kinfmu.fmu.build import default_drive, default_flavour, native_obstacle, platforms_of
-    from kinfmu.mechanism.metres import kept_numbers
 
     for option, value, plain in (("--fmi", fmi, "2"), ("--platforms", platforms, "host")):
         if flavour == "python" and value != plain:
@@ -118,7 +117,7 @@ def build(
     drive = drive or default_drive(mech)
     stated = {"author": author, "version": version, "license": license_, "copyright": copyright_, "date": date}
     chosen = flavour or default_flavour(int(fmi), platforms)
-    if si and mech.length_unit != "m" and (kept := kept_numbers(mech)):
+    if si and mech.length_unit != "m" and (kept := _kept_numbers(mech)):
         note(
             f"{listed(kept)}: without a unit, so these parameters stay numbers in {mech.length_unit}; "
             f'give them one in the file: {kept[0]} = "{float(mech.parameters[kept[0]].value):g} {mech.length_unit}"'
@@ -172,3 +171,18 @@ def _place(given: str, name: str, ending: str) -> Path:
     """Return <name>.fmu, in fmus/<name>/ of a checkout for a mechanism given by its name in the gallery."""
     own = Path("fmus") / name
     return (own if given in gallery.names() and own.is_dir() else Path()) / f"{name}{ending}"
+
+
+def _kept_numbers(mechanism: Mechanism) -> tuple[str, ...]:
+    """Return the parameters whose quantity is unknown and whose numbers stay lengths in the mechanism's unit."""
+    from kinfmu.mechanism.parameters import dimensions_of
+
+    metric = mechanism.in_metres()
+    pairs = [(one, metric.expressions[place]) for place, one in mechanism.expressions.items()]
+    for name, one in mechanism.parameters.items():
+        new = metric.parameters[name].expression
+        if one.expression and new:
+            pairs.append((one.expression, new))
+    names = {name for old, new in pairs if old.text != new.text for name in old.names}
+    known = dimensions_of(mechanism.parameters)
+    return tuple(name for name in mechanism.parameters if name in names and not known[name].is_known)

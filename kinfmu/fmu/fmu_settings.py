@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from kinfmu.errors import MechanismError, RequestError
 from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.interface import Interface, Variable
+from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.number import read_constant
 from kinfmu.mechanism.settings import Settable, read_tolerance
 from kinfmu.mechanism.valid import quoted
@@ -68,3 +69,13 @@ def _start(variable: Variable, value: object, length_unit: str) -> float:
         return float(read_constant(variable.name, value, quantity_in(variable.unit or "1", length_unit), length_unit))
     except MechanismError as error:
         raise RequestError(str(error)) from None
+
+
+def as_set(mechanism: Mechanism, settings: Mapping[str, float | bool | str]) -> Mechanism:
+    """Return the mechanism with the parameters that are set in the FMU, if it can have them."""
+    own = mechanism.settable.names
+    values: dict[str, float | str] = {name: value for name, value in settings.items() if name in own}
+    try:
+        return mechanism.with_parameters(values) if values else mechanism
+    except MechanismError:
+        return mechanism  # the FMU reports why

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 TIME = "time"
+LAST_STEP = 1e-6  # of a step: a shorter remainder before `stop` is rounding, not a step
 ROUNDING = 1e-9  # of the range: times beyond the table by less are rounding
 
 
@@ -313,3 +314,23 @@ def _unlikely(name: str, table: InputTable) -> Iterator[Event]:
             f"{table.source}: {name} jumps by {jump:.6g} deg from {table.t[k]:g} to {table.t[k + 1]:g} s{others}; "
             "used as given; --wrap unwraps angles that jump, such as from 360 to 0 deg",
         )
+
+
+def times(span: RunSettings | InputTable, start: float | None, stop: float | None, step: float) -> NDArray[np.float64]:
+    """Return t_k = start + k step (n,), of which stop is the last; start and stop default to those of `span`."""
+    first = span.start if start is None else float(start)
+    last = span.stop if stop is None else float(stop)
+    h = float(step)
+    if not np.isfinite([first, last, h]).all() or h <= 0.0 or last < first:
+        raise RequestError(
+            f"start = {first:g} s, stop = {last:g} s, step = {h:g} s: "
+            "a run needs finite times, start <= stop and a positive step"
+        )
+    if (last - first) / h > MOST_SAMPLES:
+        raise RequestError(f"{first:g} to {last:g} s in steps of {h:g} s: more than {MOST_SAMPLES} samples")
+    count = int((last - first) / h + LAST_STEP)
+    t: NDArray[np.float64] = first + h * np.arange(count + 1, dtype=np.float64)
+    if last - t[-1] > LAST_STEP * h:
+        return np.append(t, last)
+    t[-1] = last
+    return t

@@ -15,19 +15,20 @@ from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
-from kinfmu.errors import FmuError, MechanismError, RequestError, listed
+from kinfmu.errors import FmuError, RequestError, listed
 from kinfmu.fmu import description
 from kinfmu.fmu.block_estimates import BlockEstimates, block_estimates
 from kinfmu.fmu.estimated_rates import Rates
-from kinfmu.fmu.fmu_settings import fmu_settings
-from kinfmu.fmu.input_table import InputTable, input_notes, input_table, undriven
+from kinfmu.fmu.fmu_settings import as_set, fmu_settings
+from kinfmu.fmu.input_table import InputTable, input_notes, input_table, times, undriven
 from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.interruption import Interruption
 from kinfmu.fmu.samples import DISCARD, ERROR, Samples
 from kinfmu.fmu.slaves import LoadedSlave, slave
+from kinfmu.fmu.system.simulate import simulate_system
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, MECHANISM, text_in, unpacked
-from kinfmu.mechanism import Mechanism, RunSettings, toml_file
-from kinfmu.run import MOST_SAMPLES, Run
+from kinfmu.mechanism import Mechanism, toml_file
+from kinfmu.run import Run
 from kinfmu.run.channels import kept_samples
 from kinfmu.run.run import Sink
 from kinfmu.solver.python.status import Status
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
 
 BEGINNING = 4096  # bytes of a model description that hold the attributes of its first tag
 INTEGRATOR_TOLERANCE = "integrator.tolerance"  # of an FMU that owns the motion of its drivers
-LAST_STEP = 1e-6  # of a step: a shorter remainder before `stop` is rounding, not a step
 
 
 def simulate(
@@ -150,8 +150,6 @@ def simulate(
         raise RequestError(f"method: for a mechanism driven by torques, not for FMU {fmu_path}")
     path = Path(fmu_path)
     if not is_own(path):
-        from kinfmu.fmu.system.simulate import simulate_system  # imports this module
-
         if wrap:
             raise RequestError("wrap is for FMUs of kinfmu")
         return simulate_system(
@@ -229,36 +227,6 @@ def is_own(path: Path) -> bool:
                 return b'generationTool="kinfmu' in file.read(BEGINNING)
     except (OSError, BadZipFile, LookupError, ValueError, RuntimeError, zlib.error):
         return True
-
-
-def as_set(mechanism: Mechanism, settings: Mapping[str, float | bool | str]) -> Mechanism:
-    """Return the mechanism with the parameters that are set in the FMU, if it can have them."""
-    own = mechanism.settable.names
-    values: dict[str, float | str] = {name: value for name, value in settings.items() if name in own}
-    try:
-        return mechanism.with_parameters(values) if values else mechanism
-    except MechanismError:
-        return mechanism  # the FMU reports why
-
-
-def times(span: RunSettings | InputTable, start: float | None, stop: float | None, step: float) -> NDArray[np.float64]:
-    """Return t_k = start + k step (n,), of which stop is the last; start and stop default to those of `span`."""
-    first = span.start if start is None else float(start)
-    last = span.stop if stop is None else float(stop)
-    h = float(step)
-    if not np.isfinite([first, last, h]).all() or h <= 0.0 or last < first:
-        raise RequestError(
-            f"start = {first:g} s, stop = {last:g} s, step = {h:g} s: "
-            "a run needs finite times, start <= stop and a positive step"
-        )
-    if (last - first) / h > MOST_SAMPLES:
-        raise RequestError(f"{first:g} to {last:g} s in steps of {h:g} s: more than {MOST_SAMPLES} samples")
-    count = int((last - first) / h + LAST_STEP)
-    t: NDArray[np.float64] = first + h * np.arange(count + 1, dtype=np.float64)
-    if last - t[-1] > LAST_STEP * h:
-        return np.append(t, last)
-    t[-1] = last
-    return t
 
 
 def _time_drives(interface: Interface, parameters: Mapping[str, float | bool | str]) -> bool:

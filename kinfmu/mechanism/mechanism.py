@@ -25,6 +25,7 @@ from kinfmu.mechanism.checks import (
 )
 from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.members import Members, NumberPath
+from kinfmu.mechanism.metres import in_metres
 from kinfmu.mechanism.parameters import Parameter, parameter_values
 from kinfmu.mechanism.resolve import resolve
 from kinfmu.mechanism.settings import LawConstant, Settable, law_constants, with_law_constants
@@ -218,9 +219,9 @@ class Mechanism(Live):
 
     def in_metres(self) -> Mechanism:
         """Return the mechanism with the metre as its unit of length; lengths and expressions stay the same lengths."""
-        from kinfmu.mechanism.metres import in_metres  # it needs every class of this package
-
-        return in_metres(self)
+        if self.length_unit == "m":
+            return self
+        return replace(self, **in_metres(self.length_unit, self.parameters, self.members))
 
 
 def require_masses(mechanism: Mechanism) -> None:

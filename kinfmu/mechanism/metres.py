@@ -5,35 +5,28 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from decimal import Decimal
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from kinfmu.mechanism.dimension import NUMBER, Dimension, DimensionError
 from kinfmu.mechanism.expression import Computed, Expression
-from kinfmu.mechanism.members import Members
+from kinfmu.mechanism.members import Members, NumberPath
 from kinfmu.mechanism.operations import OPERATIONS, ExpressionStep
 from kinfmu.mechanism.parameters import NUMBER as PURE
 from kinfmu.mechanism.parameters import Parameter, dimensions_of
 from kinfmu.units import METRES, Quantity, every_unit, length_power
 
-if TYPE_CHECKING:
-    from kinfmu.mechanism.mechanism import Mechanism
-    from kinfmu.mechanism.members import NumberPath
-
 _SUM, _PRODUCT, _POWER, _ATOM = range(4)  # precedence of a text
 _PRECEDENCE = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 
 
-def in_metres(mechanism: Mechanism) -> Mechanism:
-    """Return the mechanism with the metre as its unit of length.
+def in_metres(old: str, declared: Mapping[str, Parameter], members: Members) -> dict[str, Any]:
+    """Return the fields of a mechanism with the metre as its unit of length that differ from those in unit `old`.
 
     Numbers are multiplied in decimal, so that 57.3 mm is 0.0573 m. An expression whose terms all have units stays as it
     is. In another one, such as "2*a + 5", bare numbers are in the old unit, and so is everything then:
     "(2.0*(a/(1 mm)) + 5.0)*(1 mm)".
     """
-    old = mechanism.length_unit
-    if old == "m":
-        return mechanism
-    metre, dimensions = Decimal(repr(METRES[old])), dimensions_of(mechanism.parameters)
+    metre, dimensions = Decimal(repr(METRES[old])), dimensions_of(declared)
 
     def number(value: float, quantity: Quantity) -> float:
         power = _power(quantity)
@@ -48,7 +41,7 @@ def in_metres(mechanism: Mechanism) -> Mechanism:
         return number(value, quantity) if isinstance(value, float | int) else value
 
     parameters: dict[str, Parameter] = {}
-    for name, one in mechanism.parameters.items():
+    for name, one in declared.items():
         quantity, value = one.quantity or PURE, one.value
         if one.expression is None:
             value = number(value, quantity)
@@ -56,22 +49,9 @@ def in_metres(mechanism: Mechanism) -> Mechanism:
             needed = dimensions[name] if quantity == PURE else Dimension.of(quantity)
             value = text(one.expression, quantity, needed)  # type: ignore[assignment]  # until it is resolved
         parameters[name] = Parameter(value, None if quantity == PURE else quantity, one.description)
-    members = mechanism.members.changed(changed)
-    parts = {key.name: getattr(members, key.name) for key in fields(Members)}
-    return replace(mechanism, length_unit="m", parameters=parameters, **parts)
-
-
-def kept_numbers(mechanism: Mechanism) -> tuple[str, ...]:
-    """Return the parameters whose quantity is unknown and whose numbers stay lengths in the mechanism's unit."""
-    metric = in_metres(mechanism)
-    pairs = [(one, metric.expressions[place]) for place, one in mechanism.expressions.items()]
-    for name, one in mechanism.parameters.items():
-        new = metric.parameters[name].expression
-        if one.expression and new:
-            pairs.append((one.expression, new))
-    names = {name for old, new in pairs if old.text != new.text for name in old.names}
-    known = dimensions_of(mechanism.parameters)
-    return tuple(name for name in mechanism.parameters if name in names and not known[name].is_known)
+    metric = members.changed(changed)
+    parts = {key.name: getattr(metric, key.name) for key in fields(Members)}
+    return {"length_unit": "m", "parameters": parameters, **parts}
 
 
 def _power(quantity: Quantity) -> int:

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kinfmu.errors import FmuError, MissingPackageError, RequestError, listed, suggestion
-from kinfmu.fmu.input_table import InputTable, table_of
+from kinfmu.fmu.fmu_settings import as_set
+from kinfmu.fmu.input_table import InputTable, table_of, times
 from kinfmu.fmu.interruption import Interruption
 from kinfmu.fmu.samples import DISCARD, ERROR, Samples
-from kinfmu.fmu.simulate import as_set, times
 from kinfmu.fmu.slaves import LoadedSlave, slave
 from kinfmu.fmu.system.exchange import check_exchange, exchange_of, ordered
 from kinfmu.fmu.system.ports import Port
