@@ -153,7 +153,15 @@ class Body:
         return plate(shape, self.mass, per_area, metre)
 
     def with_mass_properties(self, length_unit: str) -> Body:
-        """Return the body with mass, centre of mass and moment of inertia in place of a shape, in any arithmetic."""
+        """Return the body with mass, centre of mass and moment of inertia in place of a shape, in any arithmetic.
+
+        Args:
+            length_unit: Unit of length of the mechanism, such as 'mm'.
+
+        Returns:
+            The body itself if it has no shape.
+
+        """
         if self.rod is None and self.plate is None:
             return self
         mass, x, y, inertia = self.mass_properties(length_unit)

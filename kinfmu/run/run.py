@@ -154,7 +154,13 @@ class Run(Tabular, Displayed):
     def of_texts(
         cls, outputs: Iterable[str], fixed: Mapping[str, float], input_names: Sequence[str], **fields: Any
     ) -> Run:
-        """Return the run whose names are texts, as files and FMUs hold them; fields: the others, as they are.
+        """Return the run whose names are texts, as files and FMUs hold them.
+
+        Args:
+            outputs: Names of the m outputs, such as 'coupler.x', the generalized coordinates first.
+            fixed: Coordinates that a joint holds at a constant, by name [length unit, rad].
+            input_names: Names of the 3 d inputs, such as 'crank_angle': value, speed and acceleration of each driver.
+            fields: The other fields of `Run(...)`, as they are.
 
         Raises:
             KinfmuError: A name is no coordinate, or the inputs are not three for each driver.
@@ -175,7 +181,15 @@ class Run(Tabular, Displayed):
 
     @classmethod
     def of_fields(cls, **fields: Any) -> Run:
-        """Return the run of these fields, which are those of `Run(...)`; it takes a fifth of the time."""
+        """Return the run of these fields, which are those of `Run(...)`; it takes a fifth of the time.
+
+        Args:
+            fields: All fields of `Run(...)` without a default, by name; others as wanted.
+
+        Returns:
+            The run; its fields are not checked.
+
+        """
         run = object.__new__(cls)
         run.__dict__.update(_DEFAULTS | fields)
         return run
@@ -245,7 +259,16 @@ class Run(Tabular, Displayed):
         return len(self.values)
 
     def part(self, rows: slice | NDArray[Any], events: tuple[Event, ...] = ()) -> Run:
-        """Return the samples `rows`, a slice, indices or a mask (n,), with these events; lazy tables stay lazy."""
+        """Return a part of the samples.
+
+        Args:
+            rows: A slice, indices (k,) or a mask (n,).
+            events: Events of the part. Default: none.
+
+        Returns:
+            A run of k samples; lazy tables stay lazy.
+
+        """
 
         def part(name: str) -> Any:
             table = self.__dict__[name]
@@ -255,11 +278,24 @@ class Run(Tabular, Displayed):
         return self.replaced(**{name: part(name) for name in tables}, events=events)
 
     def replaced(self, **fields: Any) -> Run:
-        """Return the run with other fields; what is not computed yet stays so."""
+        """Return the run with other fields; what is not computed yet stays so.
+
+        Args:
+            fields: New values, by the names of the fields.
+
+        """
         return replace(self, **{name: self.__dict__[name] for name in _LAZY} | fields)
 
     def without(self, names: Iterable[str]) -> Run:
-        """Return the run without columns of these names: their places hold NaN (counts: 0), and none is computed."""
+        """Return the run without columns of these names: their places hold NaN (counts: 0), and none is computed.
+
+        Args:
+            names: Names of columns, such as 'coupler.ax'.
+
+        Returns:
+            A run with the same tables; `absent` lists the columns.
+
+        """
         absent = self.absent | frozenset(names)
         tables: dict[str, Any] = {}
         for name, group in groupby(self.places(kept=False), key=lambda place: place.table):
@@ -288,7 +324,15 @@ class Run(Tabular, Displayed):
             yield Column(place.name, place.unit, self._column(place.table, place.column))
 
     def places(self, *, kept: bool = True) -> Iterator[ColumnPlace]:
-        """Yield names, units and places of the columns, in their order; kept=False: also those that were not kept."""
+        """Yield names, units and places of the columns, in their order.
+
+        Args:
+            kept: False: also columns that were not kept. Default: True.
+
+        Returns:
+            Name, unit ('rad', 'mm/s', '1'), table and number of each column.
+
+        """
         for place in self._places():
             if not (kept and place.name in self.absent):
                 yield place
@@ -350,10 +394,26 @@ class Sink(Protocol):
     """A receiver of a run in parts: `begin`, `add` for each part, `end`; not called again after an error."""
 
     def begin(self, run: Run) -> None:
-        """Receive the run before its first sample: names, units, constants, mechanism."""
+        """Receive names, units, constants and mechanism of a run, before its first sample.
+
+        Args:
+            run: A run of no samples.
+
+        """
 
     def add(self, run: Run) -> None:
-        """Receive the next samples, and the events since the last call."""
+        """Receive the next samples, and the events since the last call.
+
+        Args:
+            run: A run of the samples since the last call, with their events.
+
+        """
 
     def end(self, run: Run, reason: str) -> None:
-        """Receive the whole run; reason: why it ended early, if none of its events has the reason."""
+        """Receive the whole run.
+
+        Args:
+            run: All samples that were kept, and all events.
+            reason: Why the run ended early, if none of its events has the reason; else empty.
+
+        """

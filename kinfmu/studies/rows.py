@@ -49,6 +49,9 @@ class StudyRows:
     def read(cls, path: str | Path) -> Self:
         """Return the results in a Parquet file.
 
+        Args:
+            path: The file that a study wrote.
+
         Raises:
             StudyError: The file cannot be read, or is not one of a study.
 
@@ -59,7 +62,15 @@ class StudyRows:
 
     @classmethod
     def of_bytes(cls, content: bytes) -> Self:
-        """Return the results in the content of a Parquet file."""
+        """Return the results in the content of a Parquet file.
+
+        Args:
+            content: The bytes of such a file.
+
+        Returns:
+            The results; tables are read when they are asked for.
+
+        """
         return cls(content)
 
     def _file(self) -> Any:
@@ -129,6 +140,10 @@ class StudyRows:
         """Return the unit in which summary and pictures show a column: as the files write it, measured angles in deg.
 
         The column itself and `units` keep the units of the table.
+
+        Args:
+            name: Name of a column, such as a measure or a parameter.
+
         """
         length = self.mechanism.length_unit
         own, shown = self.units[name], self._shown[name]

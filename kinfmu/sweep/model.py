@@ -349,7 +349,18 @@ class Model:
         return Library(self.plan)
 
     def is_native(self, count: int) -> bool:
-        """Return whether `count` samples are solved by the native engine; its library is compiled then."""
+        """Return whether `count` samples are solved by the native engine; its library is compiled then.
+
+        Args:
+            count: Number of samples.
+
+        Returns:
+            True for C, False for Python.
+
+        Raises:
+            CompilerError: The engine is "native", and the library cannot be compiled.
+
+        """
         work = count * max(1, len(self.plan.blocks))
         if self.engine == "python" or (self.engine == "auto" and work < WORTH_COMPILING):
             return False

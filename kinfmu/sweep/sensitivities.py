@@ -70,11 +70,35 @@ class Sensitivities(Displayed):
         return f"<Sensitivities at {len(self.t)} samples: {names}>"
 
     def of(self, output: str, parameter: str) -> FloatArray:
-        """Return the derivative of an output's position with respect to a parameter, (n,)."""
+        """Return the derivative of an output's position with respect to a parameter, (n,).
+
+        Args:
+            output: Name of an output, such as 'coupler.x'.
+            parameter: Name of a parameter or of a law constant.
+
+        Returns:
+            (n,) in the unit of the output per unit of the parameter, lengths in the mechanism's unit, angles in rad.
+
+        Raises:
+            ValueError: The sensitivities do not hold the output or the parameter.
+
+        """
         return self.values_by[:, self.outputs.index(output), self.parameters.index(parameter)]
 
     def rate_of(self, output: str, parameter: str) -> FloatArray:
-        """Return the derivative of an output's rate with respect to a parameter, (n,)."""
+        """Return the derivative of an output's rate with respect to a parameter, (n,).
+
+        Args:
+            output: Name of an output, such as 'coupler.x'.
+            parameter: Name of a parameter or of a law constant.
+
+        Returns:
+            (n,) in the unit of the output per second, or per unit of the driver, and per unit of the parameter.
+
+        Raises:
+            ValueError: The sensitivities do not hold the output or the parameter.
+
+        """
         return self.rates_by[:, self.outputs.index(output), self.parameters.index(parameter)]
 
 

@@ -113,7 +113,18 @@ class FitProblem:
         return tuple(self.unknowns)
 
     def of(self, mechanism: Mechanism) -> FitProblem:
-        """Return the same problem of another mechanism."""
+        """Return the same problem of another mechanism.
+
+        Args:
+            mechanism: A mechanism that has the unknowns and outputs of this problem.
+
+        Returns:
+            The problem, checked anew.
+
+        Raises:
+            MechanismError: An unknown or an output is missing, or a value is invalid.
+
+        """
         return FitProblem(mechanism, self.unknowns, self.targets, self.constraints, self.over)
 
     def written(self) -> dict[str, float | None]:
@@ -126,7 +137,15 @@ class FitProblem:
         return values
 
     def vector(self, z: FloatArray) -> dict[str, float]:
-        """Return the unknowns by name; z: (n,) as parts of the ranges between their bounds."""
+        """Return the unknowns by name.
+
+        Args:
+            z: (n,) each 0 to 1: part of the range between the bounds of an unknown.
+
+        Returns:
+            Values in the mechanism's unit of length and rad.
+
+        """
         return {
             name: b.low + float(part) * (b.high - b.low) for (name, b), part in zip(self.bounds.items(), z, strict=True)
         }
