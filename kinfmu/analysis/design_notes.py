@@ -30,7 +30,8 @@ _EDGE = 1e-6  # of the run's range; positions closer to its ends are not crossed
 
 def part_notes(mechanism: Mechanism) -> Iterator[str]:
     """Yield lines for unused points, coinciding joints, links much too short, and a step longer than the run."""
-    yield from _unused_points(mechanism)
+    if unused := unused_points(mechanism):
+        yield unused
     yield from _joints_in_one_place(mechanism)
     yield from _short_links(mechanism)
     run = mechanism.run
@@ -64,18 +65,17 @@ def _texts(member: object) -> set[object]:
     return found
 
 
-def _unused_points(mechanism: Mechanism) -> Iterator[str]:
+def unused_points(mechanism: Mechanism) -> str:
+    """Return a line on the points of bodies that nothing of the mechanism names; '' if there are none."""
     used: set[object] = set(mechanism.points.values())
     used |= {f"{body.name}.{end}" for body in mechanism.bodies for end in body.rod or body.plate or ()}
     for member in (*mechanism.joints, *mechanism.drivers, *mechanism.loads, *mechanism.measures):
         used |= _texts(member)
     unused = [name for name in mechanism.body_points if name not in used]
-    if unused:
-        one = len(unused) == 1
-        yield (
-            f"point{'' if one else 's'} {listed(unused)} {'is' if one else 'are'} used by no joint, driver, load, "
-            "measure or point of interest"
-        )
+    if not unused:
+        return ""
+    points = f"point {unused[0]} is" if len(unused) == 1 else f"points {listed(unused)} are"
+    return f"{points} used by no joint, driver, load, measure or point of interest"
 
 
 def _joints_in_one_place(mechanism: Mechanism) -> Iterator[str]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from kinfmu.analysis.assemblies import Assemblies, find_assemblies
 from kinfmu.analysis.cams import cam_findings
-from kinfmu.analysis.design_notes import motion_notes, part_notes
+from kinfmu.analysis.design_notes import motion_notes, part_notes, unused_points
 from kinfmu.analysis.driver_path import follow
-from kinfmu.analysis.drivers import clearer_problem, driver_advice
+from kinfmu.analysis.drivers import DriverAdvice, clearer_problem, driver_advice
 from kinfmu.analysis.file_notes import file_notes, run_notes, start_notes
 from kinfmu.analysis.findings import Findings
 from kinfmu.analysis.loading import loading
@@ -17,8 +17,9 @@ from kinfmu.analysis.singular import driver_range
 from kinfmu.analysis.text import lines
 from kinfmu.display import Displayed
 from kinfmu.equations.redundancy import find_redundancy
+from kinfmu.equations.start_poses import open_joints_text, start_from_poses
 from kinfmu.equations.system import System
-from kinfmu.errors import AssemblyError, KinfmuError
+from kinfmu.errors import AssemblyError, InconsistentError, KinfmuError, MobilityError
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.plan import localized, plan_from
@@ -83,7 +84,7 @@ def check(mechanism: Mechanism) -> Report:
     except KinfmuError as problem:
         advice = driver_advice(system, redundancy)
         loops = find_named_loops(mechanism, redundancy, ())
-        problem = clearer_problem(problem, redundancy, advice)
+        problem = _after_probable_cause(clearer_problem(problem, redundancy, advice), system, advice)
         return Report(mechanism, redundancy, problem, None, (), loops, advice, tuple(notes))
     notes += start_notes(system, redundancy.assembly.start)
     paths = []
@@ -102,3 +103,15 @@ def check(mechanism: Mechanism) -> Report:
     measured = measurements(mechanism, ranges)
     forces = loading(plan, ranges, cams)
     return Report(mechanism, redundancy, cut, plan, ranges, loops, None, tuple(notes), measured, forces, cams)
+
+
+def _after_probable_cause(problem: KinfmuError, system: System, advice: DriverAdvice | None) -> KinfmuError:
+    """Return an error of mobility after its probable cause: a joint at a wrong point, which leaves another unused."""
+    if not isinstance(problem, MobilityError | InconsistentError):
+        return problem
+    opened = open_joints_text(system, start_from_poses(system).q)
+    is_held = advice is not None and any(not surplus.implied_by for surplus in advice.surplus)
+    unused = unused_points(system.mechanism) if opened or is_held else ""
+    causes = [f"in the start poses of the file {opened}"] if opened else []
+    causes += [unused] if unused else []
+    return type(problem)("; ".join([*causes, str(problem)]), **problem.data) if causes else problem

@@ -119,7 +119,8 @@ def _advice(report: Findings) -> Iterator[ReportLine]:
         return
     for surplus in advice.surplus:
         by = f"{listed(surplus.implied_by)} and the joints" if surplus.implied_by else "the joints alone"
-        yield ReportLine("surplus", f"driver {surplus.name}: {by} determine what it drives; remove it")
+        cure = "drive another quantity" if advice.missing else "remove it"
+        yield ReportLine("surplus", f"driver {surplus.name}: {by} determine what it drives; {cure}")
     if advice.missing:
         more = (
             f"{advice.missing} more driver{'s' * (advice.missing > 1)} needed" if report.mobility else "nothing drives"

@@ -216,6 +216,17 @@ def test_an_error_of_a_later_loop_names_an_earlier_joint_that_the_start_poses_le
     assert problem.endswith("; in the start poses of the file joint B has a gap of 4.472 m")
 
 
+def test_an_error_of_mobility_names_first_a_joint_at_a_wrong_point() -> None:
+    other = SIX_BAR.replace("C = [3, 0]", "C = [2, 0]")
+    assert check(parse(other)).problem is None
+    report = check(parse(other.replace('"coupler.B", "rocker.B"', '"coupler.A", "rocker.B"')))
+    assert str(report.problem).startswith(
+        "in the start poses of the file joint B has a gap of 3.162 m; point coupler.B is used by no joint, driver, "
+        "load, measure or point of interest; [drivers.crank] drives what the joints hold, while "
+    )
+    assert "remove it" not in str(report)
+
+
 EFFORT = '[measures.motor]\ntype = "peak"\nof = "crank.torque"\n'
 
 
