@@ -356,6 +356,24 @@ def test_click_in_a_plot_moves_the_crank(chromium: Browser) -> None:
         assert page.errors == []
 
 
+def test_the_keys_of_the_page_work_after_a_click_on_a_tab(chromium: Browser) -> None:
+    with chromium.open(text_of("crank_rocker")) as page:
+        keyboard = page.tab.keyboard
+        page.tab.click("#tab-files")
+        keyboard.press("ArrowRight")
+        page.settle()
+        assert page.get("k.linkage.u[0]") == pytest.approx(math.radians(1))
+        keyboard.press("Space")
+        page.tab.wait_for_function("window.kinfmu.isPlaying")
+        keyboard.press("?")
+        assert page.tab.locator("#keys").is_visible()
+        keyboard.press("Escape")
+        page.tab.focus("#tab-files")  # by keyboard alone, the arrows choose tabs
+        keyboard.press("ArrowLeft")
+        assert page.tab.locator("#tab-files").get_attribute("aria-selected") == "false"
+        assert page.errors == []
+
+
 def test_keyboard_alone_moves_plays_and_changes_values(chromium: Browser) -> None:
     with chromium.open(text_of("crank_rocker")) as page:
         keyboard = page.tab.keyboard

@@ -273,7 +273,10 @@ class Page {
             if (tab.id === "tab-plots") this.plots.draw();
         };
         tabs.forEach((tab, k) => {
-            tab.addEventListener("click", () => choose(tab));
+            tab.addEventListener("click", (event) => {
+                choose(tab);
+                if (event.detail) tab.blur(); // a click by hand; the keys then are those of the page
+            });
             tab.addEventListener("keydown", (event) => {
                 const way = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
                 if (!way) return;
