@@ -19,6 +19,7 @@ from kinfmu.analysis.values import degrees, driver_text, multiple_of_pi, value_t
 from kinfmu.errors import listed
 from kinfmu.mechanism import Mechanism
 from kinfmu.motion import MeasuredValue
+from kinfmu.readings import counted_from
 
 _MOST_LOOPS = 8  # in the text; JSON has all
 _END = {
@@ -322,7 +323,7 @@ def measured_text(value: MeasuredValue) -> str:
     number = value_text(value.value, value.unit, "angle" if value.unit == "rad" else "length")
     at = [degrees(u) if value.at_unit == "rad" else f"{u:.6g} {value.at_unit}" for u in value.at]
     places = f" ({value.driver} at {' and '.join(at)})" if at else ""
-    return f"{number.removesuffix(' 1')}{places}"
+    return f"{number.removesuffix(' 1')}{counted_from(value.type)}{places}"
 
 
 def _notes(report: Findings) -> Iterator[ReportLine]:

@@ -17,17 +17,18 @@ EDGE = 8.0  # [pt] around the title
 
 
 class Quantities(NamedTuple):
-    """A column of a study: its name, its unit and its numbers (m,)."""
+    """A column of a study: its name, its unit and its numbers (m,); datum: ' from 90 deg' where it is a deviation."""
 
     name: str
     unit: str
     values: FloatArray
+    datum: str = ""
 
     @property
     def label(self) -> str:
         """'swing [rad]'; a pure number without its unit."""
         unit = "" if self.unit == "1" else f" [{self.unit.replace('2', chr(0xB2))}]"
-        return f"{self.name}{unit}"
+        return f"{self.name}{self.datum}{unit}"
 
 
 class PanelGrid(NamedTuple):

@@ -27,6 +27,15 @@ READINGS: tuple[type[Reading], ...] = (
     LowestMargin,
 )
 
+_COUNTED_FROM = {reading.type: reading.counted_from for reading in READINGS}
+
+
+def counted_from(kind: str) -> str:
+    """Return ' from 90 deg' for the value of a type of measure that is a deviation, to show after it; '' for others."""
+    datum = _COUNTED_FROM.get(kind, "")
+    return f" from {datum}" if datum else ""
+
+
 __all__ = [
     "READINGS",
     "Dwell",
@@ -48,4 +57,5 @@ __all__ = [
     "TimeRatio",
     "TransmissionAngle",
     "VelocityRatio",
+    "counted_from",
 ]

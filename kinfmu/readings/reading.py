@@ -42,6 +42,7 @@ class Reading(ABC):
     """
 
     type: ClassVar[str]  # its name in mechanism files
+    counted_from: ClassVar[str] = ""  # what its value is a deviation from, where that is not 0
     name: str
     begin: float | None = None
     end: float | None = None

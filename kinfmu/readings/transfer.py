@@ -22,6 +22,7 @@ class TransmissionAngle(Reading):
     """
 
     type: ClassVar[str] = "transmission_angle"
+    counted_from: ClassVar[str] = "90 deg"
 
     name: str
     coupler: Annotated[PointPair, "two points of the coupler's line"]

@@ -14,6 +14,7 @@ from kinfmu.draw.scatter import MOST_COLUMNS, scatter_matrix
 from kinfmu.draw.study_panels import Quantities
 from kinfmu.draw.writing import check_suffix, write
 from kinfmu.errors import FigureError, StudyError, listed, suggestion
+from kinfmu.readings import counted_from
 from kinfmu.studies.rows import StudyRows
 
 
@@ -74,7 +75,8 @@ def picture_of(result: StudyRows) -> str:
 
 def _column(result: StudyRows, name: str) -> Quantities:
     unit, factor = result.display_unit(name)
-    return Quantities(name, unit, result[name] / factor)
+    kinds = {reading.name: reading.type for reading in result.mechanism.measures}
+    return Quantities(name, unit, result[name] / factor, counted_from(kinds.get(name, "")))
 
 
 def _contributed(result: StudyRows, name: str) -> Contributed:

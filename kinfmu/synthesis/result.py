@@ -11,6 +11,7 @@ import numpy as np
 from kinfmu.display import Displayed
 from kinfmu.errors import KinfmuError
 from kinfmu.mechanism.display_unit import DisplayUnit
+from kinfmu.readings import counted_from
 from kinfmu.run import FloatArray
 from kinfmu.sweep.continued import continued
 from kinfmu.synthesis import display_units
@@ -178,6 +179,8 @@ def _constraints(problem: FitProblem, found: Evaluation) -> list[ConstraintResul
         violation = max(0.0, aim.excess(float(value))[0])
         size = max(1.0, *(abs(limit) for limit in (aim.minimum, aim.maximum) if limit is not None))
         shown = display.suffix
-        text = f"{aim.reading.type} = {float(value) / display.factor:.6g}{shown}, {' and '.join(limits)}{shown}"
+        datum = counted_from(aim.reading.type)
+        number = f"{float(value) / display.factor:.6g}{shown}{datum}"
+        text = f"{aim.reading.type} = {number}, {' and '.join(limits)}{shown}"
         constraints.append(ConstraintResult(aim.name, text, violation, violation <= HOLDS * size, display))
     return constraints

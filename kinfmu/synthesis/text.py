@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from kinfmu.display import aligned
+from kinfmu.readings import counted_from
 from kinfmu.synthesis.display_units import of_unknown
 from kinfmu.synthesis.outcome import FitOutcome, TargetErrors, argument_unit
 
@@ -24,8 +25,9 @@ def report(result: FitOutcome) -> list[str]:
         count, reason = sum(result.refused.values()), max(result.refused, key=lambda one: result.refused[one])
         lines.append(f"  {count} of them refused, for example: {reason}")
     unit = argument_unit(result.problem)
+    kinds = {aim.name: aim.reading.type for aim in (result.problem.measuring.aims if result.problem.measuring else ())}
     for one in result.errors:
-        lines += ["", *_target(one, unit)]
+        lines += ["", *_target(one, unit, counted_from(kinds.get(one.name, "")) if one.type == "measure" else "")]
     if result.constraints:
         lines += ["", "constraints"]
         for met in result.constraints:
@@ -52,13 +54,13 @@ def report(result: FitOutcome) -> list[str]:
     return lines
 
 
-def _target(one: TargetErrors, unit: str) -> Iterable[str]:
-    """Yield the table of a target."""
+def _target(one: TargetErrors, unit: str, datum: str) -> Iterable[str]:
+    """Yield the table of a target; datum: ' from 90 deg' after a measure that is a deviation."""
     if one.type == "measure":
         shown, factor = one.display[0].suffix, one.display[0].factor
         yield (
             f"{one.name} (measure): {one.reached[0, 0] / factor:.9g}{shown}, wanted {one.wanted[0, 0] / factor:.9g}"
-            f"{shown}, error {one.errors[0, 0] / factor:.3g}{shown}"
+            f"{shown}{datum}, error {one.errors[0, 0] / factor:.3g}{shown}"
         )
         return
     first, factors = one.display[0], np.array([column.factor for column in one.display])
