@@ -34,6 +34,14 @@ typedef fmi3Instance component;
 typedef fmi3FMUState state;
 #endif
 
+#if TORQUE /* efforts are inputs; value and speed of the drivers are continuous states */
+#define FIRST_INPUT (1u + (unsigned)kf_part_first[KF_PART_EFFORTS])
+#define INPUTS KF_DRIVERS
+#else
+#define FIRST_INPUT 1u
+#define INPUTS (3 * KF_DRIVERS)
+#endif
+
 #define INSTANCES 3
 #define STATES 2
 #define SLOWEST 20.0 /* [s], under sanitizers and next to other programs */
@@ -259,15 +267,15 @@ static int enter(host *h, slot *s, double t, bool stops)
 
 static int set_inputs(slot *s, const double *values)
 {
-    unsigned list[3 * KF_DRIVERS];
+    unsigned list[INPUTS];
     unsigned k;
-    for (k = 0; k < 3 * KF_DRIVERS; ++k) {
-        list[k] = 1u + k;
+    for (k = 0; k < INPUTS; ++k) {
+        list[k] = FIRST_INPUT + k;
     }
 #if FMI == 2
-    return fmi2SetReal(s->c, list, 3 * KF_DRIVERS, values);
+    return fmi2SetReal(s->c, list, INPUTS, values);
 #else
-    return fmi3SetFloat64(s->c, list, 3 * KF_DRIVERS, values, 3 * KF_DRIVERS);
+    return fmi3SetFloat64(s->c, list, INPUTS, values, INPUTS);
 #endif
 }
 
@@ -350,8 +358,9 @@ static void create(host *h, slot *s)
 static void check_reset(host *h, slot *s)
 {
     slot fresh = {0};
-    double of_reset[KF_REALS], of_fresh[KF_REALS], inputs[3 * KF_DRIVERS];
+    double of_reset[KF_REALS], of_fresh[KF_REALS], inputs[INPUTS];
     slot *const both[2] = {s, &fresh};
+    uint64_t random;
     int k, i;
     fresh.model_exchange = s->model_exchange;
     fresh.c = made(h, s->model_exchange, KF_TOKEN);
@@ -359,7 +368,9 @@ static void check_reset(host *h, slot *s)
     s->running = false;
     memset(inputs, 0, sizeof inputs);
     inputs[0] = uniform(h, -3.0, 3.0);
+    random = h->random;
     for (k = 0; k < 2; ++k) {
+        h->random = random; /* the same tolerance for both */
         enter(h, both[k], 0.0, false);
         CALL(ExitInitializationMode)(both[k]->c);
         for (i = 0; i < 3; ++i) {
@@ -423,12 +434,53 @@ static void set_real(host *h, slot *s)
     free(v);
 }
 
+#if TORQUE
+static void continuous_states(host *h, slot *s)
+{
+    const size_t n = 2 * KF_DRIVERS, other = one_in(h, 2) ? n + 1 : one_in(h, 2) ? 0 : SIZE_MAX;
+    double *const values = numbers(h, n), *const into = array_of(n, sizeof *into);
+    size_t k;
+    int answer;
+    refused(h, CALL(SetContinuousStates)(s->c, values, other), true);
+    refused(h, CALL(SetContinuousStates)(s->c, NULL, n), true);
+    refused(h, CALL(GetContinuousStates)(s->c, into, other), true);
+    refused(h, CALL(GetContinuousStates)(s->c, NULL, n), true);
+    refused(h, CALL(GetNominalsOfContinuousStates)(s->c, NULL, n), true);
+    refused(h, CALL(GetNominalsOfContinuousStates)(s->c, into, other), true);
+    answered(h, CALL(GetNominalsOfContinuousStates)(s->c, into, n));
+    for (k = 0; k < n; ++k) {
+        if (!(into[k] > 0.0 && isfinite(into[k]))) {
+            fail(h, "the nominal value of state %zu is %g", k, into[k]);
+        }
+    }
+    answered(h, CALL(SetContinuousStates)(s->c, values, n));
+    answered(h, CALL(GetContinuousStates)(s->c, into, n));
+    note(h, into, n * sizeof *into);
+#if FMI == 2
+    refused(h, fmi2GetDerivatives(s->c, NULL, n), true);
+    refused(h, fmi2GetDerivatives(s->c, into, other), true);
+    answer = answered(h, fmi2GetDerivatives(s->c, into, n));
+#else
+    refused(h, fmi3GetContinuousStateDerivatives(s->c, NULL, n), true);
+    refused(h, fmi3GetContinuousStateDerivatives(s->c, into, other), true);
+    answer = answered(h, fmi3GetContinuousStateDerivatives(s->c, into, n));
+#endif
+    for (k = 0; answer == OK && k < n; ++k) {
+        if (!isfinite(into[k])) {
+            fail(h, "the derivative of state %zu is %g with OK", k, into[k]);
+        }
+    }
+    free(values);
+    free(into);
+}
+#endif
+
 static void drive(host *h, slot *s)
 {
-    double values[3 * KF_DRIVERS];
+    double values[INPUTS];
     bool wrong = false;
     unsigned k;
-    for (k = 0; k < 3 * KF_DRIVERS; ++k) {
+    for (k = 0; k < INPUTS; ++k) {
         values[k] = one_in(h, 30) ? odd_number(h) : uniform(h, -4.0, 4.0);
         wrong = wrong || !(fabs(values[k]) <= 1e100);
     }
@@ -565,7 +617,7 @@ static void directional(host *h, slot *s)
     size_t k;
     int answer;
     for (k = 0; k < m && !one_in(h, 6); ++k) {
-        knowns[k] = 1u + below(h, 3 * KF_DRIVERS);
+        knowns[k] = one_in(h, 2) ? FIRST_INPUT + below(h, INPUTS) : 1u + below(h, 3 * KF_DRIVERS);
     }
 #if FMI == 2
     answer = fmi2GetDirectionalDerivative(s->c, given_u, n, given_k, m, or_null(h, seed, &wrong_k), or_null(h, slope, &wrong_u));
@@ -595,7 +647,7 @@ static void adjoint(host *h, slot *s)
     size_t k;
     int answer;
     for (k = 0; k < m && !one_in(h, 6); ++k) {
-        knowns[k] = 1u + below(h, 3 * KF_DRIVERS);
+        knowns[k] = one_in(h, 2) ? FIRST_INPUT + below(h, INPUTS) : 1u + below(h, 3 * KF_DRIVERS);
     }
     answer = fmi3GetAdjointDerivative(s->c, given_u, n, given_k, m, or_null(h, seed, &wrong_u),
                                       other_count(h, n, &miscounted), or_null(h, slope, &wrong_k),
@@ -630,7 +682,7 @@ static void derivatives(host *h, slot *s)
     for (k = 0; k < n; ++k) {
         orders[k] = an_order(h);
         if (sets && !one_in(h, 5)) {
-            r[k] = 1u + below(h, 3 * KF_DRIVERS);
+            r[k] = FIRST_INPUT + below(h, INPUTS);
         }
     }
 #if FMI == 2
@@ -772,6 +824,7 @@ static void modes(host *h, slot *s)
     double numbers_of[2] = {number(h), number(h)};
     size_t count = 7;
     (void)count;
+    (void)numbers_of;
     switch (below(h, 16)) {
     case 0: begin(h, s); break;
     case 1:
@@ -810,11 +863,15 @@ static void modes(host *h, slot *s)
         break;
     }
     case 11:
+#if TORQUE
+        continuous_states(h, s);
+#else
         refused(h, fmi2SetContinuousStates(s->c, numbers_of, 2), true);
         refused(h, fmi2GetDerivatives(s->c, NULL, 1), true);
-        refused(h, fmi2GetEventIndicators(s->c, NULL, SIZE_MAX), true);
         answered(h, fmi2GetContinuousStates(s->c, NULL, 0));
         answered(h, fmi2GetNominalsOfContinuousStates(s->c, numbers_of, 0));
+#endif
+        refused(h, fmi2GetEventIndicators(s->c, NULL, SIZE_MAX), true);
         break;
     case 12: {
         fmi2Status status;
@@ -847,11 +904,15 @@ static void modes(host *h, slot *s)
         break;
     }
     case 11:
+#if TORQUE
+        continuous_states(h, s);
+#else
         refused(h, fmi3SetContinuousStates(s->c, numbers_of, 2), true);
         refused(h, fmi3GetContinuousStateDerivatives(s->c, NULL, 1), true);
-        refused(h, fmi3GetEventIndicators(s->c, NULL, SIZE_MAX), true);
         answered(h, fmi3GetContinuousStates(s->c, NULL, 0));
         answered(h, fmi3GetNominalsOfContinuousStates(s->c, numbers_of, 0));
+#endif
+        refused(h, fmi3GetEventIndicators(s->c, NULL, SIZE_MAX), true);
         answered(h, fmi3GetNumberOfEventIndicators(s->c, one_in(h, 3) ? NULL : &count));
         answered(h, fmi3GetNumberOfContinuousStates(s->c, one_in(h, 3) ? NULL : &count));
         break;
@@ -878,6 +939,9 @@ static const struct {
     {"doStep", do_step, 8}, {"inputs", drive, 8}, {"all outputs", read_all, 4}, {"getReal", get_real, 4},
     {"setReal", set_real, 3}, {"other types", typed, 3}, {"directional derivatives", directional, 2},
     {"derivatives of inputs and outputs", derivatives, 2}, {"states", states, 3}, {"logging", logging, 1}, {"modes", modes, 4},
+#if TORQUE
+    {"continuous states", continuous_states, 2},
+#endif
 };
 
 static double now(void)
