@@ -35,4 +35,8 @@ def verify(fmu: Path, results: Path | None, tolerance: float | None) -> None:
     found = verified(fmu, results, tolerance=tolerance)
     click.echo(str(found))
     if not found.ok:
+        if len(found.missing) == found.samples or found.difference <= found.tolerance:
+            raise KinfmuError(
+                f"{results or fmu}: {len(found.missing)} of {found.samples} samples of the reference are missing"
+            )
         raise KinfmuError(f"{results or fmu}: the results are not those of the reference")

@@ -14,6 +14,7 @@ from click.testing import CliRunner
 
 from kinfmu.cli import main
 from tests.fmu.native.hosts_page import HOSTS, PAGE
+from tests.fmu.native.test_hosts import ecos_command
 
 DOCS = PAGE.parent
 PAGES = sorted(DOCS.glob("host*.md"))
@@ -84,6 +85,24 @@ def test_the_commands_of_fmpy_find_no_problem(tmp_path: Path, monkeypatch: pytes
         done = subprocess.run([sys.executable, "-m", "fmpy", command, "fourbar.fmu"], capture_output=True, text=True)
         assert done.returncode == 0, done.stdout + done.stderr
     assert "crank.phi" in done.stdout
+
+
+@pytest.mark.skipif(ecos_command() is None, reason="ecospy is not installed: no ecos command")
+def test_the_commands_of_ecos_end_in_agreement(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    page = (DOCS / "host-ecos.md").read_text(encoding="utf-8")
+    build, simulate, verify = (
+        line.split() for line in re.findall(r"^    (?:kinfmu|ecos) [^\n]*crank_rocker[^\n]*", page, re.MULTILINE)
+    )
+    result = CliRunner().invoke(main, [*build[1:], "--no-page"])
+    assert result.exit_code == 0, result.output
+    done = subprocess.run([str(ecos_command()), *simulate[1:]], capture_output=True, text=True, timeout=120)
+    if "error while loading shared libraries" in done.stderr:
+        pytest.skip("the ecos command lacks libtbb12")
+    assert done.returncode == 0, done.stdout + done.stderr
+    result = CliRunner().invoke(main, verify[1:])
+    assert result.exit_code == 0, result.output
+    assert "21 outputs at 21 of 21 samples compared" in result.output
 
 
 def test_the_ssp_of_the_overview_is_built_and_simulated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -98,6 +98,32 @@ def test_one_wrong_number_is_named(built: Built, tmp_path: Path) -> None:
     assert "21 outputs at 21 of 21 samples compared" in done.output
 
 
+@pytest.mark.parametrize(
+    ("dropped", "status", "message"),
+    [
+        (slice(21, 22), 0, "the results agree at the 20 of 21 samples that they have"),
+        (slice(12, 22), 0, "the results agree at the 11 of 21 samples that they have"),
+        (slice(11, 22), 1, "host.csv: 11 of 21 samples of the reference are missing"),
+        (slice(10, 11), 1, "host.csv: 1 of 21 samples of the reference are missing"),
+        (slice(1, 22), 1, "host.csv: 21 of 21 samples of the reference are missing"),
+    ],
+)
+def test_only_the_last_samples_may_be_missing(
+    built: Built, tmp_path: Path, dropped: slice, status: int, message: str
+) -> None:
+    fmu = built("fourbar", "time")
+    table = rows_of(texts(fmu)["fourbar_ref.csv"])
+    del table[dropped]
+    path = write(tmp_path / "host.csv", table)
+    done = CliRunner().invoke(main, ["verify", str(fmu), "--results", str(path)])
+    assert done.exit_code == status
+    assert message in done.output
+    if status == 0:
+        assert f"they end at t = {float(table[-1][0]):g} s" in done.output
+        table[4][3] = repr(float(table[4][3]) + 1e-3)
+        assert not kinfmu.verify(fmu, write(tmp_path / "wrong.csv", table)).ok
+
+
 def test_drivers_whose_law_is_external_swing(tmp_path: Path) -> None:
     mechanism = kinfmu.load("crank_rocker")
     mechanism = replace(mechanism, drivers=(replace(mechanism.drivers[0], law=kinfmu.External()),))

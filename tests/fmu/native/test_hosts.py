@@ -135,7 +135,6 @@ def table_of_ecos(
     """Return the header and the rows of the CSV file that the ecos command writes, of an FMU or an SSP."""
     ecos = ecos_command()
     assert ecos is not None
-    ecos.chmod(0o755)
     command = [str(ecos), "simulate", "--path", str(fmu), "--stopTime", str(stop), "--stepSize", str(step), *options]
     done = subprocess.run(command, capture_output=True, text=True, cwd=folder, timeout=120)
     if "error while loading shared libraries" in done.stderr:
@@ -147,11 +146,17 @@ def table_of_ecos(
 
 
 def ecos_command() -> Path | None:
-    """The native command inside the wheel of ecospy."""
+    """Return the command that scripts/hosts makes runnable, next to the Python that has ecospy."""
+    linked = Path(PYTHON).parent / "ecos"
+    if linked.is_file() and os.access(linked, os.X_OK):
+        return linked
     code = "import importlib.util as u; print(u.find_spec('ecospy').submodule_search_locations[0])"
     done = subprocess.run([PYTHON, "-c", code], capture_output=True, text=True)
-    found = sorted(Path(done.stdout.strip()).rglob("ecos")) if done.returncode == 0 else []
-    return next((path for path in found if path.is_file()), None)
+    command = Path(done.stdout.strip(), "binaries", "ecos")  # of a Python without the link
+    if done.returncode or not command.is_file():
+        return None
+    command.chmod(0o755)
+    return command
 
 
 @pytest.mark.skipif(ecos_command() is None, reason="ecospy is not installed: no ecos command")
