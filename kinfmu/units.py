@@ -105,6 +105,9 @@ def length_power(quantity: Quantity) -> int:
     return KINDS[quantity.kind].powers[1] if quantity.kind in KINDS else 0
 
 
+PLAUSIBLE_TURN = 2.0 * math.pi * (1.0 + 1e-9)  # [rad]; larger angles of a pose are probably in degrees
+
+
 def looks_like_degrees(angle: float) -> bool:
     """Return True for an angle [rad] that is probably in degrees: 30, 45, 60, 75, ..., of either sign."""
     return abs(angle) >= 30.0 and angle % 15.0 == 0.0

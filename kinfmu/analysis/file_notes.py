@@ -25,10 +25,9 @@ from kinfmu.mechanism.members import NumberPath, path_text
 from kinfmu.mechanism.parameters import dimensions_of
 from kinfmu.plan import SolvePlan
 from kinfmu.sweep import solve
-from kinfmu.units import Quantity, looks_like_degrees
+from kinfmu.units import PLAUSIBLE_TURN, Quantity, looks_like_degrees
 
 _TABLES = (Spline, MotionSequence)  # laws that keep their last value beyond their end
-_TURN = 2.0 * math.pi * (1.0 + 1e-9)  # [rad]; a full turn is plausible
 
 
 def file_notes(mechanism: Mechanism) -> Iterator[str]:
@@ -57,7 +56,11 @@ def file_notes(mechanism: Mechanism) -> Iterator[str]:
     def look(place: NumberPath, value: Any, quantity: Quantity) -> Any:
         # Those of laws may be many turns, but for cams; multiples of 15 are probably degrees.
         is_turns = ("law" in place and place[1] not in cams) or place[0] == "drivers"
-        if quantity == Quantity("angle") and abs(value) > _TURN and (not is_turns or looks_like_degrees(value)):
+        if (
+            quantity == Quantity("angle")
+            and abs(value) > PLAUSIBLE_TURN
+            and (not is_turns or looks_like_degrees(value))
+        ):
             owner = place[:2] if "law" in place else place
             large.setdefault((owner, abs(value)), (place, float(value)))
         return value
@@ -121,7 +124,7 @@ def _cams(mechanism: Mechanism) -> Iterator[str]:
             continue
         why = joint.law.why_not_periodic()
         angles = law_values(drivers[joint.cam], mechanism.run) if why else []
-        if why and max(angles) - min(angles) > _TURN:
+        if why and max(angles) - min(angles) > PLAUSIBLE_TURN:
             yield (
                 f"[joints.{joint.name}] law: {why}; "
                 f"[run] turns {joint.cam} by {math.degrees(max(angles) - min(angles)):.6g} deg"
@@ -141,7 +144,7 @@ def _loads(mechanism: Mechanism) -> Iterator[str]:
         if not isinstance(law, _TABLES) or law.repeats:
             continue
         angles = law_values(drivers[over.of], mechanism.run)
-        if max(angles) - min(angles) > _TURN:
+        if max(angles) - min(angles) > PLAUSIBLE_TURN:
             yield (
                 f"[loads.{load.name}] law: {law.why_not_periodic()}; "
                 f"[run] turns {over.of} by {math.degrees(max(angles) - min(angles)):.6g} deg"

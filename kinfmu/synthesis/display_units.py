@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from typing import Any
 
 from kinfmu.mechanism.display_unit import DisplayUnit, display_unit, written_unit
+from kinfmu.synthesis.numbers import flat
 from kinfmu.synthesis.problem import FitProblem
 from kinfmu.synthesis.sampled import Sampled
 from kinfmu.units import Quantity, quantity_in
@@ -16,7 +16,7 @@ _LENGTH, _ANGLE = Quantity("length"), Quantity("angle")
 def of_unknown(problem: FitProblem, name: str) -> DisplayUnit:
     """Return the unit of an unknown: of its bounds, else of the mechanism file."""
     if name in problem.unknowns:
-        return problem.mechanism.settable.display_unit(name, _flat(problem.unknowns[name]))
+        return problem.mechanism.settable.display_unit(name, flat(problem.unknowns[name]))
     own, _, key = name.rpartition(".")
     target: Any = next(one for one in problem.targets if one.name == own)
     sampled = next(one for one in problem.sampled if one.name == own)
@@ -24,7 +24,7 @@ def of_unknown(problem: FitProblem, name: str) -> DisplayUnit:
     if key == "start":
         quantity = sampled.argument
     length = problem.mechanism.length_unit
-    return display_unit(quantity, length, written_unit(_flat(getattr(target, key)), length))
+    return display_unit(quantity, length, written_unit(flat(getattr(target, key)), length))
 
 
 def of_columns(problem: FitProblem, sampled: Sampled) -> tuple[DisplayUnit, ...]:
@@ -37,7 +37,7 @@ def of_columns(problem: FitProblem, sampled: Sampled) -> tuple[DisplayUnit, ...]
         places = [1] if sampled.type == "function" else places
         written = written_unit([row[k] for row in rows for k in places], length)
         if not written and sampled.type == "function":
-            written = written_unit(_flat(target.offset), length)
+            written = written_unit(flat(target.offset), length)
         found.append(display_unit(_ANGLE if is_angle else _LENGTH, length, written))
     return tuple(found)
 
@@ -50,8 +50,3 @@ def of_measure(problem: FitProblem, name: str, unit: str) -> DisplayUnit:
     length = problem.mechanism.length_unit
     written = written_unit((getattr(one, key, None) for key in ("value", "minimum", "maximum")), length)
     return display_unit(quantity_in(unit, length), length, written)
-
-
-def _flat(value: Any) -> Iterable[object]:
-    """Return the numbers of a number, or of bounds."""
-    return value if isinstance(value, Sequence) and not isinstance(value, str) else (value,)

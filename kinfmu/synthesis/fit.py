@@ -11,6 +11,7 @@ import numpy as np
 from kinfmu.errors import AssemblyError, RequestError
 from kinfmu.run import FloatArray
 from kinfmu.sweep.engine import require_engine
+from kinfmu.synthesis.angle_notes import angle_notes
 from kinfmu.synthesis.fit_file import read_problem
 from kinfmu.synthesis.outcome import Optimum
 from kinfmu.synthesis.problem import FitProblem
@@ -89,7 +90,7 @@ def fit(
             reason, count = refused.most_common(1)[0]
             raise AssemblyError(
                 f"none of {len(drawn)} designs within the bounds can be assembled and reaches all samples; "
-                f"the reason of {count}: {reason}"
+                f"the reason of {count}: {reason}{''.join(f'; {text}' for text in angle_notes(problem))}"
             )
         short = team.results("short", _best(drawn, _SHORT * starts), advance)
         long = team.results("long", _best(short, starts), advance)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -45,6 +45,11 @@ def read_free(where: str, value: Any, quantity: Quantity, unit: str) -> float | 
     if isinstance(value, str) or not isinstance(value, Sequence):
         return read_constant(where, value, quantity, unit)
     return read_bounds(where, value, quantity, unit)
+
+
+def flat(value: Any) -> Iterable[object]:
+    """Return the numbers of a number, of bounds or of a list."""
+    return value if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else (value,)
 
 
 def read_rows(where: str, rows: Any, quantities: Sequence[Quantity], unit: str, example: str) -> FloatArray:

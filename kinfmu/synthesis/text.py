@@ -8,6 +8,7 @@ import numpy as np
 
 from kinfmu.display import aligned
 from kinfmu.readings import counted_from
+from kinfmu.synthesis.angle_notes import angle_notes
 from kinfmu.synthesis.display_units import of_unknown
 from kinfmu.synthesis.outcome import FitOutcome, TargetErrors, argument_unit
 
@@ -24,6 +25,7 @@ def report(result: FitOutcome) -> list[str]:
     if result.refused:
         count, reason = sum(result.refused.values()), max(result.refused, key=lambda one: result.refused[one])
         lines.append(f"  {count} of them refused, for example: {reason}")
+    lines += [f"  note: {text}" for text in angle_notes(result.problem)]
     unit = argument_unit(result.problem)
     kinds = {aim.name: aim.reading.type for aim in (result.problem.measuring.aims if result.problem.measuring else ())}
     for one in result.errors:

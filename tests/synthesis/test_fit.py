@@ -15,6 +15,7 @@ import kinfmu
 from kinfmu.cli import main
 from kinfmu.mechanism import toml_text
 from kinfmu.mechanism.parameters import Parameter
+from kinfmu.readings import Range
 from kinfmu.synthesis import (
     FunctionTarget,
     GrashofConstraint,
@@ -24,6 +25,7 @@ from kinfmu.synthesis import (
     PathTarget,
     PoseTarget,
 )
+from kinfmu.synthesis.angle_notes import angle_notes
 from kinfmu.synthesis.text import parameter_rows
 from tests.synthesis.fourbars import LENGTHS, four_bar
 
@@ -201,6 +203,48 @@ def test_an_unknown_without_effect_is_noted() -> None:
     assert found.idle == ("spare",)
     assert "note: spare has no effect on the targets: any value between its bounds is as good" in str(found)
     assert kinfmu.fit(_problem(), starts=1).idle == ()
+
+
+@pytest.mark.parametrize(
+    ("points", "offset", "noted"),
+    [
+        ([(90, 0), (130, 12)], (90, 150), ["points, x: 90 rad", "points, y: 12 rad is 687.549 deg", "offset: 90 rad"]),
+        ([(20.0, 0.1), (21.0, 0.2)], (0.0, 6.0), []),  # values of a driver may be some turns
+        ([("90 deg", "0 deg"), ("130 deg", "12 deg")], ("90 deg", "150 deg"), []),
+    ],
+)
+def test_bare_angles_of_a_function_that_are_probably_degrees_are_noted(
+    points: Any, offset: Any, noted: list[str]
+) -> None:
+    target = FunctionTarget(name="f", of="rocker.phi", points=points, offset=offset)
+    lines = angle_notes(_problem(targets=[target]))
+    assert len(lines) == len(noted)
+    for line, text in zip(lines, noted, strict=True):
+        assert line.startswith(f"[targets.f] {text}")
+        assert line.endswith(' deg" for degrees')
+
+
+def test_bare_angles_of_measures_and_poses_that_are_probably_degrees_are_noted() -> None:
+    swing = Range(name="swing", of="rocker.phi")
+    targets = [
+        MeasureTarget(name="s", of=swing, value=45),
+        PoseTarget(name="p", of="coupler", poses=[(1.0, 0.5, 0.5), (0.8, 0.9, 35)], length="50 cm", step="20 deg"),
+    ]
+    constraints = [MeasureConstraint(name="c", of=swing, minimum="20 deg", maximum=80)]
+    found = angle_notes(_problem(targets=targets, constraints=constraints))
+    assert [line.partition(":")[0] for line in found] == [
+        "[targets.p] poses, phi",
+        "[targets.s] value",
+        "[constraints.c] maximum",
+    ]
+    assert found[1] == (
+        "[targets.s] value: 45 rad is 2578.31 deg, more than a turn: a bare number is in radians; "
+        'write "45 deg" for degrees'
+    )
+    result = kinfmu.fit(_problem(targets=[replace(targets[0], value=0.7)], constraints=[]), starts=1)
+    assert "note: [targets" not in str(result)
+    result = kinfmu.fit(_problem(targets=targets[:1]), starts=1)
+    assert f"  note: {found[1]}" in str(result).splitlines()
 
 
 def test_the_files_of_a_fit_are_never_replaced_by_its_result(tmp_path: Path) -> None:
