@@ -122,11 +122,6 @@ CHANGES = {
         "[joints.L] contradicts the other joints: with O closed, row 'length' does not close: gap 0.5 m in every pose",
     ),
     "lengths that do not close": ("Q = [3.5, 0]", "Q = [13.5, 0]", "does not close near its start pose"),
-    "a length that is negative": (
-        PIN_Q,
-        'Q = { type = "distance", between = ["coupler.Q", "rocker.Q"], length = -1 }\n',
-        "[joints.Q] length = -1.0 must be a positive number",
-    ),
     "a length that a parameter makes negative": (
         PIN_Q,
         'Q = { type = "distance", between = ["coupler.Q", "rocker.Q"], length = "crank - 3 m" }\n',
@@ -149,8 +144,6 @@ CHANGES = {
         "start = 4 # phi",
         "[bodies.rocker] start = 4 must be",
     ),
-    "a body joined to itself": ('"rocker.Q"]', '"coupler.P"]', "[joints.Q] joins body 'coupler' to itself"),
-    "a driver of the ground": ('of = "crank"', 'of = "ground"', "[drivers.crank] acts on the ground only"),
     "a law that is unknown": (
         "constant_speed",
         "constant_spd",
@@ -159,14 +152,11 @@ CHANGES = {
     "a joint that is unknown": ('"revolute"', '"revolve"', "type = 'revolve' is not known; did you mean 'revolute'?"),
     "a joint without a type": ('type = "revolute", ', "", "[joints.O] needs the key 'type', one of revolute"),
     "a joint without points": (', between = ["ground.O", "crank.O"]', "", "[joints.O] needs the key 'between'"),
-    "a run that ends before it starts": ("stop = 6.3", "stop = -1", "[run] stop = -1.0 lies before start = 0.0"),
-    "a step of nothing": ("step = 0.01", "step = 0", "[run] step = 0.0 must be positive"),
     "a name that no variable can have": (
         "[bodies.crank]",
         '[bodies."my crank"]',
         "[bodies] 'my crank' must consist of at most 100 letters",
     ),
-    "no name": ('name = "crank_rocker"', "", "name is missing; the first line should be such as name = 'fourbar'"),
     "a line that is no TOML": (
         "[run]",
         "run:",
@@ -184,11 +174,8 @@ FILES = {
     "binary rubbish": (bytes(range(256)) * 100, "not a text file (byte 128 is not UTF-8)"),
     "nothing but zeros": (bytes(10_000), "not valid TOML: Invalid statement (at line 1, column 1)"),
     "a file of 10 MB": (b"# " + b"x" * 10_000_000, "too large for a mechanism file (largest: 4000000 bytes)"),
-    "another text format": (CRANK_ROCKER.encode("utf-16"), "not a text file (byte 0 is not UTF-8)"),
     "deep nesting": (b"name = " + b"[" * 1_000_000, "not valid TOML: nested too deeply"),
     "a key of a million parts": (b"name" + b".a" * 1_000_000 + b" = 1", "a key of more than 50 parts (at line 1)"),
-    "the ground alone": (b'name = "a"\n[bodies.ground]\n', "[bodies] has only the ground"),
-    "no bodies": (b'name = "a"\n', "[bodies] has only the ground; a mechanism needs a body that can move"),
     "JSON": (b'{"name": "a"}', "not valid TOML: Invalid statement (at line 1, column 1)"),
     "thousands of parameters": (
         "\n".join(['name = "a"', "[bodies.b]", "[parameters]", *(f"p{k} = {k}" for k in range(10_001))]).encode(),
