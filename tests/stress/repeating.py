@@ -20,7 +20,9 @@ from tests.power_series import mp
 from tests.stress.comparisons import all_compared, command_line
 from tests.stress.families import Draw
 
-WRONG = (4.0 * 2.0**-52, 1e-14, 1e-13)  # of the largest in the run and, for the angle, of all rises: errors of a law
+ROUNDINGS = 4.0  # of the largest values, and of the time in a period: the largest error of the law
+STEEPEST = (2.2, 7.6, 60.0)  # first, second and third derivative of a rise by its part
+EPS = 2.0**-52
 BEYOND = 10.0  # times its estimate: the largest error of the mechanism
 SAMPLES = 60
 SHAPES = {  # of rises: coefficients of the powers of a part, the lowest first
@@ -131,6 +133,7 @@ def compared(seed: int, engine: Literal["python", "native"]) -> Repeated:
         found.faults.append(f"status {run.status.max()} at sample {int(run.status.argmax())}")
         return found
     of_law = [driven.crank_at(float(time)) for time in driven.times]
+    period = sum(one.duration for one in driven.law.segments)
     rises = abs(driven.law.start) + sum(abs(one.rise) for one in driven.law.segments)
     for order in range(3):
         wanted = [one[order] for one in of_law]
@@ -138,7 +141,8 @@ def compared(seed: int, engine: Literal["python", "native"]) -> Repeated:
             [abs(float(Fraction(float(k)) - w)) for k, w in zip(run.inputs[:, order], wanted, strict=True)]
         )
         largest = max(abs(float(one)) for one in wanted)
-        bound = WRONG[order] * (largest + (rises if order == 0 else 0.0))
+        moved = period * max(abs(one.rise) / one.duration ** (order + 1) for one in driven.law.segments)
+        bound = ROUNDINGS * EPS * (largest + STEEPEST[order] * moved + (rises if order == 0 else 0.0))
         if errors.max() > bound:
             found.faults.append(f"derivative {order} of the law: error {errors.max():.1e} of {largest:.3g}")
     exact = [driven.exact(row) for row in run.inputs]
@@ -147,7 +151,7 @@ def compared(seed: int, engine: Literal["python", "native"]) -> Repeated:
         errors = np.array(
             [abs(float(mp.mpf(float(k)) - one[order])) for k, one in zip(table[:, column], exact, strict=True)]
         )
-        worst[order] = errors.max() / max(abs(float(one[order])) for one in exact)
+        worst[order] = errors.max() / (max(abs(float(one[order])) for one in exact) or 1.0)
         k = int((errors - BEYOND * run.error[:, order]).argmax())
         if errors[k] > BEYOND * run.error[k, order]:
             found.faults.append(
