@@ -21,6 +21,20 @@ DISCARD = 2  # fmi2Discard and fmi3Discard
 Log = Callable[[int, str], None]  # status and text of a message
 
 
+def free(slave: Any) -> None:
+    """Free the instance of an object of fmpy, and its library.
+
+    pythonfmu's library also frees its state of Python, which it would free a second time when the process ends.
+    """
+    finalize = getattr(slave.dll, "finalizePythonInterpreter", None)
+    if finalize is None:
+        slave.freeInstance()
+        return
+    slave.fmi2FreeInstance(slave.component)
+    finalize()
+    slave.freeLibrary()
+
+
 class LoadedSlave(ABC):
     """A slave of an FMU unpacked into a folder; raises what fmpy raises.
 
@@ -49,7 +63,7 @@ class LoadedSlave(ABC):
         )
 
     def free(self) -> None:
-        self.fmpy.freeInstance()
+        free(self.fmpy)
 
     @abstractmethod
     def initialize(self, start: float) -> None:

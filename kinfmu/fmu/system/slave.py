@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from kinfmu.errors import FmuError
-from kinfmu.fmu.slaves import DISCARD, Log, fmi2_callbacks
+from kinfmu.fmu.slaves import DISCARD, Log, fmi2_callbacks, free
 from kinfmu.fmu.system.ports import Port
 
 Getter = Callable[[], list[float]]
@@ -116,7 +116,7 @@ def foreign_slave(name: str, about: Any, folder: Path, log: Log) -> Iterator[Any
     try:
         yield AnySlave(name, slave, is_fmi3)
     finally:
-        slave.freeInstance()
+        free(slave)
 
 
 def _instance(name: str, about: Any, folder: Path, is_fmi3: bool, log: Log) -> Any:
