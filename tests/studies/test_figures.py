@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import kinfmu
@@ -73,6 +74,27 @@ def test_columns_are_shown_in_the_units_of_the_files_and_the_table_keeps_its_own
     tolerances = {"tilt": {"tolerance": 0.01}, "crank": {"tolerance": "0.002 in"}}
     scattered = kinfmu.study(mechanism, tables | tolerances, measures="swing", designs=4, workers=1)
     assert [scattered.display_unit(name).unit for name in ("tilt", "crank")] == ["deg", "in"]
+
+
+def test_a_scatter_matrix_has_one_axis_for_each_row_and_column_and_marks_designs_that_fail() -> None:
+    given = {"crank": {"from": 10, "to": 60}, "base": {"from": 20, "to": 60}}
+    found = kinfmu.study(linkage(), given, measures="swing", designs=64, workers=1)
+    failed = int(np.isnan(found["swing"]).sum())
+    assert 0 < failed < 64
+    figure = figure_of(found)
+    panels = np.array(figure.axes[:9]).reshape(3, 3)  # histograms have axes of their own, behind these
+    for k in range(3):
+        assert len({panels[row, k].get_xlim() for row in range(3)}) == 1
+        assert len({panels[k, column].get_ylim() for column in range(3)}) == 1
+        assert panels[k, 0].yaxis.get_tick_params()["labelleft"]  # in the top row too
+    low, high = panels[0, 0].get_xlim()
+    assert low < min(found["crank"]) < max(found["crank"]) < high
+    crosses, dots = (len(one.get_offsets()) for one in panels[0, 1].collections)
+    assert (crosses, dots) == (failed, 64 - failed)
+    assert [len(one.get_offsets()) for one in panels[0, 2].collections] == [64 - failed]
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [f"a measure has no value: {failed} of 64 designs"]
+    assert not figure_of(kinfmu.study(linkage(), KINDS["scatter"], designs=16, workers=1)).legends
 
 
 def test_contributions_are_written_at_their_bars(tmp_path: Path) -> None:
