@@ -274,3 +274,20 @@ def test_a_file_whose_bodies_or_joints_are_invalid_has_no_report(
     assert (result.exit_code, result.stdout) == (1, "")
     assert problem in result.stderr
     assert result.stderr.count("\n") == 1
+
+
+def test_the_figure_is_drawn_at_the_pose_asked_for(command: Command, tmp_path: Path) -> None:
+    """45 degrees are not 45 rad, and not the start; the same pose in radians gives the same picture."""
+    pictures = []
+    for k, pose in enumerate(["45deg", repr(math.pi / 4), "60deg"]):
+        path = tmp_path / f"{k}.svg"
+        result = command("check", "crank_rocker", "--figure", str(path), "--at", pose)
+        assert result.exit_code == 0, result.stderr
+        pictures.append(path.read_text("utf-8"))
+    assert "45 deg" in pictures[0] or "45°" in pictures[0]
+    assert pictures[0] == pictures[1]
+    assert pictures[0] != pictures[2]
+    refused = command("check", "crank_rocker", "--figure", str(tmp_path / "a.svg"), "--at", "45mm")
+    assert refused.exit_code != 0
+    assert "--at" in refused.stderr
+    assert not (tmp_path / "a.svg").exists()
