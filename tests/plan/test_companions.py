@@ -19,6 +19,11 @@ QUARTER = math.pi / 2
 LOCOMOTIVE = {"A": (0, 1, 0.0), "B": (0, 1, QUARTER)}
 IN_LINE = {"A": (0, 1, 0.0), "B": (0, 1, math.pi)}
 ROW = {f"{name}{k}": (k, k + 1, turn + 0.035 * k) for k in range(3) for name, turn in (("A", 0.0), ("B", QUARTER))}
+PAIRS = {  # twelve, each 2 degrees further than the one before
+    f"{name}{k}": (k, k + 1, turn + k * math.radians(2.0))
+    for k in range(12)
+    for name, turn in (("A", 0.0), ("B", QUARTER))
+}
 # A and C are in their dead centres together: B then carries the last wheel, and nothing the middle one
 MIDDLE_LOOSE = {"A": (0, 1, 0.0), "C": (1, 2, 0.0), "B": (0, 2, QUARTER)}
 ANGLES = np.radians(np.arange(-40.0, 400.0, 2.5))
@@ -67,6 +72,23 @@ def test_coupled_wheels_turn_by_equal_angles(
             assert run[name] == pytest.approx(angles if turns else 0.0 * angles, abs=1e-14)
             assert run[f"{body}.omega"] == pytest.approx(2.0 if turns else 0.0, abs=1e-13)
             assert run[f"{body}.alpha"] == pytest.approx(-3.0 if turns else 0.0, abs=1e-12)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("second", [False, True])
+def test_twelve_pairs_of_rods_out_of_phase_are_regular_at_every_angle(engine: str, second: bool) -> None:
+    """Among the angles are the dead centres of the first pairs."""
+    angles = np.radians(np.arange(-10.0, 370.0, 10.0))
+    inputs = {"crank_angle": angles, "crank_speed": 2.0, "crank_acceleration": -3.0}
+    run = kinfmu.solve(
+        wheels(PAIRS, second=second), engine=engine, **inputs | ({"arm_angle": -angles} if second else {})
+    )
+    assert (run.status == 0).all()
+    assert run.margin.min() > 0.2
+    for k in range(13):
+        assert run[f"wheel{k}.phi"] == pytest.approx(angles, abs=1e-13)
+        assert run[f"wheel{k}.alpha"] == pytest.approx(-3.0, abs=1e-12)
 
 
 def test_check_sees_no_singular_point_where_the_second_rod_carries() -> None:
