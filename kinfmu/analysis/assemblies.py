@@ -256,8 +256,10 @@ def _shorter_choices(
     """
     bodies = mechanism.moving_bodies
     only_turns = [body.name for body, where in zip(bodies, moved, strict=True) if where[2] and not where[:2].any()]
-    turned = {
-        body.name: body.start._replace(phi=elsewhere[body.name].phi)
+    turned = {  # complete start poses stay poses that close the joints
+        body.name: elsewhere[body.name]
+        if None not in body.start and where[:2].any()
+        else body.start._replace(phi=elsewhere[body.name].phi)
         for body, where in zip(bodies, moved, strict=True)
         if where[2]
     }

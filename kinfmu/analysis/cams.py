@@ -15,6 +15,7 @@ from kinfmu.analysis.driver_path import DriverPath, follow
 from kinfmu.analysis.values import degrees
 from kinfmu.cams import (
     CAM_JOINTS,
+    NO_PROFILE,
     CamExtreme,
     CamJoint,
     CamProfile,
@@ -289,7 +290,7 @@ def cam_findings(plan: SolvePlan, paths: Sequence[DriverPath]) -> tuple[CamFindi
             name, at = _driver(plan, placed, paths)
             found.append(CamFindings(joint.name, placed, critical_values(placed), name, at, mechanism.length_unit))
         except KinfmuError as reason:
-            text = str(reason).removeprefix(f"cam '{joint.name}': ")
+            text = str(reason).removeprefix(f"cam '{joint.name}': ").removeprefix(f"{NO_PROFILE}: ")
             found.append(CamFindings(joint.name, None, None, "", float, mechanism.length_unit, text))
     return tuple(found)
 

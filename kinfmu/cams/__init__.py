@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from kinfmu.cams.critical import CamExtreme, Critical, Cut, critical_values
-from kinfmu.cams.placed import CAM_JOINTS, CamJoint, PlacedCam, placed_cam
+from kinfmu.cams.placed import CAM_JOINTS, NO_PROFILE, CamJoint, PlacedCam, placed_cam
 from kinfmu.cams.profile import CamProfile, profile_at, turn_of
 from kinfmu.cams.traced import pressing_sign
 
 __all__ = [
     "CAM_JOINTS",
+    "NO_PROFILE",
     "CamExtreme",
     "CamJoint",
     "CamProfile",

@@ -14,6 +14,7 @@ from kinfmu.mechanism import Mechanism
 
 CamJoint = CamTranslating | CamOscillating | CamRoller | CamFlatFace
 CAM_JOINTS = (CamTranslating, CamOscillating, CamRoller, CamFlatFace)
+NO_PROFILE = "the cam has no closed profile"
 _PARALLEL = 1e-9  # sine of the angle between the guide of a follower and the axis of its lift
 
 
@@ -68,7 +69,7 @@ def placed_cam(mechanism: Mechanism, joint: CamJoint, poses: Mapping[str, tuple[
     where = f"cam '{joint.name}'"
     why = joint.law.why_not_periodic()
     if why:
-        raise MechanismError(f"{where}: {why}, so the cam has no closed profile")
+        raise MechanismError(f"{where}: {NO_PROFILE}: {why}")
     cam, follower, touching = members_of(joint)
     if touching is None:
         raise MechanismError(

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-from kinfmu.errors import MechanismError
+from kinfmu.errors import MechanismError, listed
 from kinfmu.joints.follower_element import FaceNormal, RollerRadius, check_element, roller_conditions
 from kinfmu.joints.joint import Condition, Joint
-from kinfmu.laws import Law
-from kinfmu.laws.law import TURN
+from kinfmu.laws import Law, MotionSequence
+from kinfmu.laws.law import NEARLY, TURN
 from kinfmu.measures import AngleBetween, PoseQuantity, PositionAlong
 from kinfmu.measures.arithmetic import Value
 from kinfmu.measures.placement import BodyName, BodyPair, Placement, PointPair, Reference, body_of
@@ -84,9 +85,22 @@ class Cam(Joint):
             )
         why = self.law.why_not_periodic() if self.law.repeats else ""
         if why:
-            raise MechanismError(
-                f"{where} law: {why}; a follower that goes on turn after turn needs a coupling", joint=self.name
-            )
+            raise MechanismError(f"{where} law: {why}{_cure(self.law, self.led)}", joint=self.name)
+
+
+def _cure(law: Law, led: str) -> str:
+    """Return what to change of a law that is not periodic; '' where its reason says that."""
+    if isinstance(law, MotionSequence):
+        if abs(sum(segment.duration for segment in law.segments) - TURN) > NEARLY * TURN:
+            return ""
+        rises = [segment.rise for segment in law.segments if segment.rise != 0.0]
+        bare = next((rise for rise in rises if abs(rise) > TURN), None)
+        if led == "angle" and bare is not None:
+            shown = listed(f"{math.degrees(rise):.6g} deg" for rise in rises)
+            return f" ({shown}); a bare angle is in radians: write '{bare:.6g} deg' for degrees"
+        if led == "angle":
+            return f" ({math.degrees(sum(rises)):.6g} deg); a follower that goes on turn after turn needs a coupling"
+    return "; a follower that goes on turn after turn needs a coupling"
 
 
 def closing(law: Law) -> tuple[Condition, ...]:

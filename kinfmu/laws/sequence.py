@@ -125,7 +125,11 @@ class MotionSequence(Law):
         if abs(whole - TURN) > NEARLY * TURN:
             found = f"the durations of its sequence add up to {math.degrees(whole):.9g} deg, not to a turn of 360 deg"
             bare = next((one.duration for one in self.segments if one.duration > TURN), None)
-            return found if bare is None else f"{found}; a bare angle is in radians: write '{bare:.6g} deg' for degrees"
+            if bare is not None:
+                return f"{found}; a bare angle is in radians: write '{bare:.6g} deg' for degrees"
+            rest = math.degrees(TURN - whole)
+            cure = f"{rest:.9g} deg are missing: add a dwell" if rest > 0.0 else f"{-rest:.9g} deg are too many"
+            return f"{found}; {cure}"
         rise = sum(segment.rise for segment in self.segments)
         if abs(rise) > NEARLY * max(abs(segment.rise) for segment in self.segments):
             return f"the rises of its sequence add up to {rise:.9g}, not to 0"

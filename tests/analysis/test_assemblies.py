@@ -12,9 +12,11 @@ import pytest
 import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, Start, gallery
 from kinfmu.analysis.assemblies import Assemblies, find_assemblies
+from kinfmu.equations.start_poses import open_joints, start_from_poses
+from kinfmu.equations.system import System
 from kinfmu.errors import AssemblyError, MobilityError
 from kinfmu.joints import Coordinate, Translational
-from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.plan import SolvePlan, compile_plan, localized
 from tests.analysis.linkages import digger, five_bar_arm, pushed_crank
 from tests.gallery_members import mostly_long
 from tests.mechanisms import bar_linkage, five_bar, fourbar, reference_fourbar, six_bar, slider_crank
@@ -119,6 +121,25 @@ def test_one_start_angle_chooses_a_four_bar() -> None:
     assert "  assemblies  2 at crank = 1 rad (57.2957795 deg), distinguished by coupler.phi" in text
     assert "  * 1         coupler.phi 36.609 deg, that of the file" in text
     assert '              choose it by [bodies.rocker] start.phi = "-129.9 deg"' in text
+
+
+def test_complete_start_poses_are_replaced_by_complete_ones_that_close_the_joints() -> None:
+    places = {"O": (0, 0), "A": (0, 30), "B": (85, 70), "C": (100, 0)}  # of a sketch, in the world
+    links = {"crank": "OA", "coupler": "AB", "rocker": "BC"}
+    bodies = [Body(name, {end: places[end] for end in ends}, (0, 0, 0)) for name, ends in links.items()]
+    joints = [
+        Revolute("O", ("ground.O", "crank.O")),
+        Revolute("A", ("crank.A", "coupler.A")),
+        Revolute("B", ("coupler.B", "rocker.B")),
+        Revolute("C", ("ground.C", "rocker.C")),
+    ]
+    ground = Body("ground", {end: places[end] for end in "OC"})
+    drawn = Mechanism("drawn", [ground, *bodies], joints, [AngleDriver("motor", "crank", ConstantSpeed(0.0, 1.0))])
+    assemblies = found_for(drawn)
+    assert len(assemblies.found) == 2
+    assert "[bodies.rocker] start = { x = " in str(assemblies)
+    other = System(localized(started(drawn, dict(assemblies.found[1].start)))[0])
+    assert open_joints(other, start_from_poses(other).q) == []
 
 
 def test_assemblies_are_plain_data_too() -> None:

@@ -266,7 +266,7 @@ WRONG: dict[str, tuple[Any, str]] = {
     ),
     "law without repetition": (
         lambda: followers.lifted_roller(8.0, kinfmu.Cycloidal(10.0, 1.0)),
-        "cam 'lift': law 'cycloidal' does not repeat, so the cam has no closed profile",
+        "cam 'lift': the cam has no closed profile: law 'cycloidal' does not repeat",
     ),
 }
 

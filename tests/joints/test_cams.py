@@ -306,13 +306,32 @@ WRONG: dict[str, tuple[Joint, str]] = {
     "a sequence that is no turn": (
         CamTranslating("c", ("ground.O", "follower.R"), "cam", MotionSequence((Segment("dwell", 3.0),), repeat=True)),
         "[joints.c] law: the durations of its sequence add up to 171.887339 deg, not to a turn of 360 deg; "
-        "a follower that goes on turn after turn needs a coupling",
+        "188.112661 deg are missing: add a dwell",
     ),
     "a sequence that does not come back": (
         CamTranslating(
             "c", ("ground.O", "follower.R"), "cam", MotionSequence((Segment("cycloidal", TURN, 1.0),), repeat=True)
         ),
         "[joints.c] law: the rises of its sequence add up to 1, not to 0; "
+        "a follower that goes on turn after turn needs a coupling",
+    ),
+    "a rise in degrees without a unit": (
+        CamOscillating(
+            "c",
+            ("ground", "follower"),
+            "cam",
+            MotionSequence(
+                (Segment("cycloidal", 3.0, 15.0), Segment("3-4-5", TURN - 3.0, -math.pi / 12.0)), repeat=True
+            ),
+        ),
+        "[joints.c] law: the rises of its sequence add up to 14.7382006, not to 0 (859.437 deg, -15 deg); "
+        "a bare angle is in radians: write '15 deg' for degrees",
+    ),
+    "a swing that does not come back": (
+        CamOscillating(
+            "c", ("ground", "follower"), "cam", MotionSequence((Segment("cycloidal", TURN, 0.5),), repeat=True)
+        ),
+        "[joints.c] law: the rises of its sequence add up to 0.5, not to 0 (28.6479 deg); "
         "a follower that goes on turn after turn needs a coupling",
     ),
     "a cam that is its own follower": (

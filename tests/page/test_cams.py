@@ -233,9 +233,13 @@ def test_roller_of_a_given_curve_can_be_changed(chromium: Browser) -> None:
 @pytest.mark.parametrize(
     ("values", "joint", "note"),
     [
-        ({"r": 75.0}, "lobe", "the profile of lobe, into which its roller cuts; the profile of lift, whose roller"),
-        ({"h": 35.0}, "lift", "the profile of lift, into which its roller cuts"),
-        ({"swing": -1.2}, "pad", "the profile of pad, which would not be convex"),
+        (
+            {"r": 75.0},
+            "lobe",
+            "the profile of joint lobe, into which its roller cuts; the profile of joint lift, whose roller",
+        ),
+        ({"h": 35.0}, "lift", "the profile of joint lift, into which its roller cuts"),
+        ({"swing": -1.2}, "pad", "the profile of joint pad, which would not be convex"),
     ],
 )
 def test_profile_that_cannot_be_is_left_out_and_the_page_states_why(
@@ -263,7 +267,7 @@ def test_cam_that_does_not_turn_all_the_way_is_left_out(cams: Opened) -> None:
     cams.get("delete k.linkage.engines.opened[1].at")
     assert shapes(cams, "lift") == {}
     assert (
-        "Not drawn with these values: the cam of lift, which no driver turns all the way round."
+        "Not drawn with these values: the cam of joint lift, which no driver turns all the way round."
         in cams.tab.text_content("#note")
     )
 

@@ -40,7 +40,7 @@ function camOf(linkage, cam) {
     const [radius, normal] = [numberOf(linkage, cam, "roller_radius"), numberOf(linkage, cam, "normal")];
     const unknown = normal === undefined ? "the direction of whose face follows from an expression" : "";
     const turn = unknown ? null : turnOf(linkage, cam, normal);
-    if (!turn) return { shapes: [], leftOut: `the cam of ${cam.name}, ${unknown || "which no driver turns all the way round"}` };
+    if (!turn) return { shapes: [], leftOut: `the cam of joint ${cam.name}, ${unknown || "which no driver turns all the way round"}` };
     const { points, sense } = turn;
     const colour = (body) => linkage.data.bodies[linkage.body(body)].colour;
     const curve = (kind, line) => ({ kind, name: cam.name, frame: cam.body, colour: colour(cam.body), points: line, closed: true });
@@ -48,13 +48,13 @@ function camOf(linkage, cam) {
         const touching = points.map(({ z, n, c }) => [z[0] - c * n[1], z[1] + c * n[0]]);
         const face = { kind: "face", name: cam.name, frame: cam.follower, colour: colour(cam.follower), ...faceOf(linkage, cam, normal, points, touching) };
         const isReal = isConvex(points, touching, sense, linkage.local(cam.centre));
-        return isReal ? { shapes: [curve("cam", touching), face], leftOut: "" } : { shapes: [face], leftOut: `the profile of ${cam.name}, which would not be convex` };
+        return isReal ? { shapes: [curve("cam", touching), face], leftOut: "" } : { shapes: [face], leftOut: `the profile of joint ${cam.name}, which would not be convex` };
     }
     const pitch = curve("pitch", points.map(({ z }) => z));
     if (radius === null) return { shapes: [pitch], leftOut: "" };
-    if (radius === undefined) return { shapes: [pitch], leftOut: `the profile of ${cam.name}, whose roller follows from an expression` };
+    if (radius === undefined) return { shapes: [pitch], leftOut: `the profile of joint ${cam.name}, whose roller follows from an expression` };
     const profile = profileOf(points, sense, radius, linkage.local(cam.centre));
-    if (!profile) return { shapes: [pitch], leftOut: `the profile of ${cam.name}, into which its roller cuts` };
+    if (!profile) return { shapes: [pitch], leftOut: `the profile of joint ${cam.name}, into which its roller cuts` };
     const roller = { kind: "roller", name: cam.name, frame: cam.follower, colour: ROLLER_GREY, points: [linkage.local(cam.point)], radius };
     return { shapes: [pitch, curve("cam", profile), ...(radius > 0 ? [roller] : [])], leftOut: "" };
 }

@@ -122,7 +122,7 @@ class Page {
         this.transport.update();
         const { design, linkage, motion } = this;
         $("note").hidden = !linkage.leftOut.length;
-        $("note").textContent = `Not drawn with these values: ${linkage.leftOut.join("; ")}. kinfmu check --figure draws the saved file.`;
+        $("note").textContent = `Not drawn with these values: ${linkage.leftOut.join("; ")}. The lines of kinfmu check hold for the saved file.`;
         $("undo").disabled = !design.past.length;
         $("redo").disabled = !design.future.length;
         $("reset").disabled = !design.changes().length;
