@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import mpmath as mp
 import numpy as np
 import pytest
+from fmpy import read_model_description
 
 import kinfmu
 from kinfmu import Body, ConstantSpeed, DistanceDriver, Mechanism, Revolute
 from kinfmu.errors import AssemblyError, RequestError
 from tests import oracle
+from tests.fmu.host import Host
 from tests.mechanisms import fourbar
 
 ENGINES = ("python", "native")
@@ -128,3 +131,33 @@ def test_a_speed_whose_square_no_float_holds_is_refused(engine: str) -> None:
     with pytest.raises(RequestError, match=r"^crank_speed = 1e\+155 at sample 1: the largest value is 1e\+100$"):
         kinfmu.solve(mechanism, engine=engine, crank_angle=[1.0, 1.1], crank_speed=[1.0, 1e155])
     assert np.isfinite(kinfmu.solve(mechanism, engine=engine, crank_angle=[1.0], crank_speed=1e99).accelerations).all()
+
+
+@pytest.mark.parametrize(("flavour", "fmi"), [("python", 2), ("native", 2), ("native", 3)])
+def test_in_fmus_estimates_hold_at_the_longest_reach_that_is_declared(flavour: str, fmi: int, tmp_path: Path) -> None:
+    """At the first sample as at a later one."""
+    path = kinfmu.build(
+        cylinder(0.7),
+        tmp_path / "cylinder.fmu",
+        flavour=flavour,  # type: ignore[arg-type]  # one of the two
+        fmi=fmi,  # type: ignore[arg-type]
+        drive="inputs",
+    )
+    variables = read_model_description(str(path)).modelVariables
+    (longest,) = [float(one.max) for one in variables if one.name == "cylinder_length"]
+    at_longest = {"cylinder_length": longest, "cylinder_speed": 1.0}
+    exact = exact_arm(0.7, longest)
+    for is_first in (True, False):
+        host = Host(path, tmp_path / f"{is_first}")
+        try:
+            host.set(at_longest if is_first else {"cylinder_length": 1.0, "cylinder_speed": 1.0})
+            host.initialize(0.0)
+            host.set(at_longest)
+            assert host.status() == 1
+            values, errors = host.get("arm.phi", "arm.omega"), host.get("solver.error_q", "solver.error_qd")
+            bounds = [
+                abs(value - wanted) <= error for value, wanted, error in zip(values, exact or (), errors, strict=False)
+            ]
+            assert bounds == [True, True]
+        finally:
+            host.free()
