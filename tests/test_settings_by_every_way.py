@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +16,7 @@ import kinfmu
 from kinfmu import Cycloidal, Mechanism
 from kinfmu.cli.group import main
 from kinfmu.errors import KinfmuError, RequestError
+from kinfmu.mechanism import toml_file
 from tests.fmu.test_parameters import LENGTHS, linkage
 
 MISTAKES = {  # name, value, message up to the list of what would be valid
@@ -117,3 +119,38 @@ def test_a_parameter_that_a_model_has_built_in_is_refused() -> None:
     assert str(caught.value) == (
         "coupler is a number of the model; compile(mechanism, parameters=['coupler']) makes it an argument"
     )
+
+
+SPRING = """
+name = "swing"
+units.length = "mm"
+parameters = { reach = 70, size = 10 }
+bodies.ground.points = { O = [0, 0], S = ["reach", 0] }
+bodies.crank = { points = { O = [0, 0], P = [30, 0] } }
+bodies.slide = { points = { C = [0, 0] }, start = { x = 0, y = 40 } }
+joints.O = { type = "revolute", between = ["ground.O", "crank.O"] }
+joints.cam = { type = "cam_flat_face", between = ["crank.O", "slide.C"], normal = "90 deg", law = "sequence", \
+segments = [{ law = "cycloidal", rise = 5, duration = "180 deg" }, { law = "cycloidal", rise = -5, \
+duration = "180 deg" }], repeat = true, start = "2*size" }
+drivers.crank = { type = "angle", of = "crank", law = "constant_speed", speed = "60 rpm" }
+loads.spring = { type = "spring", between = ["ground.S", "crank.P"], stiffness = "0.05 N/mm", free_length = "reach" }
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        (
+            "spring.stiffness",
+            "there is no parameter 'spring.stiffness': it is a number of [loads.spring]; to set it, give it as "
+            'spring_stiffness in [parameters] and write "spring_stiffness" in its place; parameters: reach, ',
+        ),
+        ("cam.rise_1", "there is no parameter 'cam.rise_1': it is a number of [joints.cam]; to set it, give it as "),
+        ("spring.free_length", "spring.free_length follows from 'reach'; set the parameters in it"),
+        ("cam.start", "cam.start follows from '2*size'; set the parameters in it"),
+        ("spring.stifness", "there is no parameter 'spring.stifness'; parameters: reach, "),
+    ],
+)
+def test_numbers_of_joints_and_loads_are_set_by_parameters(name: str, message: str) -> None:
+    with pytest.raises(RequestError, match=re.escape(message)):
+        toml_file.parse(SPRING).with_parameters({name: 1.0})

@@ -191,7 +191,21 @@ class Mechanism(Live):
     def settable(self) -> Settable:
         """What can be set by name, with the checks of names and values."""
         constants = (*self.law_constants, *self.load_constants)
-        return Settable(self.parameters, constants, self.expressions, self.length_unit)
+        return Settable(self.parameters, constants, self.expressions, self.length_unit, lambda: self._other_numbers)
+
+    @property
+    def _other_numbers(self) -> dict[str, str]:
+        """Tables of the numbers of joints and loads that cannot be set by name, by '<member>.<key>'."""
+        found: dict[str, str] = {}
+
+        def look(place: NumberPath, value: Any, _: Quantity) -> Any:
+            if place[0] in ("joints", "loads"):
+                keys = (key for key in place[2:] if isinstance(key, str) and key != "law")
+                found[".".join((str(place[1]), *keys))] = f"[{place[0]}.{place[1]}]"
+            return value
+
+        self.members.changed(look)
+        return found
 
     def with_parameters(self, values: Mapping[str, float | str]) -> Mechanism:
         """Return the mechanism with other values of some parameters.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import NamedTuple, TypeVar
@@ -79,6 +79,13 @@ class Settable:
         constants: The law constants that are not written as expressions.
         names: Names of both.
 
+    Args:
+        parameters: As above.
+        constants: As above.
+        expressions: Expressions by the places of their numbers.
+        length_unit: Unit of length.
+        others: Returns tables by '<member>.<key>' of the numbers of joints and loads that cannot be set by name.
+
     """
 
     def __init__(
@@ -87,12 +94,13 @@ class Settable:
         constants: Sequence[LawConstant],
         expressions: Mapping[NumberPath, Expression],
         length_unit: str,
+        others: Callable[[], Mapping[str, str]],
     ) -> None:
         self.parameters = parameters
         self.constants = {constant.name: constant for constant in constants}
         self.names = (*parameters, *self.constants)
         self._expressions = expressions
-        self._length_unit = length_unit
+        self._length_unit, self._others = length_unit, others
 
     def check_name(self, name: str) -> None:
         """Raise a RequestError for a name that is neither a parameter nor a law constant."""
@@ -104,6 +112,13 @@ class Settable:
         expression = self._expression(name)
         if expression is not None:
             return RequestError(f"{name} follows from {quoted(expression.text)}; set the parameters in it")
+        table = self._others().get(name)
+        if table is not None:
+            key = name.replace(".", "_")
+            return RequestError(
+                f"there is no parameter {quoted(name)}: it is a number of {table}; to set it, give it as {key} in "
+                f'[parameters] and write "{key}" in its place; parameters: {listed(known)}'
+            )
         return RequestError(
             f"there is no parameter {quoted(name)}{suggestion(name, known)}; parameters: {listed(known)}"
         )
@@ -163,13 +178,13 @@ class Settable:
         return display_unit(setting.quantity, self._length_unit, written_unit(values, self._length_unit) or own)
 
     def _expression(self, name: str) -> Expression | None:
-        """Return the expression of a parameter or a law constant, if it has one."""
+        """Return the expression of a parameter or of a number of a joint, driver or load, if it has one."""
         if name in self.parameters:
             return self.parameters[name].expression
         paths = {
-            f"{path[1]}.{path[3]}": path
+            ".".join((str(path[1]), *(str(key) for key in path[2:] if key != "law"))): path
             for path in self._expressions
-            if path[0] in ("drivers", "loads") and len(path) == 4 and path[2] == "law"
+            if path[0] in ("drivers", "joints", "loads")
         }
         return self._expressions[paths[name]] if name in paths else None
 
