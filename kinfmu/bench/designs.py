@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from itertools import cycle
 from time import perf_counter, process_time
@@ -89,10 +89,13 @@ def _batches(rounds: int, count: int) -> list[str]:
         "solve_designs, q alone": (count, lambda: native.solve_designs(lengths, crank_angle=angles, derivatives=0)),
         "Model.solve, design after design, q, qd, qdd": (few, one_after_another),
         "closed form in a loop, by numba, q alone": (count, _numba(angles, lengths)),
+        "pylinkage, by numba: points, not angles": (few, _pylinkage(angles, sets)),
         "scipy.optimize.fsolve, q alone": (min(2, few), by_fsolve),
     }
     if find_spec("numba") is None:
         del ways["closed form in a loop, by numba, q alone"]
+    if find_spec("numba") is None or find_spec("pylinkage") is None:
+        del ways["pylinkage, by numba: points, not angles"]
     measured = in_turn([way for _, way in ways.values()], rounds, process_time)
     rows = []
     for (name, (designs, _)), seconds in zip(ways.items(), measured, strict=True):
@@ -116,6 +119,29 @@ def _loop_closure(z: FloatArray, u: float, g: float, a: float, b: float, c: floa
         a * np.cos(u) + b * np.cos(z[0]) - g - c * np.cos(z[1]),
         a * np.sin(u) + b * np.sin(z[0]) - c * np.sin(z[1]),
     ]
+
+
+def _pylinkage(angles: FloatArray, sets: Sequence[dict[str, float]]) -> Callable[[], object]:
+    """Return a function that computes positions, velocities and accelerations of the two pins, design after design."""
+    if find_spec("numba") is None or find_spec("pylinkage") is None:
+        return lambda: None
+    from pylinkage.actuators import Crank
+    from pylinkage.components import Ground
+    from pylinkage.dyads import RRRDyad
+    from pylinkage.simulation import Linkage
+
+    step = float(angles[1] - angles[0])
+
+    def way() -> None:
+        for values in sets:
+            ground, crank, coupler, rocker = values.values()
+            o, c = Ground(0.0, 0.0), Ground(ground, 0.0)
+            p = Crank(o, crank, step, float(angles[0]) - step)
+            linkage = Linkage([o, c, p, RRRDyad(p.output, c, coupler, rocker, ground, rocker)])
+            linkage.set_input_velocity(p, 1.0, 0.0)
+            linkage.step_fast_with_kinematics(len(angles))
+
+    return way
 
 
 def _numba(angles: FloatArray, lengths: dict[str, FloatArray]) -> Callable[[], object]:

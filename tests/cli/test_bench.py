@@ -233,6 +233,13 @@ def test_designs_are_compared_with_the_closed_form() -> None:
 
 
 @pytest.mark.long
+def test_pylinkage_computes_the_pins_of_the_same_designs() -> None:
+    pytest.importorskip("pylinkage")
+    pytest.importorskip("numba")
+    assert "pylinkage, by numba: points, not angles" in designs.run(rounds=1, designs=8)
+
+
+@pytest.mark.long
 def test_the_table_of_designs_has_a_row_for_every_way_to_solve_them() -> None:
     text = designs.run(rounds=1, designs=8)
     assert "8 crank-rockers at 361 angles" in text
