@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import partial
 from itertools import combinations, pairwise
+from statistics import median_low
 from typing import NamedTuple
 
 from kinfmu.analysis.driver_path import DriverPath
@@ -22,7 +23,9 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.solver.python import Pose
 
+TOO_LONG = 50.0  # medians of all links; a link that long is probably in another unit
 TOO_SHORT = 1e-3  # of the shortest neighbour; a link that short is probably in another unit
+_LEAST_LINKS = 4  # fewer have no usual length
 _STILL = 1e-9  # [rad, sizes]; a body that moves less does not move
 _SAME = 1e-9  # of the size; points closer than this coincide
 _EDGE = 1e-6  # of the run's range; positions closer to its ends are not crossed
@@ -100,6 +103,7 @@ def _short_links(mechanism: Mechanism) -> Iterator[str]:
         for body in joint.bodies():
             neighbours.setdefault(body, set()).update(joint.bodies())
     lengths = {body: _longest(mechanism.body_points, names) for body, names in held.items()}
+    yield from _long_links({body: length for body, length in lengths.items() if length > 0.0}, mechanism.length_unit)
     for body, length in lengths.items():
         others = [lengths.get(other, 0.0) for other in neighbours[body] - {body}]
         others = [other for other in others if other > 0.0]
@@ -108,6 +112,19 @@ def _short_links(mechanism: Mechanism) -> Iterator[str]:
             yield (
                 f"{body} is {length:.4g} {unit} long between its joints, its neighbours at least {min(others):.4g} "
                 f"{unit}: are its points in another unit?"
+            )
+
+
+def _long_links(lengths: Mapping[str, float], unit: str) -> Iterator[str]:
+    """Yield a line for moving bodies that are much longer between their joints than most."""
+    if len(lengths) < _LEAST_LINKS:
+        return
+    usual = median_low(lengths.values())  # of four links two may be in another unit
+    for body, length in lengths.items():
+        if body != GROUND_NAME and length > TOO_LONG * usual:
+            yield (
+                f"{body} is {length:.4g} {unit} long between its joints, the median of all is {usual:.4g} {unit}: "
+                "are its points in another unit?"
             )
 
 

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from kinfmu.analysis.singular import DriverRange
-from kinfmu.analysis.values import LOOKS, law_values, value_text
+from kinfmu.analysis.values import LOOKS, degrees, law_values, value_text
 from kinfmu.drivers import AngleDriver, DistanceDriver
 from kinfmu.equations.start_poses import StartValues, is_in_world_coordinates, open_joints_text, start_from_poses
 from kinfmu.equations.system import System
 from kinfmu.errors import KinfmuError, listed
-from kinfmu.joints.cam import Cam
+from kinfmu.joints.cam import Cam, CamOscillating
 from kinfmu.laws import MotionSequence, Spline
 from kinfmu.measures import AngleBetween
 from kinfmu.mechanism import Mechanism
@@ -151,6 +151,7 @@ def _loads(mechanism: Mechanism) -> Iterator[str]:
             )
 
 
+_FAR = 0.5  # [rad]; start angles read off a sketch are nearer to those of a cam
 _LARGE = 600  # coordinates; runs of larger mechanisms with several drivers are not evaluated
 
 
@@ -184,6 +185,7 @@ def start_notes(system: System, values: StartValues) -> Iterator[str]:
         them, their = ("them", "their") if ", " in opened else ("it", "its")
         cure = f"; check the coordinates of {their} points" if is_in_world_coordinates(system.mechanism) else ""
         yield f"in the start poses of the file {opened}; assembly closed {them}{cure}"
+    yield from _turned_followers(system)
     if not values.is_moved:
         return
     given, unit = start_from_poses(system).u, system.mechanism.length_unit
@@ -197,3 +199,19 @@ def start_notes(system: System, values: StartValues) -> Iterator[str]:
         f"{listed(f'{name} = {start}' for name, _, start in changed)}, which cannot be reached from there: "
         "the mechanism is assembled at the start of the law"
     )
+
+
+def _turned_followers(system: System) -> Iterator[str]:
+    """Yield a line for each oscillating follower that its cam holds far from its start angle."""
+    bodies = system.mechanism.moving_bodies
+    given = {body.name for body in bodies if body.start.phi is not None}
+    residual = system.residual(start_from_poses(system).q, np.zeros(len(system.mechanism.drivers)))
+    for member in system.members[: len(system.mechanism.joints)]:
+        joint = member.owner
+        if isinstance(joint, CamOscillating) and given.issuperset(member.bodies):
+            off = math.remainder(float(residual[member.rows[0]]), math.tau)
+            if abs(off) > _FAR:
+                yield (
+                    f"[joints.{joint.name}] turns {joint.between[1]} by {degrees(-off)} from its start pose: check "
+                    f"offset = {degrees(joint.offset)} and the law"
+                )

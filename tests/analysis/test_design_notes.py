@@ -103,6 +103,15 @@ def test_joints_that_hold_the_same_bodies_in_one_place_are_named() -> None:
     ]
 
 
+@pytest.mark.parametrize(("length", "names"), [('"50 m"', ["coupler", "rocker"]), ("900", [])])
+def test_links_in_another_unit_that_share_a_pin_are_reported(length: str, names: list[str]) -> None:
+    pin = f"Q = [{length}, 0] }}"
+    found = notes(
+        ("P = [0, 0], Q = [50, 0] }", f"P = [0, 0], {pin}"), ("C = [0, 0], Q = [50, 0] }", f"C = [0, 0], {pin}")
+    )
+    assert [note.split()[0] for note in found if "the median of all is 40 mm" in note] == names
+
+
 @pytest.mark.parametrize(("length", "is_noted"), [("0.02", True), ("0.019", True), ("0.051", False), ("20", False)])
 def test_a_link_in_another_unit_is_reported(length: str, is_noted: bool) -> None:
     found = notes(("P = [20, 0] }", f"P = [{length}, 0] }}"), ("C = [40, 0]", "C = [60, 0]"))

@@ -254,3 +254,21 @@ def test_a_rise_of_a_cam_in_degrees_without_a_unit_is_reported_once() -> None:
         "[joints.lobe] rise_1 = -22 rad is -1260.51 deg, more than a turn: a bare angle is in radians; "
         "degrees are written such as '60 deg'"
     ]
+
+
+@pytest.mark.parametrize(("offset", "is_noted"), [("5", True), ("5 deg", False), ("-40 deg", True)])
+def test_an_offset_that_turns_an_oscillating_follower_far_from_its_start_pose_is_reported(
+    offset: str, is_noted: bool
+) -> None:
+    lever = "[bodies.lever]\npoints = { H = [-2, 0], R = [0, 0.5] }\nstart = { x = 0, y = 0, phi = 0 }\n[joints]\n"
+    cam = (
+        f'[joints.lobe]\ntype = "cam_oscillating"\nbetween = ["ground", "lever"]\ncam = "crank"\noffset = "{offset}"\n'
+        'law = "harmonic"\namplitude = "5 deg"\nfrequency = 1\n'
+    ).replace('"5"', "5")
+    text = SIX_BAR.replace("[joints]\n", f"{lever}H = {{ type = 'revolute', between = ['ground.H', 'lever.H'] }}\n")
+    text = text.replace("G = [6, 1] }\n[bodies.crank]", "G = [6, 1], H = [-2, 0] }\n[bodies.crank]")
+    found = [
+        note for note in check(parse(text.replace("[drivers.crank]", f"{cam}[drivers.crank]"))).notes if "lobe" in note
+    ]
+    assert bool(found) == is_noted
+    assert all("check offset = " in note for note in found)
