@@ -13,11 +13,13 @@ import numpy as np
 from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.plan import compile_plan
 from kinfmu.run import FloatArray
+from kinfmu.solver.python.status import Status
 from kinfmu.sweep import Model
 from kinfmu.synthesis.nearest import NotReachedError, crossings, modulo, nearest
 from kinfmu.synthesis.numbers import Bounds
 from kinfmu.synthesis.problem import FitProblem
 from kinfmu.synthesis.sampled import Sampled
+from kinfmu.units import unit_of
 
 
 class NotAssembledError(Exception):
@@ -190,8 +192,13 @@ class Equations:
             raise RequestError(f"[unknowns] {reason}")
         if not np.isfinite(found.values_by).all():
             k = int(np.flatnonzero(~np.isfinite(found.values_by).all(axis=(1, 2)))[0])
-            name = self.problem.argument.name
-            raise NotAssembledError(f"the design has no derivatives at {name} = {u[k]:.6g} (status {found.status[k]})")
+            argument = self.problem.argument
+            is_angle, unit = argument.quantity.kind == "angle", self.problem.mechanism.length_unit
+            at = f"{math.degrees(u[k]):.6g} deg" if is_angle else f"{u[k]:.6g} {unit_of(argument.quantity, unit)}"
+            status = Status(int(found.status[k]))
+            reason = "cannot reach" if status is Status.OUTSIDE else "has no derivatives at"
+            name = status.name.lower().replace("_", " ")
+            raise NotAssembledError(f"the design {reason} {argument.name} = {at} (status {int(status)}: {name})")
         ends = np.cumsum([0, *map(len, arguments)])
         return tuple(
             self._row(target, values, u[a:b], found.values[a:b], found.rates[a:b], found.values_by[a:b])

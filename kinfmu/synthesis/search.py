@@ -133,7 +133,7 @@ def distinct(found: Sequence[tuple[Found, int]]) -> list[tuple[Found, int]]:
 
 
 SAME = 1e-3  # of the ranges of the unknowns, between two ends of a search at one optimum
-SAME_TOTAL = 1e-3  # relative
+SAME_TOTAL = 1e-2  # relative; where the sum has a slope at a bound, ends that are so near differ by some 1e-3
 
 
 def _is_same(one: Found, other: Found) -> bool:

@@ -7,6 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from kinfmu.display import aligned
+from kinfmu.errors import listed
+from kinfmu.mechanism.display_unit import DisplayUnit
 from kinfmu.readings import counted_from
 from kinfmu.synthesis.angle_notes import angle_notes
 from kinfmu.synthesis.display_units import of_unknown
@@ -19,7 +21,7 @@ _MOST_POINTS = 40  # of a target in the table
 def report(result: FitOutcome) -> list[str]:
     """Return the lines of the report."""
     lines = [
-        f"{result.mechanism.name}: sum of squares {result.squares:.9g}, rms {result.rms:.6g}, "
+        f"{result.mechanism.name}: sum of squares {result.squares:.9g}{_unit_of_errors(result)}, "
         f"{result.tried} designs tried"
     ]
     if result.refused:
@@ -54,6 +56,16 @@ def report(result: FitOutcome) -> list[str]:
     if len(result.optima) > MOST_OPTIMA:
         lines.append(f"  and {len(result.optima) - MOST_OPTIMA} more")
     return lines
+
+
+def _unit_of_errors(result: FitOutcome) -> str:
+    """Return the unit of the errors whose squares are summed, and their rms in the unit of the targets."""
+    units = list(dict.fromkeys(one.units[0] for one in result.errors))
+    shown = {one.display[0] for one in result.errors}
+    if len(units) > 1:
+        return f" (errors in {listed(units)}), rms {result.rms:.6g}"
+    display = shown.pop() if len(shown) == 1 else DisplayUnit(units[0])
+    return f" (errors in {units[0]}), rms {result.rms / display.factor:.6g}{display.suffix}"
 
 
 def _target(one: TargetErrors, unit: str, datum: str) -> Iterable[str]:

@@ -26,6 +26,7 @@ from kinfmu.synthesis import (
     PoseTarget,
 )
 from kinfmu.synthesis.angle_notes import angle_notes
+from kinfmu.synthesis.search import Found, distinct
 from kinfmu.synthesis.text import parameter_rows
 from tests.synthesis.fourbars import LENGTHS, four_bar
 
@@ -194,6 +195,31 @@ def test_errors_of_poses_are_lengths_in_the_report_too() -> None:
     lines = str(result).splitlines()
     (k,) = (k for k, line in enumerate(lines) if line.endswith("error [m]"))
     assert [line.split()[-1] for line in lines[k + 1 : k + 3]] == [f"{size:.3g}" for size in sizes]
+
+
+def test_the_first_line_names_the_unit_of_the_errors() -> None:
+    points = [("120 deg", "60 deg"), ("150 deg", "63 deg"), ("180 deg", "70 deg")]
+    target = FunctionTarget(name="f", of="rocker.phi", points=points, offset=("0 deg", "90 deg"))
+    result = kinfmu.fit(_problem(unknowns={"crank": (0.5, 2.5)}, targets=[target]), starts=1, engine="python")
+    first = str(result).splitlines()[0]
+    assert f"sum of squares {result.squares:.9g} (errors in rad), rms {np.degrees(result.rms):.6g} deg, " in first
+    path = str(kinfmu.fit(_problem(targets=[PATH, target]), starts=1, engine="python")).splitlines()[0]
+    assert " (errors in m, rad), rms " in path
+
+
+def test_a_design_that_does_not_reach_a_point_is_refused_with_angle_and_status() -> None:
+    result = kinfmu.fit(_problem(unknowns={**BOUNDS, "crank": (0.5, 6.0)}), starts=2, engine="python")
+    assert any(re.search(r"crank\w* = \d+ deg \(status \d: [a-z ]+\)", reason) for reason in result.refused), (
+        result.refused
+    )
+
+
+def test_ends_of_searches_at_one_optimum_are_one() -> None:
+    z = np.array([1.0, 0.5])
+    totals = {0.0: 2.554e-4, 0.0009: 2.557e-4, 0.002: 2.559e-4}
+    ends = [(Found(z - [shift, 0.0], total, 1), 1) for shift, total in totals.items()]
+    assert [(one.total, count) for one, count in distinct(ends)] == [(2.554e-4, 2), (2.559e-4, 1)]
+    assert len(distinct([(Found(z, 1.0, 1), 1), (Found(z, 1.1, 1), 1)])) == 2
 
 
 def test_an_unknown_without_effect_is_noted() -> None:
