@@ -86,7 +86,8 @@ TURN = 2.0 * math.pi
         (MotionSequence(UP_AND_DOWN), "its sequence does not repeat; set repeat = true"),
         (
             MotionSequence(UP_AND_DOWN, repeat=True),
-            "the durations of its sequence add up to 214.859173 deg, not to a turn of 360 deg",
+            "the durations of its sequence add up to 214.859173 deg, not to a turn of 360 deg; "
+            "145.140827 deg are missing: add a dwell",
         ),
         (
             MotionSequence((Segment("dwell", 110.0), Segment("dwell", 250.0)), repeat=True),
