@@ -10,7 +10,7 @@ import pytest
 import kinfmu
 from kinfmu import Status, gallery
 from kinfmu.page.module import page_module
-from kinfmu.page.opened import opened
+from kinfmu.page.opened import Opened, opened
 from tests.page import test_lengths
 from tests.page.engines import (
     StepByStep,
@@ -32,18 +32,22 @@ NARROW = 1e-8  # of the same, at poses interpolated across a singular point
 pytestmark = needs_node
 
 
-def test_every_mechanism_has_the_bits_of_the_native_engine(tmp_path: Path) -> None:
-    mechanisms = {name: kinfmu.load(name) for name in MEMBERS}
-    runs = {name: driven_through(mechanism, StepByStep(mechanism)) for name, mechanism in mechanisms.items()}
+@pytest.mark.parametrize("is_page", [False, True], ids=["as written", "with the open numbers of a page"])
+def test_every_mechanism_has_the_bits_of_the_native_engine(is_page: bool, tmp_path: Path) -> None:
+    modules, runs = [], []
+    for name in MEMBERS:
+        found = opened(kinfmu.load(name)) if is_page else Opened(kinfmu.load(name), {})
+        modules.append(page_module(found.mechanism, found.labels))
+        runs.append(driven_through(found.mechanism, StepByStep(found.mechanism)))
     jobs = []
-    for name, run in runs.items():
-        module, driven = page_module(mechanisms[name]), driven_of(run)
+    for module, run in zip(modules, runs, strict=True):
+        driven = driven_of(run)
         jobs.append((module, [sweep_call(module, driven), ["restart"], drag_call(driven)]))
-    for (name, run), (sweep, _, drag) in zip(runs.items(), answers(tmp_path, jobs), strict=True):
+    for name, run, (sweep, _, drag) in zip(MEMBERS, runs, answers(tmp_path, jobs), strict=True):
         expected = rows_of(run)
         assert sweep["status"] == run.status.tolist(), name
-        found = table(sweep["values"], expected.shape[1])
-        assert np.array_equal(found, expected, equal_nan=True), name
+        found_rows = table(sweep["values"], expected.shape[1])
+        assert np.array_equal(found_rows, expected, equal_nan=True), name
         good = run.status <= Status.BRIDGED
         assert np.array_equal(np.array(drag["rows"])[good], expected[good]), name
 
