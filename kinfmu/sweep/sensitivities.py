@@ -80,10 +80,10 @@ class Sensitivities(Displayed):
             (n,) in the unit of the output per unit of the parameter, lengths in the mechanism's unit, angles in rad.
 
         Raises:
-            ValueError: The sensitivities do not hold the output or the parameter.
+            RequestError: The sensitivities do not hold the output or the parameter.
 
         """
-        return self.values_by[:, self.outputs.index(output), self.parameters.index(parameter)]
+        return self._column(self.values_by, output, parameter)
 
     def rate_of(self, output: str, parameter: str) -> FloatArray:
         """Return the derivative of an output's rate with respect to a parameter, (n,).
@@ -96,10 +96,18 @@ class Sensitivities(Displayed):
             (n,) in the unit of the output per second, or per unit of the driver, and per unit of the parameter.
 
         Raises:
-            ValueError: The sensitivities do not hold the output or the parameter.
+            RequestError: The sensitivities do not hold the output or the parameter.
 
         """
-        return self.rates_by[:, self.outputs.index(output), self.parameters.index(parameter)]
+        return self._column(self.rates_by, output, parameter)
+
+    def _column(self, table: FloatArray, output: str, parameter: str) -> FloatArray:
+        for what, name, known in (("output", output, self.outputs), ("parameter", parameter, self.parameters)):
+            if name not in known:
+                raise RequestError(
+                    f"the sensitivities have no {what} '{name}'{suggestion(name, known)}; {what}s: {listed(known)}"
+                )
+        return table[:, self.outputs.index(output), self.parameters.index(parameter)]
 
 
 class _Memory(NamedTuple):

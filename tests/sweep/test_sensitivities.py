@@ -523,3 +523,11 @@ def test_an_argument_written_as_an_expression_follows_unless_given() -> None:
 def test_a_model_without_parameters_is_reported() -> None:
     with pytest.raises(RequestError, match="the model has no parameters"):
         kinfmu.compile(kinfmu.load("fourbar")).sensitivities(crank_angle=ANGLES)
+
+
+def test_an_unknown_name_is_reported_with_those_that_are_known() -> None:
+    found = kinfmu.compile(kinfmu.load("jansen_leg"), ["foot.x"]).sensitivities([0.0, 0.1], wrt=["a", "b"])
+    with pytest.raises(RequestError, match=r"the sensitivities have no output 'foot\.y'.*; outputs: foot\.x$"):
+        found.of("foot.y", "a")
+    with pytest.raises(RequestError, match=r"the sensitivities have no parameter 'c'.*; parameters: a, b$"):
+        found.rate_of("foot.x", "c")
