@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -46,6 +47,19 @@ def test_a_sample_solved_in_one_order_and_not_in_another_has_an_estimate(
     """At a limit the order of the samples decides: errors are estimated in the order in which samples were solved."""
     monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
     assert trial(seed, family, "native").judged().faults == []
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_a_path_through_a_short_stretch_that_does_not_close_ends_there(
+    engine: Literal["python", "native"], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A machine bends the path of a robot beyond its reach, by 6.5e-4, in the middle of a step."""
+    monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
+    one = trial(911, "machines with a robot", "native")
+    one.engine = engine
+    verdict = one.judged()
+    assert verdict.statuses[260] == 3
+    assert verdict.faults == []
 
 
 def test_at_a_crossing_without_a_bridge_the_rates_are_not_known() -> None:

@@ -21,15 +21,35 @@ static kf_pose *share_of(const kf_pose *whole, kf_pose *share)
     return share;
 }
 
+/* Find the unknowns half way to u, of the tracks alone; false if the tracks end before it. */
+static bool half_way(kf_solver *solver, kf_pose *pose, const double *u, kf_pose *there, double *z)
+{
+    double half[KF_DRIVERS];
+    int k;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        half[k] = 0.5 * (KF_POSE_U(pose)[k] + u[k]);
+    }
+    if (!KF_GOOD(kf_assembled(solver, pose, half, half, pose->found.x, there))) {
+        solver->message[0] = '\0';
+        return false;
+    }
+    memcpy(z, there->found.x, KF_UNKNOWNS * sizeof *z);
+    return true;
+}
+
 /* Take one step of all blocks, or find a failed pose if the tracks end before it; false if the blocks that depend on
- * several drivers cannot be trusted to stay on their branch.
+ * several drivers cannot be trusted to stay on their branch, or if they may not close in between, because the tracks bend
+ * away from their chord there.
  */
 static bool mixed_step(kf_solver *solver, kf_pose *pose, const double *u, const double *target, kf_pose *there)
 {
     kf_pose *const start = &solver->scratch.share[0], *const trial = &solver->scratch.share[1];
-    double chord[KF_UNKNOWNS], path[KF_DRIVERS];
-    bool is_trusted;
+    double chord[KF_UNKNOWNS], path[KF_DRIVERS], middle[KF_UNKNOWNS], margin, bent = 0.0;
+    bool is_trusted, has_middle;
     int k, iterations;
+    margin = share_of(pose, start)->found.margin;
+    has_middle = margin < KF_REGULAR / KF_FALL /* the step may end at a pose that is not regular */
+                 && half_way(solver, pose, u, there, middle);
     if (!KF_GOOD(kf_assembled(solver, pose, u, target, pose->found.x, there))) {
         return true;
     }
@@ -47,6 +67,14 @@ static bool mixed_step(kf_solver *solver, kf_pose *pose, const double *u, const 
                  && (trial->found.margin >= KF_REGULAR || kf_keeps_branch(solver, start, trial, path, 1.0));
     kf_leave_track(solver);
     if (!is_trusted) {
+        return false;
+    }
+    for (k = 0; has_middle && k < KF_UNKNOWNS; ++k) {
+        const double off = middle[k] - 0.5 * (pose->found.x[k] + there->found.x[k]);
+        bent = fmax(bent, fabs(off) / kf_unknown_scales[k]);
+    }
+    margin = fmin(margin, trial->found.margin);
+    if (KF_TRUST * bent > margin * margin) { /* blocks close where the square of their sine is positive */
         return false;
     }
     iterations = there->found.iterations + trial->found.iterations;
@@ -70,7 +98,8 @@ static void mixed_limit(kf_solver *solver, const kf_pose *before, kf_pose *pose,
 /* Find the pose at `target`; blocks that depend on several drivers follow the tracks in trusted steps.
  *
  * The path is straight, as in kf_advance, but at each step the tracks are solved first, and the other blocks are
- * predicted along the chord of the tracks: they need no rates of the tracks, which may be singular.
+ * predicted along the chord of the tracks: they need no rates of the tracks, which may be singular. Steps near a singular
+ * pose are so short that the tracks stay on their chord.
  */
 kf_status kf_advance_mixed(kf_solver *solver, kf_pose *start, const double *target, kf_pose *found)
 {

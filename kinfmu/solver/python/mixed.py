@@ -8,14 +8,15 @@ from .pose import Pose, Vector, evaluated, failed
 from .span import REGULAR
 from .status import Status
 from .tracks import TrackModel, Tracks, on_track, rates_in_time
-from .trusted_step import BENT, keeps_branch, trusted_step
+from .trusted_step import BENT, FALL, TRUST, keeps_branch, trusted_step
 
 
 def advance_mixed(tracks: Tracks, mixed: TrackModel, start: Pose, target: Vector) -> Pose:
     """Return the pose at `target`; blocks that depend on several drivers follow the tracks in trusted steps.
 
     The path is straight, as in `advance`, but at each step the tracks are solved first, and the other blocks are
-    predicted along the chord of the tracks: they need no rates of the tracks, which may be singular.
+    predicted along the chord of the tracks: they need no rates of the tracks, which may be singular. Steps near a
+    singular pose are so short that the tracks stay on their chord.
     """
     pose = start
     if start.base is not None:
@@ -46,8 +47,14 @@ def advance_mixed(tracks: Tracks, mixed: TrackModel, start: Pose, target: Vector
 def _mixed_step(tracks: Tracks, mixed: TrackModel, pose: Pose, u: Vector, target: Vector) -> Pose | None:
     """Return one step of all blocks, or a failed pose if the tracks end before it.
 
-    None if the blocks that depend on several drivers cannot be trusted to stay on their branch.
+    None if the blocks that depend on several drivers cannot be trusted to stay on their branch, or if they may not
+    close in between, because the tracks bend away from their chord there.
     """
+    margin = min([abs(pose.determinants[k]) for k in mixed.blocks])
+    middle = None
+    if margin < REGULAR / FALL:  # the step may end at a pose that is not regular
+        half = tuple([0.5 * (a + b) for a, b in zip(pose.u, u, strict=True)])
+        middle = tracks.assembled(pose, half, half, pose.z)
     there = tracks.assembled(pose, u, target, pose.z)
     if not there.good:
         return there
@@ -60,6 +67,12 @@ def _mixed_step(tracks: Tracks, mixed: TrackModel, pose: Pose, u: Vector, target
     trial = trusted_step(mixed, start, path, 1.0, u)
     if trial is None or (trial.margin < REGULAR and not keeps_branch(mixed, start, trial, path, 1.0)):
         return None
+    if middle is not None and middle.good:
+        bends = zip(pose.z, middle.z, there.z, model.UNKNOWN_SCALES, strict=True)
+        bent = max([abs(b - 0.5 * (a + c)) / scale for a, b, c, scale in bends])
+        least = min(margin, trial.margin)
+        if TRUST * bent > least * least:  # blocks close where the square of their sine is positive
+            return None
     own, singularities, status, iterations = there.tracks, there.singularities, there.status, there.iterations
     there = Pose(u, evaluated(model, u, mixed.put(trial.z, there.z)), singularities)
     there.tracks, there.status, there.iterations = own, status, iterations + trial.iterations
