@@ -121,7 +121,7 @@ def test_gamma_is_minus_the_second_derivative_and_the_acceleration_equation_hold
     gamma = system.gamma(q, qd, NO_DRIVERS, NO_DRIVERS, NO_DRIVERS)
     motion = [Series([a, b, 0]) for a, b in zip(q, qd, strict=True)]
     exact = -second_derivative(system, motion, [])
-    np.testing.assert_allclose(gamma, exact, rtol=0.0, atol=ROUNDING * size(system, q, qd))
+    np.testing.assert_allclose(gamma, exact, rtol=ROUNDING, atol=ROUNDING * size(system, q, qd))  # laws may be steep
     motion = [Series([a, b, c / 2]) for a, b, c in zip(q, qd, qdd, strict=True)]
     exact = second_derivative(system, motion, [])
     second = system.jacobian(q) @ qdd - gamma

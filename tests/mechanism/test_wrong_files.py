@@ -152,6 +152,7 @@ CHANGES = {
     "a joint that is unknown": ('"revolute"', '"revolve"', "type = 'revolve' is not known; did you mean 'revolute'?"),
     "a joint without a type": ('type = "revolute", ', "", "[joints.O] needs the key 'type', one of revolute"),
     "a joint without points": (', between = ["ground.O", "crank.O"]', "", "[joints.O] needs the key 'between'"),
+    "no name": ('name = "crank_rocker"', "", "name is missing; the first line should be such as name = 'fourbar'"),
     "a name that no variable can have": (
         "[bodies.crank]",
         '[bodies."my crank"]',
