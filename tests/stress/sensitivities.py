@@ -1,6 +1,7 @@
 """Sensitivities of random mechanisms and of the gallery against differences of 50 digits.
 
-`python -m tests.stress.sensitivities` compares random mechanisms, with --gallery every mechanism of the gallery.
+`python -m tests.stress.sensitivities` compares random mechanisms, with --gallery every mechanism of the gallery, of
+one mechanism of eight the sensitivities that C computes, or with --engine those of one engine.
 
 The oracle reads the text of the mechanism's file and shares no code with kinfmu. It has three coordinates for each body
 and the rows of all joints and drivers. Poses and rates for a length p + h and for p - h are found by Newton in 80
@@ -14,7 +15,7 @@ import sys
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,8 +43,10 @@ EPS = mp.mpf(2) ** -52
 ROUNDINGS = 20.0  # a larger error than so many times that of rounded lengths and driver values is kinfmu's own
 CLOSED = mp.mpf("1e-70")
 OPENS = 1e-6  # gap per length of a row that opens; kinfmu refuses such a length
+NATIVE_EVERY = 8  # one random mechanism of so many is solved by the native engine
 ELSEWHERE = 10  # more samples at which a row may open
 
+Engine = Literal["python", "native"]
 Floats = NDArray[np.float64]
 
 
@@ -214,13 +217,13 @@ class Comparison:
     faults: list[str] = field(default_factory=list)
 
 
-def compared(seed: int, family: str | None = None) -> Comparison:
+def compared(seed: int, family: str | None = None, engine: Engine | None = None) -> Comparison:
     """Compare the sensitivities of a random mechanism with differences of 50 digits."""
     one = trial(seed, family)
     result = Comparison(seed, one.family)
     mechanism = with_open_lengths(one.drawn.mechanism)
     try:
-        model = kinfmu.compile(mechanism, engine="python")
+        model = kinfmu.compile(mechanism, engine=engine or ("native" if seed % NATIVE_EVERY == 0 else "python"))
     except AmbiguousStartError:
         result.skipped = "ambiguous start"
         return result
@@ -245,18 +248,21 @@ def compared(seed: int, family: str | None = None) -> Comparison:
     return result
 
 
-def compared_in_gallery(name: str, lengths: int | None = None, samples: slice = slice(None)) -> Comparison:
+def compared_in_gallery(
+    name: str, lengths: int | None = None, samples: slice = slice(None), engine: Engine = "python"
+) -> Comparison:
     """Compare the sensitivities of a mechanism of the gallery with differences, over its own motion.
 
     Args:
         name: Name of the mechanism.
         lengths: How many of its lengths, at most. Default: all of them.
         samples: Which of GALLERY_TIMES. Default: all of them.
+        engine: Of the model.
 
     """
     result = Comparison(GALLERY, name)
     mechanism = with_open_lengths(kinfmu.load(name))
-    model = kinfmu.compile(mechanism, engine="python")
+    model = kinfmu.compile(mechanism, engine=engine)
     start, stop = mechanism.run.start, mechanism.run.stop
     t = start + (stop - start) * GALLERY_TIMES[samples]
     run = model.solve(t)
@@ -354,10 +360,10 @@ def _judge(
                 result.faults.append(f"{name} is wrong by {errors[name]:.2g}")
 
 
-def _task(task: tuple[int, str | None]) -> Comparison:
-    seed, name = task
+def _task(task: tuple[int, str | None, Engine | None]) -> Comparison:
+    seed, name, engine = task
     try:
-        return compared_in_gallery(name or "") if seed == GALLERY else compared(seed, name)
+        return compared_in_gallery(name or "", engine=engine or "python") if seed == GALLERY else compared(seed, name, engine)
     except Exception as error:  # it is a fault of this mechanism, and the next one goes on
         return Comparison(task[0], task[1] or "", faults=[f"{type(error).__name__}: {error}"])
 
@@ -366,10 +372,16 @@ def main() -> int:
     """Compare many mechanisms and print what is found; 1 if anything is wrong."""
     parser = command_line("Sensitivities of random mechanisms against 50 digits.", 1000)
     parser.add_argument("--gallery", action="store_true", help="the mechanisms of the gallery, and no others")
+    parser.add_argument(
+        "--engine", choices=get_args(Engine), help="one engine for all; default: both in the gallery, else native for 1 of 8"
+    )
     given = parser.parse_args()
-    tasks: list[tuple[int, str | None]] = [(seed, given.family) for seed in range(given.seed, given.seed + given.count)]
+    tasks: list[tuple[int, str | None, Engine | None]] = [
+        (seed, given.family, given.engine) for seed in range(given.seed, given.seed + given.count)
+    ]
     if given.gallery:
-        tasks = [(GALLERY, name) for name in NAMES]
+        engines = [given.engine] if given.engine else get_args(Engine)
+        tasks = [(GALLERY, name, engine) for name in NAMES for engine in engines]
     found = all_compared(_task, tasks, given.jobs)
     worst = max(found, key=lambda one: one.worst)
     skipped = [one.skipped for one in found if one.skipped]

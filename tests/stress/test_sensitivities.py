@@ -10,7 +10,7 @@ import pytest
 
 from kinfmu import Model
 from kinfmu.sweep.sensitivities import Sensitivities
-from tests.stress.sensitivities import WRONG, compared
+from tests.stress.sensitivities import WRONG, Engine, compared
 
 FEW = {
     "four-bars": 0,
@@ -22,9 +22,10 @@ FEW = {
 }
 
 
+@pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize(("family", "seed"), FEW.items())
-def test_sensitivities_agree_with_50_digits(family: str, seed: int) -> None:
-    found = compared(seed, family)
+def test_sensitivities_agree_with_50_digits(family: str, seed: int, engine: Engine) -> None:
+    found = compared(seed, family, engine)
     assert found.faults == []
     assert found.compared > 0
     assert found.worst <= WRONG
@@ -39,6 +40,6 @@ def test_wrong_derivatives_and_wrong_refusals_are_reported(monkeypatch: pytest.M
         return replace(found, rates_by=found.rates_by + 1e-9, refused=refused)
 
     monkeypatch.setattr(Model, "sensitivities", changed)
-    faults = compared(0, "four-bars").faults
+    faults = compared(0, "four-bars", "python").faults
     assert "is refused, but no row opens: no reason" in faults[0] + faults[-1]
     assert sum("is wrong by" in fault for fault in faults) >= 6
