@@ -30,6 +30,7 @@ from tests.mechanisms import (
     with_robot,
     with_second,
 )
+from tests.power_series import Series, mp, sin_cos, sqrt
 from tests.solver.change_points import Case, fourbar
 
 Engine = Literal["python", "native"]
@@ -148,6 +149,72 @@ def test_near_a_singular_pose_newton_leaves_no_residual_that_another_step_would_
         left_over.append((pose.residual, residual))
     before, after = np.mean(left_over, axis=0)
     assert before <= 1.1 * after
+
+
+SPEEDS, ACCELERATIONS = (0.7, -1.1), (0.3, 0.2)  # of the five-bar's left and right arm
+
+
+def pin(left: float, right: float) -> tuple[float, float]:
+    """Acceleration of pin T of the five-bar in 50 digits: it is where two circles about the ends of the arms meet."""
+    arms = zip((left, right), SPEEDS, ACCELERATIONS, strict=True)
+    (s1, c1), (s2, c2) = (sin_cos(Series([mp.mpf(u), mp.mpf(v), mp.mpf(a) / 2])) for u, v, a in arms)
+    across, up = 100 + 120 * c2 - 120 * c1, 120 * s2 - 120 * s1
+    height = sqrt(160 * 160 / (across * across + up * up) - mp.mpf(1) / 4)
+    at = 120 * c1 + across / 2 - height * up, 120 * s1 + up / 2 + height * across
+    return float(2 * at[0].c[2]), float(2 * at[1].c[2])
+
+
+def pin_by_dense_newton(left: float, right: float, forearms: FloatArray) -> tuple[float, float]:
+    """The same in doubles: Newton on the loop closure for the angles of both forearms, until it no longer improves."""
+    (u1, u2), (v1, v2), (a1, a2) = np.exp(1j * np.array([left, right])), SPEEDS, ACCELERATIONS
+
+    def solved(gap: complex, directions: FloatArray) -> FloatArray:
+        jacobian = 160.0 * np.array([1j * directions[0], -1j * directions[1]])
+        found: FloatArray = np.linalg.solve(np.array([jacobian.real, jacobian.imag]), [-gap.real, -gap.imag])
+        return found
+
+    angles = forearms.copy()
+    for _ in range(30):
+        p, r = np.exp(1j * angles)
+        step = solved(120.0 * (u1 - u2) + 160.0 * (p - r) - 100.0, np.array([p, r]))
+        angles += step
+        if abs(step).max() < 1e-15:
+            break
+    directions = np.exp(1j * angles)
+    w1, w2 = solved(120.0j * (v1 * u1 - v2 * u2), directions)
+    ends = 120.0 * ((1j * a1 - v1 * v1) * u1 - (1j * a2 - v2 * v2) * u2)
+    b1, _ = solved(ends - 160.0 * (w1 * w1 * directions[0] - w2 * w2 * directions[1]), directions)
+    found = 120.0 * (1j * a1 - v1 * v1) * u1 + 160.0 * (1j * b1 - w1 * w1) * directions[0]
+    return float(found.real), float(found.imag)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("gap", "rounding"), [(1e-3, 1e-12), (1e-4, 1e-11), (1e-5, 1e-10)])
+def test_near_a_singular_pose_of_two_drivers_accelerations_are_those_of_a_dense_newton_that_goes_on(
+    engine: Engine, gap: float, rounding: float
+) -> None:
+    """Relative to the largest of the column; what rounding of the driver values leaves grows as 1 / gap."""
+    left = STRETCHED - gap * (1.0 + 1e-3 * np.arange(60))
+    right = math.pi - left - 1e-4 * gap * np.arange(60)
+    mechanism = kinfmu.load("five_bar")
+    run = kinfmu.solve(
+        mechanism,
+        engine=engine,
+        left_angle=[2.356, *left],
+        right_angle=[0.785, *right],
+        left_speed=SPEEDS[0],
+        right_speed=SPEEDS[1],
+        left_acceleration=ACCELERATIONS[0],
+        right_acceleration=ACCELERATIONS[1],
+    )
+    exact = np.array([pin(*of) for of in zip(left, right, strict=True)])
+    forearms = np.array([run["left_forearm.phi"][1], run["right_forearm.phi"][1]])
+    dense = np.array([pin_by_dense_newton(*of, forearms) for of in zip(left, right, strict=True)])
+    found = np.array([run["T.ax"], run["T.ay"]]).T[1:]
+    ours, theirs = (np.abs(one - exact).max() / np.abs(exact).max() for one in (found, dense))
+    assert ours <= 1.5 * theirs
+    assert ours <= rounding
+    assert (np.abs(found - exact).max(axis=1) <= run.error[1:, 2] * compile_plan(mechanism).size).all()
 
 
 # ---------------------------------------------------------------------------------- each driver its own singular points
