@@ -68,7 +68,7 @@ def lift_offs(motion: Motion, cams: Sequence[CamFindings]) -> Iterator[LiftOff]:
             track = track.negative()
         if not track.is_known:
             continue
-        low, high = track.minimum(), track.maximum()
+        low, high = track.extremes()
         if -float(low.value) <= _ROUNDING * max(-float(low.value), float(high.value)):
             continue
         unit = motion.mechanism.length_unit

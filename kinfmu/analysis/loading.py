@@ -235,7 +235,7 @@ class _Forces:
         run, values = self._run, force_of(self._run, name)
         if self._motion is not None and np.isfinite(values).all():
             motion, track = self._motion, self._motion.track(name)
-            low, high = track.minimum(), track.maximum()
+            low, high = track.extremes()
             return (
                 (float(low.value), float(motion.driven_at(np.asarray(low.x)))),
                 (float(high.value), float(motion.driven_at(np.asarray(high.x)))),

@@ -220,6 +220,7 @@ class BatchReading:
             if reason:
                 reasons.setdefault(k, reason)
         closed_ones: dict[tuple[QuantityRead, ...], NDArray[np.bool_]] = {}
+        is_whole = np.asarray(good.all(axis=1))
         whole: dict[bool, Motion] = {}  # of all designs: measures of one quantity share its extremes
         for reading in self._readings:
             value, at = self.values[reading.name][part], self.at[reading.name][part]
@@ -227,7 +228,7 @@ class BatchReading:
                 continue
             quantities = self._quantities[reading.name]
             if quantities not in closed_ones:
-                closed_ones[quantities] = motion.goes_round(quantities)
+                closed_ones[quantities] = motion.goes_round(quantities, is_whole)
             for is_closed in (True, False):
                 is_chosen = is_solved & (closed_ones[quantities] == is_closed)
                 if not is_chosen.any():

@@ -189,7 +189,7 @@ def _turned(fitted: FloatArray, x: Track, y: Track, contacts: IntArray) -> Float
     def strip(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the half width of the strip at an angle, and its offset."""
         across = Track.of(x, np.cos(theta)[:, None] * y.taylor - np.sin(theta)[:, None] * x.taylor)
-        high, low = across.maximum().value, across.minimum().value
+        low, high = (extreme.value for extreme in across.extremes())
         return 0.5 * (high - low), 0.5 * (high + low)
 
     low, high = (fitted[is_double, 1] + side * _NEAR for side in (-1.0, 1.0))

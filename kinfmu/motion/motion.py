@@ -145,10 +145,12 @@ class Motion:
             _tracks={},
         )
 
-    def goes_round(self, quantities: Sequence[QuantityRead]) -> NDArray[np.bool_]:
-        """Return (...) whether quantities go round, whatever else moves."""
+    def goes_round(
+        self, quantities: Sequence[QuantityRead], is_known: NDArray[np.bool_] | None = None
+    ) -> NDArray[np.bool_]:
+        """Return (...) whether quantities go round, whatever else moves; is_known: designs without gaps, if known."""
         moving = [(self.quantity_track(one), is_angle(one)) for one in quantities if one not in self.fixed]
-        return goes_round(moving) if moving else np.full(self.tables[0].shape[:-2], self.is_closed)
+        return goes_round(moving, is_known) if moving else np.full(self.tables[0].shape[:-2], self.is_closed)
 
     def going_round(self, is_closed: bool) -> Motion:
         """Return the motion as one that goes round, or does not."""

@@ -228,17 +228,26 @@ static void maximum(const kf_quantity *of, int64_t count, const double *x, const
     }
 }
 
-/* The largest values of quantities, (designs, count) with a step from design to design, and their places. */
-void kf_maxima(int64_t designs, int64_t count, const double *x, const double *h, double sign, const double *f,
-               ptrdiff_t f_step, const double *v, ptrdiff_t v_step, const double *a, ptrdiff_t a_step, double *value, double *at)
+/* The largest values of quantities, (designs, count) with a step from design to design, and their places.
+ *
+ * signs: (sides) 1 for the largest value of a quantity, -1 for that of its negative. value, at: (sides, designs).
+ */
+void kf_maxima(int64_t designs, int64_t count, const double *x, const double *h, int64_t sides, const double *signs,
+               const double *f, ptrdiff_t f_step, const double *v, ptrdiff_t v_step, const double *a, ptrdiff_t a_step,
+               double *value, double *at)
 {
-    int64_t k;
+    int64_t k, side;
     for (k = 0; k < designs; ++k) {
-        const kf_quantity of = {f + k * f_step, v + k * v_step, a + k * a_step, sign};
-        if (is_finite(of.f, count) && is_finite(of.v, count) && is_finite(of.a, count)) {
-            maximum(&of, count, x, h, &value[k], &at[k]);
-        } else {
-            value[k] = at[k] = NAN;
+        kf_quantity of = {f + k * f_step, v + k * v_step, a + k * a_step, 1.0};
+        const bool is_known = is_finite(of.f, count) && is_finite(of.v, count) && is_finite(of.a, count);
+        for (side = 0; side < sides; ++side) {
+            double *const best = &value[side * designs + k], *const place = &at[side * designs + k];
+            of.sign = signs[side];
+            if (is_known) {
+                maximum(&of, count, x, h, best, place);
+            } else {
+                *best = *place = NAN;
+            }
         }
     }
 }

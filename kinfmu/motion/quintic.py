@@ -7,6 +7,7 @@ many designs are measured and a compiler is found.
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -37,7 +38,7 @@ def use_compiled() -> None:
     library = compiler.load({"quintic.c": text}, compiler.VECTORIZED)
     place, count, step = ctypes.c_void_p, ctypes.c_int64, ctypes.c_ssize_t
     table = (place, step)
-    library.kf_maxima.argtypes = (count, count, place, place, ctypes.c_double, *table * 3, place, place)
+    library.kf_maxima.argtypes = (count, count, place, place, count, place, *table * 3, place, place)
     library.kf_higher.argtypes = (count, count, ctypes.c_bool, place, place, *table * 3, place, place)
     library.kf_ranges.argtypes = (count, count, *table, place, place)
     library.kf_maxima.restype = library.kf_higher.restype = library.kf_ranges.restype = None
@@ -56,7 +57,7 @@ def ranges(table: FloatArray) -> tuple[FloatArray, FloatArray]:
     return low.reshape(table.shape[:-1]), high.reshape(table.shape[:-1])
 
 
-def maxima(x: FloatArray, rows: Rows, sign: float = 1.0) -> tuple[FloatArray, FloatArray]:
+def maxima(x: FloatArray, rows: Rows, signs: Sequence[float]) -> list[tuple[FloatArray, FloatArray]]:
     """Return the largest value of each design and where it occurs; NaN for designs with unknown samples.
 
     An interval counts if its polynomial can be larger than all samples: no polynomial exceeds its control points
@@ -67,15 +68,19 @@ def maxima(x: FloatArray, rows: Rows, sign: float = 1.0) -> tuple[FloatArray, Fl
     Args:
         x: (n,) arguments.
         rows: (m, n) values, rates and accelerations.
-        sign: -1 for the largest value of the negative quantity.
+        signs: 1 for the largest value of the quantity, -1 for that of its negative.
 
     Returns:
-        Largest values and their places, (m,).
+        Largest values and their places, (m,) each, for each sign.
 
     """
     if _compiled:
-        return _compiled_maxima(x, rows, sign)
-    f, v, a = (sign * row for row in rows)
+        return _compiled_maxima(x, rows, signs)
+    return [_largest(x, [sign * row for row in rows]) for sign in signs]
+
+
+def _largest(x: FloatArray, rows: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    f, v, a = rows
     is_known = np.logical_and.reduce([np.isfinite(row).all(axis=-1) for row in rows])
     h = np.diff(x)
     k = np.argmax(f, axis=1)  # of unknown samples the first
@@ -208,14 +213,15 @@ def _keep_largest(value: FloatArray, x: FloatArray, design: IntArray, found: Flo
     value[design[order]], x[design[order]] = found[order], at[order]
 
 
-def _compiled_maxima(x: FloatArray, rows: Rows, sign: float) -> tuple[FloatArray, FloatArray]:
+def _compiled_maxima(x: FloatArray, rows: Rows, signs: Sequence[float]) -> list[tuple[FloatArray, FloatArray]]:
     tables = [_by_samples(row) for row in rows]
-    h, (m, n) = np.diff(x), tables[0].shape
+    h, sides, (m, n) = np.diff(x), np.array(signs), tables[0].shape
     x = np.ascontiguousarray(x)
-    value, at = np.empty(m), np.empty(m)
+    value, at = np.empty((len(sides), m)), np.empty((len(sides), m))
     places = [part for table in tables for part in (_start(table), table.strides[0] // 8)]
-    _compiled[0].kf_maxima(m, n, _start(x), _start(h), sign, *places, _start(value), _start(at))
-    return value, at
+    given = (_start(x), _start(h), len(sides), _start(sides))
+    _compiled[0].kf_maxima(m, n, *given, *places, _start(value), _start(at))
+    return list(zip(value, at, strict=True))
 
 
 def _compiled_higher(rows: Rows, weights: tuple[FloatArray, FloatArray], *, is_closed: bool) -> Rows:

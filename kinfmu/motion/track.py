@@ -185,29 +185,36 @@ class Track:
 
     def maximum(self) -> Extreme:
         """Return the largest value of each design and where it occurs; NaN for designs with unknown samples."""
-        return self._maximum
+        return self._largest(1.0)[0]
 
     def minimum(self) -> Extreme:
         """Return the smallest value of each design and where it occurs; NaN for designs with unknown samples."""
-        return self._minimum
+        return self._largest(-1.0)[0]
 
-    @cached_property
-    def _maximum(self) -> Extreme:
-        value, x = maxima(self.x, self._flat)
-        shape = self.value.shape[:-1]
-        return Extreme(value.reshape(shape), x.reshape(shape))
-
-    @cached_property
-    def _minimum(self) -> Extreme:
-        value, x = maxima(self.x, self._flat, -1.0)
-        shape = self.value.shape[:-1]
-        return Extreme(-value.reshape(shape), x.reshape(shape))
+    def extremes(self) -> tuple[Extreme, Extreme]:
+        """Return minimum and maximum, found in one pass over the samples."""
+        low, high = self._largest(-1.0, 1.0)
+        return low, high
 
     def largest_size(self) -> Extreme:
         """Return the largest absolute value of each design and where it occurs."""
-        high, low = self.maximum(), self.minimum()
+        low, high = self.extremes()
         is_low = -low.value > high.value
         return Extreme(np.where(is_low, -low.value, high.value), np.where(is_low, low.x, high.x))
+
+    def _largest(self, *signs: float) -> list[Extreme]:
+        """Return the extremes of these signs: 1 for the maximum, -1 for the minimum."""
+        missing = [sign for sign in signs if sign not in self._found]
+        if missing:
+            shape = self.value.shape[:-1]
+            for sign, (value, x) in zip(missing, maxima(self.x, self._flat, missing), strict=True):
+                self._found[sign] = Extreme((sign * value).reshape(shape), x.reshape(shape))
+        return [self._found[sign] for sign in signs]
+
+    @cached_property
+    def _found(self) -> dict[float, Extreme]:
+        """Extremes that are known, by their signs."""
+        return {}
 
     def crossings(self, level: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return where the quantity takes a value.

@@ -57,7 +57,7 @@ class Range(Reading):
 
     def read(self, motion: Motion) -> Finding:
         track = motion.track(self.of)
-        low, high = track.minimum(), track.maximum()
+        low, high = track.extremes()
         return Finding(high.value - low.value, motion.quantity(self.of), (low.x, high.x))
 
 

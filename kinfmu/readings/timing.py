@@ -27,7 +27,7 @@ class TimeRatio(Reading):
     def read(self, motion: Motion) -> Finding:
         motion.require_closed(self.type)
         track = motion.track(self.of)
-        low, high = track.minimum().x, track.maximum().x
+        low, high = (extreme.x for extreme in track.extremes())
         stroke = abs(high - low)
         other = track.span - stroke
         longer = 0.5 * (track.span + abs(stroke - other))

@@ -77,6 +77,7 @@ class _Designs(ctypes.Structure):
         ("start", ctypes.c_double),
         ("samples", _Job),
         ("table_step", ctypes.c_ssize_t * 3),
+        ("status", _Place),
         ("reached", _Place),
         ("messages", _Place),
     )
@@ -248,7 +249,7 @@ class Library:
             driven: (n, d) or (m, n, d) driver values, speeds and accelerations; None: by the laws.
             law: Times and constants of the laws; None: by driver values.
             tables: Three arrays (m, n, outputs) of values, rates and accelerations; None: not wanted.
-            status: (m, n), filled with values of Status.
+            status: (m, n) of 32 bits without gaps, filled with values of Status.
             tolerance: Residual relative to the size above which a sample is not ok.
 
         Returns:
@@ -262,9 +263,7 @@ class Library:
         designs, samples = status.shape
         reached = np.empty(designs, dtype=np.int32)
         messages = np.zeros((designs, MESSAGE), dtype=np.uint8)
-        outcomes = np.empty((designs, samples, 2), dtype=np.int32)
-        residual = np.empty((designs, samples))
-        watch = np.empty((designs, samples, len(self.plan.watches)))
+        of_one = np.empty((2 + len(self.plan.watches), samples))  # outcomes, residual and watches of a design
         job = _Designs(count=designs, parameters=_start(parameters))
         if driven is not None:
             given = [np.ascontiguousarray(table) for table in driven]
@@ -280,13 +279,11 @@ class Library:
                 step, row, column = (stride // table.itemsize for stride in table.strides)
                 job.samples.tables[k] = _Table(_start(table), row, column)
                 job.table_step[k] = step
-        job.samples.outcomes, job.samples.residual = _start(outcomes), _start(residual)
-        job.samples.watches = _start(watch)
-        job.reached, job.messages = _start(reached), _start(messages)
+        job.samples.outcomes, job.samples.residual, job.samples.watches = map(_start, (of_one, of_one[1:], of_one[2:]))
+        job.status, job.reached, job.messages = _start(status), _start(reached), _start(messages)
         with self._memory(samples, tolerance, ()) as memory:
             if not self._library.kf_designs_run(memory.sweep, ctypes.byref(job)):
                 raise KinfmuError(self._refusal(designs * samples))
-        status[:] = outcomes[:, :, 0]
         return reached, {int(k): _text(_start(messages[k])) for k in np.flatnonzero(messages[:, 0])}
 
     @contextmanager

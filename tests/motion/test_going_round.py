@@ -56,6 +56,22 @@ def test_the_last_sample_is_compared_with_the_first_one_of_each_quantity() -> No
 
 
 @pytest.mark.usefixtures("arithmetic")
+def test_of_designs_without_gaps_a_few_samples_decide_unless_they_are_too_small() -> None:
+    """A motion that the few samples miss is measured by all of them."""
+    large, _, _ = sine(1.0)
+    bump = np.zeros_like(X)
+    bump[3] = 1.0
+    off = 1e-10 * X
+    values = np.array([large + off, bump + off, large + 10.0 * X, off * 0.0, large])
+    values[4, 5] = np.nan
+    track, is_known = track_of((values, 0.0 * values, 0.0 * values)), np.array([True, True, True, True, False])
+    expected = [True, True, False, False, False]
+    assert goes_round([(track, False)]).tolist() == expected
+    assert goes_round([(track, False)], is_known).tolist() == expected
+    assert goes_round([(Track(X, *(row[:1] for row in track.rows)), False)], is_known[:1]).tolist() == [True]
+
+
+@pytest.mark.usefixtures("arithmetic")
 @pytest.mark.parametrize("count", [1, 7, 8, 9, 361])
 def test_ranges_are_the_smallest_and_the_largest_number_of_each_row(count: int) -> None:
     table = np.random.default_rng(count).normal(size=(5, 2, count + 3))[:, :, :count]

@@ -49,7 +49,8 @@ bool kf_designs_run(kf_sweep *sweep, const kf_designs *designs)
     for (k = 0; k < designs->count; ++k) {
         const double *const constants = designs->constants + k * designs->constant_step;
         char *const message = designs->messages + k * KF_MESSAGE;
-        int64_t failure;
+        int32_t *const status = designs->status + k * designs->samples.count;
+        int64_t failure, sample;
         kf_job job = designs->samples;
         if (designs->times == NULL) {
             job.u += k * designs->drive_step;
@@ -59,9 +60,6 @@ bool kf_designs_run(kf_sweep *sweep, const kf_designs *designs)
         for (order = 0; order < 3; ++order) {
             job.tables[order].start += job.tables[order].start == NULL ? 0 : k * designs->table_step[order];
         }
-        job.outcomes += k * job.count;
-        job.residual += k * job.count;
-        job.watches += k * job.count * KF_WATCHES;
         job.most_failures = 1;
         job.failures = &failure;
         job.messages = message;
@@ -75,13 +73,16 @@ bool kf_designs_run(kf_sweep *sweep, const kf_designs *designs)
         if (designs->reached[k] != KF_REACHED) {
             memcpy(message, kf_sweep_message(sweep), KF_MESSAGE);
             leave_out(&job);
-            continue;
+        } else {
+            if (designs->times != NULL) {
+                drive(&sweep->follower.solver.model, designs->times, constants, &job);
+            }
+            if (!kf_sweep_run(sweep, &job)) {
+                return false;
+            }
         }
-        if (designs->times != NULL) {
-            drive(&sweep->follower.solver.model, designs->times, constants, &job);
-        }
-        if (!kf_sweep_run(sweep, &job)) {
-            return false;
+        for (sample = 0; sample < job.count; ++sample) {
+            status[sample] = job.outcomes[sample].status;
         }
     }
     return true;

@@ -21,10 +21,10 @@ typedef enum {
  * - the laws: times (samples.count), and constants of the first design; those of the next one begin constant_step numbers
  *   later. The laws start at the time `start`. Each design overwrites samples.u, ud and udd.
  *
- * samples: its tables are those of the first design; those of the next one begin table_step[order] numbers later. Its
- * outcomes, residual and watches follow each other without a gap. Failures of samples are not collected.
+ * samples: its tables are those of the first design; those of the next one begin table_step[order] numbers later. Each
+ * design overwrites its outcomes, residual and watches. Failures of samples are not collected.
  *
- * reached: (count) values of kf_reached. messages: (count, KF_MESSAGE), why a design, or else its first sample without
+ * status: (count, samples.count) values of kf_status. reached: (count) values of kf_reached. messages: (count, KF_MESSAGE), why a design, or else its first sample without
  * numbers, is not reached; empty if all are.
  */
 typedef struct {
@@ -36,7 +36,7 @@ typedef struct {
     double start;
     kf_job samples;
     ptrdiff_t table_step[3];
-    int32_t *reached;
+    int32_t *status, *reached;
     char *messages;
 } kf_designs;
 
