@@ -19,9 +19,7 @@ _FEW = 5  # samples
 Ranges = Callable[[FloatArray], tuple[FloatArray, FloatArray]]  # smallest and largest number of each row (..., n)
 
 
-def goes_round(
-    tracks: Sequence[tuple[Track, bool]], is_known: NDArray[np.bool_] | None = None
-) -> NDArray[np.bool_]:
+def goes_round(tracks: Sequence[tuple[Track, bool]], is_known: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
     """Return whether motions go round: quantities, rates and accelerations of the last sample are those of the first.
 
     They are compared with their largest values, of angles and of other quantities.

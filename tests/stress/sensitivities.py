@@ -363,7 +363,11 @@ def _judge(
 def _task(task: tuple[int, str | None, Engine | None]) -> Comparison:
     seed, name, engine = task
     try:
-        return compared_in_gallery(name or "", engine=engine or "python") if seed == GALLERY else compared(seed, name, engine)
+        return (
+            compared_in_gallery(name or "", engine=engine or "python")
+            if seed == GALLERY
+            else compared(seed, name, engine)
+        )
     except Exception as error:  # it is a fault of this mechanism, and the next one goes on
         return Comparison(task[0], task[1] or "", faults=[f"{type(error).__name__}: {error}"])
 
@@ -373,7 +377,9 @@ def main() -> int:
     parser = command_line("Sensitivities of random mechanisms against 50 digits.", 1000)
     parser.add_argument("--gallery", action="store_true", help="the mechanisms of the gallery, and no others")
     parser.add_argument(
-        "--engine", choices=get_args(Engine), help="one engine for all; default: both in the gallery, else native for 1 of 8"
+        "--engine",
+        choices=get_args(Engine),
+        help="one engine for all; default: both in the gallery, else native for 1 of 8",
     )
     given = parser.parse_args()
     tasks: list[tuple[int, str | None, Engine | None]] = [
