@@ -84,7 +84,7 @@ def load_named_in(document: Mapping[str, Any], folder: Path) -> Mechanism:
 
 
 def save(mechanism: Mechanism, path: str | Path) -> Path:
-    """Write a mechanism file, which `load` reads as the same mechanism.
+    """Write a mechanism file, which `load` reads as the same mechanism; numbers keep the units of its file.
 
     Args:
         mechanism: The mechanism.
@@ -99,7 +99,7 @@ def save(mechanism: Mechanism, path: str | Path) -> Path:
     """
     path = Path(path)
     try:
-        write_whole(path, text(mechanism).encode())
+        write_whole(path, text(mechanism, as_written=True).encode())
     except OSError as error:
         raise MechanismError(f"{path}: cannot be written ({error.strerror})") from None
     return path

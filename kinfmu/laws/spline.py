@@ -83,7 +83,9 @@ class Spline(Law):
             raise MechanismError(
                 f"{where} points: {len(self.points)} points are too few for ends = '{self.ends}'; at least {fewest}"
             )
-        if any(type(value) is not float for point in self.points for value in point):
+        if any(
+            not isinstance(value, float) or hasattr(value, "expression") for point in self.points for value in point
+        ):
             raise MechanismError(f"{where} points must be numbers; a table cannot hold expressions of parameters")
         for k, ((x, _), (following, _)) in enumerate(pairwise(self.points), start=2):
             if not following > x:

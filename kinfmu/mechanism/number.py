@@ -31,6 +31,23 @@ EXAMPLES = {
 }
 
 
+class Written(float):
+    """A float with the text that gave it, such as '60 deg', and the unit in it."""
+
+    __slots__ = ("text", "unit")
+
+    text: str
+    unit: str
+
+    def __new__(cls, value: float, text: str, unit: str) -> Written:
+        number = super().__new__(cls, value)
+        number.text, number.unit = text, unit
+        return number
+
+    def __getnewargs__(self) -> tuple[float, str, str]:  # type: ignore[override]  # for copies
+        return float(self), self.text, self.unit
+
+
 def read_number(where: str, value: object, quantity: Quantity | None, length_unit: str) -> float | Expression:
     """Return a number in the units used inside, or the expression that gives it.
 
@@ -70,12 +87,28 @@ def read_number(where: str, value: object, quantity: Quantity | None, length_uni
             factor, (_, usual) = factors(quantity, length_unit)[literal.unit], every_unit(length_unit)[literal.unit]
             number = number if factor == usual else number * (factor / usual)  # the unit of two quantities
         check_number(where, number, value)
-        return number
+        return Written(number, value, literal.unit) if literal.unit else number
     if not is_number(value):
         valid = f"a number or text such as '{_example(quantity, length_unit)}'"
         raise MechanismError(f"{where} = {quoted(value)} must be {valid}")
     check_number(where, value)
-    return float(value)  # type: ignore[arg-type]  # is_number has checked it
+    return value if isinstance(value, Written) else float(value)  # type: ignore[arg-type]  # is_number has checked it
+
+
+def written_in(value: object) -> str:
+    """Return the unit in which a number was written; '' if there is none."""
+    return str(value.unit) if isinstance(value, Written) else ""
+
+
+def in_unit_of(old: object, value: float, quantity: Quantity, length_unit: str) -> float:
+    """Return a number in the unit of another one, rounded there to 15 digits; itself if that one has no unit."""
+    unit = written_in(old)
+    factor = factors(quantity, length_unit).get(unit)
+    if factor is None:
+        return value
+    shown = float(value) / factor
+    rounded = float(f"{shown:.15g}")  # 60.0, not 59.99999999999999
+    return read_constant("", f"{rounded!r} {unit}", quantity, length_unit)
 
 
 def read_constant(where: str, value: object, quantity: Quantity, length_unit: str) -> float:
@@ -93,7 +126,7 @@ def read_constant(where: str, value: object, quantity: Quantity, length_unit: st
             raise MechanismError(f"{where} = {quoted(value)} must be {valid}")
         return number
     check_number(where, value)
-    return float(value)  # type: ignore[arg-type]  # check_number has checked it
+    return value if isinstance(value, Written) else float(value)  # type: ignore[arg-type]  # check_number has checked it
 
 
 def expression_error(

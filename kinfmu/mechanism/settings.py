@@ -16,7 +16,7 @@ from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.display_unit import DisplayUnit, display_unit, written_unit
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.members import NumberPath
-from kinfmu.mechanism.number import read_constant, read_number, unit_advice
+from kinfmu.mechanism.number import in_unit_of, read_constant, read_number, unit_advice, written_in
 from kinfmu.mechanism.parameters import NUMBER, Parameter
 from kinfmu.mechanism.valid import is_number, quoted
 from kinfmu.units import Quantity, unit_of
@@ -49,9 +49,7 @@ def law_constants(owners: Sequence[Driver | Load], computed: Collection[NumberPa
             table = "drivers" if isinstance(owner, Driver) else "loads"
             for key, (value, measured) in owner.law.constants().items():
                 if (table, owner.name, "law", key) not in computed:
-                    yield LawConstant(
-                        owner.name, key, float(value), measured.quantity(*owner.law_kinds), measured.is_positive
-                    )
+                    yield LawConstant(owner.name, key, value, measured.quantity(*owner.law_kinds), measured.is_positive)
 
 
 Owner = TypeVar("Owner", bound=Driver | Load)
@@ -150,6 +148,11 @@ class Settable:
             raise RequestError(f"{name} = {quoted(value)} must be positive")
         return number
 
+    def as_in_file(self, name: str, value: float) -> float:
+        """Return a value of a parameter or law constant in the unit of the mechanism file, rounded there."""
+        setting = self.constants.get(name) or self.parameters[name]
+        return in_unit_of(setting.value, value, setting.quantity or NUMBER, self._length_unit)
+
     def note_on_bare(self, name: str, values: Iterable[object]) -> str:
         """Return a note if one of the values is bare and the file writes the parameter in another unit; else ''."""
         parameter = self.parameters.get(name)
@@ -174,7 +177,7 @@ class Settable:
 
         """
         setting = self.constants.get(name) or self.parameters[name]
-        own = setting.unit if isinstance(setting, Parameter) else ""
+        own = setting.unit if isinstance(setting, Parameter) else written_in(setting.value)
         return display_unit(setting.quantity, self._length_unit, written_unit(values, self._length_unit) or own)
 
     def _expression(self, name: str) -> Expression | None:

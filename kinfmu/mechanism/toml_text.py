@@ -3,30 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import fields
 from typing import Any
 
+from kinfmu.errors import MechanismError
 from kinfmu.laws.sequence import DWELL
 from kinfmu.measures import PoseQuantity
 from kinfmu.mechanism.body import RunSettings
 from kinfmu.mechanism.declared import keys_of
 from kinfmu.mechanism.expression import Computed
 from kinfmu.mechanism.mechanism import Mechanism
+from kinfmu.mechanism.number import Written, read_number
 from kinfmu.mechanism.parameters import Parameter
-from kinfmu.units import unit_of
+from kinfmu.units import Quantity, unit_of
 
 
-def text(mechanism: Mechanism) -> str:
-    """Return the mechanism as TOML; `parse(text(m)) == m`, numbers to the last bit."""
+def text(mechanism: Mechanism, *, as_written: bool = False) -> str:
+    """Return the mechanism as TOML; `parse(text(m)) == m`, numbers to the last bit.
+
+    Args:
+        mechanism: The mechanism.
+        as_written: Write numbers in the units of its file. Default: in the units used inside, so that equal mechanisms
+            have equal texts.
+
+    """
+    parts = mechanism.members
+    if as_written:
+        parts = parts.changed(lambda _, value, quantity: _as_written(value, quantity, mechanism.length_unit))
     lines = [f"name = {_toml(mechanism.name)}"]
     if mechanism.title:
         lines.append(f"title = {_toml(mechanism.title)}")
     lines += ["", "[units]", f"length = {_toml(mechanism.length_unit)}"]
     if mechanism.parameters:
-        lines += ["", "[parameters]", *(_parameter(name, p, mechanism) for name, p in mechanism.parameters.items())]
+        lines += [
+            "",
+            "[parameters]",
+            *(_parameter(name, p, mechanism, as_written) for name, p in mechanism.parameters.items()),
+        ]
     lines += ["", "[run]"]
-    lines += [f"{key.name} = {_toml(getattr(mechanism.run, key.name))}" for key in fields(RunSettings)]
-    for body in mechanism.bodies:
+    lines += [f"{key.name} = {_toml(getattr(parts.run, key.name))}" for key in fields(RunSettings)]
+    for body in parts.bodies:
         lines += ["", f"[bodies.{body.name}]"]
         points = ", ".join(f"{name} = {_toml(point)}" for name, point in body.points.items())
         lines.append(f"points = {{ {points} }}" if points else "points = {}")
@@ -34,17 +51,17 @@ def text(mechanism: Mechanism) -> str:
         if start:
             lines.append(f"start = {{ {start} }}")
         lines += [f"{key} = {_toml(value)}" for key, value in body.given_masses.items()]
-    for table, members in (("joints", mechanism.joints), ("drivers", mechanism.drivers)):
+    for table, members in (("joints", parts.joints), ("drivers", parts.drivers)):
         for member in members:
             lines += ["", f"[{table}.{member.name}]", f"type = {_toml(member.type)}", *_keys(member)]
-    if mechanism.gravity is not None:
-        lines += ["", "[gravity]", *(f"{key} = {_toml(value)}" for key, value in mechanism.gravity._asdict().items())]
-    for load in mechanism.loads:
+    if parts.gravity is not None:
+        lines += ["", "[gravity]", *(f"{key} = {_toml(value)}" for key, value in parts.gravity._asdict().items())]
+    for load in parts.loads:
         lines += ["", f"[loads.{load.name}]", f"type = {_toml(load.type)}", *_keys(load)]
     if mechanism.points:
         lines += ["", "[points]", *(f"{name} = {_toml(target)}" for name, target in mechanism.points.items())]
     lines += ["", "[outputs]", f"coordinates = {_toml(mechanism.coordinates)}"]
-    for reading in mechanism.measures:
+    for reading in parts.measures:
         lines += ["", f"[measures.{reading.name}]", f"type = {_toml(reading.type)}", *_keys(reading)]
     return "\n".join(lines) + "\n"
 
@@ -67,10 +84,22 @@ def _keys(member: Any) -> Iterator[str]:
             yield f"{key.name} = {_toml(value)}"
 
 
-def _parameter(name: str, parameter: Parameter, mechanism: Mechanism) -> str:
+def _as_written(value: Any, quantity: Quantity | None, length_unit: str) -> Any:
+    """Return the text with a unit that gave a number, if it still gives it; else the value."""
+    if isinstance(value, Written):
+        with suppress(MechanismError):
+            return value.text if read_number("", value.text, quantity, length_unit) == value else value
+    return value
+
+
+def _parameter(name: str, parameter: Parameter, mechanism: Mechanism, as_written: bool) -> str:
     """Return the line of a parameter: its expression, or its number with its unit."""
     value: object = parameter.value
-    if parameter.expression is None and parameter.quantity and parameter.kind != "number":
+    if as_written:
+        value = _as_written(value, parameter.quantity, mechanism.length_unit)
+    if isinstance(value, str):
+        pass
+    elif parameter.expression is None and parameter.quantity and parameter.kind != "number":
         value = f"{float(parameter.value)!r} {unit_of(parameter.quantity, mechanism.length_unit)}"
     if not parameter.description:
         return f"{name} = {_toml(value)}"

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from kinfmu.mechanism import Mechanism, Parameter
+from kinfmu.mechanism.expression import Computed
 from kinfmu.mechanism.members import NumberPath
 from kinfmu.units import Quantity
 
@@ -41,7 +42,7 @@ def opened(mechanism: Mechanism) -> Opened:
     parameters: dict[str, Parameter] = {}
 
     def open_number(place: NumberPath, value: Any, quantity: Quantity) -> Any:
-        if type(value) is not float or not _can_be_opened(place, value):
+        if not isinstance(value, float) or isinstance(value, Computed) or not _can_be_opened(place, value):
             return value
         name = _unused(f"opened_{len(places)}", mechanism)
         places[name] = place

@@ -9,12 +9,14 @@ from typing import NamedTuple
 
 from kinfmu.codegen.python import load_module
 from kinfmu.errors import KinfmuError
-from kinfmu.mechanism import Mechanism, Start
+from kinfmu.mechanism import Body, Mechanism, Start
 from kinfmu.mechanism.members import COORDINATES
+from kinfmu.mechanism.number import in_unit_of
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.solver.python import Solver, UnsolvableModel, with_parameters
 from kinfmu.solver.python.pose import Pose, failed
 from kinfmu.solver.python.status import Status
+from kinfmu.units import Quantity
 
 Settings = Mapping[str, float | str]
 
@@ -54,11 +56,17 @@ def continued(mechanism: Mechanism, settings: Settings) -> Continued:
         return Continued(changed, anew(pose.message))
     pose = pose if pose.status == Status.OK else solver.anchor
     start: dict[str, float] = dict(zip(plan.outputs, solver.outputs(pose), strict=True))
-    bodies = tuple(
-        body if body.is_ground else replace(body, start=Start(*(start[f"{body.name}.{c}"] for c in COORDINATES)))
-        for body in changed.bodies
-    )
+    bodies = tuple(body if body.is_ground else _started(body, start, changed.length_unit) for body in changed.bodies)
     return Continued(replace(changed, bodies=bodies))
+
+
+def _started(body: Body, pose: Mapping[str, float], length_unit: str) -> Body:
+    """Return a body that starts in a pose, with its coordinates in the units of its file."""
+    found = [
+        in_unit_of(old, pose[f"{body.name}.{c}"], Quantity("angle" if c == "phi" else "length"), length_unit)
+        for c, old in zip(COORDINATES, body.start, strict=True)
+    ]
+    return replace(body, start=Start(*found))
 
 
 @lru_cache(maxsize=4)

@@ -19,12 +19,8 @@ def of_unknown(problem: FitProblem, name: str) -> DisplayUnit:
         return problem.mechanism.settable.display_unit(name, flat(problem.unknowns[name]))
     own, _, key = name.rpartition(".")
     target: Any = next(one for one in problem.targets if one.name == own)
-    sampled = next(one for one in problem.sampled if one.name == own)
-    quantity = _ANGLE if sampled.angles[0] else _LENGTH
-    if key == "start":
-        quantity = sampled.argument
     length = problem.mechanism.length_unit
-    return display_unit(quantity, length, written_unit(flat(getattr(target, key)), length))
+    return display_unit(problem.quantity(name), length, written_unit(flat(getattr(target, key)), length))
 
 
 def of_columns(problem: FitProblem, sampled: Sampled) -> tuple[DisplayUnit, ...]:

@@ -16,7 +16,7 @@ from kinfmu.synthesis.fit_file import read_problem
 from kinfmu.synthesis.outcome import Optimum
 from kinfmu.synthesis.problem import FitProblem
 from kinfmu.synthesis.result import FitResult, result_of
-from kinfmu.synthesis.search import Found, distinct, start_points
+from kinfmu.synthesis.search import Found, Sameness, distinct, start_points
 from kinfmu.synthesis.team import Team
 
 STARTS = 16
@@ -94,14 +94,15 @@ def fit(
             )
         short = team.results("short", _best(drawn, _SHORT * starts), advance)
         long = team.results("long", _best(short, starts), advance)
-        ends = distinct([(one, 1) for one in long])
+        same = Sameness(problem.turns, float(np.median([one.total for one in drawn if np.isfinite(one.total)])))
+        ends = distinct([(one, 1) for one in long], same)
         polished = team.results("fine", [one.z for one, _ in ends[:_POLISHED] if one.z is not None], advance)
         for one in (*short, *long, *polished):
             refused.update(one.refused)
         if progress is not None:
             progress(steps, steps)
         counts = [count for _, count in ends]
-        best = distinct([*zip(polished, counts, strict=False), *ends[_POLISHED:]])
+        best = distinct([*zip(polished, counts, strict=False), *ends[_POLISHED:]], same)
         optima = tuple(Optimum(problem.vector(one.z), one.total, count) for one, count in best if one.z is not None)
         return result_of(team.equations, optima, tried, refused)
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
+
+import numpy as np
 
 from kinfmu.errors import MechanismError, RequestError, listed
 from kinfmu.mechanism import Mechanism
@@ -20,7 +23,9 @@ from kinfmu.synthesis.measuring import Measuring, measuring_of
 from kinfmu.synthesis.numbers import Bounds, read_bounds
 from kinfmu.synthesis.sampled import Sampled, TracedPoints, sampled
 from kinfmu.synthesis.targets import TARGETS, MeasureTarget, Target
-from kinfmu.units import CoordinateName
+from kinfmu.units import CoordinateName, Quantity
+
+ANGLE = Quantity("angle")
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +140,25 @@ class FitProblem:
             setting = settable.constants.get(name) or self.mechanism.parameters[name]
             values[name] = min(max(float(setting.value), self.bounds[name].low), self.bounds[name].high)
         return values
+
+    @property
+    def turns(self) -> FloatArray:
+        """(n,) a whole turn as part of the range of each unknown that is an angle; inf for others."""
+        return np.array(
+            [
+                math.tau / (b.high - b.low) if self.quantity(name) == ANGLE else math.inf
+                for name, b in self.bounds.items()
+            ]
+        )
+
+    def quantity(self, name: str) -> Quantity:
+        """Return the quantity of an unknown."""
+        if name in self.unknowns:
+            settable = self.mechanism.settable
+            return (settable.constants.get(name) or settable.parameters[name]).quantity or NUMBER
+        own, _, key = name.rpartition(".")
+        sampled = next(one for one in self.sampled if one.name == own)
+        return sampled.argument if key == "start" else Quantity("angle" if sampled.angles[0] else "length")
 
     def vector(self, z: FloatArray) -> dict[str, float]:
         """Return the unknowns by name.

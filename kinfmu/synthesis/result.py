@@ -73,7 +73,8 @@ class FitResult(FitOutcome, Displayed):
 def result_of(equations: Equations, optima: Sequence[Optimum], tried: int, refused: Mapping[str, int]) -> FitResult:
     """Return the result of a search; its errors are those of the mechanism as a file of its own."""
     problem, best = equations.problem, optima[0]
-    settings = {name: best.parameters[name] for name in problem.parameters}
+    settable = problem.mechanism.settable
+    settings = {name: settable.as_in_file(name, best.parameters[name]) for name in problem.parameters}
     followed = continued(problem.mechanism, settings)
     z = np.array([(best.parameters[name] - b.low) / (b.high - b.low) for name, b in problem.bounds.items()])
     fitted, jacobian = equations.at(z)
@@ -87,7 +88,7 @@ def result_of(equations: Equations, optima: Sequence[Optimum], tried: int, refus
         note = f"the mechanism does not assemble from its file: {reason}"
     return FitResult(
         problem=problem,
-        parameters=dict(best.parameters),
+        parameters={**best.parameters, **{name: float(value) for name, value in settings.items()}},
         mechanism=followed.mechanism,
         errors=tuple(_errors(problem, found)),
         residuals=found.residuals[: found.target_count],

@@ -119,25 +119,39 @@ def search(equations: Equations, z: FloatArray, effort: Effort) -> Found:
     return Found(z, equations.at(z)[0].total, tried, refused)
 
 
-def distinct(found: Sequence[tuple[Found, int]]) -> list[tuple[Found, int]]:
+SAME = 1e-3  # of the ranges of the unknowns, between two ends of a search at one optimum
+SAME_TOTAL = 1e-2  # relative; where the sum has a slope at a bound, ends that are so near differ by some 1e-3
+
+
+class Sameness(NamedTuple):
+    """What two ends of searches at one optimum may differ by.
+
+    turns: (n,) whole turns of the unknowns that are angles, as parts of their ranges; inf of others.
+    typical: Sum of squares of a design that is far from any optimum.
+    """
+
+    turns: FloatArray
+    typical: float = 0.0
+
+    def holds(self, one: Found, other: Found) -> bool:
+        """Return whether two searches ended at one optimum; angles count without whole turns."""
+        if one.z is None or other.z is None:
+            return False
+        apart, is_angle = np.abs(one.z - other.z), np.isfinite(self.turns)
+        turns = self.turns[is_angle]
+        apart[is_angle] -= turns * np.round(apart[is_angle] / turns)
+        most = SAME_TOTAL * max(one.total, other.total) + SAME**2 * self.typical + 1e-14
+        return bool(np.abs(apart).max() <= SAME) and abs(one.total - other.total) <= most
+
+
+def distinct(found: Sequence[tuple[Found, int]], same: Sameness) -> list[tuple[Found, int]]:
     """Return optima with the number of searches that ended there, each once, best first."""
     kept: list[tuple[Found, int]] = []
     for one, searches in sorted(found, key=lambda pair: pair[0].total):
         for k, (other, count) in enumerate(kept):
-            if _is_same(one, other):
+            if same.holds(one, other):
                 kept[k] = other, count + searches
                 break
         else:
             kept.append((one, searches))
     return [pair for pair in kept if pair[0].z is not None]
-
-
-SAME = 1e-3  # of the ranges of the unknowns, between two ends of a search at one optimum
-SAME_TOTAL = 1e-2  # relative; where the sum has a slope at a bound, ends that are so near differ by some 1e-3
-
-
-def _is_same(one: Found, other: Found) -> bool:
-    if one.z is None or other.z is None:
-        return False
-    near = float(np.abs(one.z - other.z).max()) <= SAME
-    return near and abs(one.total - other.total) <= SAME_TOTAL * max(one.total, other.total) + 1e-14

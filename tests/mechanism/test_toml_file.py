@@ -290,3 +290,25 @@ def test_the_fourbars_text_with_a_piece_cut_out_or_put_in_gives_a_mechanism_or_o
 @given(junk=st.text())
 def test_any_text_gives_one_line(junk: str) -> None:
     parsed_or_reported(junk)
+
+
+@pytest.mark.parametrize("name", gallery.names())
+def test_a_file_written_in_its_own_units_is_the_same_mechanism(name: str) -> None:
+    mechanism = gallery.load(name)
+    written = text(mechanism, as_written=True)
+    assert parse(written) == mechanism
+    assert text(parse(written), as_written=True) == written
+    assert text(parse(written)) == text(mechanism)
+
+
+def test_a_text_that_no_longer_gives_its_number_is_not_written() -> None:
+    mechanism = parse(
+        'name = "m"\n[units]\nlength = "mm"\n[parameters]\na = "2 cm"\n'
+        '[bodies.ground]\npoints = {}\n[bodies.bar]\npoints = { P = ["3 cm", "a"] }\nstart = { phi = "60°" }\n'
+    )
+    assert '"3 cm"' in text(mechanism, as_written=True)
+    assert 'phi = "60°"' in text(mechanism, as_written=True)
+    metric = text(mechanism.in_metres(), as_written=True)
+    assert '[0.03, "a"]' in metric
+    assert parse(metric) == mechanism.in_metres()
+    assert '[30.0, "a"]' in text(replace(mechanism, length_unit="cm"), as_written=True)

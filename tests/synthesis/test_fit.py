@@ -26,7 +26,7 @@ from kinfmu.synthesis import (
     PoseTarget,
 )
 from kinfmu.synthesis.angle_notes import angle_notes
-from kinfmu.synthesis.search import Found, distinct
+from kinfmu.synthesis.search import Found, Sameness, distinct
 from kinfmu.synthesis.text import parameter_rows
 from tests.synthesis.fourbars import LENGTHS, four_bar
 
@@ -218,8 +218,55 @@ def test_ends_of_searches_at_one_optimum_are_one() -> None:
     z = np.array([1.0, 0.5])
     totals = {0.0: 2.554e-4, 0.0009: 2.557e-4, 0.002: 2.559e-4}
     ends = [(Found(z - [shift, 0.0], total, 1), 1) for shift, total in totals.items()]
-    assert [(one.total, count) for one, count in distinct(ends)] == [(2.554e-4, 2), (2.559e-4, 1)]
-    assert len(distinct([(Found(z, 1.0, 1), 1), (Found(z, 1.1, 1), 1)])) == 2
+    same = Sameness(np.full(2, np.inf))
+    assert [(one.total, count) for one, count in distinct(ends, same)] == [(2.554e-4, 2), (2.559e-4, 1)]
+    assert len(distinct([(Found(z, 1.0, 1), 1), (Found(z, 1.1, 1), 1)], same)) == 2
+
+
+def test_ends_whole_turns_of_an_angle_apart_are_one_optimum() -> None:
+    same = Sameness(np.array([np.inf, 0.25]))
+    ends = [(Found(np.array([0.3, part]), total, 1), 1) for part, total in ((0.1, 1e-9), (0.6004, 2e-9), (0.2, 3e-9))]
+    alone = [(Found(np.array([0.1, 0.3]), 1.0, 1), 1), (Found(np.array([0.35, 0.3]), 1.0, 1), 1)]
+    assert [count for _, count in distinct(ends, same._replace(typical=1e-2))] == [2, 1]
+    assert len(distinct(ends, same)) == 3  # the sums differ by their double
+    assert len(distinct(alone, same)) == 2  # a length has no turns
+
+
+def test_a_fit_lists_an_optimum_once_for_all_turns_of_its_angles() -> None:
+    mechanism = four_bar()
+    turn = np.radians(np.arange(0, 360, 30))
+    swing = kinfmu.solve(mechanism, crank_angle=turn)["rocker.phi"]
+    target = FunctionTarget(
+        name="f", of="rocker.phi", points=list(zip(turn, swing, strict=True)), offset=("-720 deg", "720 deg")
+    )
+    result = kinfmu.fit(_problem(unknowns={"crank": (0.5, 2.5), "coupler": (2.0, 5.0)}, targets=[target]), starts=6)
+    turns = result.parameters["f.offset"] / (2.0 * np.pi)
+    assert turns == pytest.approx(round(turns), abs=1e-9)
+    exact = [one for one in result.optima if one.total < 1e-12]
+    assert [one.searches for one in exact] == [6], result.optima
+
+
+def test_a_fitted_mechanism_is_written_in_the_units_of_its_file(tmp_path: Path) -> None:
+    text = toml_text.text(four_bar(), as_written=True).replace('px = "1.7 m"', 'px = "170 cm"\ntilt = "20 deg"')
+    text = text.replace("[1.7, 1.2]", '["px*cos(tilt)", "py"]')
+    (tmp_path / "bar.toml").write_text(text.replace("speed = 1.0", 'speed = "30 rpm"'), encoding="utf-8")
+    bar = kinfmu.load(tmp_path / "bar.toml")
+    unknowns = {"px": (0.5, 3.0), "tilt": (0.0, 1.0), "crank.speed": ("20 rpm", "40 rpm")}
+    result = kinfmu.fit(
+        kinfmu.FitProblem(bar, unknowns, [replace(PATH, step="0.1 s", start="0.1 s")], over="time"), starts=1
+    )
+    kinfmu.save(result.mechanism, tmp_path / "out.toml")
+
+    lines = dict(line.split(" = ", 1) for line in (tmp_path / "out.toml").read_text().splitlines() if " = " in line)
+    assert (lines["crank"], lines["px"][-4:], lines["tilt"][-5:]) == ('"1.0 m"', ' cm"', ' deg"')
+    assert lines["speed"].endswith(' rpm"')
+    written = (tmp_path / "out.toml").read_text()
+    assert written.count("phi = ") == written.count(' deg" }') == 3
+    assert 'start = "60 deg"' in written
+    again = kinfmu.load(tmp_path / "out.toml")
+    assert again == result.mechanism
+    assert again.law_constants[1].value == result.parameters["crank.speed"]
+    assert again.parameters["tilt"].value == result.parameters["tilt"]
 
 
 def test_an_unknown_without_effect_is_noted() -> None:
