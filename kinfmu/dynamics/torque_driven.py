@@ -19,12 +19,14 @@ from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.forces import effort_noun
 from kinfmu.run import Event, FloatArray, Run
 from kinfmu.run.axis import TIME
+from kinfmu.run.coarse import coarse_samples
 from kinfmu.solver.python.law_breaks import LEAST_TOLERANCE, MOST_TOLERANCE, STEP_TOLERANCE
 from kinfmu.solver.python.pose import Vector
 from kinfmu.solver.python.status import Status
 from kinfmu.sweep.continued import Settings, continued
 from kinfmu.sweep.forces import ForceModel, LoadedRun, applied_efforts, force_plan
 from kinfmu.sweep.model import Model
+from kinfmu.units import InputName
 
 
 def torque_driven(
@@ -85,6 +87,9 @@ def torque_driven(
         if progress is not None:
             progress(len(samples), len(times))
     events = [Event(ends[0], "info", changed.message)] if changed.message else []
+    coarse = coarse_samples(*_motion(plan, samples))
+    if coarse:
+        events.append(Event(ends[0], "info", coarse))
     if stepper.end is not None:
         end = stepper.end
         samples.append(Sample(end.t, end.u, end.ud, (0.0,) * len(end.u)))
@@ -92,6 +97,12 @@ def torque_driven(
     run = _run(Model(plan), samples, efforts, tuple(events), ended=stepper.end is not None)
     about = {"drive": "torque", "method": method, "tolerance": repr(float(tolerance)), "steps": str(stepper.steps)}
     return run.replaced(info={**run.info, **about})
+
+
+def _motion(plan: SolvePlan, samples: list[Sample]) -> tuple[FloatArray, list[InputName], FloatArray, FloatArray]:
+    """Return the times (n,), the names (d,) of the drivers' values, their values and their speeds (n, d)."""
+    t, u, ud = (np.array([sample[k] for sample in samples]) for k in range(3))
+    return t, [driver.inputs[0] for driver in plan.drivers], u, ud
 
 
 def _effort_names(plan: SolvePlan) -> list[str]:

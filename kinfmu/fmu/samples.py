@@ -18,9 +18,10 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import force_names, reaction_names_of
 from kinfmu.run import Event, Run
 from kinfmu.run.channels import absent_columns
+from kinfmu.run.coarse import coarse_samples
 from kinfmu.run.run import Sink
 from kinfmu.solver.python.status import Status
-from kinfmu.units import ForceName
+from kinfmu.units import ForceName, read_inputs
 
 PIECE = 1024 * 1024  # [bytes] of a run passed to a sink at once, or fewer after PERIOD
 FEWEST = 16  # samples in a piece of a large mechanism: each piece has a fixed cost
@@ -196,6 +197,16 @@ class Samples:
         if row >= self._full_at or perf_counter() > self._due:
             self._pass_on()
         return good
+
+    def note_coarse(self) -> None:
+        """Store a note if the samples are too far apart to show a motion that the FMU integrates."""
+        names = read_inputs([variable.name for variable in self._interface.part("states")])
+        names = names[::3] if names else ()
+        if names and len(self._drivers) == 3 * len(names):
+            driven = self._reals[: self._size, self._drivers]
+            text = coarse_samples(self._t[: self._size], names, driven[:, ::3], driven[:, 1::3])
+            if text:
+                self._events.append(Event(float(self._t[0]), "info", text))
 
     def end(self, reason: str = "") -> Run:
         """Return all samples as a Run and end the sink's run; reason: the error that ended it, if any."""

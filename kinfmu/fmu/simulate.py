@@ -210,6 +210,8 @@ def simulate(
                     except BaseException as failure:
                         samples.end(str(failure) or type(failure).__name__)
                         raise
+                if rate is None:
+                    samples.note_coarse()
                 return samples.end()
     finally:
         interrupted.deliver()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -320,3 +321,18 @@ def test_a_mechanism_that_no_effort_determines_is_refused() -> None:
 def test_states_outside_the_limits_are_refused() -> None:
     with pytest.raises(RequestError, match=r"the initial state: crank = 2.5 rad .* cannot be reached"):
         simulated(heavy(fourbar(2.0, 1.0, 0.9, 1.5)), 1.0, 10, state={"crank_angle": 2.5})
+
+
+def test_samples_too_coarse_to_show_the_motion_are_noted_with_a_step_that_would_do() -> None:
+    state = {"crank_angle": -1.2, "crank_speed": 0.0}
+    (event,) = simulated(pendulum(), 10.0, 10, state=state).events
+    assert event.level == "info"
+    found = re.fullmatch(
+        r"samples 1 s apart do not show the motion: .*crank .*; a step of (\S+) s would", event.text
+    )
+    assert found, event.text
+    assert not simulated(pendulum(), 10.0, round(10.0 / float(found[1])), state=state).events
+    spun = simulated(pendulum(gravity=None), 1.0, 4, state={"crank_angle": 0.0, "crank_speed": 20.0})
+    assert [one.text.partition(": ")[2] for one in spun.events] == [
+        "crank turns by up to 286 deg from one to the next; a step of 0.005 s would"
+    ]

@@ -107,7 +107,11 @@ def test_co_simulation_is_the_motion_that_python_integrates(
     path, state = fmu_of("motor", flavour, fmi), {"crank_angle": 0.4, "crank_speed": 3.0}
     run = kinfmu.simulate(path, start=0.0, stop=1.2, step=0.1, inputs=inputs, state=state, tolerance=1e-12)
     exact = same_motion(motor(), 1.2, 0.1, inputs={"crank_torque": 11.0, "wind_force": -7.0}, state=state)
-    assert not run.events
+    assert [event.text for event in run.events] == [event.text for event in exact.events]
+    assert all("a step of 0.01 s would" in event.text for event in run.events)
+    fine = {"start": 0.0, "stop": 0.2, "step": 0.01, "inputs": inputs, "state": state}
+    assert not kinfmu.simulate(path, **fine).events
+    assert not kinfmu.simulate(path, **fine, rate=5.0).events  # the samples are chosen
     for name in (*run.force_names, *(f"crank_{noun}" for noun in ("angle", "speed", "acceleration")), "coupler.ax"):
         np.testing.assert_allclose(run[name], exact[name], rtol=1e-9, atol=1e-9, err_msg=name)
     np.testing.assert_allclose(run["crank.torque"], 11.0, rtol=1e-9)
