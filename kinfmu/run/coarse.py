@@ -1,4 +1,4 @@
-"""Samples too far apart to show a motion that nobody prescribed: the step with which they would show it."""
+"""Samples too far apart to show a motion under torques, and the step with which they would show it."""
 
 from __future__ import annotations
 

@@ -327,9 +327,7 @@ def test_samples_too_coarse_to_show_the_motion_are_noted_with_a_step_that_would_
     state = {"crank_angle": -1.2, "crank_speed": 0.0}
     (event,) = simulated(pendulum(), 10.0, 10, state=state).events
     assert event.level == "info"
-    found = re.fullmatch(
-        r"samples 1 s apart do not show the motion: .*crank .*; a step of (\S+) s would", event.text
-    )
+    found = re.fullmatch(r"samples 1 s apart do not show the motion: .*crank .*; a step of (\S+) s would", event.text)
     assert found, event.text
     assert not simulated(pendulum(), 10.0, round(10.0 / float(found[1])), state=state).events
     spun = simulated(pendulum(gravity=None), 1.0, 4, state={"crank_angle": 0.0, "crank_speed": 20.0})
