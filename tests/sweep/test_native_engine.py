@@ -88,8 +88,8 @@ def test_optimizing_compilers_find_nothing_to_warn_of(monkeypatch: pytest.Monkey
 
 def test_optimization_changes_no_bit(request: pytest.FixtureRequest) -> None:
     plan = compile_plan(kinfmu.load("jansen_leg"))
-    angles = driven(np.linspace(0.0, 6.0, 200))  # too few for lanes, which fuse on purpose
-    found = [np.zeros((3, 200, len(plan.outputs))) for _ in range(2)]
+    angles = driven(np.linspace(0.0, 6.0, 120))  # too few for lanes, which fuse on purpose
+    found = [np.zeros((3, 120, len(plan.outputs))) for _ in range(2)]
     library.Library(plan).sweep(angles, found[0])
     request.getfixturevalue("optimized")
     library.Library(plan).sweep(angles, found[1])

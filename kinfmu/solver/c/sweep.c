@@ -144,7 +144,7 @@ static bool solve_alone(kf_sweep *sweep, kf_job *job, int64_t sample, double tur
 /* Return whether a job is large enough to be worth segments. */
 static bool goes_side_by_side(const kf_sweep *sweep, const kf_job *job)
 {
-    return job->count >= 4 * KF_LANES && !sweep->follower.solver.unsolvable;
+    return job->count >= 2 * KF_LANES && !sweep->follower.solver.unsolvable;
 }
 
 /* Keep a sample for later; false if memory ran out. */
