@@ -11,7 +11,6 @@ import pytest
 
 import kinfmu
 from kinfmu.mechanism.toml_file import parse
-from tests.docs.commands import check_commands
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -46,10 +45,9 @@ def test_the_ten_lines_of_toml_turn_all_the_way() -> None:
     assert "crank-rocker" in str(report)
 
 
-def test_the_commands_of_the_readme_exist() -> None:
+def test_the_scripts_of_the_readme_exist() -> None:
     for script in re.findall(r"scripts/(\w+)", README):
         assert (ROOT / "scripts" / script).is_file()
-    check_commands(README)
 
 
 def test_the_comparison_is_that_of_the_accuracy_page(request: pytest.FixtureRequest) -> None:

@@ -13,6 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.docs.blocks import blocks as page_blocks
+from tests.docs.blocks import commands
+
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "adding-a-joint.md").read_text(encoding="utf-8")
 
@@ -60,8 +63,12 @@ def test_the_contract_tests_pick_the_new_joint_up_and_pass(project: Path) -> Non
 def test_the_mechanism_of_the_page_solves_as_the_page_says(project: Path) -> None:
     (mechanism,) = blocks("toml")
     (project / "vice.toml").write_text(mechanism, encoding="utf-8")
-    for command in re.findall(r"^    kinfmu (\w+ vice\.toml.*)$", PAGE, re.MULTILINE):
-        done = run(project, "-m", "kinfmu", *command.split())
+    of_the_tests, *lines = (line for block in page_blocks(PAGE) if block.kind == "commands" for line in commands(block))
+    assert of_the_tests == "scripts/test tests/joints"  # the test above runs those of the joint
+    for line in lines:
+        program, *words = line.split()
+        assert program == "kinfmu"
+        done = run(project, "-m", program, *words)
         assert (done.returncode, done.stderr) == (0, ""), done.stderr
     with (project / "vice.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))

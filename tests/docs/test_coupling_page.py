@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 import zipfile
 from pathlib import Path
@@ -11,38 +10,20 @@ import pytest
 from click.testing import CliRunner
 
 from kinfmu.cli import main
-from tests.docs.commands import check_commands
+from tests.docs.follow import accept, follow, page_text, typed
 
-ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "coupling.md").read_text(encoding="utf-8")
+PAGE = page_text("coupling.md")
 
 
-@pytest.fixture(autouse=True)
-def _in_a_folder_with_the_system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_page_runs_and_prints_its_comments(request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    followed = follow("coupling.md", tmp_path)
+    accept("coupling.md", followed.commented(PAGE), request)
+    assert "current [A]" in (tmp_path / "drive.svg").read_text(encoding="utf-8")
+
+
+def test_constants_and_the_message_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    spec = importlib.util.spec_from_file_location("build", ROOT / "examples" / "dc_motor" / "build.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    assert "python examples/dc_motor/build.py drive " in PAGE
-    module.build(Path("drive"))
-
-
-def test_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
-    check_commands(PAGE)
-    for command in re.findall(r"^    kinfmu ((?:simulate|export) [^#\n]+)", PAGE, re.MULTILINE):
-        result = CliRunner().invoke(main, command.split())
-        assert result.exit_code == 0, result.output
-    assert "current [A]" in Path("drive.svg").read_text(encoding="utf-8")
-    capsys.readouterr()
-    code = "\n".join(re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL))
-    exec(compile(code, "coupling.md", "exec"), {})  # noqa: S102  our own page
-    shown = re.findall(r"^print\(.*\)  # (.*)$", code, re.MULTILINE)
-    assert capsys.readouterr().out.splitlines() == shown
-
-
-def test_constants_and_the_message_of_the_page(tmp_path: Path) -> None:
+    typed("python examples/dc_motor/build.py drive")
     command = [
         "simulate",
         "drive/press_drive.ssp",

@@ -1,58 +1,48 @@
-"""docs/hosts.md and the page of each co-simulation tool: commands run, and so does the Python of installed tools."""
+"""docs/hosts.md and the page of each co-simulation tool: the pages of installed tools run."""
 
 from __future__ import annotations
 
-import ast
-import os
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
-from kinfmu.cli import main
+from tests.docs.blocks import blocks
+from tests.docs.follow import PYTHON, follow, page_text, run_in_host, typed
 from tests.fmu.native.hosts_page import HOSTS, PAGE
 from tests.fmu.native.test_hosts import ecos_command
 
-DOCS = PAGE.parent
-PAGES = sorted(DOCS.glob("host*.md"))
-PYTHON = os.environ.get("KINFMU_HOSTS", sys.executable)
-NEEDS = {"host-fmpy.md": "fmpy", "host-osp.md": "libcosimpy", "host-ecos.md": "ecospy"}
+RUN = {"host-fmpy.md", "host-osp.md", "host-ecos.md"}
+SYSTEM = """<?xml version="1.0" encoding="UTF-8"?>
+<OspSystemStructure xmlns="http://opensimulationplatform.com/MSMI/OSPSystemStructure" version="0.1">
+<BaseStepSize>0.01</BaseStepSize><Algorithm>fixedStep</Algorithm>
+<Simulators>
+{simulator}<Simulator name="motor" source="motor/toggle_press.fmu"/>
+<Simulator name="press" source="press/toggle_press.fmu"/>
+</Simulators>
+<Connections>
+{connection}</Connections>
+</OspSystemStructure>
+"""
+STEPS = """
+from libcosimpy.CosimExecution import CosimExecution
+execution = CosimExecution.from_osp_config_file("OspSystemStructure.xml")
+print("steps:", sum(execution.step() for _ in range(5)))
+"""
 
 
-def _blocks(page: Path) -> list[str]:
-    return re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
-
-
-def _build(page: Path) -> None:
-    """Run every `kinfmu build` of a page in the current folder, without pages of kinfmu play."""
-    text = page.read_text(encoding="utf-8")
-    for command in dict.fromkeys(re.findall(r"^    kinfmu (build [^#\n]+)", text, re.MULTILINE)):
-        words = command.split()
-        result = CliRunner().invoke(main, [*words, "--no-page", *([] if "-o" in words else ["-o", "."])])
-        assert result.exit_code == 0, (command, result.output)
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_every_command_and_block_of_a_host_page_is_well_formed(page: Path) -> None:
-    text = page.read_text(encoding="utf-8")
-    for line in re.findall(r"^    kinfmu ([^#\n]+)", text, re.MULTILINE):
-        command, *words = line.split()
-        known = {name for option in main.commands[command].params for name in option.opts}
-        assert {word for word in words if re.match("--?[a-z]", word)} <= known, line
-    for block in _blocks(page):
-        ast.parse(block)
+def _needs(module: str) -> None:
+    if subprocess.run([PYTHON, "-c", f"import {module}"], capture_output=True).returncode:
+        pytest.skip(f"{module} is not installed")
 
 
 def test_there_is_a_page_for_each_tool_and_it_states_whether_it_was_run() -> None:
-    text = PAGE.read_text(encoding="utf-8")
-    names = {page.name for page in PAGES} - {PAGE.name}
-    assert set(re.findall(r"\((host-\w+\.md)\)", text)) == names
-    assert len(names) == 7
-    not_run = {page.name for page in PAGES if "Not run by us" in page.read_text(encoding="utf-8")}
-    assert names - not_run == {host.page for host in HOSTS} == set(NEEDS)
+    pages = {page.name: page.read_text(encoding="utf-8") for page in PAGE.parent.glob("host-*.md")}
+    assert set(re.findall(r"\((host-\w+\.md)\)", PAGE.read_text(encoding="utf-8"))) == set(pages)
+    assert len(pages) == 7
+    not_run = {name for name, text in pages.items() if "Not run by us" in text}
+    assert set(pages) - not_run == {host.page for host in HOSTS} == RUN
 
 
 def test_the_table_of_runs_has_each_host_with_version_date_and_tests() -> None:
@@ -62,55 +52,40 @@ def test_the_table_of_runs_has_each_host_with_version_date_and_tests() -> None:
         assert re.search(row, text), host.name
 
 
-@pytest.mark.parametrize("name", NEEDS)
-def test_the_python_of_a_host_page_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    if subprocess.run([PYTHON, "-c", f"import {NEEDS[name]}"], capture_output=True).returncode:
-        pytest.skip(f"{NEEDS[name]} is not installed")
+def test_the_page_of_fmpy_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    followed = follow("host-fmpy.md", tmp_path)
+    assert "No problems found." in followed.outputs["fmpy validate fourbar.fmu"]
+    assert "crank.phi" in followed.outputs["fmpy info fourbar.fmu"]
     monkeypatch.chdir(tmp_path)
-    _build(DOCS / name)
-    code = "\n".join(_blocks(DOCS / name))
-    if name == "host-fmpy.md":
-        code += "\nassert late < 1e-12"
-    done = subprocess.run([PYTHON, "-c", code], capture_output=True, text=True, timeout=200)
-    assert done.returncode == 0, done.stderr
+    run_in_host(f"{followed.in_host}\nassert late < 1e-12")
 
 
-def test_the_commands_of_fmpy_find_no_problem(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_page_of_libcosim_runs(tmp_path: Path) -> None:
+    _needs("libcosimpy")
+    follow("host-osp.md", tmp_path)
+
+
+def test_libcosim_steps_a_system_of_the_parts_that_its_page_shows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _needs("libcosimpy")
     monkeypatch.chdir(tmp_path)
-    page = (DOCS / "host-fmpy.md").read_text(encoding="utf-8")
-    result = CliRunner().invoke(main, ["build", "fourbar", "-o", "fourbar.fmu", "--no-page", "--flavour", "python"])
-    assert result.exit_code == 0, result.output
-    for command in ("validate", "info"):
-        assert f"    fmpy {command} fourbar.fmu" in page
-        done = subprocess.run([sys.executable, "-m", "fmpy", command, "fourbar.fmu"], capture_output=True, text=True)
-        assert done.returncode == 0, done.stdout + done.stderr
-    assert "crank.phi" in done.stdout
+    simulator, connection = (block.text for block in blocks(page_text("host-osp.md")) if block.kind == "xml")
+    typed("kinfmu build fourbar --fmi 2 -o fourbar.fmu")
+    for folder, drive in (("motor", "torque"), ("press", "inputs")):
+        typed(f"kinfmu build toggle_press --drive {drive} --osp -o {folder}/toggle_press.fmu")
+    assert 'name="shaft"' in connection  # the group of a motor; here another press moves the press
+    system = SYSTEM.format(simulator=simulator, connection=connection.replace("shaft", "crank"))
+    Path("OspSystemStructure.xml").write_text(system, encoding="utf-8")
+    assert "steps: 5" in run_in_host(STEPS).splitlines()  # among the log of libcosim
 
 
-@pytest.mark.skipif(ecos_command() is None, reason="ecospy is not installed: no ecos command")
-def test_the_commands_of_ecos_end_in_agreement(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    page = (DOCS / "host-ecos.md").read_text(encoding="utf-8")
-    build, simulate, verify = (
-        line.split() for line in re.findall(r"^    (?:kinfmu|ecos) [^\n]*crank_rocker[^\n]*", page, re.MULTILINE)
-    )
-    result = CliRunner().invoke(main, [*build[1:], "--no-page"])
-    assert result.exit_code == 0, result.output
-    done = subprocess.run([str(ecos_command()), *simulate[1:]], capture_output=True, text=True, timeout=120)
-    if "error while loading shared libraries" in done.stderr:
+def test_the_page_of_ecos_runs_and_ends_in_agreement(tmp_path: Path) -> None:
+    command = ecos_command()
+    if command is None:
+        pytest.skip("ecospy is not installed: no ecos command")
+    if "error while loading shared libraries" in subprocess.run([command], capture_output=True, text=True).stderr:
         pytest.skip("the ecos command lacks libtbb12")
-    assert done.returncode == 0, done.stdout + done.stderr
-    result = CliRunner().invoke(main, verify[1:])
-    assert result.exit_code == 0, result.output
-    assert "21 outputs at 21 of 21 samples compared" in result.output
-
-
-def test_the_ssp_of_the_overview_is_built_and_simulated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    page = PAGE.read_text(encoding="utf-8")
-    commands = re.findall(r"^    kinfmu ((?:build|simulate) engine[^#\n]*)", page, re.MULTILINE)
-    assert len(commands) == 4
-    for command in commands:
-        words = command.split()
-        result = CliRunner().invoke(main, [*words, *(["--no-page", "-o", "."] if words[0] == "build" else [])])
-        assert result.exit_code == 0, (command, result.output)
+    followed = follow("host-ecos.md", tmp_path)
+    verified = followed.outputs["kinfmu verify crank_rocker.fmu --results crank_rocker.csv --tolerance 1e-5"]
+    assert "21 outputs at 21 of 21 samples compared" in verified

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 import kinfmu
 from kinfmu.drivers import DRIVERS
+from kinfmu.errors import MechanismError
 from kinfmu.joints import JOINTS
 from kinfmu.laws import LAWS
 from kinfmu.loads import LOADS
@@ -23,7 +25,9 @@ from tests.docs.key_tables import filled
 
 PATH = Path(__file__).parents[2] / "docs" / "mechanism-files.md"
 PAGE = PATH.read_text(encoding="utf-8")
+SCREW, LIFT = "[joints.screw]", "[repeat.j]"  # blocks that are not of press.toml
 BLOCKS = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+PRESS = "\n".join(block for block in BLOCKS if not block.startswith((SCREW, LIFT)))
 
 
 def test_the_tables_are_what_the_classes_declare(request: pytest.FixtureRequest) -> None:
@@ -37,7 +41,7 @@ def test_the_tables_are_what_the_classes_declare(request: pytest.FixtureRequest)
 
 
 def test_the_blocks_are_one_mechanism_that_solves() -> None:
-    mechanism = parse("\n".join(BLOCKS), "docs/mechanism-files.md")
+    mechanism = parse(PRESS, "docs/mechanism-files.md")
     report = kinfmu.check(mechanism)
     assert report.problem is None
     run = kinfmu.solve(mechanism, [0.0, 1.0, 2.0])
@@ -46,6 +50,48 @@ def test_the_blocks_are_one_mechanism_that_solves() -> None:
     assert "tip.x" in run.outputs
     apart = np.hypot(run["mark_2.x"] - run["mark_1.x"], run["mark_2.y"] - run["mark_1.y"])
     np.testing.assert_allclose(apart, 50.0, rtol=1e-12)
+
+
+def test_the_screw_lifts_its_nut_by_its_lead() -> None:
+    (screw,) = (block for block in BLOCKS if block.startswith(SCREW))
+    mechanism = parse(f"""
+name = "lift"
+units.length = "mm"
+bodies.ground.points = {{ O = [0, 0] }}
+bodies.screw.points = {{ O = [0, 0] }}
+bodies.nut = {{ points = {{ P = [0, 0] }}, start = {{ phi = 0 }} }}
+joints.O = {{ type = "revolute", between = ["ground.O", "screw.O"] }}
+joints.guide = {{ type = "translational", between = ["ground.O", "nut.P"], axis = "90 deg" }}
+drivers.crank = {{ type = "angle", of = "screw", law = "constant_speed", speed = "60 rpm" }}
+{screw}""")
+    run = kinfmu.solve(mechanism, [0.0, 1.0, 2.5])
+    np.testing.assert_allclose(run["nut.y"], [0.0, 5.0, 12.5], rtol=0.0, atol=1e-12)
+
+
+def test_the_repeated_joint_is_that_of_the_scissor_lift() -> None:
+    (shown,) = (tomllib.loads(block)["repeat"]["j"] for block in BLOCKS if block.startswith(LIFT))
+    lift = (PATH.parents[1] / "examples" / "scissor_lift" / "mechanism.toml").read_text(encoding="utf-8")
+    there = tomllib.loads(lift)["repeat"]["j"]
+    assert shown == there | {"joints": {"A_{j}": there["joints"]["A_{j}"]}}
+
+
+def test_the_table_of_inputs_drives_the_press(tmp_path: Path) -> None:
+    (table,) = re.findall(r"```csv\n(.*?)```", PAGE, re.DOTALL)
+    (tmp_path / "crank.csv").write_text(table, encoding="utf-8")
+    fmu = kinfmu.build(parse(PRESS), tmp_path / "press.fmu", drive="inputs")
+    run = kinfmu.simulate(fmu, inputs=tmp_path / "crank.csv", step=0.5)
+    np.testing.assert_allclose(np.degrees(run["crank.phi"])[:3], [60.0, 75.0, 75.0 - 15.0 / 7.0], rtol=1e-12)
+    assert run.t[-1] == 4.0
+
+
+def test_the_error_message_of_the_page_is_that_of_a_misspelt_body() -> None:
+    (message,) = re.findall(r"```text\nkinfmu: (.*)\.\.\.\n```", PAGE)
+    with pytest.raises(MechanismError) as caught:
+        parse(
+            PRESS.replace('P = { type = "revolute", between = ["crank.', 'P = { type = "revolute", between = ["krank.'),
+            "press.toml",
+        )
+    assert str(caught.value).startswith(message)
 
 
 def test_every_table_of_the_format_is_on_the_page() -> None:

@@ -1,27 +1,17 @@
-"""docs/playing.md: its commands exist, its Python runs."""
+"""docs/playing.md: its commands and its Python run."""
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from tests.docs.commands import check_commands
-
-PAGE = (Path(__file__).parents[2] / "docs" / "playing.md").read_text(encoding="utf-8")
+from tests.docs.follow import follow
 
 
-def test_every_command_and_option_of_the_page_exists() -> None:
-    check_commands(PAGE)
-
-
-def test_the_python_of_the_page_runs() -> None:
+def test_the_page_runs_and_the_live_mechanism_has_the_length_of_the_page(tmp_path: Path) -> None:
     pytest.importorskip("anywidget", reason="anywidget is not installed")
     pytest.importorskip("ziglang", reason="pages are compiled by zig")
-    (block,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    names: dict[str, Any] = {}
-    exec(compile(block, "playing.md", "exec"), names)  # noqa: S102  our own page
-    assert names["live"].parameters.m == 14.5
-    assert names["live"].values["crank.speed"] > 0.0
+    live = follow("playing.md", tmp_path).names["live"]
+    assert live.parameters.m == 14.5
+    assert live.values["crank.speed"] > 0.0

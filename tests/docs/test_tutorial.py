@@ -19,6 +19,7 @@ import kinfmu
 from kinfmu.cli import main
 from kinfmu.log import read
 from kinfmu.mechanism.toml_file import parse
+from tests.docs.blocks import blocks, commands
 
 DOCS = Path(__file__).parents[2] / "docs"
 PATH = DOCS / "tutorial.md"
@@ -65,6 +66,7 @@ def test_the_tutorial_works_word_for_word(in_folder: Path, request: pytest.Fixtu
     texts = iter([file, masses_added(file.replace("crank = 50", "crank = 54"), added)])
     (in_folder / "motor.py").write_text(script, encoding="utf-8")
     count = 0
+    lines: list[str] = []
 
     def step(found: re.Match[str]) -> str:
         nonlocal count
@@ -73,7 +75,8 @@ def test_the_tutorial_works_word_for_word(in_folder: Path, request: pytest.Fixtu
         for line in found[1].splitlines():
             if count == 1 or "build" in line:
                 (in_folder / "wiper.toml").write_text(next(texts), encoding="utf-8")
-            text = typed(line.strip(), in_folder)
+            lines.append(line.strip())
+            text = typed(lines[-1], in_folder)
         if found[2] is None:
             return found[0]
         if "--set crank" in found[1]:  # shortened to what changes
@@ -91,7 +94,7 @@ def test_the_tutorial_works_word_for_word(in_folder: Path, request: pytest.Fixtu
             shutil.copy(in_folder / made, DOCS / name)
     else:
         assert shown == page, "docs/tutorial.md is old; pytest tests/docs/test_tutorial.py --update writes it anew"
-    assert count >= 10
+    assert lines == [line for block in blocks(page) if block.kind == "commands" for line in commands(block)]
     assert all((in_folder / made).stat().st_size and (DOCS / name).is_file() for made, name in PICTURES.items())
     run = read("logs/start.mcap")
     assert run.good.all()

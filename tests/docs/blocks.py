@@ -1,0 +1,61 @@
+"""The blocks of a page in their order: commands to type, Python, files, and what is shown between them."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
+
+PROGRAMS = (
+    "kinfmu",
+    "python",
+    "fmpy",
+    "ecos",
+    "cosim",
+    "pip",
+    "source",
+)  # a line that begins so, or with scripts/, is typed
+_BLOCK = re.compile(r"^```([^\n]*)\n(.*?)^```$|((?:^    [^\n]*\n)+)", re.DOTALL | re.MULTILINE)
+
+
+class Block(NamedTuple):
+    """A block of a page."""
+
+    kind: str  # "commands", the language of a fenced block, "" without a language, "indented" for any other
+    text: str
+    file: str = ""  # name of the file that the paragraph above announces
+
+    @property
+    def head(self) -> str:
+        """The first line, by which lists name the block."""
+        return self.text.strip().partition("\n")[0]
+
+
+def is_typed(line: str) -> bool:
+    """Return whether the line is a command."""
+    return line.startswith("scripts/") or line.partition(" ")[0] in PROGRAMS
+
+
+def blocks(page: str) -> list[Block]:
+    """Return the blocks of a page; directives of the site, such as a table of contents, are none."""
+    found = []
+    for match in _BLOCK.finditer(page):
+        if match[3] is not None:
+            lines = [line[4:] for line in match[3].splitlines()]
+            kind = "commands" if is_typed(lines[0]) else "indented"
+            found.append(Block(kind, "\n".join(lines) + "\n"))
+        elif not match[1].startswith("{"):
+            (above,) = page[: match.start()].rstrip().split("\n\n")[-1:]
+            names = re.findall(r"`([\w.]+\.(?:toml|csv|py))`", above)
+            found.append(Block(match[1], match[2], names[-1] if above.endswith(":") and names else ""))
+    return found
+
+
+def commands(block: Block) -> list[str]:
+    """Return the lines of a block of commands without comments."""
+    return [shlex.join(shlex.split(line, comments=True)) for line in block.text.splitlines() if line.strip()]
