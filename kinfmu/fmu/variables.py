@@ -21,6 +21,7 @@ from kinfmu.solver.python.solver import TOLERANCE
 from kinfmu.solver.python.status import Status
 from kinfmu.units import CoordinateName, Quantity, unit_of
 
+_INSIDE = 1e-12  # of a range: how far declared limits are from those found, which round-off may miss
 SMALLEST_TOLERANCE = 1e-15  # round-off: below it no sample would be ok
 _COORDINATE_WORDS = {
     "x": ("x", "x velocity", "x acceleration"),
@@ -201,7 +202,8 @@ def _limits(plan: SolvePlan, reach: DriverRange | None, start: float) -> tuple[f
     low, high = reach.low, reach.high
     if not (low is None or low <= start) or not (high is None or start <= high):
         return None, None
-    return low, high
+    inside = _INSIDE * (1.0 if low is None or high is None else high - low)
+    return None if low is None else low + inside, None if high is None else high - inside
 
 
 def _nominal(plan: SolvePlan) -> float | None:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import mpmath as mp
 import numpy as np
@@ -13,8 +16,9 @@ from fmpy import read_model_description
 import kinfmu
 from kinfmu import Body, ConstantSpeed, DistanceDriver, Mechanism, Revolute
 from kinfmu.errors import AssemblyError, RequestError
+from kinfmu.solver.python.status import Status
 from tests import oracle
-from tests.fmu.host import Host
+from tests.fmu.host import DISCARD, OK, Host
 from tests.mechanisms import fourbar
 
 ENGINES = ("python", "native")
@@ -133,18 +137,31 @@ def test_a_speed_whose_square_no_float_holds_is_refused(engine: str) -> None:
     assert np.isfinite(kinfmu.solve(mechanism, engine=engine, crank_angle=[1.0], crank_speed=1e99).accelerations).all()
 
 
-@pytest.mark.parametrize(("flavour", "fmi"), [("python", 2), ("native", 2), ("native", 3)])
-def test_in_fmus_estimates_hold_at_the_longest_reach_that_is_declared(flavour: str, fmi: int, tmp_path: Path) -> None:
+FLAVOURS = [("python", 2), ("native", 2), ("native", 3)]
+
+
+@pytest.fixture(scope="module")
+def cylinder_fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], tuple[Path, float, float]]:
+    """`cylinder_fmu(flavour, fmi)`: path of the FMU, built once, and the declared shortest and longest length."""
+    folder = tmp_path_factory.mktemp("cylinders")
+
+    @cache
+    def get(flavour: str, fmi: int) -> tuple[Path, float, float]:
+        name: Any = folder / f"{flavour}{fmi}.fmu"
+        path = kinfmu.build(cylinder(0.7), name, flavour=flavour, fmi=fmi, drive="inputs")
+        variables = read_model_description(str(path)).modelVariables
+        (length,) = [one for one in variables if one.name == "cylinder_length"]
+        return path, float(length.min), float(length.max)
+
+    return get
+
+
+@pytest.mark.parametrize(("flavour", "fmi"), FLAVOURS)
+def test_in_fmus_estimates_hold_at_the_longest_reach_that_is_declared(
+    flavour: str, fmi: int, cylinder_fmu: Callable[[str, int], tuple[Path, float, float]], tmp_path: Path
+) -> None:
     """At the first sample as at a later one."""
-    path = kinfmu.build(
-        cylinder(0.7),
-        tmp_path / "cylinder.fmu",
-        flavour=flavour,  # type: ignore[arg-type]  # one of the two
-        fmi=fmi,  # type: ignore[arg-type]
-        drive="inputs",
-    )
-    variables = read_model_description(str(path)).modelVariables
-    (longest,) = [float(one.max) for one in variables if one.name == "cylinder_length"]
+    path, _, longest = cylinder_fmu(flavour, fmi)
     at_longest = {"cylinder_length": longest, "cylinder_speed": 1.0}
     exact = exact_arm(0.7, longest)
     for is_first in (True, False):
@@ -161,3 +178,40 @@ def test_in_fmus_estimates_hold_at_the_longest_reach_that_is_declared(flavour: s
             assert bounds == [True, True]
         finally:
             host.free()
+
+
+@pytest.mark.parametrize(("flavour", "fmi"), FLAVOURS)
+@pytest.mark.parametrize("has_moved", [False, True])
+def test_in_fmus_a_cylinder_beyond_its_declared_range_is_outside(
+    flavour: str,
+    fmi: int,
+    has_moved: bool,
+    cylinder_fmu: Callable[[str, int], tuple[Path, float, float]],
+    tmp_path: Path,
+) -> None:
+    """At the declared ends, and 1e-9 within, it is near_singular; beyond there is no pose, from far and from near."""
+    path, shortest, longest = cylinder_fmu(flavour, fmi)
+    host = Host(path, tmp_path / "instance")
+    try:
+        host.initialize(0.0)
+        time = 0.0
+        for end, sign in ((shortest, -1.0), (longest, 1.0)):
+            if has_moved:
+                for inside in (1e-2, 1e-6):
+                    host.set({"cylinder_length": end - sign * inside})
+                    assert host.step(time, 0.1) == OK
+                    time += 0.1
+            for beyond in (-1e-9, 0.0):
+                host.set({"cylinder_length": end + sign * beyond})
+                assert host.status() == Status.NEAR_SINGULAR, beyond
+                assert host.get("arm.phi") == pytest.approx([0.0 if sign < 0.0 else math.pi], abs=2e-4)
+            for beyond in (3e-12, 1e-9, 1e-6, 1e-2, 10.0):
+                host.set({"cylinder_length": end + sign * beyond})
+                assert host.status() == Status.OUTSIDE, beyond
+                assert host.step(time, 0.1) == DISCARD
+            host.set({"cylinder_length": end - sign * 1e-2})
+            assert host.status() == Status.OK
+            assert host.step(time, 0.1) == OK
+            time += 0.1
+    finally:
+        host.free()
