@@ -12,6 +12,7 @@ from kinfmu.draw.study_panels import PanelGrid, Quantities, colour_of, few_ticks
 from kinfmu.run import FloatArray
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _MARKED = 40  # designs up to which each has a dot
@@ -27,18 +28,24 @@ def response(over: Quantities, measures: Sequence[Quantities], title: str) -> Fi
 
     """
     made, panels = sheet_of(PanelGrid(len(measures), 1, 360.0, 110.0, (0.0, 22.0)), title)
-    order = np.argsort(over.values, kind="stable")
     for k, (measure, (axes,)) in enumerate(zip(measures, panels, strict=True)):
-        marker = "o" if len(order) <= _MARKED else ""
-        look: dict[str, Any] = {"color": ink(colour_of(k)), "linewidth": 1.4, "marker": marker, "markersize": 3.0}
-        axes.plot(over.values[order], measure.values[order], **look)
+        response_into(axes, over, measure, k)
         is_last = k == len(measures) - 1
         name_axes(axes, over.label if is_last else "", measure.label)
-        axes.set_xlim(*_limits(over.values))
         few_ticks(axes, None, 4)
         axes.yaxis.set_label_coords(-44.0 / 360.0, 0.5)
         axes.tick_params(labelbottom=is_last)
     return made
+
+
+def response_into(axes: Axes, over: Quantities, measure: Quantities, place: int = 0) -> None:
+    """Draw a measure over a parameter; place: of the measure among others, which decides its colour."""
+    order = np.argsort(over.values, kind="stable")
+    marker = "o" if len(order) <= _MARKED else ""
+    look: dict[str, Any] = {"color": ink(colour_of(place)), "linewidth": 1.4, "marker": marker, "markersize": 3.0}
+    axes.plot(over.values[order], measure.values[order], **look)
+    axes.set_xlim(*_limits(over.values))
+    name_axes(axes, over.label, measure.label)
 
 
 def _limits(values: FloatArray) -> tuple[float, float]:

@@ -69,6 +69,15 @@ def scatter_matrix(parameters: Sequence[Quantities], measures: Sequence[Quantiti
     return made
 
 
+def scatter_into(axes: Axes, parameter: Quantities, measure: Quantities) -> None:
+    """Draw a measure over a parameter, a dot for each design that has a value."""
+    failed = ~np.isfinite(measure.values)
+    _dots(axes, parameter.values, measure.values, failed, ink(colour_of(0)), -(-len(failed) // MOST_DOTS))
+    axes.set_xlim(_limits(parameter.values))
+    axes.set_ylim(_limits(measure.values))
+    name_axes(axes, parameter.label, measure.label)
+
+
 def _limits(values: FloatArray) -> tuple[float, float]:
     """Return the ends of the axis of a column."""
     known = values[np.isfinite(values)]

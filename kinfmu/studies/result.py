@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from kinfmu.display import Displayed
 from kinfmu.studies.rows import StudyRows
 from kinfmu.studies.summary import summary
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 class StudyResult(StudyRows, Displayed):
@@ -29,8 +34,8 @@ class StudyResult(StudyRows, Displayed):
     def __str__(self) -> str:
         return summary(self)
 
-    def figure(self, path: str | Path, measures: tuple[str, ...] = ()) -> None:
-        """Draw the results into a .svg or .png file.
+    def figure(self, path: str | Path | None = None, measures: Sequence[str] = (), *, ax: Axes | None = None) -> None:
+        """Draw the results into a .svg, .png or .pdf file, or one measure into Axes of matplotlib.
 
         One grid: the measures over it. Two grids: their contours. Tolerances alone: what each contributes. Any others:
         a scatter matrix. The same results give the same bytes.
@@ -38,13 +43,16 @@ class StudyResult(StudyRows, Displayed):
         Args:
             path: The file.
             measures: Names of the measures to draw. Default: all.
+            ax: Axes to draw into, in place of a file: one measure over one or two grids or over one parameter, or the
+                contributions to it.
 
         Raises:
             StudyError: A measure is unknown.
-            FigureError: The file cannot be written, or its suffix is unknown.
+            FigureError: The file cannot be written, or its suffix is unknown; neither or both of `path` and `ax` are
+                given; the picture needs several Axes.
             MissingPackageError: matplotlib is not installed.
 
         """
         from kinfmu.studies.figure import draw
 
-        draw(self, Path(path), measures)
+        draw(self, path, ax, tuple(measures))

@@ -7,6 +7,7 @@ import zipfile
 import zlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -107,7 +108,12 @@ def test_limits_of_the_only_driver_are_those_of_check() -> None:
     assert reach is not None
     assert reach.low is not None
     inputs = interface(plan, reach=documents(plan, 2).reach).part("inputs")
-    assert [(one.minimum, one.maximum) for one in inputs] == [(reach.low, reach.high), (None, None), (None, None)]
+    assert reach.high is not None
+    limits = [(one.minimum, one.maximum) for one in inputs]
+    assert limits == [pytest.approx((reach.low, reach.high), abs=1e-11), (None, None), (None, None)]
+    for value in limits[0]:  # both are reached
+        values: Any = {inputs[0].name: [inputs[0].start, value]}
+        assert kinfmu.solve(mechanism, **values).status.tolist() == [0, 1]
     text = documents(plan, 2).files(interface(plan))["documentation/index.html"].decode()
     assert f"up to {np.degrees(reach.high):.8g} deg (dead centre)" in text
 

@@ -45,6 +45,54 @@ def test_each_kind_names_what_it_shows_and_is_the_same_every_time(kind: str, tmp
     assert (tmp_path / "figure.png").read_bytes()[:4] == b"\x89PNG"
 
 
+IN_AXES: dict[str, tuple[dict[str, Any], tuple[str, str]]] = {
+    "response": (KINDS["response"], ("crank [mm]", "swing [deg]")),
+    "contours": (KINDS["contours"], ("crank [mm]", "base [mm]")),
+    "scatter": ({"crank": {"from": 10, "to": 25}}, ("crank [mm]", "swing [deg]")),
+    "contributions": (KINDS["contributions"], ("part of the variance [%]", "")),
+}
+
+
+@pytest.mark.parametrize("kind", IN_AXES)
+def test_one_measure_is_drawn_into_axes(kind: str, tmp_path: Path) -> None:
+    from matplotlib.figure import Figure
+
+    tables, labels = IN_AXES[kind]
+    found = kinfmu.study(linkage(), tables, designs=16, workers=1)
+    left, right = Figure().subplots(1, 2)
+    found.figure(ax=left, measures=("swing",))
+    assert picture_of(found) == kind
+    assert left.has_data()
+    assert not right.has_data()
+    assert (left.get_xlabel(), left.get_ylabel()) == labels
+    if kind == "response":
+        (line,) = left.lines
+        np.testing.assert_array_equal(line.get_xydata(), np.column_stack([found["crank"], np.degrees(found["swing"])]))
+    if kind == "scatter":
+        (dots,) = left.collections
+        assert len(dots.get_offsets()) == 16
+    with pytest.raises(
+        FigureError, match=r"^Axes show one measure, and these are 2: swing, fastest; choose one, such "
+    ):
+        found.figure(ax=right)
+    with pytest.raises(StudyError, match=r"^the study has no measure 'swin'; did you mean 'swing'"):
+        found.figure(ax=right, measures=("swin",))
+    for path, ax in ((None, None), (tmp_path / "a.svg", right)):
+        with pytest.raises(FigureError, match=r"^figure needs a path, or Axes of matplotlib as ax=; give one of both$"):
+            found.figure(path, ("swing",), ax=ax)
+    assert not right.has_data()
+
+
+def test_a_scatter_matrix_does_not_fit_into_axes() -> None:
+    from matplotlib.figure import Figure
+
+    found = kinfmu.study(linkage(), KINDS["scatter"], designs=16, workers=1)
+    with pytest.raises(
+        FigureError, match=r"^designs that vary crank, base are drawn as a matrix of several Axes: give "
+    ):
+        found.figure(ax=Figure().subplots(), measures=("swing",))
+
+
 def test_columns_are_shown_in_the_units_of_the_files_and_the_table_keeps_its_own(tmp_path: Path) -> None:
     tilted = TEXT.replace("{ crank", '{ tilt = "5 deg", lean = "0.1 rad", crank').replace(
         'Q = ["rocker", 0] }, start = { x = 20',
