@@ -48,7 +48,7 @@ def contours(x: Quantities, y: Quantities, measures: Sequence[Quantities], title
 
 
 def contours_into(axes: Axes, x: Quantities, y: Quantities, measure: Quantities) -> None:
-    """Draw a measure (p, q) over a grid of two parameters, with the scale of its colours beside the Axes."""
+    """Draw a measure (p, q) over a grid of two parameters, with the scale of its colours next to the Axes."""
     filled = _fill(axes, x, y, measure)
     if filled is not None:
         _scale(axes.figure, filled, ax=axes)

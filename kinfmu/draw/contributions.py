@@ -57,7 +57,7 @@ def contributions_into(axes: Axes, measure: Contributed, place: int = 0, most: i
         axes: The Axes.
         measure: The measure.
         place: Its place among others, which decides the colour.
-        most: Number of bars that have room. Default: those of the measure.
+        most: Number of bars that the Axes hold. Default: those of the measure.
 
     """
     shown = list(measure.parts.items())[:MOST_BARS]

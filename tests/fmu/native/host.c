@@ -87,7 +87,7 @@ static int step(instance c, double t, double h)
 
 int main(void)
 {
-    unsigned outputs[OUTPUTS] = {OUTPUT_REFERENCES}, angle = 1, parameter = (unsigned)(PARAMETER);
+    unsigned outputs[OUTPUTS] = {OUTPUT_REFERENCES}, input = INPUT, parameter = (unsigned)(PARAMETER);
     double values[OUTPUTS], others[OUTPUTS], begin, u, one = 1.0, nan_value = NAN, known;
     void *state = NULL, *again = NULL;
     unsigned char *bytes;
@@ -105,26 +105,26 @@ int main(void)
         CHECK(DERIVE(c, outputs, OUTPUTS, &parameter, 1, &one, values) == 0)
     }
     CHECK(CALL(ExitInitializationMode)(c) == 0)
-    CHECK(GET(c, &angle, 1, &begin) == 0)
+    CHECK(GET(c, &input, 1, &begin) == 0)
     for (k = 0; k < 400; ++k) { /* to and fro, where it goes and where it does not */
-        u = begin + 2.0 * sin(0.05 * k);
-        CHECK(SET(c, &angle, 1, &u) == 0)
+        u = begin + AMPLITUDE * sin(0.05 * k);
+        CHECK(SET(c, &input, 1, &u) == 0)
         if (step(c, 0.01 * k, 0.01) == 0) {
             CHECK(GET(c, outputs, OUTPUTS, values) == 0)
         } else {
             GET(c, outputs, OUTPUTS, values);
         }
         if (k % 50 == 0) {
-            DERIVE(c, outputs, OUTPUTS, &angle, 1, &one, others);
+            DERIVE(c, outputs, OUTPUTS, &input, 1, &one, others);
         }
     }
-    CHECK(SET(c, &angle, 1, &begin) == 0)
+    CHECK(SET(c, &input, 1, &begin) == 0)
     CHECK(STATE(Get)(c, &state) == 0)
     CHECK(GET(c, outputs, OUTPUTS, values) == 0)
     CHECK(SIZE(c, state, &size) == 0)
     bytes = malloc(size);
     CHECK(STATE(Serialize)(c, state, (void *)bytes, size) == 0)
-    CHECK(SET(c, &angle, 1, &nan_value) != 0)
+    CHECK(SET(c, &input, 1, &nan_value) != 0)
     CHECK(DESERIALIZE(c, (void *)bytes, size, &again) == 0)
     CHECK(STATE(Set)(c, again) == 0)
     CHECK(GET(c, outputs, OUTPUTS, others) == 0)

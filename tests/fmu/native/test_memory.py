@@ -7,27 +7,29 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 import kinfmu
 from kinfmu.codegen.c import compiler
-from kinfmu.fmu.native.sources import headers, sources
-from kinfmu.fmu.variables import interface
-from tests.fmu.planned import planned
+from kinfmu.fmu.interface import Drive
+from kinfmu.fmu.native.sources import headers
+from tests.fmu.planned import fmu_sources
 from tests.fmu.test_parameters import linkage
+from tests.fmu.test_torque import motor, rocker
 
 HOST = Path(__file__).with_name("host.c")
 CC = shutil.which("gcc") or shutil.which("clang")
-TOKEN = "{00000000-0000-0000-0000-000000000000}"  # noqa: S105  # a guid
+OWN: dict[str, Callable[[], kinfmu.Mechanism]] = {"settable": linkage, "motor": motor, "rocker": rocker}
+DRIVEN_BY_TORQUES = ("motor", "rocker")  # the rocker falls to its dead centre, where its motion ends
 
 
-def _program(mechanism: kinfmu.Mechanism, fmi: int, folder: Path, *flags: str) -> Path:
+def _program(mechanism: kinfmu.Mechanism, fmi: int, folder: Path, *flags: str, drive: Drive = "inputs") -> Path:
     """The FMU's sources and a host, linked into one program."""
-    plan, forces = planned(mechanism)
-    variables = interface(plan, "inputs", has_time=fmi == 3, forces=forces)
-    files = sources(plan, variables, f"{fmi}.0", TOKEN, forces) | headers(f"{fmi}.0")
+    files, variables, plan = fmu_sources(mechanism, fmi, drive)
+    files |= headers(f"{fmi}.0")
     program = folder / "host"
     sources_and_host = files | {"host.c": HOST.read_text("utf-8")}
     references = variables.value_references()
@@ -36,7 +38,8 @@ def _program(mechanism: kinfmu.Mechanism, fmi: int, folder: Path, *flags: str) -
         "FMI": fmi,
         "OUTPUT_REFERENCES": ",".join(str(references[name]) for name in outputs),
         "OUTPUTS": len(outputs),
-        "DRIVERS": len(plan.drivers),
+        "INPUT": references[variables.part("efforts" if drive == "torque" else "inputs")[0].name],
+        "AMPLITUDE": 40.0 if drive == "torque" else 2.0,
         "PARAMETER": references[plan.parameters[0].name] if plan.parameters else -1,
     }
     for name, text in sources_and_host.items():
@@ -57,6 +60,9 @@ def _program(mechanism: kinfmu.Mechanism, fmi: int, folder: Path, *flags: str) -
     [
         pytest.param("fourbar", 2, marks=pytest.mark.long),
         ("fourbar_loaded", 3),
+        ("motor", 3),
+        pytest.param("motor", 2, marks=pytest.mark.long),
+        ("rocker", 2),
         pytest.param("settable", 3, marks=pytest.mark.long),
     ],
 )
@@ -66,9 +72,10 @@ def test_address_and_undefined_behaviour_sanitizers_report_no_errors(name: str, 
 
 def check_under_sanitizers(name: str, fmi: int, tmp_path: Path, *more: str) -> None:
     """Run the host of a mechanism's FMU under the sanitizers; more: flags of the compiler."""
-    mechanism = linkage() if name == "settable" else kinfmu.load(name)
+    mechanism = OWN[name]() if name in OWN else kinfmu.load(name)
+    drive: Drive = "torque" if name in DRIVEN_BY_TORQUES else "inputs"
     flags = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", *more)
-    done = subprocess.run([_program(mechanism, fmi, tmp_path, *flags)], capture_output=True, text=True)
+    done = subprocess.run([_program(mechanism, fmi, tmp_path, *flags, drive=drive)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
 
