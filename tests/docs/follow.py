@@ -74,7 +74,7 @@ BEFORE = {  # commands for the files that a page takes as given
     "playing.md": ["kinfmu new fourbar mine.toml", "kinfmu simulate mine.toml"],
 }
 FROM_PAGES = {"commands.md": ["fitting.md", "studies.md"]}  # pages whose files a page takes as given
-_SHOWN = re.compile(r"(print\(.*\))  # (.*)")
+SHOWN = re.compile(r"(print\(.*\))  # (.*)")
 INPUTS = "time,crank_angle\n0,0\n0.5,0.5\n1,1\n"  # crank.csv
 
 
@@ -84,12 +84,13 @@ class Followed(NamedTuple):
     outputs: dict[str, str]  # of each command
     printed: str  # by the page's Python
     names: dict[str, Any]  # that the page's Python defines
-    in_host: str  # the page's Python for a host, which runs in a process of its own
+    in_host: str  # the page's Python for hosts, which runs in a process of its own
+    printed_in_host: str
 
     def commented(self, page: str) -> str:
         """Return the page with the comment behind each `print(...)` as the page's Python prints it."""
         lines = iter(self.printed.splitlines())
-        return _SHOWN.sub(lambda found: f"{found[1]}  # {next(lines)}", page)
+        return SHOWN.sub(lambda found: f"{found[1]}  # {next(lines)}", page)
 
 
 def why_not_run(text: str) -> str | None:
@@ -118,7 +119,7 @@ def follow(name: str, folder: Path) -> Followed:
     outputs: dict[str, str] = {}
     names: dict[str, Any] = {}
     printed = StringIO()
-    in_host = ""
+    in_host, printed_in_host = "", ""
     for page in (name, *FROM_PAGES.get(name, ())):
         for file, text in files(page).items():
             (folder / file).write_text(text, encoding="utf-8")
@@ -130,13 +131,15 @@ def follow(name: str, folder: Path) -> Followed:
             if block.kind == "commands":
                 outputs |= {line: typed(line) for line in commands(block) if _can_run(line)}
             elif block.kind == "python" and _can_run(block.text):
-                if in_host or HOSTS.search(block.text):
+                if block.file.endswith(".py"):  # a command below starts it
+                    Path(block.file).write_text(block.text, encoding="utf-8")
+                elif in_host or HOSTS.search(block.text):
                     in_host += block.text
-                    run_in_host(in_host)
+                    printed_in_host = run_in_host(in_host)
                 else:
                     with redirect_stdout(printed):
                         exec(compile(block.text, name, "exec"), names)  # noqa: S102  our own page
-    return Followed(outputs, printed.getvalue(), names, in_host)
+    return Followed(outputs, printed.getvalue(), names, in_host, printed_in_host)
 
 
 def typed(line: str) -> str:

@@ -57,6 +57,8 @@ def problems(name: str, found: list[Block]) -> list[str]:
             executed = before.kind in ("commands", "python", "text")  # what they print
         elif block.kind == "toml":
             executed = name in OWN_TOML or _is_used(name, block)
+        elif block.file.endswith(".py"):
+            executed = any(f"python {block.file}" in other.text for other in found)
         else:
             executed = block.kind in ("commands", "python")
         if not (executed or listed):
