@@ -76,7 +76,7 @@ def test_the_repeated_joint_is_that_of_the_scissor_lift() -> None:
 
 
 def test_the_table_of_inputs_drives_the_press(tmp_path: Path) -> None:
-    (table,) = re.findall(r"```csv\n(.*?)```", PAGE, re.DOTALL)
+    (table,) = re.findall(r"```text\n(time,.*?)```", PAGE, re.DOTALL)
     (tmp_path / "crank.csv").write_text(table, encoding="utf-8")
     fmu = kinfmu.build(parse(PRESS), tmp_path / "press.fmu", drive="inputs")
     run = kinfmu.simulate(fmu, inputs=tmp_path / "crank.csv", step=0.5)
