@@ -30,7 +30,7 @@ _WIDTH, _HEIGHT, _SQUARE = (
     130.0,
     330.0,
 )  # [pt] of a panel; longest side of an equal or polar one
-_NARROWEST = 0.4  # width to height, or height to width, of a panel with equal axes
+_TICK = 36.0  # [pt] for a number along the horizontal axis of an equal panel
 _LEFT, _RIGHT, _TOP, _BOTTOM, _GAP = 60.0, 24.0, 34.0, 34.0, 16.0  # [pt] around and between panels
 _LEGEND_LINE, _LEGEND_COLUMNS = 12.0, 3  # [pt]; names in a line of a legend
 _EDGE = 8.0  # [pt] around the title
@@ -155,6 +155,7 @@ def overlay_sheet(shown: Overlay) -> Figure:
         is_last = number == len(panels) - 1
         if equal[number]:
             axes.set_aspect("equal", adjustable="datalim")
+            axes.locator_params(axis="x", nbins=max(int(wide / _TICK), 2))
         if not shown.polar:
             axes.yaxis.set_label_coords(-44.0 / wide, 0.5)
             if is_last or labels_below:
@@ -198,10 +199,13 @@ def _x_label(shown: Overlay) -> str:
 
 
 def _is_map(shown: Overlay, panel: Sequence[str]) -> bool:
-    """Return True if both axes are positions in the plane: then a length has the same size on both."""
-    run = shown.runs[0]
-    lengths = {str(name) for name in (*run.outputs, *run.fixed) if not name.is_angle}
-    return not shown.polar and bool(shown.xs) and lengths.issuperset((*panel, *shown.xs))
+    """Return True if both axes are positions, velocities, accelerations or forces: then both have the same scale."""
+    if shown.polar or not shown.xs:
+        return False
+    run, columns = shown.runs[0], {*panel, *shown.xs}
+    coordinates = [name for name in (*run.outputs, *run.fixed) if not name.is_angle]
+    kinds = [{name.derivative(order) for name in coordinates} for order in range(3)]
+    return any(columns <= kind for kind in kinds) or {unit_in(run, column) for column in columns} == {"N"}
 
 
 def _size(shown: Overlay, panel: Sequence[str], *, is_map: bool) -> tuple[float, float]:

@@ -96,7 +96,8 @@ def plot(
     its name as the label, in your settings of matplotlib; several calls draw several runs into the same Axes.
 
     With `x`, `overlaid` or `polar` the named columns themselves are the curves, those of one unit in one panel. Angles
-    along the horizontal axis are in degrees. Positions over positions, such as coupler curves, have equal scales.
+    along the horizontal axis are in degrees. Positions over positions, such as coupler curves, have equal
+    scales, and so have velocities over velocities, accelerations over accelerations and forces over forces.
 
     Args:
         run: The run.

@@ -40,6 +40,29 @@ def test_a_coupler_curve_is_a_circle_with_equal_scales(run: Run) -> None:
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("coupler.x [m]", "coupler.y [m]")
 
 
+def test_forces_over_forces_and_rates_over_rates_have_equal_scales_and_other_columns_have_not() -> None:
+    run = kinfmu.solve(kinfmu.load("engine"), np.linspace(0.0, 0.04, 73))
+
+    def scales(x: str, *columns: str) -> list[tuple[float, float]]:
+        made = sheet([run], [*columns], [x])
+        made.draw_without_rendering()
+        found = []
+        for axes in made.axes:
+            (x0, y0), (x1, y1) = axes.transData.transform([[0.0, 0.0], [1.0, 1.0]])
+            found.append((x1 - x0, y1 - y0))
+        return found
+
+    for x, y in [("O.force_x", "O.force_y"), ("rod.vx", "rod.vy"), ("rod.ax", "rod.ay")]:
+        ((across, up),) = scales(x, y)
+        assert across == pytest.approx(up), x
+    for x, y in [("crank.torque", "crank.power"), ("rod.x", "rod.vx"), ("crank.phi", "rod.phi"), ("rod.vy", "O.force_y")]:
+        ((across, up),) = scales(x, y)
+        assert across != pytest.approx(up), x
+    forces, torque = scales("O.force_x", "P.force_x", "crank.torque")  # a panel for each unit
+    assert forces[0] == pytest.approx(forces[1])
+    assert torque[0] != pytest.approx(torque[1])
+
+
 def test_a_flat_path_has_a_flat_sheet(run: Run) -> None:
     narrow = dataclasses.replace(run, values=run.values * np.where(np.array(run.outputs) == "coupler.y", 0.5, 1.0))
     round_, flat = (sheet([one], ["coupler.y"], ["coupler.x"]) for one in (run, narrow))

@@ -86,6 +86,27 @@ def test_dragged_bucket_moves_three_cylinders_whose_sliders_end_at_their_limits(
         assert page.errors == []
 
 
+@pytest.mark.parametrize("stop", [1e-6, 0.004, 0.2, 3.0, 100.0])
+def test_the_clock_has_the_digits_of_the_run_and_the_speed_makes_short_runs_visible(
+    chromium: Browser, stop: float
+) -> None:
+    text = toml_text(kinfmu.load("crank_rocker"))
+    start, end = text.index("[run]"), text.index("[bodies.ground]")
+    mech = parse(f"{text[:start]}[run]\nstop = {stop!r}\nstep = {stop / 100!r}\n\n{text[end:]}")
+    with chromium.open(kinfmu.page.page(mech)) as page:
+        shown = []
+        for part in range(101):
+            page.get(f"k.refresh(() => k.linkage.goToTime({stop * part / 100!r}))")
+            page.settle()
+            shown.append(page.tab.inner_text("#clock"))
+        speed = float(page.tab.input_value("#speed"))
+        assert page.errors == []
+    assert len(set(shown)) == 101
+    assert float(shown[-1].removesuffix(" s")) == pytest.approx(stop)
+    assert len(shown[1]) <= len("0.00000001 s")
+    assert 1.5 <= stop / speed <= 30.0  # [s]
+
+
 def test_page_fits_a_phone(chromium: Browser) -> None:
     with chromium.open(text_of("jansen_leg"), has_touch=True) as page:
         page.resize(PHONE)

@@ -10,6 +10,11 @@ export function number(value, digits = 5) {
     return String(Number(value.toPrecision(digits)));
 }
 
+// Return how many decimals a number in a range needs for `steps` different texts.
+export function decimals(range, steps) {
+    return range > 0 ? Math.min(Math.max(Math.ceil(Math.log10(steps / range)), 0), 15) : 0;
+}
+
 export function degrees(angle, decimals = 2) {
     return `${Number(((angle * 180) / Math.PI).toFixed(decimals)) + 0}\u00b0`;
 }

@@ -1,9 +1,10 @@
 // The row of play, time and speed, and the sliders of the drivers.
 
-import { number } from "./numbers.js";
+import { decimals, number } from "./numbers.js";
 import { $, breakable, element, shownUnit } from "./elements.js";
 
 const SPEEDS = [0.005, 0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1, 2, 4];
+const STEPS = 100; // of the clock in a run, at least
 const LONGEST_PLAY = 8; // [s] of a run at the first speed; longer or shorter runs start at another one
 const PLAY = '<svg viewBox="0 0 20 20"><path class="full" d="M5 3v14l12-7z"/></svg>';
 const PAUSE = '<svg viewBox="0 0 20 20"><path class="full" d="M5 3h3.5v14H5zM11.5 3H15v14h-3.5z"/></svg>';
@@ -15,9 +16,11 @@ export class Transport {
         const { linkage } = this;
         const { run, drivers } = linkage.data;
         const speed = $("speed");
-        SPEEDS.forEach((value) => speed.append(element("option", { value, textContent: `${value}\u00d7` })));
         const wanted = linkage.hasTime ? (run.to - run.from) / Math.min(Math.max(run.to - run.from, 2), LONGEST_PLAY) : 1;
-        speed.value = SPEEDS.reduce((best, value) => (Math.abs(Math.log(value / wanted)) < Math.abs(Math.log(best / wanted)) ? value : best));
+        const slower = wanted < SPEEDS[0] ? [Number(wanted.toPrecision(1))] : []; // of a run of milliseconds
+        const speeds = [...slower, ...SPEEDS];
+        speeds.forEach((value) => speed.append(element("option", { value, textContent: `${value}\u00d7` })));
+        speed.value = speeds.reduce((best, value) => (Math.abs(Math.log(value / wanted)) < Math.abs(Math.log(best / wanted)) ? value : best));
         $("play").addEventListener("click", () => page.motion.play());
         const time = $("time");
         [time.min, time.max] = [run.from, run.to];
@@ -77,7 +80,7 @@ export class Transport {
         const { linkage } = this;
         const { isPlaying } = this.page.motion;
         const { run } = linkage.data;
-        $("clock").textContent = linkage.hasTime ? `${linkage.t.toFixed(run.to - run.from < 10 ? 2 : 1)} s` : `sample ${Math.round(linkage.t)}`;
+        $("clock").textContent = linkage.hasTime ? `${linkage.t.toFixed(Math.max(decimals(run.to - run.from, STEPS), 1))} s` : `sample ${Math.round(linkage.t)}`;
         if (document.activeElement !== $("time") || isPlaying) $("time").value = linkage.t;
         this.sliders.forEach(({ slider, field, factor }, k) => {
             const value = linkage.wrapped(k);
