@@ -31,6 +31,7 @@ _SCRIPTS = (
     "branches",
     "linkage",
     "instants",
+    "names",
     "marks",
     "loads",
     "drawing",

@@ -55,7 +55,12 @@ def test_forces_over_forces_and_rates_over_rates_have_equal_scales_and_other_col
     for x, y in [("O.force_x", "O.force_y"), ("rod.vx", "rod.vy"), ("rod.ax", "rod.ay")]:
         ((across, up),) = scales(x, y)
         assert across == pytest.approx(up), x
-    for x, y in [("crank.torque", "crank.power"), ("rod.x", "rod.vx"), ("crank.phi", "rod.phi"), ("rod.vy", "O.force_y")]:
+    for x, y in [
+        ("crank.torque", "crank.power"),
+        ("rod.x", "rod.vx"),
+        ("crank.phi", "rod.phi"),
+        ("rod.vy", "O.force_y"),
+    ]:
         ((across, up),) = scales(x, y)
         assert across != pytest.approx(up), x
     forces, torque = scales("O.force_x", "P.force_x", "crank.torque")  # a panel for each unit

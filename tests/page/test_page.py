@@ -14,12 +14,13 @@ import kinfmu
 import kinfmu.page
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text as toml_text
-from tests.page.browser import PHONE, Browser, browser, needs_browser, text_of
+from tests.page.browser import DESKTOP, PHONE, Browser, browser, needs_browser, text_of
 
 pytestmark = needs_browser
 LARGEST = 300_000  # [bytes] of a page
 LABELS = Path(__file__).with_name("labels.js").read_text("utf-8")
 CONTRASTS = Path(__file__).with_name("contrasts.js").read_text("utf-8")
+COVERED = Path(__file__).with_name("covered.js").read_text("utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -113,6 +114,60 @@ def test_page_fits_a_phone(chromium: Browser) -> None:
         assert page.tab.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
         x, y = page.at("crank.X")
         page.tab.touchscreen.tap(x, y)
+        assert page.errors == []
+
+
+@pytest.mark.parametrize("name", ["jansen_leg", "parallel_jaw", "peaucellier", "fourbar", "toggle_press"])
+@pytest.mark.parametrize("size", [PHONE, DESKTOP])
+def test_names_cover_neither_each_other_nor_the_linkage(chromium: Browser, name: str, size: dict[str, int]) -> None:
+    with chromium.open(text_of(name)) as page:
+        page.resize(size)
+        page.get("k.fit()")
+        page.tab.click("#tab-files")
+        low, high = page.get("k.linkage.ranges[0]")
+        for part in (0.1, 0.3, 0.55, 0.8):
+            page.move(low + part * (high - low))
+            with page.tab.expect_download() as waiting:
+                page.tab.click("#save-svg")
+            covered = page.tab.evaluate(COVERED, waiting.value.path().read_text("utf-8"))
+            assert covered["count"] > 8
+            assert covered["found"] == []
+        assert page.errors == []
+
+
+def test_a_name_without_a_place_is_shown_at_a_tap_and_under_the_mouse(chromium: Browser) -> None:
+    with chromium.open(text_of("parallel_jaw"), has_touch=True) as page:
+        page.resize(PHONE)
+        page.get("k.fit()")
+        page.tab.evaluate(
+            """() => {
+                window.texts = [];
+                const write = CanvasRenderingContext2D.prototype.fillText;
+                CanvasRenderingContext2D.prototype.fillText = function (text, ...at) {
+                    window.texts.push(text);
+                    write.call(this, text, ...at);
+                };
+            }"""
+        )
+
+        def texts() -> list[str]:
+            page.get("(window.texts = [], k.refresh())")
+            page.settle()
+            return [str(one) for one in page.tab.evaluate("window.texts")]
+
+        def shows_rod() -> bool:
+            return sum("rod" in one.split(", ") for one in texts()) == 1
+
+        x, y = page.at("left_crank.rod")
+        assert not shows_rod()
+        page.tab.touchscreen.tap(x, y)
+        assert shows_rod()
+        page.tab.touchscreen.tap(x - 90, y + 60)
+        assert not shows_rod()
+        page.tab.mouse.move(x, y)
+        assert shows_rod()
+        page.tab.mouse.move(x, PHONE["height"] - 20)
+        assert not shows_rod()
         assert page.errors == []
 
 

@@ -1,17 +1,16 @@
 // The drawing of a linkage: shapes, pins, names, curves, arrows, marks.
 
 import { edgeOf, fillOf, GREY, paleOf } from "./colours.js";
-import { distance, isSlim, outline, placed } from "./geometry.js";
+import { distance, distanceToSegment, isSlim, outline, placed } from "./geometry.js";
 import { gravity, loads } from "./loads.js";
 import { marks } from "./marks.js";
+import { Names } from "./names.js";
 import { grouped, niceStep, number } from "./numbers.js";
+import { widthOf } from "./pen.js";
 import { BUTTONS } from "./view.js";
 
-const MOST_NAMES = 80; // at once, the most important ones; more are unreadable, and those in view come with zooming in
-const SPOTS = [[0.9, -0.9], [-0.9, -0.9], [0.9, 0.9], [-0.9, 0.9], [0, -1.2], [0, 1.2], [1.2, 0], [-1.2, 0]]; // around a place
-const CELL = 48; // [px] of the grid that finds names in the way
-
-// Draw a pose; show: what is switched on; view: from the plane to pixels. Returns the handles { driver, body, at } of drivers.
+// Draw a pose; show: what is switched on; view: from the plane to pixels. Returns the handles { driver, body, at } of drivers,
+// and whether names have no place.
 export function draw(pen, linkage, view, theme, show, extra) {
     const painter = new Painter(pen, linkage, view, theme, extra.isGhost);
     painter.grid(show.grid);
@@ -28,17 +27,19 @@ export function draw(pen, linkage, view, theme, show, extra) {
     painter.pins(extra.held);
     if (show.loads) gravity(painter);
     marks(painter, show, extra);
-    if (show.names) painter.names();
-    return painter.handles;
+    if (show.names) {
+        painter.names.draw();
+        if (extra.pointer) painter.names.drawAt(extra.pointer.at, extra.pointer.reach);
+    }
+    return { handles: painter.handles, hasHidden: painter.names.hidden.length > 0 };
 }
 
 class Painter {
     constructor(pen, linkage, view, theme, isGhost) {
         Object.assign(this, { pen, linkage, view, theme, isGhost });
         this.pose = linkage.pose;
-        this.boxes = new Boxes(); // of names and pins
-        this.lines = new Boxes(); // of links and arrows
-        [this.wanted, this.handles] = [[], []];
+        this.names = new Names(pen, view, theme);
+        this.handles = [];
         this.fine = linkage.fineness;
         this.width = Math.max(4, Math.min(15, 13 * this.fine));
         this.size = Math.max(0.55, Math.min(1.15, 1.15 * this.fine));
@@ -85,17 +86,8 @@ class Painter {
         return [x, -y];
     }
 
-    name(text, places, colour, off, rank) {
-        this.wanted.push({ text, places, colour, off, rank });
-    }
-
-    // Keep names off a line of a width, if there is space elsewhere.
-    cover(a, b, width) {
-        const count = Math.min(Math.ceil(distance(a, b) / 10), 100);
-        for (let k = 0; k <= count; k++) {
-            const [x, y] = [0, 1].map((axis) => a[axis] + ((b[axis] - a[axis]) * k) / Math.max(count, 1));
-            this.lines.add([x - width / 2, y - width / 2, x + width / 2, y + width / 2]);
-        }
+    name(text, places, colour, off, rank, more = {}) {
+        this.names.add({ text, places, colour, off, rank, ...more });
     }
 
     grid(isOn) {
@@ -106,14 +98,19 @@ class Painter {
         for (let k = Math.ceil(low[0] / step); k * step <= high[0]; k++) {
             const [x] = this.dot([k * step, 0]);
             pen.line([[x, 0], [x, view.height]], { width: 1, colour: theme.grid });
-            if (x < view.width - 60) pen.text(x + 3, view.height - 8, number(k * step), { colour: theme.quiet, size: 10, halo: theme.paper });
+            if (x < view.width - 60) this.scaleNumber(x + 3, view.height - 8, number(k * step));
         }
         for (let k = Math.ceil(low[1] / step); k * step <= high[1]; k++) {
             const [, y] = this.dot([0, k * step]);
             pen.line([[0, y], [view.width, y]], { width: 1, colour: theme.grid });
-            if (y > BUTTONS + 20) pen.text(4, y - 7, number(k * step), { colour: theme.quiet, size: 10, halo: theme.paper });
+            if (y > BUTTONS + 20) this.scaleNumber(4, y - 7, number(k * step));
         }
         pen.text(view.width - 6, view.height - 8, this.linkage.data.unit, { colour: theme.quiet, size: 11, align: "right", halo: theme.paper });
+    }
+
+    scaleNumber(x, y, text) {
+        this.pen.text(x, y, text, { colour: this.theme.quiet, size: 10, halo: this.theme.paper });
+        this.names.boxes.add([x, y - 6, x + widthOf(text, 10), y + 6]);
     }
 
     curves(curves, show) {
@@ -131,8 +128,13 @@ class Painter {
         for (const shape of wheels) {
             const points = this.at(shape).map((p) => this.dot(p));
             const style = { width: 1.5, colour: this.edge(shape.colour), fill: this.isGhost ? null : paleOf(shape.colour, this.theme) };
-            if (shape.kind === "cam") this.pen.line(points, { ...style, closed: true });
-            else this.pen.circle(...points[0], shape.radius * this.view.scale, shape.kind === "wheel" ? { ...style, dash: [7, 3] } : style);
+            if (shape.kind === "cam") {
+                this.pen.line(points, { ...style, closed: true });
+                this.names.coverAll(points, 1.5, true);
+            } else {
+                this.pen.circle(...points[0], shape.radius * this.view.scale, shape.kind === "wheel" ? { ...style, dash: [7, 3] } : style);
+                this.names.coverCircle(points[0], shape.radius * this.view.scale);
+            }
         }
         for (const shape of this.all("pitch")) this.pen.line(this.at(shape).map((p) => this.dot(p)), { width: 1.1, colour: this.edge(shape.colour), closed: true, dash: [9, 3, 2, 3] });
         for (const shape of this.all("spoke", "belt")) {
@@ -160,6 +162,7 @@ class Painter {
         }
         corners.push([b[0] + 4 * nx, b[1] + 4 * ny], [b[0] + 11 * nx, b[1] + 11 * ny], [a[0] + 11 * nx, a[1] + 11 * ny]);
         this.pen.line(corners, { width: 1.2, colour: this.edge(shape.colour), fill: this.fill(shape.colour), closed: true });
+        this.names.coverAll(corners.slice(-4), 8, true);
     }
 
     ground() {
@@ -173,6 +176,7 @@ class Painter {
             const corner = (k) => [foot[0] + k * along[0], foot[1] + k * along[1]];
             this.pen.line([p, corner(-10), corner(10)], { width: 1.3, colour, fill: fillOf(GREY, this.theme), closed: true });
             this.hatched(corner(-15), corner(15), [dx, dy], colour);
+            this.names.cover(p, foot, 12 * s);
         }
         for (const shape of this.all("rail", "bed")) {
             const [a, b] = this.at(shape).map((one) => this.dot(one));
@@ -196,6 +200,7 @@ class Painter {
             this.pen.line([top, [top[0] + depth * (dx - 0.8 * along[0]), top[1] + depth * (dy - 0.8 * along[1])]], { width: 0.9, colour });
         }
         this.pen.line([a, b], { width: 1.6, colour });
+        this.names.cover(a, b, 4);
     }
 
     // Draw links: plates first, then those whose points are on a line, with their rods.
@@ -216,12 +221,17 @@ class Painter {
             for (const { points, closed } of routes) this.pen.line(points, { width: width + 1.4, colour: edge, closed });
             for (const { points, closed } of routes) this.pen.line(points, { width: width - 1.4, colour: fill, closed });
             if (found.closed && isSlim(routes[0].points, width)) this.pen.line(routes[0].points, { width: 0, fill, closed: true });
-            for (const { points, closed } of routes) (closed ? [...points, points[0]] : points).slice(1).forEach((b, k) => this.cover(points[k], b, width));
-            for (const rib of found.ribs) this.pen.line(rib.map(place), { width: width * 0.5, colour: fill });
+            for (const { points, closed } of routes) this.names.coverAll(points, width, closed);
+            for (const rib of found.ribs) {
+                this.pen.line(rib.map(place), { width: width * 0.5, colour: fill });
+                this.names.coverAll(rib.map(place), width * 0.5);
+            }
             const middles = routes.flatMap(({ points, closed }) => middlesOf(points, closed));
-            if (found.closed) middles.unshift(centreOf(routes[0].points));
-            if (middles.length) this.name(link.name, middles, edge, found.closed ? 0 : width / 2 + 8, 2);
-            else this.name(link.name, [place(found.corners[0] || [0, 0])], edge, 24, 3);
+            const gap = (p) => Math.min(...routes.flatMap(({ points, closed }) => sidesOf(points, closed).map((side) => distanceToSegment(p, ...side) - width / 2)));
+            const inside = found.closed ? centreOf(routes[0].points) : null;
+            const first = place(found.corners[0] || [0, 0]);
+            if (middles.length) this.name(link.name, middles, edge, width / 2 + 8, 2, { inside, gap });
+            else this.name(link.name, [first], edge, 24, 3, { gap: (p) => distance(p, first) - width });
         }
     }
 
@@ -255,8 +265,8 @@ class Painter {
             const width = 0.5 * this.width;
             this.pen.line(points, { width: width + 1.2, colour: this.edge(GREY) });
             this.pen.line(points, { width: Math.max(width - 1, 1), colour: fillOf(GREY, this.theme) });
-            this.cover(...points, width);
-            this.name(bar.name, middlesOf(points, false), this.edge(GREY), width / 2 + 8, 3);
+            this.names.cover(...points, width);
+            this.name(bar.name, middlesOf(points, false), this.edge(GREY), width / 2 + 8, 3, { gap: (p) => distanceToSegment(p, ...points) });
         }
     }
 
@@ -271,10 +281,12 @@ class Painter {
                 this.pen.line([a, b], { width: 1.55 * this.width - 1.4, colour: fill });
                 this.pen.line([a, b], { width: 0.75 * this.width + 1.2, colour: edge });
                 this.pen.line([a, b], { width: 0.75 * this.width - 1.2, colour: this.theme.paper });
+                this.names.cover(a, b, 1.55 * this.width);
             } else {
                 const [x, y] = shape.kind === "die" ? [shape.direction[0], -shape.direction[1]] : this.direction(shape);
                 const corner = (i, j) => [points[0][0] + s * (13 * i * x - 8 * j * y), points[0][1] + s * (13 * i * y + 8 * j * x)];
                 this.pen.line([corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)], { width: 1.5, colour: edge, fill, closed: true });
+                this.names.cover(corner(-0.4, 0), corner(0.4, 0), 16 * s);
             }
         }
     }
@@ -295,103 +307,58 @@ class Painter {
             this.pen.line([at(5), at(tube - 1)], { width: 1.15 * w - 1, colour: fillOf(GREY, this.theme), cap: "butt" });
             const disc = Math.min(Math.max(piston, 7), tube - 3);
             this.pen.line([at(disc - 1.6), at(disc + 1.6)], { width: 1.15 * w - 1, colour: this.edge(GREY), cap: "butt" });
-            this.cover(a, b, 1.15 * w);
-            this.name(barrel.name, [at(0.35 * length), at(0.6 * length)], this.edge(GREY), 0.6 * w + 8, 3);
+            this.names.cover(a, b, 1.15 * w);
+            this.name(barrel.name, [at(0.35 * length), at(0.6 * length)], this.edge(GREY), 0.6 * w + 8, 3, { gap: (p) => distanceToSegment(p, a, b) });
         }
     }
 
     pins(held) {
         const { linkage, pen, theme } = this;
         const radius = Math.max(2.4, 0.33 * this.width);
-        const [done, named] = [new Set(), new Set()]; // places of pins, and names with their places
+        const [done, withName, named] = [new Set(), new Set(), new Set()]; // places of pins, those with names, names with places
+        const isOfInterest = new Set(linkage.data.interest.map(({ point }) => point));
         const key = (p) => `${Math.round(p[0])} ${Math.round(p[1])}`;
-        const pin = (point, text) => {
+        const pin = (point, text, rank = 1) => {
             const p = this.dot(linkage.point(point));
             const place = key(p);
             if (!done.has(place)) {
                 done.add(place);
                 pen.circle(...p, radius, { width: 1.6, colour: theme.ink, fill: theme.pin });
-                this.boxes.add([p[0] - radius, p[1] - radius, p[0] + radius, p[1] + radius]);
+                this.names.boxes.add([p[0] - radius, p[1] - radius, p[0] + radius, p[1] + radius]);
             }
-            if (text) this.name(text, [p], theme.ink, radius + 8, 1);
+            if (text) {
+                this.name(text, [p], theme.ink, radius + 8, rank, { gap: (one) => distance(one, p) - radius });
+                withName.add(place);
+            }
             named.add(`${text} ${place}`);
         };
-        for (const joint of linkage.data.joints) {
-            if (joint.points && !["translational", "cam_flat_face"].includes(joint.type)) {
-                joint.points.forEach((point, k) => pin(point, k === joint.points.length - 1 ? joint.name : ""));
-            }
-        }
-        for (const driver of linkage.data.drivers) if (driver.type === "distance") driver.points.forEach((point) => pin(point, ""));
-        for (const { points } of linkage.data.loads) if (points.length > 1) points.forEach((point) => pin(point, ""));
+        const end = (point) => { // of a bar, cylinder or spring, whose own name is at its middle
+            const { name } = linkage.data.points[point];
+            pin(point, withName.has(key(this.dot(linkage.point(point)))) || isOfInterest.has(point) ? "" : name, 4);
+        };
+        const joints = linkage.data.joints.filter((joint) => joint.points && !["translational", "cam_flat_face"].includes(joint.type));
+        const [bars, others] = [true, false].map((isBar) => joints.filter((joint) => (joint.type === "distance") === isBar));
+        for (const { points, name } of others) points.forEach((point, k) => pin(point, k === points.length - 1 ? name : ""));
+        for (const { points } of bars) points.forEach(end);
+        for (const driver of linkage.data.drivers) if (driver.type === "distance") driver.points.forEach(end);
+        for (const { points } of linkage.data.loads) if (points.length > 1) points.forEach(end);
         for (const { name, point, colour } of linkage.data.interest) {
             const p = this.dot(linkage.point(point));
             pen.circle(...p, radius + 0.6, { width: 1.6, colour: theme.ink, fill: this.edge(colour) });
-            if (!named.has(`${name} ${key(p)}`)) this.name(name, [p], theme.ink, radius + 8, 0);
+            if (!done.has(key(p))) this.names.boxes.add([p[0] - radius, p[1] - radius, p[0] + radius, p[1] + radius]);
+            if (!named.has(`${name} ${key(p)}`)) this.name(name, [p], theme.ink, radius + 8, 0, { gap: (one) => distance(one, p) - radius });
         }
         if (held) pen.circle(...this.dot(held), radius + 6, { width: 2.5, colour: theme.accent });
     }
-
-    // ---- names: the most important first, where they cover nothing
-
-    names() {
-        const { pen, theme } = this;
-        this.wanted.sort((a, b) => a.rank - b.rank);
-        this.wanted.slice(0, MOST_NAMES).forEach((name) => {
-            const box = this.place(name, [1, 1.8, 2.8], (one) => this.boxes.isFree(one) && this.lines.isFree(one)) || this.place(name, [1], (one) => this.boxes.isFree(one));
-            if (!box) return;
-            this.boxes.add(box);
-            pen.text((box[0] + box[2]) / 2, (box[1] + box[3]) / 2, name.text, { colour: name.colour, size: 12, align: "center", halo: theme.paper });
-        });
-    }
-
-    // Return the first free rectangle for a name next to one of its places, at factors of its distance; null without one.
-    place({ text, places, off }, factors, isFree) {
-        const width = 6.6 * text.length + 4;
-        for (const factor of off === 0 ? [1] : factors) {
-            for (const [x, y] of places) {
-                for (const [dx, dy] of off === 0 ? [[0, 0]] : SPOTS) {
-                    const cx = x + dx * off * factor + (Math.sign(dx) * width) / 2;
-                    const cy = y + dy * off * factor;
-                    const box = [cx - width / 2, cy - 8, cx + width / 2, cy + 8];
-                    const isIn = box[0] >= 2 && box[2] <= this.view.width - 2 && box[1] >= BUTTONS + 10 && box[3] <= this.view.height - 2;
-                    if (isIn && isFree(box)) return box;
-                }
-            }
-        }
-        return null;
-    }
 }
 
-// Rectangles [left, top, right, bottom] that are taken, listed by the cells of a grid that they touch.
-class Boxes {
-    constructor() {
-        this.cells = new Map();
-    }
-
-    *#touched([left, top, right, bottom]) {
-        for (let i = Math.floor(left / CELL); i <= Math.floor(right / CELL); i++) {
-            for (let j = Math.floor(top / CELL); j <= Math.floor(bottom / CELL); j++) yield i * 4096 + j;
-        }
-    }
-
-    add(box) {
-        for (const cell of this.#touched(box)) {
-            if (this.cells.has(cell)) this.cells.get(cell).push(box);
-            else this.cells.set(cell, [box]);
-        }
-    }
-
-    isFree(box) {
-        for (const cell of this.#touched(box)) {
-            if (this.cells.get(cell)?.some((b) => b[0] < box[2] && b[2] > box[0] && b[1] < box[3] && b[3] > box[1])) return false;
-        }
-        return true;
-    }
+function sidesOf(points, closed) {
+    const ends = closed ? [...points, points[0]] : points;
+    return ends.slice(1).map((b, k) => [ends[k], b]);
 }
 
 function middlesOf(points, closed) {
-    const ends = closed ? [...points, points[0]] : points;
-    const edges = ends.slice(1).map((b, k) => [ends[k], b]);
+    const edges = sidesOf(points, closed);
     edges.sort((p, q) => distance(...q) - distance(...p));
     return edges.flatMap(([a, b]) => [0.5, 0.35, 0.65].map((part) => [a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])]));
 }

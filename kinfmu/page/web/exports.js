@@ -54,7 +54,7 @@ export function table(linkage, over) {
 export function drawing(linkage, view, show, extra) {
     const theme = THEMES.light;
     const pen = new SvgPen(Math.round(view.width), Math.round(view.height), theme.paper);
-    draw(pen, linkage, view, theme, show, extra);
+    draw(pen, linkage, view, theme, show, { ...extra, pointer: null });
     return pen.svg();
 }
 

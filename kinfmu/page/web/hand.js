@@ -6,6 +6,7 @@ export class Hand {
     constructor(page) {
         this.page = page;
         this.held = null; // the place that is held, for the drawing
+        this.pointer = null; // { at, reach } of the mouse or the last touch [px], for names without a place
         const { canvas, view } = page;
         const held = new Map(); // pointers on the canvas
         let drag = null;
@@ -13,14 +14,20 @@ export class Hand {
             const box = canvas.getBoundingClientRect();
             return [event.clientX - box.left, event.clientY - box.top];
         };
-        const reach = (event) => (event.pointerType === "touch" ? 26 : 13) / view.scale;
+        const pixels = (event) => (event.pointerType === "touch" ? 26 : 13);
+        const reach = (event) => pixels(event) / view.scale;
+        const point = (event) => {
+            this.pointer = { at: at(event), reach: pixels(event) };
+            if (page.hasHidden) page.refresh();
+        };
         canvas.addEventListener("pointerdown", (event) => {
             canvas.setPointerCapture(event.pointerId);
             held.set(event.pointerId, at(event));
+            point(event);
             page.hint("");
             if (held.size === 2) {
                 drag = { kind: "pinch" };
-                this.held = null;
+                [this.held, this.pointer] = [null, null];
                 return;
             }
             drag = this.#grab(view.plane(at(event)), reach(event)) || { kind: "pan" };
@@ -31,6 +38,7 @@ export class Hand {
         canvas.addEventListener("pointermove", (event) => {
             const p = at(event);
             const before = held.get(event.pointerId);
+            if (drag?.kind !== "pinch") point(event);
             if (!before) {
                 canvas.classList.toggle("grip", Boolean(this.#grab(view.plane(p), reach(event))));
                 return;
@@ -60,6 +68,11 @@ export class Hand {
         };
         canvas.addEventListener("pointerup", release);
         canvas.addEventListener("pointercancel", release);
+        canvas.addEventListener("pointerleave", (event) => {
+            if (event.pointerType === "touch" || held.size) return;
+            this.pointer = null;
+            if (page.hasHidden) page.refresh();
+        });
         canvas.addEventListener("wheel", (event) => {
             event.preventDefault();
             page.zoom(Math.exp(-0.0016 * event.deltaY * (event.deltaMode ? 20 : 1)), at(event));

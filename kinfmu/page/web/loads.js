@@ -24,7 +24,7 @@ export function loads(painter) {
                 return [at[0] + ahead * x + side * y, at[1] + ahead * y - side * x];
             });
             pen.line(line, { width: solid ? 0.5 : 1.8, colour: ink, closed: Boolean(area), fill: area ? (solid ? ink : theme.paper) : null });
-            line.slice(1).forEach((p, k) => painter.cover(line[k], p, 3));
+            painter.names.coverAll(line, 3);
             all.push(...line);
         }
         const middle = [0, 1].map((axis) => all.reduce((sum, p) => sum + p[axis], 0) / all.length);
@@ -79,17 +79,17 @@ export function loadsLeftOut(linkage) {
 
 // Draw the direction of gravity in the upper right corner, if nothing is there.
 export function gravity(painter) {
-    const { linkage, pen, theme, view, boxes, lines } = painter;
+    const { linkage, pen, theme, view, names } = painter;
     if (!linkage.data.gravity) return;
     const [x, y] = linkage.data.gravity.map((value, k) => linkage.bound.get(`gravity.${"xy"[k]}`) ?? value);
     const size = Math.hypot(x, y);
     const [cx, cy] = [view.width - 34, BUTTONS + 34];
     const box = [cx - 24, cy - 24, cx + 24, cy + 24];
-    if (!size || !boxes.isFree(box) || !lines.isFree(box)) return;
+    if (!size || !names.isFree(box)) return;
     const at = (part, side) => [cx + (part * PULL * x) / size + (side * y) / size, cy - (part * PULL * y) / size + (side * x) / size];
     pen.line([at(-0.5, 0), at(0.3, 0)], { width: 1.6, colour: theme.quiet });
     pen.line([at(0.5, 0), at(0.25, 3), at(0.25, -3)], { width: 1, colour: theme.quiet, fill: theme.quiet, closed: true });
     const [tx, ty] = at(0, y < 0 ? -12 : 12);
     pen.text(tx, ty, "g", { colour: theme.quiet, size: 13, align: "center", italic: true });
-    boxes.add(box);
+    names.boxes.add(box);
 }

@@ -33,6 +33,7 @@ class Page {
         this.curves = [];
         this.traces = new Map();
         this.handles = []; // of drivers, as drawn
+        this.hasHidden = false; // names without a place
         this.mode = "move";
         this.driver = 0;
         this.canvas = $("drawing");
@@ -95,17 +96,18 @@ class Page {
         const ratio = window.devicePixelRatio || 1;
         c.setTransform(ratio, 0, 0, ratio, 0, 0);
         c.clearRect(0, 0, view.width, view.height);
-        this.handles = draw(new CanvasPen(c), linkage, view, this.theme, this.show, this.extra());
+        const drawn = draw(new CanvasPen(c), linkage, view, this.theme, this.show, this.extra());
+        [this.handles, this.hasHidden] = [drawn.handles, drawn.hasHidden];
         this.#readouts();
         this.plots.draw();
     }
 
-    // Return what is drawn besides the linkage: curves and traces, arrows, the place that is held.
+    // Return what is drawn besides the linkage: curves and traces, arrows, the place that is held, the pointer.
     extra() {
         const curves = this.drawn.map(({ colour }, k) => ({ line: this.curves[k] || [], colour }));
         if (this.show.traces) for (const [point, line] of this.traces) curves.push({ line, colour: this.drawn.find((one) => one.point === point)?.colour || [90, 90, 90], isTrace: true });
         const { found, legend } = arrows(this);
-        return { curves, arrows: found, legend, held: this.hand.held, isGhost: !this.design.isOk };
+        return { curves, arrows: found, legend, held: this.hand.held, pointer: this.hand.pointer, isGhost: !this.design.isOk };
     }
 
     #trace() {

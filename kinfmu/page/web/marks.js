@@ -36,6 +36,7 @@ function transmissionMarks(painter) {
         const acute = Math.min(angle, Math.PI - angle);
         const colour = acute < (40 * Math.PI) / 180 ? theme.bad : theme.accent;
         pen.line(arc, { width: 2, colour });
+        painter.names.coverAll(arc, 2);
         const w = a + sweep / 2;
         const label = `${degrees(angle, 1)}${acute < (40 * Math.PI) / 180 ? " poor" : ""}`;
         painter.name(label, [[p[0] + (r + 6) * Math.cos(w), p[1] - (r + 6) * Math.sin(w)]], colour, 14, -1);
@@ -77,7 +78,7 @@ function arrow(painter, { from, along, colour, text }) {
     if (length < 2) return;
     const ink = css(colour);
     head(painter.pen, a, b, ink);
-    painter.cover(a, b, 6);
+    painter.names.cover(a, b, 6);
     if (text) painter.name(text, [b], ink, 10, -1);
 }
 
@@ -106,13 +107,14 @@ function driverMarks(painter) {
         pen.line(Array.from({ length: 73 }, (_, i) => on(low + (span * i) / 72, radius)), { width: 1.4, colour: theme.quiet, dash: [2, 4] });
         const mark = (u, colour, label) => {
             pen.line([on(u, radius - 7), on(u, radius + 7)], { width: 3, colour });
+            painter.names.cover(on(u, radius - 7), on(u, radius + 7), 3);
             painter.name(label, [on(u, radius + 8)], colour, 14, -1);
         };
         for (const limit of linkage.limits) if (limit.driver === k) mark(limit.at, theme.bad, `limit ${degrees(limit.at, 1)}`);
         for (const point of linkage.changePoints) if (point.driver === k) mark(point.at, theme.accent, `change point ${degrees(point.at, 1)}`);
         const p = on(linkage.u[k], radius);
         pen.circle(...p, 7, { width: 2, colour: theme.paper, fill: theme.accent });
-        painter.boxes.add([p[0] - 8, p[1] - 8, p[0] + 8, p[1] + 8]);
+        painter.names.boxes.add([p[0] - 8, p[1] - 8, p[0] + 8, p[1] + 8]);
         painter.handles.push({ driver: k, body, at: p });
     });
 }

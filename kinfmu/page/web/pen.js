@@ -101,4 +101,14 @@ export class SvgPen {
     }
 }
 
+// Return the width of a text [px] in the font of the drawing.
+export function widthOf(text, size = 12) {
+    if (!ruler) ruler = document.createElement("canvas").getContext("2d");
+    const font = `${size}px ${FONT}`;
+    if (ruler.font !== font) ruler.font = font;
+    return ruler.measureText(text).width;
+}
+
+let ruler = null;
+
 export const FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif';
