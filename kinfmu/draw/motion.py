@@ -18,7 +18,7 @@ from kinfmu.scene import palette
 from kinfmu.scene.instant import Instant
 
 COLOUR: palette.Colour = (185, 28, 28)
-_RADIUS, _TURN = 19.0, math.radians(95.0)  # [pt] and [rad], of a curved arrow
+_RADII, _TURN = (19.0, 32.0), math.radians(95.0)  # [pt] and [rad], of a curved arrow; the larger one around torques
 _PUSH, _DISTANCE = 30.0, 13.0  # [pt]; length of a straight arrow, and its distance from its point
 _HEAD, _HALF_HEAD = 7.0, 2.8  # [pt]
 _STROKE = 1.4  # [pt]
@@ -44,9 +44,11 @@ class Turn(Mark):
 
     def _route(self, sheet: Sheet) -> FloatArray:
         """Return the arc that covers least; the first one compared begins just ahead of the body."""
-        radius = _RADIUS * sheet.ornament
+        radii = [radius * sheet.ornament for radius in _RADII]
         starts = [self.heading + self.sense * (math.radians(25.0) + k * math.tau / _TRIES) for k in range(_TRIES)]
-        return _freest(sheet, [arc(self.centre, radius, start, start + self.sense * _TURN) for start in starts])
+        return _freest(
+            sheet, [arc(self.centre, radius, start, start + self.sense * _TURN) for radius in radii for start in starts]
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 
 import numpy as np
 
@@ -32,7 +33,10 @@ from kinfmu.scene.instant import Instant
 from kinfmu.scene.shape import Shape
 from kinfmu.scene.symbols import Strip
 
+_Ring = Callable[[float], tuple[Strip, ...]]  # the lines of a symbol about a pin, from what is added to its radii
 BETWEEN = (Spring, Damper, GasSpring, ForceBetween)  # classes of loads between two points
+_TORSION: dict[type[Load], _Ring] = {TorsionSpring: symbols.spiral, TorsionDamper: symbols.dashpot}
+_SAME = 1e-6  # of the size; pins that are nearer are one place
 _ARGUMENTS = 200  # of a law, in which its largest effort is looked for
 _BARREL, _OF_SHORTEST = 0.62, 0.92  # length of a barrel: of the usual length, and at most of the shortest one
 EFFORT_UNITS = {"force": "N", "torque": "N m"}
@@ -43,7 +47,7 @@ def load_shapes(shown: Instant, box: FloatArray) -> Iterator[Shape]:
     """Yield the symbols of loads on bodies whose poses are known; box: corners (2, 2) of the mechanism as drawn.
 
     A force points where its largest effort over the run does, and pushes its point if that is towards the middle. A
-    constant force of 0 has no direction and no symbol.
+    constant force of 0 has no direction and no symbol. Symbols about one pin have different radii.
     """
     taken = Counter(
         frozenset(member.between)
@@ -52,6 +56,7 @@ def load_shapes(shown: Instant, box: FloatArray) -> Iterator[Shape]:
     )
     sharing = Counter(frozenset(load.between) for load in shown.mechanism.loads if isinstance(load, BETWEEN))
     done: Counter[frozenset[str]] = Counter()
+    rings = _rings(shown, float(np.ptp(box, axis=0).max()))
     for load in shown.mechanism.loads:
         if not shown.poses.keys() >= {*load.bodies()}:
             continue
@@ -62,11 +67,8 @@ def load_shapes(shown: Instant, box: FloatArray) -> Iterator[Shape]:
             yield _between(shown, load, off, float(np.ptp(box, axis=0).max()))
         elif isinstance(load, ForceAt | ForceAlong):
             yield from _force(shown, load, box.mean(axis=0))
-        elif isinstance(load, TorqueOn):
-            yield _about(shown, load, load.on, load.against, symbols.turn(_sense(shown, load)))
-        elif isinstance(load, TorsionSpring | TorsionDamper):
-            strips = symbols.spiral() if isinstance(load, TorsionSpring) else symbols.dashpot()
-            yield _about(shown, load, load.between[1], load.between[0], strips)
+        elif load.name in rings:
+            yield rings[load.name]
 
 
 def load_text(load: Load) -> str:
@@ -140,12 +142,45 @@ def _force(shown: Instant, load: ForceAt | ForceAlong, middle: FloatArray) -> It
     yield _shape(load, body_of(load.at), shown.at(load.at)[None], strips, direction=towards, other=load.axes)
 
 
-def _about(shown: Instant, load: Load, body: str, against: str, strips: tuple[Strip, ...]) -> Shape:
-    """Return a symbol about the pin of a body, that turns with it; without a pin it is about the body's origin."""
-    if body == GROUND_NAME:
-        body, against = against, body
+def _rings(shown: Instant, size: float) -> dict[str, Shape]:
+    """Return the symbols about pins, by load: of torques, torsion springs and torsion dampers on known bodies.
+
+    Those about one pin have different radii, springs the smallest ones. size: of the mechanism as drawn [length].
+    """
+    wanted: list[tuple[Load, tuple[str, str], _Ring]] = []
+    for load in shown.mechanism.loads:
+        if not shown.poses.keys() >= {*load.bodies()}:
+            continue
+        if isinstance(load, TorsionSpring | TorsionDamper):
+            wanted.append((load, load.between[::-1], _TORSION[type(load)]))
+        elif isinstance(load, TorqueOn):
+            wanted.append((load, (load.on, load.against), partial(symbols.turn, _sense(shown, load))))
+    found: dict[str, Shape] = {}
+    for load, bodies, ring in sorted(wanted, key=lambda one: symbols.radii(one[2](0.0))):
+        found[load.name] = _about(shown, load, bodies, ring, found.values(), size)
+    return found
+
+
+def _about(
+    shown: Instant,
+    load: Load,
+    bodies: tuple[str, str],
+    ring: _Ring,
+    others: Iterable[Shape],
+    size: float,
+) -> Shape:
+    """Return a symbol about the pin of two bodies, that turns with the first; without a pin it is about its origin.
+
+    others: symbols, of which those about the same pin keep their radii.
+    """
+    body, against = bodies if bodies[0] != GROUND_NAME else bodies[::-1]
     pin = shown.pivot(body, against)
     at = shown.at(pin) if pin else np.zeros(2)
+    (place,) = shown.placed(body, at[None])
+    same = [
+        other for other in others if np.hypot(*(shown.placed(other.frame, other.points)[0] - place)) <= _SAME * size
+    ]
+    strips = ring(symbols.beyond([other.strips for other in same], ring(0.0)))
     return _shape(load, body, at[None], strips, direction=np.array([1.0, 0.0]))
 
 

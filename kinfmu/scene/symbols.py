@@ -29,6 +29,7 @@ _SPIRAL = (3.5, 12.0, 2.25)  # radii of a torsion spring, and its turns
 _DASHPOT = (14.0, 21.0)  # radii of a torsion damper's cup
 _CUP_ANGLES, _ROD_ANGLES, _STEM = (100.0, 215.0), (150.0, 20.0), 0.5  # [deg], and of the stem behind the cup [rad]
 _STEP = math.radians(15.0)  # between the corners of an arc
+_APART = 3.0  # between two symbols about one pin
 
 
 class Strip(NamedTuple):
@@ -95,9 +96,9 @@ def arrows_apart(sense: float) -> tuple[Strip, ...]:
     return (line, *_arrow(_FIRST, 0.0, -sense * _ARROW), *_arrow(_LAST, 0.0, sense * _ARROW))
 
 
-def turn(sense: float) -> tuple[Strip, ...]:
-    """Return the circular arrow of a torque; sense: 1.0 counter-clockwise, -1.0 clockwise."""
-    radius, first, last = _TURN
+def turn(sense: float, out: float = 0.0) -> tuple[Strip, ...]:
+    """Return the circular arrow of a torque; sense: 1.0 counter-clockwise, -1.0 clockwise; out: added to its radius."""
+    radius, first, last = _TURN[0] + out, *_TURN[1:]
     tip = last + _HEAD / radius
     arc = _polar(radius, _angles(first, last))
     base, point = arc[-1], _polar(radius, np.array([tip]))[0]
@@ -107,17 +108,17 @@ def turn(sense: float) -> tuple[Strip, ...]:
     return _flat(arc * mirror), _flat(np.array([point, base + across, base - across]) * mirror, is_head=True)
 
 
-def spiral() -> tuple[Strip, ...]:
-    """Return the spiral of a torsion spring."""
-    inner, outer, turns = _SPIRAL
+def spiral(out: float = 0.0) -> tuple[Strip, ...]:
+    """Return the spiral of a torsion spring; out: added to its radii."""
+    inner, outer, turns = _SPIRAL[0] + out, _SPIRAL[1] + out, _SPIRAL[2]
     angles = _angles(0.0, math.tau * turns)
     radii = inner + (outer - inner) * angles / angles[-1]
     return (_flat(np.vstack([_polar(radii, angles), [[0.0, outer + _CLEAR]]])),)
 
 
-def dashpot() -> tuple[Strip, ...]:
-    """Return the curved dashpot of a torsion damper."""
-    inner, outer = _DASHPOT
+def dashpot(out: float = 0.0) -> tuple[Strip, ...]:
+    """Return the curved dashpot of a torsion damper; out: added to its radii."""
+    inner, outer = (radius + out for radius in _DASHPOT)
     middle = 0.5 * (inner + outer)
     cup, rod = (_angles(*map(math.radians, ends)) for ends in (_CUP_ANGLES, _ROD_ANGLES))
     piston = np.array([inner + 1.0, outer - 1.0])
@@ -127,6 +128,22 @@ def dashpot() -> tuple[Strip, ...]:
         _flat(_polar(middle, rod)),
         _flat(_polar(middle, cup[-1] + np.array([0.0, _STEM]))),
     )
+
+
+def beyond(others: Iterable[tuple[Strip, ...]], strips: tuple[Strip, ...]) -> float:
+    """Return what to add to the radii of a symbol about a pin, so that it is clear of others about the same pin."""
+    inner, outer = radii(strips)
+    out = 0.0
+    for low, high in sorted(map(radii, others)):
+        if low - _APART < outer + out and inner + out < high + _APART:
+            out = high + _APART - inner
+    return out
+
+
+def radii(strips: tuple[Strip, ...]) -> tuple[float, float]:
+    """Return the smallest and largest distance of the corners of a symbol from its pin."""
+    distances = np.concatenate([np.hypot(*strip.points[:, 2:].T) for strip in strips])
+    return float(distances.min()), float(distances.max())
 
 
 def _arrow(part: float, tail: float, tip: float) -> tuple[Strip, ...]:

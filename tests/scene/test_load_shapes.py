@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -196,6 +197,27 @@ def test_torsion_springs_and_dampers_are_about_the_pin_between_their_bodies(foun
     assert (np.diff(radii) > 0.0).all()
     around = np.vstack(lines(found, "grease"))
     assert (np.hypot(*(around - point(found, "rocker.Q")).T) <= 21.0 * SIZE + 1e-9).all()
+
+
+def test_torques_springs_and_dampers_about_one_pin_have_different_radii() -> None:
+    about = [
+        '[loads.motor]\ntype = "torque"\non = "crank"\nlaw = "constant"\nlevel = 2\n',
+        '[loads.brake]\ntype = "torque"\non = "crank"\nlaw = "constant"\nlevel = -1\n',
+        '[loads.clock]\ntype = "torsion_spring"\nbetween = ["ground", "crank"]\nstiffness = 1\nfree_angle = 0\n',
+        '[loads.clock_2]\ntype = "torsion_spring"\nbetween = ["ground", "crank"]\nstiffness = 1\nfree_angle = 0\n',
+        '[loads.grease]\ntype = "torsion_damper"\nbetween = ["ground", "crank"]\ndamping = 1\n',
+        '[loads.other]\ntype = "torque"\non = "rocker"\nlaw = "constant"\nlevel = 2\n',
+    ]
+    for order in (about, about[::-1]):
+        made = scene_of(fourbar("".join(order)))
+        rings = {}
+        for name in ("motor", "brake", "clock", "clock_2", "grease"):
+            radii = np.hypot(*(np.vstack(lines(made, name)) - point(made, "crank.O")).T) / SIZE
+            rings[name] = (radii.min(), radii.max())
+        spans = sorted(rings.values())
+        assert all(after[0] > before[1] + 2.5 for before, after in pairwise(spans))
+        other = np.hypot(*(lines(made, "other")[0] - point(made, "rocker.C")).T) / SIZE
+        np.testing.assert_allclose(other, 14.0, rtol=1e-9)  # another pin
 
 
 def test_the_ground_end_of_a_spring_has_a_support_within_the_bounds(found: Scene) -> None:
