@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.draw.drawing import draw
+from kinfmu.draw.gravity import gravity_in_margin
 from kinfmu.draw.painting import extent, placed, shortest
 from kinfmu.draw.pins import paths, pins
 from kinfmu.draw.sheet import GREY, PAPER, Sheet, ink
@@ -166,6 +167,7 @@ def _images(run: Run, mechanism: Mechanism, poses: dict[str, FloatArray], film: 
         begun = k - back if k >= back else (k - back + len(film.rows) if film.repeats else 0)
         draw(sheet, drawn, tracks, places)
         _trails(sheet, run, mechanism, poses, (int(film.rows[begun]), int(row)))
+        gravity_in_margin(sheet, mechanism)
         _clock(sheet, run, int(row))
         yield _picture(sheet)
 

@@ -36,6 +36,7 @@ from kinfmu.page.module import PageModule
 from kinfmu.page.opened import AXES, place_text
 from kinfmu.plan.undetermined import undetermined_reactions
 from kinfmu.scene import palette
+from kinfmu.scene.gravity import gravity_direction
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.load_shapes import EFFORT_UNITS, load_text
 from kinfmu.scene.shape import Shape
@@ -306,8 +307,8 @@ def _load(mechanism: Mechanism, shape: Shape, numbers: Mapping[str, int]) -> dic
 
 
 def _gravity(mechanism: Mechanism) -> list[float] | None:
-    """Return the acceleration of free fall, if bodies have masses."""
-    if not mechanism.gravity or not any(body.mass for body in mechanism.moving_bodies):
+    """Return the acceleration of free fall, if it is drawn."""
+    if mechanism.gravity is None or gravity_direction(mechanism) is None:
         return None
     return [float(value) for value in mechanism.gravity]
 

@@ -13,6 +13,7 @@ from kinfmu.measures.placement import body_of
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.run import FloatArray, Run
+from kinfmu.scene.gravity import gravity_direction
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.outline import pins_of
 from kinfmu.scene.placing import poses_of, remedy, world
@@ -32,7 +33,7 @@ class Scene:
     [rad] by name, NaN where the run has no numbers; shapes: fixed in frames; pins: by frame, with the names of their
     joints, (2,); points: of interest, by frame, with their names, (2,); paths: (n, 2) of the points of interest, by
     name; left_out: bodies whose pose is not in the run -> the missing coordinates; low, high: corners (2,) of the
-    bounding box.
+    bounding box; gravity: its direction (2,), None without gravity or masses.
     """
 
     bodies: Mapping[str, int]
@@ -44,6 +45,7 @@ class Scene:
     left_out: Mapping[str, tuple[str, ...]]
     low: FloatArray
     high: FloatArray
+    gravity: FloatArray | None
 
     @property
     def supports(self) -> dict[str, FloatArray]:
@@ -113,6 +115,7 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
         },
         left_out,
         *_bounds(found, known),
+        gravity_direction(mechanism),
     )
 
 

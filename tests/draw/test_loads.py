@@ -109,6 +109,28 @@ def test_an_animation_shows_the_spring_as_it_changes(tmp_path: Path, monkeypatch
     assert max(widths) > 1.3 * min(widths)
 
 
+@pytest.mark.parametrize(("pull", "side"), [((0.0, -9.81), 1), ((0.0, 9.81), -1), ((0.0, 0.0), 0)])
+def test_an_animation_shows_the_direction_of_gravity_at_one_place(
+    pull: tuple[float, float], side: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(animation, "MOST", 4)
+    animate(kinfmu.solve(replace(fourbar(), gravity=kinfmu.mechanism.body.Gravity(*pull))), tmp_path / "run.gif")
+    corners = []
+    with image.open(tmp_path / "run.gif") as pictures:
+        for k in range(pictures.n_frames):
+            pictures.seek(k)
+            page = np.asarray(pictures.convert("L"), dtype=int)
+            corners.append(page[28:70, 10:31])  # [px] below the title, left of the letter
+    for corner in corners[1:]:
+        np.testing.assert_array_equal(corner, corners[0])
+    rows, columns = np.nonzero(corners[0] < 200)
+    assert bool(len(rows)) == bool(side)
+    if side:  # the head is the widest part, at the end to which gravity pulls
+        widths = {row: np.ptp(columns[rows == row]) + 1 for row in np.unique(rows)}
+        widest = max(widths, key=lambda row: widths[row])
+        assert np.sign(widest - 0.5 * (rows.min() + rows.max())) == side
+
+
 def test_small_arrows_keep_their_colour_in_an_animation_of_many_colours(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

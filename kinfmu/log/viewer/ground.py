@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from kinfmu.scene.scene import Scene
 if TYPE_CHECKING:
     import rerun as rr
 
+_GRAVITY = 0.07  # of the size: length of the arrow of gravity
 MOST_NAMES = 12  # more names would hide the linkage; they show when pointed at
 
 
@@ -63,7 +64,22 @@ def log_ground(rec: rr.RecordingStream, root: str, scene: Scene, pin: float) -> 
             show_labels=len(names) <= MOST_NAMES,
         )
         rec.log(f"{root}/ground/names", labels, static=True)
+    if scene.gravity is not None:
+        _log_gravity(rec, f"{root}/ground/gravity", scene, scene.gravity)
     if GROUND_NAME in scene.pins:
         names, at = map(list, zip(*scene.pins[GROUND_NAME], strict=True))
         pins = rr.Points2D(at, labels=names, colors=[palette.PIN], radii=[pin], show_labels=False, draw_order=30.0)
         rec.log(f"{root}/ground/pins", pins, static=True)
+
+
+def _log_gravity(rec: rr.RecordingStream, entity: str, scene: Scene, along: FloatArray) -> None:
+    """Log an arrow along gravity in the upper left margin, which the linkage never enters, with a name behind it."""
+    import rerun as rr
+
+    middle = np.array([scene.low[0] - _GRAVITY * scene.size, scene.high[1]])
+    arrow = _GRAVITY * scene.size * along
+    look: dict[str, Any] = {"colors": [palette.GROUND]}
+    lines = rr.Arrows2D(vectors=[arrow], origins=[middle - 0.5 * arrow], radii=rr.Radius.ui_points(1.8), **look)
+    rec.log(entity, lines, static=True)
+    name = rr.Points2D([middle - 1.3 * arrow], labels=["g"], radii=[0.0], show_labels=True, **look)
+    rec.log(f"{entity}/name", name, static=True)

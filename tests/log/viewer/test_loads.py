@@ -11,9 +11,12 @@ import pytest
 import kinfmu
 from kinfmu.log import write_rrd
 from kinfmu.log.viewer.comparison import write_comparison
+from kinfmu.log.viewer.linkage import view_box
+from kinfmu.mechanism.body import Gravity
 from kinfmu.run import FloatArray, Run
 from kinfmu.scene import palette
 from kinfmu.scene.placing import world
+from kinfmu.scene.scene import scene
 from tests.loads.every_load import every_load, fourbar
 from tests.log.runs import with_gap
 from tests.log.viewer.test_rerun_file import STRIPS, entities, rows, statics, verified
@@ -128,3 +131,26 @@ def test_a_comparison_draws_the_loads_of_both_runs_in_their_colours(run: Run, tm
 def test_a_recording_without_loads_has_no_symbols(tmp_path: Path) -> None:
     write_rrd(kinfmu.solve(fourbar(has_gravity=True), TIMES), tmp_path / "run.rrd")
     assert not [entity for entity in entities(tmp_path / "run.rrd") if "loads" in entity]
+
+
+@pytest.mark.parametrize("pull", [(0.0, -9.81), (3.0, 4.0), (0.0, 0.0)])
+def test_a_recording_shows_the_direction_of_gravity_outside_the_linkage(
+    pull: tuple[float, float], tmp_path: Path
+) -> None:
+    mechanism = dataclasses.replace(fourbar(), gravity=Gravity(*pull))
+    run = kinfmu.solve(mechanism, TIMES)
+    write_rrd(run, tmp_path / "run.rrd")
+    assert ("/linkage/ground/gravity" in entities(tmp_path / "run.rrd")) == any(pull)
+    if any(pull):
+        (arrow,) = statics(tmp_path / "run.rrd", "/linkage/ground/gravity", "Arrows2D:vectors")
+        (tail,) = statics(tmp_path / "run.rrd", "/linkage/ground/gravity", "Arrows2D:origins")
+        np.testing.assert_allclose(np.array(arrow) / np.hypot(*arrow), np.array(pull) / np.hypot(*pull), atol=1e-6)
+        made = scene(run, mechanism)
+        assert max(tail[0], tail[0] + arrow[0]) < made.low[0]
+        (x0, x1), (y0, y1) = view_box(made)
+        for x, y in (tail, np.add(tail, arrow)):
+            assert x0 < x < x1
+            assert y0 < -y < y1
+    bare = kinfmu.load("slider_crank")
+    write_rrd(kinfmu.solve(bare), tmp_path / "bare.rrd")
+    assert "/linkage/ground/gravity" not in entities(tmp_path / "bare.rrd")
