@@ -27,7 +27,7 @@ DRAWING = ".dxf"
 FORMATS = (*TABLES, *PLOTS, *ANIMATIONS, DRAWING)
 
 
-def _write(run: Run, path: Path, columns: Sequence[str], *, units: bool, **how: Any) -> None:
+def _write(run: Run, path: Path, columns: Sequence[str], *, units: bool, width: int | None, **how: Any) -> None:
     """Write a run in the format of the path's suffix."""
     if suffix_of(path) in TABLES:
         from kinfmu.log import write_table
@@ -40,7 +40,7 @@ def _write(run: Run, path: Path, columns: Sequence[str], *, units: bool, **how: 
     else:
         from kinfmu.draw import animate
 
-        animate(run, path)
+        animate(run, path, width=width)
 
 
 def _between(run: Run, start: str | None, stop: str | None) -> Run:
@@ -75,6 +75,14 @@ def _between(run: Run, start: str | None, stop: str | None) -> Run:
     kept = run.t[rows]
     low, high = (first, last) if axis.is_time else (np.min(kept), np.max(kept))
     return run.part(rows, events=tuple(event for event in run.events if low <= event.t <= high))
+
+
+def _check_width(width: int) -> None:
+    """Raise a UsageError for a width that no animation has."""
+    from kinfmu.draw.animation import LARGEST, NARROWEST
+
+    if not NARROWEST <= width <= LARGEST:
+        raise click.UsageError(f"--width {width}: must be {NARROWEST} to {LARGEST} pixels")
 
 
 def _on_axis_of(run: Run, text: str) -> float:
@@ -125,6 +133,12 @@ def _on_axis_of(run: Run, text: str) -> float:
     "--at", metavar="VALUE", help="Time or driver value of a .dxf drawing, such as 45deg. Default: the first."
 )
 @click.option(
+    "--width",
+    metavar="PIXELS",
+    type=int,
+    help="Width of a .gif or .mp4; neither side may be longer than 1920 pixels. Default: about 600.",
+)
+@click.option(
     "--cam",
     metavar="JOINT",
     help="Write the profile of a cam, by its joint: as a table, a figure with pressure angle and curvature, or .dxf.",
@@ -148,6 +162,7 @@ def export(
     start: str | None,
     stop: str | None,
     at: str | None,
+    width: int | None,
     cam: str | None,
     tolerance: str | None,
     units: bool,
@@ -163,6 +178,8 @@ def export(
     .mp4 shows the moving linkage, a .dxf the pose at a value as a CAD drawing. With --cam, a mechanism or a record
     gives the profile of a cam as .csv, .dxf or a figure.
     """
+    if width is not None:
+        _check_width(width)
     if cam is not None:
         export_cam(run, output, cam, tolerance, units=units)
         return
@@ -194,6 +211,8 @@ def export(
         raise click.UsageError(f"--svaj excludes {listed(excluded)}")
     if at is not None and suffix != DRAWING:
         raise click.UsageError(f"--at {at}: only for {DRAWING}, not {suffix}")
+    if width is not None and suffix not in ANIMATIONS:
+        raise click.UsageError(f"--width {width}: only for animations, {listed(ANIMATIONS)}, not {suffix}")
     if columns is not None and suffix in (*ANIMATIONS, DRAWING):
         valid = listed((*TABLES, *PLOTS))
         raise click.UsageError(f"--columns {columns}: only for tables and plots, {valid}, not {suffix}")
@@ -217,7 +236,7 @@ def export(
     how: dict[str, Any] = {"x": names_in(across) or (), "overlaid": overlay, "polar": polar, "degrees": degrees}
     if other is not None:
         how |= {"other": _between(read(other), start, stop), "names": (Path(run).stem, other.stem)}
-    _write(part, output, names_in(columns) or (), units=units, **how)
+    _write(part, output, names_in(columns) or (), units=units, width=width, **how)
     click.echo(f"written: {output}")
 
 

@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 SUFFIXES = (".gif", ".mp4")
-DOTS_PER_INCH = 80  # about 600 pixels across
+DOTS_PER_INCH = 80.0  # about 600 pixels across
+NARROWEST, LARGEST = 100, 1920  # [pixels]; smallest width, and longest side, since all pictures are kept in memory
 SHORTEST, LONGEST = 3.0, 8.0  # [s], limits of the duration; between them it is the run's own time
 PER_SECOND, MOST = 20.0, 100  # pictures; viewers of GIF round times to hundredths of a second
 COLOURS = 32  # of the whole animation; more make the file larger without a visible difference
@@ -48,6 +49,24 @@ _WIDTHS = (1.3, 1.9, 2.6, 3.3)  # [pt] of a trail, along it
 _LOST: palette.Colour = (185, 28, 28)
 
 
+class _Size(NamedTuple):
+    """Width of the pictures [pixels], None for the usual one, and the file, for messages."""
+
+    width: int | None
+    path: Path
+
+    def dots_per_inch(self, inches: FloatArray) -> float:
+        """Return the resolution of pictures whose width and height are `inches`."""
+        if self.width is None:
+            return DOTS_PER_INCH
+        wide, high = map(float, inches)
+        if max(self.width, round(self.width * high / wide)) > LARGEST:
+            most = math.floor(LARGEST * min(wide / high, 1.0))
+            size = f"{self.width} x {round(self.width * high / wide)}"
+            raise FigureError(f"{self.path}: pictures of {size} pixels are too large; the width can be {most} at most")
+        return (self.width + 1e-6) / wide  # matplotlib rounds down
+
+
 class _Film(NamedTuple):
     """Samples to show in order, the duration, and whether the motion repeats."""
 
@@ -56,7 +75,7 @@ class _Film(NamedTuple):
     repeats: bool
 
 
-def animate(run: Run, path: str | Path) -> None:
+def animate(run: Run, path: str | Path, *, width: int | None = None) -> None:
     """Draw the moving linkage of `run` into a .gif or .mp4 file: bodies, joints, cams, wheels, paths, trails.
 
     The animation takes the run's own time, but at least SHORTEST and at most LONGEST; LONGEST if the run has no time. A
@@ -66,23 +85,27 @@ def animate(run: Run, path: str | Path) -> None:
     Args:
         run: The run.
         path: The .gif or .mp4 file.
+        width: Of the pictures [pixels], 100 or more; no side may be longer than 1920. A video has an even width and
+            height, rounded up. Default: 80 pixels per inch, about 600.
 
     Raises:
-        FigureError: The run has no mechanism, not all its coordinates, fewer than two samples with numbers, or too many
-            turns for the number of pictures; or the file cannot be written.
+        FigureError: The width is out of range; the run has no mechanism, not all its coordinates, fewer than two
+            samples with numbers, or too many turns for the number of pictures; or the file cannot be written.
         MissingPackageError: matplotlib is not installed or, for .mp4, ffmpeg is not.
 
     """
     path = Path(path)
     if suffix_of(path) not in SUFFIXES:
         raise FigureError(f"{path}: '{path.suffix}' is not a known format of animations; known: {listed(SUFFIXES)}")
+    if width is not None and (isinstance(width, bool) or not isinstance(width, int) or width < NARROWEST):
+        raise FigureError(f"{path}: width {width!r} must be a whole number of pixels, {NARROWEST} or more")
     is_video = suffix_of(path) == ".mp4"
     if is_video:
         encoder(path)  # reports a missing program before the pictures are drawn
     mechanism, poses = placed_run(run, path)
     film = _film(run, poses, path)
     with figure_style(path):
-        images = list(_images(run, mechanism, poses, film))
+        images = list(_images(run, mechanism, poses, film, _Size(width, path)))
     own = [*PAPER, *_LOST, *(palette.LOAD if mechanism.loads else ())]
     write_bytes(path, mp4(images, film.seconds, path) if is_video else _gif(images, film, own))
 
@@ -147,7 +170,7 @@ def _comes_back(pose: FloatArray) -> bool:
     return bool(np.hypot(*(last - first)[:2]) <= _CLOSED * extent and abs(turn) <= _CLOSED * np.ptp(pose[:, 2]))
 
 
-def _images(run: Run, mechanism: Mechanism, poses: dict[str, FloatArray], film: _Film) -> Iterator[Image]:
+def _images(run: Run, mechanism: Mechanism, poses: dict[str, FloatArray], film: _Film, size: _Size) -> Iterator[Image]:
     """Yield the pictures in order, all of one size."""
     some = slice(None, None, max(-(-len(run) // _SAMPLES), 1))
     directions = {driver.name: 1.0 for driver in mechanism.drivers}
@@ -169,7 +192,7 @@ def _images(run: Run, mechanism: Mechanism, poses: dict[str, FloatArray], film: 
         _trails(sheet, run, mechanism, poses, (int(film.rows[begun]), int(row)))
         gravity_in_margin(sheet, mechanism)
         _clock(sheet, run, int(row))
-        yield _picture(sheet)
+        yield _picture(sheet, size.dots_per_inch(sheet.figure.get_size_inches()))
 
 
 def _trails(sheet: Sheet, run: Run, mechanism: Mechanism, poses: dict[str, FloatArray], ends: tuple[int, int]) -> None:
@@ -198,11 +221,11 @@ def _clock(sheet: Sheet, run: Run, row: int) -> None:
     )
 
 
-def _picture(sheet: Sheet) -> Image:
+def _picture(sheet: Sheet, dots_per_inch: float) -> Image:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
 
-    sheet.figure.set_dpi(DOTS_PER_INCH)
+    sheet.figure.set_dpi(dots_per_inch)
     canvas = FigureCanvasAgg(sheet.figure)
     canvas.draw()  # type: ignore[no-untyped-call]  # matplotlib has no types here
     return Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy())  # type: ignore[no-untyped-call]

@@ -14,10 +14,14 @@ from kinfmu.scene.palette import Colour
 
 _DIRECTIONS = 16  # from an anchor to a place for its name
 _FURTHER = (0.0, 4.0, 9.0, 16.0, 26.0, 38.0)  # [pt], additional distances
+LEADER: Colour = (120, 120, 120)
 _LEADER_FROM = 9.0  # [pt]; a leader line connects a name that is further away with its anchor
+_INSIDE = 1.0  # [pt] inside the edge of a name's rectangle, from which a line crosses it
 _AIR, _GAP = 1.5, 3.0  # [pt], margins above and below a name, and left and right of it
 _OVERLAP, _OFF_SHEET = 60.0, 200.0  # costs of covering another name and of leaving the sheet; of a covered dot: 1
 _DISTANCE, _TILT = 0.12, 0.05  # costs of a distance of 1 pt and of places other than above on the right
+_CROSSED = 12.0  # cost of a leader line across another name, of which it would seem to be a part
+_ON_LEADER = np.linspace(0.0, 1.0, 12)  # points at which a leader line is compared with names
 _CROWD, _APART = 0.8, 5.0  # cost of another name within this distance [pt]: both would be read as one
 _BROKEN = 0.6  # cost of a name in several lines
 _ROUNDS = 6  # at most, in which names are placed again
@@ -61,26 +65,29 @@ class Mark(ABC):
 class _Options:
     """Possible places of a name.
 
-    spots, halves: middles and half sizes (s, 2) [pt]; texts: its text there; homes: the anchors (s, 2) [pt]; costs:
-    (s,), without other names.
+    spots, halves: middles and half sizes (s, 2) [pt]; texts: its text there; leaders: points (s, n, 2) on its leader
+    lines [pt], NaN without one; costs: (s,), without other names.
     """
 
     spots: FloatArray
     halves: FloatArray
     texts: Sequence[str]
-    homes: FloatArray
+    leaders: FloatArray
     costs: FloatArray
 
     def box(self, k: int) -> FloatArray:
         """Return the lower left and upper right corner, (4,), at spot k."""
         return np.concatenate([self.spots[k] - self.halves[k], self.spots[k] + self.halves[k]])
 
-    def best(self, taken: Sequence[FloatArray]) -> int:
-        """Return the spot of the least cost, given boxes (4,) of other names."""
+    def best(self, taken: Sequence[tuple[FloatArray, FloatArray]]) -> int:
+        """Return the spot of the least cost, given boxes (4,) and points on leader lines (n, 2) of other names."""
         costs = self.costs.copy()
-        for box in taken:
+        for box, leader in taken:
             middle, size = (box[:2] + box[2:]) / 2.0, (box[2:] - box[:2]) / 2.0
             apart = np.abs(self.spots - middle) - (self.halves + size)  # (s, 2)
+            on_other = np.abs(self.leaders - middle) < size - _INSIDE  # (s, n, 2)
+            on_this = np.abs(leader - self.spots[:, None]) < self.halves[:, None] - _INSIDE
+            costs += _CROSSED * np.any(np.all(on_other, axis=2) | np.all(on_this, axis=2), axis=1)
             costs += _OVERLAP * (apart < 0.0).all(axis=1) + _CROWD * (apart < _APART).all(axis=1)
         return int(np.argmin(np.round(costs, 6)))  # rounding keeps the choice the same on every machine
 
@@ -96,12 +103,15 @@ def place(names: Sequence[Name], sheet: Sheet) -> None:
     for _ in range(_ROUNDS):
         before = dict(chosen)
         for k, option in enumerate(options):
-            chosen[k] = option.best([options[j].box(spot) for j, spot in chosen.items() if j != k])
+            others = [(options[j], spot) for j, spot in chosen.items() if j != k]
+            chosen[k] = option.best([(other.box(spot), other.leaders[spot]) for other, spot in others])
         if chosen == before:
             break
     for k, (name, option) in enumerate(zip(names, options, strict=True)):
         spot = chosen[k]
-        _lead(sheet, option.homes[spot], option.spots[spot], option.halves[spot], name.clearance)
+        if np.isfinite(option.leaders[spot]).all():
+            ends = sheet.low + option.leaders[spot][[0, -1]] * sheet.point
+            sheet.line(ends, 0.5, LEADER, matters=0.0)
         sheet.text(option.spots[spot], option.texts[spot], name.colour, italic=name.italic)
 
 
@@ -113,9 +123,10 @@ def _options(name: Name, sheet: Sheet) -> _Options:
         half = _half_size(text, italic=name.italic)
         spots, homes, costs = _spots(anchors, half, name.clearance, can_cover=name.clearance == 0.0)
         costs = costs + _covering(spots, half, sheet.covered, corner) + _BROKEN * broken
-        found.append((spots, np.tile(half, (len(spots), 1)), [text] * len(spots), anchors[homes], costs))
-    spots_, halves, texts, homes_, costs_ = zip(*found, strict=True)
-    together = [np.concatenate(part) for part in (spots_, halves, homes_, costs_)]
+        leaders = _leaders(anchors[homes], spots, half, name.clearance)
+        found.append((spots, np.tile(half, (len(spots), 1)), [text] * len(spots), leaders, costs))
+    spots_, halves, texts, leaders_, costs_ = zip(*found, strict=True)
+    together = [np.concatenate(part) for part in (spots_, halves, leaders_, costs_)]
     return _Options(together[0], together[1], [text for part in texts for text in part], together[2], together[3])
 
 
@@ -162,11 +173,10 @@ def _covering(spots: FloatArray, half: FloatArray, covered: FloatArray, corner: 
     return np.asarray(costs + _OFF_SHEET * off)
 
 
-def _lead(sheet: Sheet, home: FloatArray, spot: FloatArray, half: FloatArray, clearance: float) -> None:
-    """Draw a leader line from an anchor to a name that is far away."""
-    nearest = np.clip(home, spot - half, spot + half)
-    distance = float(np.hypot(*(nearest - home)))
-    if distance - clearance > _LEADER_FROM:
-        start = home + (nearest - home) * (clearance / distance)
-        ends = sheet.low + np.array([start, nearest]) * sheet.point
-        sheet.line(ends, 0.5, (120, 120, 120), matters=0.0)
+def _leaders(homes: FloatArray, spots: FloatArray, half: FloatArray, clearance: float) -> FloatArray:
+    """Return points (s, n, 2) on the lines from anchors (s, 2) to names that are far from them, NaN for near ones."""
+    nearest = np.clip(homes, spots - half, spots + half)
+    distance = np.hypot(*(nearest - homes).T)[:, None]
+    far = distance - clearance > _LEADER_FROM
+    starts = np.where(far, homes + (nearest - homes) * (clearance / np.where(far, distance, 1.0)), np.nan)
+    return np.asarray(starts[:, None] + _ON_LEADER[:, None] * (nearest - starts)[:, None])

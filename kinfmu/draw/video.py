@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 import subprocess
 from collections.abc import Sequence
@@ -40,9 +41,13 @@ def mp4(images: Sequence[Image], seconds: float, path: Path) -> bytes:
             "-r", f"{len(images) / seconds:.6f}", "-i", "-", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white",
             "-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-fflags", "+bitexact", str(made),
         ]  # fmt: skip
-        frames = b"".join(image.tobytes() for image in images)
-        done = subprocess.run(command, input=frames, capture_output=True, check=False)  # noqa: S603  ffmpeg of the PATH
-        if done.returncode or not made.exists():
-            *_, why = ["no reason given", *done.stderr.decode(errors="replace").split("\n")[:1]]
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as running:  # noqa: S603  of the PATH
+            if running.stdin:
+                with contextlib.suppress(OSError):  # it ended early, and states why
+                    for image in images:
+                        running.stdin.write(image.tobytes())
+            _, errors = running.communicate()
+        if running.returncode or not made.exists():
+            *_, why = ["no reason given", *errors.decode(errors="replace").split("\n")[:1]]
             raise FigureError(f"{path}: ffmpeg failed: {why or 'no reason given'}")
         return made.read_bytes()

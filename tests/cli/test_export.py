@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import kinfmu
 from kinfmu.cli.export import FORMATS
 from kinfmu.draw import animation
 from kinfmu.log import read, write_mcap
@@ -113,6 +114,37 @@ def test_a_column_that_is_not_there_is_reported(record: Path, refuses: Callable[
     message = refuses("export", record, "-o", "run.svg", "--columns", "cupler.x")
     expected = "the run has no coordinate 'cupler.x'; did you mean 'coupler.x'?; coordinates: crank.phi, "
     assert message.startswith(expected)
+
+
+def test_animations_have_the_width_that_is_asked_for(
+    record: Path,
+    command: Command,
+    refuses: Callable[..., str],
+    fails: Callable[..., str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    image = pytest.importorskip("PIL.Image")
+    monkeypatch.setattr(animation, "MOST", 3)
+    for width in (100, 333, 1280):
+        assert command("export", record, "-o", "run.gif", "--width", str(width)).exit_code == 0
+        with image.open(tmp_path / "run.gif") as picture:
+            assert picture.size[0] == width
+            assert picture.n_frames == 4
+    assert "--width 99: must be 100 to 1920 pixels" in refuses("export", record, "-o", "run.gif", "--width", "99")
+    assert "--width 0: must be 100 to" in refuses("export", record, "-o", "run.html", "--width", "0")
+    assert "--width 1921: must be" in refuses("export", record, "-o", "run.mp4", "--width", "1921")
+    assert "'wide' is not a valid integer" in refuses("export", record, "-o", "run.gif", "--width", "wide")
+    message = refuses("export", record, "-o", "run.svg", "--width", "800")
+    assert "--width 800: only for animations, .gif, .mp4, not .svg" in message
+    assert "a page has no other options" in refuses("export", "fourbar", "-o", "run.html", "--width", "800")
+    tall = tmp_path / "tall.mcap"
+    write_mcap(kinfmu.solve(kinfmu.load("engine"), np.linspace(0.0, 0.01, 11)), tall)
+    message = fails("export", tall, "-o", "run.gif", "--width", "1900")
+    (most,) = re.findall(r"pictures of 1900 x \d+ pixels are too large; the width can be (\d+) at most", message)
+    assert command("export", tall, "-o", "run.gif", "--width", most).exit_code == 0
+    with image.open(tmp_path / "run.gif") as picture:
+        assert 1915 <= picture.size[1] <= 1920
 
 
 def test_a_part_of_a_run_is_exported(

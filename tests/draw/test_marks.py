@@ -26,8 +26,10 @@ from kinfmu import (
 from kinfmu.draw.drawing import sheet_of
 from kinfmu.draw.instant import instant
 from kinfmu.draw.motion import Length, Push, Turn, motion
+from kinfmu.draw.names import LEADER
 from kinfmu.draw.painting import placed
 from kinfmu.draw.pins import Pin, pins
+from kinfmu.draw.sheet import ink
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.shape import Shape
 from kinfmu.scene.shapes import shapes
@@ -253,6 +255,18 @@ def test_names_do_not_overlap_stay_on_the_sheet_and_leave_links_and_paths_free(n
         low, high = sheet.to_paper(to_world.transform(text.get_window_extent().get_points()))
         inside = (dots[:, :2] > low + EDGE) & (dots[:, :2] < high - EDGE)
         assert dots[inside.all(axis=1), 2].sum() < COVERED, text.get_text()
+    leaders = [line for line in sheet.axes.patches if line.get_edgecolor()[:3] == ink(LEADER)]
+    for leader in leaders:
+        route = sheet.axes.transData.transform(leader.get_path().interpolated(40).vertices)
+        for text in sheet.axes.texts:
+            low, high = text.get_window_extent().get_points()  # one pixel is one pt
+            assert not ((route > low + EDGE) & (route < high - EDGE)).all(axis=1).any(), text.get_text()
+
+
+def test_far_names_have_leader_lines() -> None:
+    pytest.importorskip("matplotlib")
+    patches = sheet_of(instant(load("rack_steering"))).axes.patches
+    assert sum(line.get_edgecolor()[:3] == ink(LEADER) for line in patches) >= 2
 
 
 def test_a_list_of_names_that_does_not_fit_on_one_line_is_wrapped() -> None:
