@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from kinfmu.cli import main
+from tests.cli.test_colours import on_a_terminal
 from tests.studies.linkage import write
 
 GRID = 'mechanism = "hoeken.toml"\nparameters.base = { from = 40, to = 300, count = 3 }\n'
@@ -79,3 +81,21 @@ def test_an_interrupted_study_says_how_to_go_on(number: int, status: int, tmp_pa
     last = stderr.splitlines()[-1]
     assert "of 5000 designs are kept in study.parquet.parts: the same command goes on from there" in last
     assert len(stderr.splitlines()) == (1 if number == signal.SIGINT else 2)
+
+
+def test_on_a_terminal_a_line_shows_how_much_is_done_and_the_time_left(tmp_path: Path) -> None:
+    write(tmp_path, LONG.replace("5000", "800"))
+    command = ("-m", "kinfmu", "study", "study.toml", "--workers", "1", "--engine", "python")
+    text = on_a_terminal(command, tmp_path, {"COLUMNS": "120"}).decode()
+    lines = re.findall(r"kinfmu study study\.toml +\[[#-]+\] +(\d+)%(?:  (\d\d):(\d\d):(\d\d))?", text)
+    assert lines, text
+    parts = [int(part) for part, *_ in lines]
+    assert (parts[0], parts[-1]) == (0, 100)
+    assert parts == sorted(parts)
+    left = [
+        60 * int(minutes) + int(seconds) for part, hours, minutes, seconds in lines if hours == "00" and part != "100"
+    ]
+    assert left, text  # of the lines in between
+    assert max(left) <= 600
+    assert left[-1] <= left[0] + 1
+    assert "results: study.parquet" in text
