@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +46,24 @@ def test_a_pose_is_drawn_in_layers_with_its_true_dimensions(tmp_path: Path) -> N
     np.testing.assert_allclose(np.hypot(*(inside - corners).T), 12.0, rtol=1e-12)
     gaps = np.hypot(*(inside - np.array([*roller.dxf.center.vec2])).T) - 12.0
     assert abs(gaps.min()) < 4e-3  # the profile has a corner at each degree
+
+
+def with_loads(name: str) -> tuple[kinfmu.Mechanism, kinfmu.Mechanism]:
+    """A mechanism of the gallery with its loads, gravity and a spring, and without them."""
+    loaded = kinfmu.load(name)
+    ends = [f"{body.name}.{[*body.points][-1]}" for body in (loaded.bodies[0], loaded.bodies[-1])]
+    spring = kinfmu.Spring("back", (ends[0], ends[1]), 100.0, 0.1)
+    assert loaded.loads
+    assert loaded.gravity is not None
+    bare = replace(loaded, loads=(), gravity=None)
+    return replace(loaded, loads=(*loaded.loads, spring)), bare
+
+
+def test_loads_springs_and_gravity_are_left_out(tmp_path: Path) -> None:
+    pytest.importorskip("ezdxf")
+    for name, mechanism in zip(("loaded", "bare"), with_loads("excavator_loaded"), strict=True):
+        dxf(kinfmu.solve(mechanism, [0.0, 0.1]), tmp_path / f"{name}.dxf", at=0.1)
+    assert (tmp_path / "loaded.dxf").read_bytes() == (tmp_path / "bare.dxf").read_bytes()
 
 
 def test_drawings_and_videos_that_cannot_be_made_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,6 +13,7 @@ from kinfmu.run import Run
 from kinfmu.scene.scene import scene
 from kinfmu.sweep import run_times
 from kinfmu.units import METRES
+from tests.draw.test_dxf import with_loads
 from tests.gallery_members import every_member
 
 
@@ -44,6 +45,14 @@ def test_every_link_of_the_description_has_a_frame_and_every_frame_a_link(name: 
     moving = link_poses(solved(name), kinfmu.load(name))
     assert {*described(name)} == {"ground", *moving}
     assert all(np.isfinite(pose).all() for pose in moving.values())
+
+
+def test_loads_springs_and_gravity_are_not_in_the_description() -> None:
+    texts = []
+    for mechanism in with_loads("excavator_loaded"):
+        drawn = scene(kinfmu.solve(mechanism, [0.0]), mechanism)
+        texts.append(robot_description("excavator", drawn, METRES[mechanism.length_unit]))
+    assert texts[0] == texts[1]
 
 
 def test_a_cam_is_drawn_round_its_body_and_its_roller_on_the_follower() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -135,6 +136,34 @@ def test_a_speed_whose_square_no_float_holds_is_refused(engine: str) -> None:
     with pytest.raises(RequestError, match=r"^crank_speed = 1e\+155 at sample 1: the largest value is 1e\+100$"):
         kinfmu.solve(mechanism, engine=engine, crank_angle=[1.0, 1.1], crank_speed=[1.0, 1e155])
     assert np.isfinite(kinfmu.solve(mechanism, engine=engine, crank_angle=[1.0], crank_speed=1e99).accelerations).all()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_estimates_of_rates_are_for_the_driver_values_and_do_not_count_their_rounding(
+    engine: str,
+) -> None:
+    """As docs/accuracy.md states. Oracle: the closed form in 50 digits at the exact angle of the law."""
+    lengths, start, speed, angle = (2.0, 0.7, 1.9, 1.5), 0.3, 0.7, 1e4
+    mechanism = fourbar(*lengths)
+    law = replace(mechanism.drivers[0], law=ConstantSpeed(start, speed))
+    times = [0.0, *(angle / speed + 0.9 * k + 0.0137 * k * k for k in range(5))]
+    run = kinfmu.solve(replace(mechanism, drivers=(law,)), times, engine=engine)
+    branch = 1 if run["coupler.phi"][0] > 0.0 else -1
+    worst = {"exact": [0.0, 0.0], "rounded": [0.0, 0.0]}  # of the estimates, by order
+    for k, t in enumerate(times[1:], start=1):
+        with mp.workdps(50):
+            places = {"exact": mp.mpf(start) + mp.mpf(speed) * mp.mpf(t), "rounded": mp.mpf(float(run["crank.phi"][k]))}
+            for kind, place in places.items():
+                motion = oracle.fourbar(*lengths, [place], speed, 0.0, branch=branch)
+                for order, suffix in enumerate(("phi", "omega")):
+                    found = [mp.mpf(float(run[f"{body}.{suffix}"][k])) for body in ("crank", "coupler", "rocker")]
+                    off = [abs(a - b) for a, b in zip(found, motion[order][0], strict=True)]
+                    off = [abs(mp.sin(one)) for one in off] if order == 0 else off  # without turns
+                    worst[kind][order] = max(worst[kind][order], float(max(off) / run.error[k, order]))
+    assert max(*worst["rounded"], worst["exact"][0]) < 1.0
+    speeds = worst["exact"][1] * run.error[1:, 1].max()
+    assert run.error[1:, 1].max() < speeds < np.spacing(2.0 * angle)
+    assert np.spacing(1e6) == pytest.approx(1e-10, rel=0.2)
 
 
 FLAVOURS = [("python", 2), ("native", 2), ("native", 3)]
