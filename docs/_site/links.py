@@ -15,7 +15,7 @@ LOADED = {"script": "src", "img": "src", "link": "href", "source": "src", "ifram
 LOADING_CSS = re.compile(r"(?:@import\s+|url\(\s*)[\"']?(?:https?:)?//", re.IGNORECASE)
 
 
-class _Page(HTMLParser):
+class Page(HTMLParser):
     """Ids, links and loaded files of a page."""
 
     def __init__(self, path: Path) -> None:
@@ -36,7 +36,7 @@ class _Page(HTMLParser):
 
 def problems(site: Path) -> list[str]:
     """Return one line for each dead link, missing file and file that would come from the network."""
-    pages = {path.resolve(): _Page(path) for path in sorted(site.rglob("*.html")) if "_static" not in path.parts}
+    pages = {path.resolve(): Page(path) for path in sorted(site.rglob("*.html")) if "_static" not in path.parts}
     found = [] if pages else [f"{site}: no page"]
     for path, page in pages.items():
         name = path.relative_to(site.resolve())

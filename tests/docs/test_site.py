@@ -104,3 +104,61 @@ def test_the_check_of_links_finds_fonts_from_the_net(tmp_path: Path) -> None:
     (tmp_path / "a.css").write_text('@import "https://example.org/font.css";', encoding="utf-8")
     check = runpy.run_path(str(DOCS / "_site" / "links.py"))["problems"]
     assert check(tmp_path) == ["a.css: loads a file from the network"]
+
+
+GALLERY_PAGE = """<iframe src="live/fourbar.html"></iframe><a href="live/fourbar.html">live</a>
+<a href="live/fourbar.fmu">FMU</a> <a href="../_downloads/1/mechanism.toml">file</a>
+<a href="../_downloads/2/reference.csv">data</a> <a href="../_downloads/3/figure.svg">figure</a>"""
+
+
+@pytest.fixture
+def built(tmp_path: Path) -> Path:
+    """A site with one page of the gallery."""
+    (tmp_path / "gallery" / "live").mkdir(parents=True)
+    (tmp_path / "gallery" / "fourbar.html").write_text(GALLERY_PAGE, encoding="utf-8")
+    (tmp_path / "gallery" / "live" / "fourbar.html").write_text("<title>fourbar</title>", encoding="utf-8")
+    kinfmu.build(kinfmu.load("fourbar"), tmp_path / "gallery" / "live" / "fourbar.fmu")
+    for number, file in enumerate(("mechanism.toml", "reference.csv", "figure.svg"), start=1):
+        target = tmp_path / "_downloads" / str(number) / file
+        target.parent.mkdir(parents=True)
+        target.write_bytes((gallery.folder() / "fourbar" / file).read_bytes())
+    return tmp_path
+
+
+def test_the_check_of_the_gallery_accepts_pages_with_all_their_files(site: Any, built: Path) -> None:
+    problems = site("_site.contents").problems
+    assert problems(built, ["fourbar"]) == []
+    assert problems(built, ["fourbar", "engine"]) == ["gallery/engine.html: there is no such page"]
+
+
+@pytest.mark.parametrize(
+    ("link", "fault"),
+    [
+        ('<iframe src="live/fourbar.html">', "no link to live/fourbar.html"),
+        ('<a href="live/fourbar.html">', "no link to live/fourbar.html"),
+        ('<a href="live/fourbar.fmu">', "no link to live/fourbar.fmu"),
+        ('<a href="../_downloads/1/mechanism.toml">', "no link to mechanism.toml"),
+    ],
+)
+def test_the_check_of_the_gallery_finds_a_missing_link(site: Any, built: Path, link: str, fault: str) -> None:
+    page = built / "gallery" / "fourbar.html"
+    assert link in GALLERY_PAGE
+    page.write_text(GALLERY_PAGE.replace(link, ""), encoding="utf-8")
+    assert site("_site.contents").problems(built, ["fourbar"]) == [f"gallery/fourbar.html: {fault}"]
+
+
+def test_the_check_of_the_gallery_finds_files_of_another_mechanism(site: Any, built: Path) -> None:
+    kinfmu.build(kinfmu.load("engine"), built / "gallery" / "live" / "fourbar.fmu")
+    (built / "gallery" / "live" / "fourbar.html").write_text("<title>engine</title>", encoding="utf-8")
+    (built / "_downloads" / "1" / "mechanism.toml").write_text('name = "engine"', encoding="utf-8")
+    assert site("_site.contents").problems(built, ["fourbar"]) == [
+        "gallery/fourbar.html: live/fourbar.html is not the page of fourbar",
+        "gallery/fourbar.html: live/fourbar.fmu is an FMU of engine",
+        "gallery/fourbar.html: ../_downloads/1/mechanism.toml is not mechanism.toml of fourbar",
+    ]
+
+
+def test_the_site_is_checked_when_it_is_built() -> None:
+    script = (DOCS.parent / "scripts" / "docs").read_text(encoding="utf-8")
+    assert "docs/_site/links.py docs/_build" in script
+    assert "-m _site.contents docs/_build" in script
