@@ -58,14 +58,13 @@ OPTIONS = {  # options that tests add, by the beginning of the command
 }
 
 FILES = {  # the file of each block of TOML, where the text above does not announce it
-    "README.md": ["crank_rocker.toml"],
-    "fitting.md": ["guide.toml", "arch.toml", "flat.toml"],
+    "fitting.md": ["flat.toml"],
     "forces.md": ["pump.toml", "pump.toml"],
     "measures.md": ["hoeken.toml", "hoeken.toml"],
 }
 BEFORE = {  # commands for the files that a page takes as given
     "commands.md": ["kinfmu solve fourbar -o host.csv", "python examples/dc_motor/build.py ."],
-    "fmu.md": ["kinfmu build fourbar", "kinfmu solve fourbar -o host.csv", "kinfmu new toggle_press press.toml"],
+    "fmu.md": ["kinfmu solve fourbar -o host.csv", "kinfmu new toggle_press press.toml"],
     "host-omsimulator.md": ["kinfmu solve fourbar -o fourbar_res.csv"],
     "host-openmodelica.md": ["kinfmu solve fourbar -o fourbar_res.csv"],
     "host-pyfmi.md": ["kinfmu solve fourbar -o pyfmi.csv"],
@@ -151,8 +150,6 @@ def typed(line: str) -> str:
         words += next((more for begin, more in OPTIONS.items() if line.startswith(begin)), [])
         if words[0] == "review" and "--save" not in words:
             words += ["--save", "review.rrd"]
-        if words[0] == "build" and "-o" not in words:
-            words += ["-o", "."]  # an FMU of the gallery is else written into its folder there
         result = CliRunner().invoke(main, words)
         assert result.exit_code == 0, (line, result.output)
         return result.output

@@ -15,7 +15,9 @@ from tests.docs.follow import SHOWN, accept, follow, page_text
 NAME = "system.md"
 
 
-def test_the_page_runs_and_prints_what_it_shows(request: pytest.FixtureRequest, tmp_path: Path) -> None:
+def test_the_page_runs_in_ecos_and_libcosim_too_and_prints_what_it_shows(
+    request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
     followed = follow(NAME, tmp_path)
     before, in_hosts = page_text(NAME).split("## 5.")
     accept(NAME, f"{followed.commented(before)}## 5.{in_hosts}", request)

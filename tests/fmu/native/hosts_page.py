@@ -27,6 +27,7 @@ class Host(NamedTuple):
     chosen: str  # by pytest's -k
 
 
+PAGES = ("tests/docs/test_host_pages.py", "tests/docs/test_system_page.py")
 HOSTS = (
     Host(
         "fmpy",
@@ -40,16 +41,16 @@ HOSTS = (
         "libcosim",
         "host-osp.md",
         "libcosimpy",
-        "both flavours, FMI 2.0; limits; SSP; OSP system structure with groups of variables; the page",
-        ("tests/fmu/native/test_hosts.py", "tests/fmu/test_ssp.py", "tests/docs/test_host_pages.py"),
+        "both flavours, FMI 2.0; limits; SSP, of two FMUs too; OSP system structure with groups of variables; the page",
+        ("tests/fmu/native/test_hosts.py", "tests/fmu/test_ssp.py", *PAGES),
         "libcosim or (osp and not ecospy)",
     ),
     Host(
         "Ecos",
         "host-ecos.md",
         "ecospy",
-        "from Python both flavours, FMI 2.0 and 3.0; the `ecos` command; limits; SSP; the page",
-        ("tests/fmu/native/test_hosts.py", "tests/fmu/test_ssp.py", "tests/docs/test_host_pages.py"),
+        "from Python both flavours, FMI 2.0 and 3.0; the `ecos` command; limits; SSP, of two FMUs too; the page",
+        ("tests/fmu/native/test_hosts.py", "tests/fmu/test_ssp.py", *PAGES),
         "ecos",
     ),
 )
