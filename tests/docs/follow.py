@@ -74,7 +74,10 @@ BEFORE = {  # commands for the files that a page takes as given
 }
 FROM_PAGES = {"commands.md": ["fitting.md", "studies.md"]}  # pages whose files a page takes as given
 SHOWN = re.compile(r"(print\(.*\))  # (.*)")
-INPUTS = "time,crank_angle\n0,0\n0.5,0.5\n1,1\n"  # crank.csv
+INPUTS = {  # tables of inputs that pages take as given
+    "crank.csv": "time,crank_angle\n0,0\n0.5,0.5\n1,1\n",
+    "torque.csv": "time,crank_torque [N m]\n0,50\n0.2,50\n",
+}
 
 
 class Followed(NamedTuple):
@@ -122,7 +125,8 @@ def follow(name: str, folder: Path) -> Followed:
     for page in (name, *FROM_PAGES.get(name, ())):
         for file, text in files(page).items():
             (folder / file).write_text(text, encoding="utf-8")
-    (folder / "crank.csv").write_text(INPUTS, encoding="utf-8")
+    for file, text in INPUTS.items():
+        (folder / file).write_text(text, encoding="utf-8")
     with chdir(folder):
         for line in BEFORE.get(name, ()):
             typed(line)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from kinfmu.cli import main
 from tests.docs.blocks import PAGES, ROOT, Block, blocks, commands, is_typed
 from tests.docs.follow import NOT_RUN, files, follow
 
@@ -89,6 +90,14 @@ def test_every_exception_of_the_lists_is_on_a_page() -> None:
     for why in (*NOT_RUN.values(), *CHECKED_ELSEWHERE.values()):
         for path in re.findall(r"tests/[\w/.]+", why):
             assert (ROOT / path).exists(), path
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_within_sentences_exist_with_their_options(page: Path) -> None:
+    for line in re.findall(r"`kinfmu ([a-z][^`]*)`", page.read_text(encoding="utf-8")):
+        command, *words = line.split()
+        known = {name for option in main.commands[command].params for name in option.opts}
+        assert {word.partition("=")[0] for word in words if re.match("--?[a-z]", word)} <= known, line
 
 
 def test_pages_with_a_test_of_their_own_have_it() -> None:
