@@ -152,7 +152,12 @@ class FitProblem:
         )
 
     def quantity(self, name: str) -> Quantity:
-        """Return the quantity of an unknown."""
+        """Return the quantity of an unknown.
+
+        Args:
+            name: The unknown, such as 'crank', 'crank.speed' or 'curve.start'.
+
+        """
         if name in self.unknowns:
             settable = self.mechanism.settable
             return (settable.constants.get(name) or settable.parameters[name]).quantity or NUMBER
