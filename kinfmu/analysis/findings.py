@@ -7,6 +7,7 @@ from typing import Any
 
 from kinfmu.analysis.cams import CamFindings
 from kinfmu.analysis.drivers import DriverAdvice
+from kinfmu.analysis.dyads import NamedDyad
 from kinfmu.analysis.loading import Loading
 from kinfmu.analysis.measuring import Measurements
 from kinfmu.analysis.named_loops import NamedLoop
@@ -33,7 +34,8 @@ class Findings:
     ranges: one per driver, in file order; loops: the four-bars and slider-cranks among the joints; advice: on drivers,
     None where drivers and degrees of freedom match; notes: further findings, one line each;
     measured: values of the measures, None without measures; loading: efforts and reactions, None without masses, loads;
-    cams: one per cam joint; left_out: invalid entries of a file that is reported in part, such as '[drivers.crank]'.
+    cams: one per cam joint; left_out: invalid entries of a file that is reported in part, such as '[drivers.crank]';
+    dyads: further pairs of links that have a transmission angle.
     """
 
     mechanism: Mechanism
@@ -48,6 +50,7 @@ class Findings:
     loading: Loading | None = None
     cams: tuple[CamFindings, ...] = ()
     left_out: tuple[str, ...] = ()
+    dyads: tuple[NamedDyad, ...] = ()
 
     @property
     def mobility(self) -> int:
@@ -107,6 +110,8 @@ class Findings:
         while the driver is fixed), coordinates.
         loops: kind ('four-bar' or 'slider-crank'), links, lengths (by link; 'ground' too), offset (slider-cranks),
         class, shape, sums, transmission: driver, coupler, output, smallest, at_smallest, largest, at_largest, verdict.
+        dyads (pairs of links in none of the loops that have a transmission angle): links (of a guided link, it and its
+        slider or guiding joint), lengths, joint (where they meet, or null), between (bodies), transmission.
         advice: null if drivers and degrees of freedom match, else missing (number), surplus (name, implied_by), loose
         (coordinates), suggestions (name, and the keys of the driver's table).
         measures: over (the motion, as text), values: name, type, value, unit, driver, at (driver values), at_unit,
@@ -153,6 +158,7 @@ class Findings:
             ],
             "ranges": [reach.as_json() for reach in self.ranges],
             "loops": [loop.as_json() for loop in self.loops],
+            "dyads": [dyad.as_json() for dyad in self.dyads],
             "advice": None if self.advice is None else self.advice.as_json(),
             "measures": None if self.measured is None else self.measured.as_json(),
             **({} if self.loading is None else {"forces": self.loading.as_json()}),

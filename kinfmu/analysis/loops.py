@@ -96,6 +96,23 @@ class SliderCrank:
         return tuple(dict.fromkeys((self.crank.name, self.rod.name, self.slider)))
 
 
+@dataclass(frozen=True)
+class Dyad:
+    """Two links that meet at a pin, or a link with a point that is guided along a line fixed in the ground.
+
+    first, second: the links; of a guided one, the second is the body that slides with it, or the guiding joint, with a
+    length of 0. joint: the joint at which they meet, '' without one. pins: places on all bodies of each of its pins:
+    the other pin of the first link, the common one, the other pin of the second link if it has one. direction: of the
+    line [rad], None without one.
+    """
+
+    first: Link
+    second: Link
+    joint: str
+    pins: tuple[tuple[Place, ...], ...]
+    direction: float | None = None
+
+
 class _Guide(NamedTuple):
     """A line in the ground along which a point is guided, by a joint, perhaps as part of a body that cannot turn."""
 
@@ -123,6 +140,12 @@ def named_loops(
     return tuple(net.four_bars()), tuple(net.slider_cranks())
 
 
+def dyads(mechanism: Mechanism, without: Iterable[str] = ()) -> tuple[Dyad, ...]:
+    """Return all pairs of links that meet at a moving pin, and all links with a guided point; `without` as above."""
+    net = _Net(mechanism, set(without))
+    return (*net.pairs(), *net.guided_links())
+
+
 class _Net:
     """Pins as nodes, links as edges between them.
 
@@ -139,6 +162,8 @@ class _Net:
         for joint in self.joints:
             if isinstance(joint, Revolute):
                 self._unite(*(self._place(point) for point in joint.between))
+        pinned = [joint for joint in self.joints if isinstance(joint, Revolute)]
+        self.names = {self._number(self._place(joint.between[0])): joint.name for joint in pinned}
         held = self._held_coordinates()
         for (point, axis), (x, _) in held.items():
             if axis == "x" and (point, "y") in held:  # both coordinates: a pin on the ground
@@ -188,6 +213,26 @@ class _Net:
                         pins = (pivot, self._on(p, crank, rod), self._on(s, rod, rod, guide.slider))
                         slider = guide.slider or rod.name
                         yield SliderCrank(crank, rod, offset, guide.direction, pins, guide.joint, slider)
+
+    def pairs(self) -> Iterator[Dyad]:
+        """Yield the pairs of links that meet at a pin which is not on the ground, one for each pair of other pins."""
+        for q, edges in self.edges.items():
+            links = [edge for edge in edges if edge.link.length > self.grid and q not in self.ground]
+            for k, first in enumerate(links):
+                for second in links[k + 1 :]:
+                    if first.link.name != second.link.name and first.end != second.end:
+                        pins = tuple(tuple(self.places[pin]) for pin in (first.end, q, second.end))
+                        yield Dyad(first.link, second.link, self.names.get(q, ""), pins)
+
+    def guided_links(self) -> Iterator[Dyad]:
+        """Yield links with a guided point, one for each other pin."""
+        for s, guides in self.guides.items():
+            for rod in self.edges.get(s, ()):
+                for guide in guides:
+                    if rod.link.length > self.grid and rod.link.name != guide.slider:
+                        slider = Link(guide.slider or guide.joint, 0.0)
+                        pins = tuple(tuple(self.places[pin]) for pin in (rod.end, s))
+                        yield Dyad(rod.link, slider, self.names.get(s, ""), pins, guide.direction)
 
     def _moving_edges(self, pin: int) -> Iterator[_Edge]:
         """Yield links from a pin to others that are not on the ground."""

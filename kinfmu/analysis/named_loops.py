@@ -14,7 +14,7 @@ from kinfmu.drivers import AngleDriver
 from kinfmu.equations.redundancy import Redundancy
 from kinfmu.mechanism import Mechanism
 
-_MOST = 200  # coordinates; transmission angles of larger mechanisms are not computed
+MOST = 200  # coordinates; transmission angles of larger mechanisms are not computed
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def find_named_loops(
     transmission angles.
     """
     four_bars, slider_cranks = named_loops(mechanism, {row.row.owner for row in redundancy.dependent})
-    followed = paths if len(mechanism.coordinate_names) <= _MOST else ()
+    followed = paths if len(mechanism.coordinate_names) <= MOST else ()
     return (*_four_bars(mechanism, four_bars, paths, followed), *_slider_cranks(slider_cranks, followed))
 
 

@@ -7,6 +7,7 @@ from kinfmu.analysis.cams import cam_findings
 from kinfmu.analysis.design_notes import motion_notes, part_notes, unused_points
 from kinfmu.analysis.driver_path import follow
 from kinfmu.analysis.drivers import DriverAdvice, clearer_problem, driver_advice
+from kinfmu.analysis.dyads import find_dyads
 from kinfmu.analysis.file_notes import file_notes, run_notes, start_notes
 from kinfmu.analysis.findings import Findings
 from kinfmu.analysis.loading import loading
@@ -96,13 +97,16 @@ def check(mechanism: Mechanism) -> Report:
     ranges = tuple(driver_range(path) for path in paths)
     notes += run_notes(plan, ranges)
     loops = find_named_loops(mechanism, redundancy, paths)
+    further = find_dyads(mechanism, redundancy, paths, loops)
     notes += motion_notes(mechanism, paths, loops)
     cams = cam_findings(plan, paths)
     notes += [cam.note() for cam in cams if cam.note()]
     cut = next((problem for problem in (cam.problem() for cam in cams) if problem is not None), None)
     measured = measurements(mechanism, ranges)
     forces = loading(plan, ranges, cams)
-    return Report(mechanism, redundancy, cut, plan, ranges, loops, None, tuple(notes), measured, forces, cams)
+    return Report(
+        mechanism, redundancy, cut, plan, ranges, loops, None, tuple(notes), measured, forces, cams, dyads=further
+    )
 
 
 def _after_probable_cause(problem: KinfmuError, system: System, advice: DriverAdvice | None) -> KinfmuError:

@@ -41,7 +41,7 @@ class ReportLine(NamedTuple):
 def findings(report: Findings) -> list[ReportLine]:
     """Return the findings in order."""
     found: list[ReportLine] = []
-    for parts in (_count, _rows, _plan, _advice, _loops, _motion, _cams, _measures, _forces, _notes):
+    for parts in (_count, _rows, _plan, _advice, _loops, _dyads, _motion, _cams, _measures, _forces, _notes):
         found += parts(report)
     if report.problem is not None:
         found.append(ReportLine("problem", str(report.problem)))
@@ -155,6 +155,24 @@ def _loops(report: Findings) -> Iterator[ReportLine]:
             yield ReportLine("", _transmission(angle, unit))
     if len(report.loops) > _MOST_LOOPS:
         yield ReportLine("", f"and {len(report.loops) - _MOST_LOOPS} more four-bars and slider-cranks")
+
+
+def _dyads(report: Findings) -> Iterator[ReportLine]:
+    unit = report.mechanism.length_unit
+    for named in report.dyads[:_MOST_LOOPS]:
+        dyad = named.dyad
+        bodies = " and ".join(dict.fromkeys(place.body for place in (named.pins[0], *named.pins[2:])))
+        first = f"{dyad.first.name} {dyad.first.length:.6g}"
+        if dyad.direction is None:
+            at = f" at {dyad.joint}" if dyad.joint else ""
+            sizes = f"{first}, {dyad.second.name} {dyad.second.length:.6g} {unit}"
+            yield ReportLine("dyad", f"{sizes}; they meet{at}, between {bodies}")
+        else:
+            yield ReportLine("dyad", f"{first} {unit} between {bodies} and the slide {dyad.second.name}")
+        for angle in named.transmission:
+            yield ReportLine("", _transmission(angle, unit))
+    if len(report.dyads) > _MOST_LOOPS:
+        yield ReportLine("", f"and {len(report.dyads) - _MOST_LOOPS} more dyads")
 
 
 def _sized(role: str, link: Link) -> str:
@@ -378,8 +396,9 @@ def _range(report: Findings, reach: DriverRange) -> Iterator[ReportLine]:
 
 def _limit_reason(report: Findings, reach: DriverRange, limit: LimitPosition) -> str:
     """Return the reason of a limit: two links in line, or bodies that can move."""
-    for named in report.loops:
-        for angle in named.transmission:
+    angles = [one.transmission for one in report.loops] + [one.transmission for one in report.dyads]
+    for found in angles:
+        for angle in found:
             if angle.driver == reach.driver and limit.value in angle.in_line_at:
                 return _in_line(angle)
     return f"{_names(limit.bodies)} can move while {reach.driver} is fixed"

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from kinfmu.analysis.driver_path import DriverPath
-from kinfmu.analysis.loops import FourBar, Place, SliderCrank
+from kinfmu.analysis.loops import Dyad, FourBar, Place, SliderCrank
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.plan import SolvePlan
 from kinfmu.solver.python import Pose
@@ -91,6 +91,47 @@ def transmission_angle(path: DriverPath, loop: FourBar | SliderCrank) -> Transmi
     if led is None:
         return None
     coupler, output, cosine, is_slide = led
+    return _range(path, coupler, output, cosine, is_slide=is_slide)
+
+
+def dyad_angle(path: DriverPath, dyad: Dyad) -> tuple[TransmissionRange, tuple[Place, ...]] | None:
+    """Return the extremes of a dyad's transmission angle over the path of a driver, and the places of its pins.
+
+        cos mu = (b^2 + c^2 - f^2) / (2 b c)        f: distance of the other pins P and C of links of lengths b and c
+        cos mu = n.(S - P) / l                      n: normal of the slide of the point S of a link of length l
+
+    None if the driver does not move the links relative to each other, or if their other pins are not on bodies that
+    are solved before both links.
+    """
+    places = _block_of(path.plan)
+    own = {dyad.first.name, dyad.second.name}
+    axes = ("phi",) if dyad.direction is None else ("x", "y")
+    blocks = [places.get(f"{dyad.first.name}.phi"), *(places.get(f"{dyad.second.name}.{axis}") for axis in axes)]
+    later = [block for block in blocks if block is not None]
+    if not later or (dyad.direction is None and len(set(later)) > 1):
+        return None
+
+    def led(pin: Iterable[Place]) -> Place | None:
+        """Return a pin as a place on a body that is solved before the links."""
+        for place in pin:
+            solved = [places.get(f"{place.body}.{axis}", -1) for axis in ("x", "y", "phi")]
+            if place.body not in own and max(solved) < min(later):
+                return place
+        return None
+
+    outer = [place for place in map(led, dyad.pins[::2]) if place is not None]
+    if len(outer) < len(dyad.pins[::2]):
+        return None
+    middle, b, c = dyad.pins[1][0], dyad.first.length, dyad.second.length
+    if dyad.direction is not None:
+        cosine = _against_normal(outer[0], middle, b, dyad.direction)
+    else:
+        cosine = _opposite(b, c, outer[0], outer[1])
+    found = _range(path, dyad.first.name, dyad.second.name, cosine, is_slide=dyad.direction is not None)
+    return None if found is None else (found, (outer[0], middle, *outer[1:]))
+
+
+def _range(path: DriverPath, coupler: str, output: str, cosine: _Cosine, *, is_slide: bool) -> TransmissionRange | None:
     found = _extremes(path, cosine)
     if found is None:
         return None
@@ -145,17 +186,8 @@ def _led_slider_crank(plan: SolvePlan, loop: SliderCrank) -> tuple[str, str, _Co
         slider = max((places.get(f"{loop.slider}.{axis}", -1) for axis in ("x", "y")), default=-1)
     o, p, s = loop.pins
     if _is_before(crank, rod, slider):
-        n = (-math.sin(loop.direction), math.cos(loop.direction))
-
-        def value(q: Coordinates) -> float:
-            (px, py), (sx, sy) = p.world(q), s.world(q)
-            return (n[0] * (sx - px) + n[1] * (sy - py)) / loop.rod.length
-
-        def slope(q: Coordinates, qd: Coordinates) -> float:
-            vx, vy = p.velocity(q, qd)
-            return -(n[0] * vx + n[1] * vy) / loop.rod.length
-
-        return loop.rod.name, loop.slider if slider is not None else loop.guide, _Cosine(value, slope), True
+        cosine = _against_normal(p, s, loop.rod.length, loop.direction)
+        return loop.rod.name, loop.slider if slider is not None else loop.guide, cosine, True
     if _is_before(slider, rod, crank) or _drives_end(plan, loop):
         return loop.rod.name, loop.crank.name, _opposite(loop.rod.length, loop.crank.length, s, o), False
     return None
@@ -191,6 +223,21 @@ def _opposite(b: float, c: float, p: Place, q: Place) -> _Cosine:
         (px, py), (qx, qy) = p.world(at), q.world(at)
         (pu, pv), (qu, qv) = p.velocity(at, rates), q.velocity(at, rates)
         return -((qx - px) * (qu - pu) + (qy - py) * (qv - pv)) / (b * c)
+
+    return _Cosine(value, slope)
+
+
+def _against_normal(p: Place, s: Place, length: float, direction: float) -> _Cosine:
+    """Return the cosine of the angle between a rod from p to s and the normal of the line on which s slides."""
+    n = (-math.sin(direction), math.cos(direction))
+
+    def value(q: Coordinates) -> float:
+        (px, py), (sx, sy) = p.world(q), s.world(q)
+        return (n[0] * (sx - px) + n[1] * (sy - py)) / length
+
+    def slope(q: Coordinates, qd: Coordinates) -> float:
+        vx, vy = p.velocity(q, qd)
+        return -(n[0] * vx + n[1] * vy) / length
 
     return _Cosine(value, slope)
 

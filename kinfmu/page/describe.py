@@ -369,7 +369,7 @@ def _rounded(values: Any) -> Any:
 
 
 def _loops(report: Report, numbers: Mapping[str, int]) -> Any:
-    """Yield the loops with a transmission angle: the numbers of the pins that enclose it."""
+    """Yield the loops and dyads with a transmission angle: the numbers of the pins that enclose it."""
     points = report.mechanism.body_points
 
     def number(place: Place) -> int | None:
@@ -396,3 +396,9 @@ def _loops(report: Report, numbers: Mapping[str, int]) -> Any:
             yield found | {"pins": pins[1:], "direction": loop.direction}
         else:
             yield found | {"pins": [pins[2], pins[1], pins[0]]}
+    for one in report.dyads:
+        pins = [number(pin) for pin in one.pins]
+        if None not in pins:
+            angle = one.transmission[0]
+            found = {"driver": angle.driver, "coupler": angle.coupler, "output": angle.output}
+            yield found | {"pins": pins} | ({} if one.dyad.direction is None else {"direction": one.dyad.direction})

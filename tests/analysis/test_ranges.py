@@ -101,7 +101,7 @@ def test_each_driver_of_a_five_bar_goes_until_its_arms_are_straight() -> None:
     assert elbow.high == pytest.approx(lean + half, abs=1e-10)
     text = str(report)
     assert "each with the other drivers at their start values" in text
-    assert "forearm, strut can move while shoulder is fixed" in text
+    assert text.count("forearm and strut fall in line") == 6  # at four limits and in two transmission angles
 
 
 def test_cylinders_go_as_far_as_their_triangles() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import AngleDriver, ConstantSpeed
+from kinfmu import AngleDriver, Body, ConstantSpeed, PointOnLine, Revolute, Translational
 from kinfmu.analysis.transmission import TransmissionRange
 from tests.analysis.linkages import five_bar_arm, pushed_crank
 from tests.mechanisms import bar_linkage, fourbar, reference_fourbar, six_bar, slider_crank
@@ -101,3 +101,84 @@ def test_loops_that_no_end_leads_have_no_transmission_angle() -> None:
     (named,) = kinfmu.check(by_coupler).loops
     assert named.transmission == ()
     assert kinfmu.check(five_bar_arm()).loops == ()
+
+
+def sampled(mechanism: kinfmu.Mechanism, first: str, middle: str, second: str, **inputs: np.ndarray) -> np.ndarray:
+    """The angle [rad] at the point `middle` between the points `first` and `second`, at driver values."""
+    run = kinfmu.solve(mechanism, **inputs)
+
+    def place(point: str) -> np.ndarray:
+        body, _, _ = point.partition(".")
+        a, b = mechanism.body_points[point]
+        x, y, phi = (run[f"{body}.{axis}"] for axis in ("x", "y", "phi"))
+        return np.array([x + np.cos(phi) * a - np.sin(phi) * b, y + np.sin(phi) * a + np.cos(phi) * b])
+
+    one, other = place(first) - place(middle), place(second) - place(middle)
+    return np.asarray(np.arccos((one * other).sum(axis=0) / (np.hypot(*one) * np.hypot(*other))))
+
+
+@pytest.mark.parametrize(
+    ("name", "links", "joint", "points"),
+    [
+        ("watt_six_bar", ("left", "right"), "T", ("left.R", "left.T", "right.S")),
+        ("jansen_leg", ("leg", "link"), "knee", ("leg.bottom", "leg.knee", "link.left")),
+        ("geared_five_bar", ("left", "right"), "T", ("left.P", "left.T", "right.Q")),
+    ],
+)
+def test_a_dyad_between_moving_bodies_has_its_transmission_angle(
+    name: str, links: tuple[str, str], joint: str, points: tuple[str, str, str]
+) -> None:
+    mechanism = kinfmu.load(name)
+    (found,) = kinfmu.check(mechanism).dyads
+    assert {found.dyad.first.name, found.dyad.second.name} == {*links}
+    assert found.dyad.joint == joint
+    (angle,) = found.transmission
+    (driver,) = mechanism.drivers
+    values = sampled(mechanism, *points, **{f"{driver.name}_angle": np.linspace(0.0, math.tau, 7201)})
+    assert angle.smallest == pytest.approx(values.min(), abs=1e-6)
+    assert angle.largest == pytest.approx(values.max(), abs=1e-6)
+    at = sampled(mechanism, *points, **{f"{driver.name}_angle": np.array([angle.at_smallest, angle.at_largest])})
+    assert at == pytest.approx([angle.smallest, angle.largest], abs=1e-12)
+    text = str(kinfmu.check(mechanism))
+    assert f"; they meet at {joint}, between {' and '.join(place.body for place in found.pins[::2])}" in text
+
+
+@pytest.mark.parametrize("has_slider", [True, False])
+def test_a_slide_moved_by_a_point_of_a_coupler_has_its_transmission_angle(has_slider: bool) -> None:
+    four, direction, length = kinfmu.load("crank_rocker"), 0.2, 120.0
+    rod = Body("rod", {"T": (0, 0), "S": (length, 0)}, (40.0, 95.0, 0.5))
+    joints = [*four.joints, Revolute("T", ("coupler.tracer", "rod.T"))]
+    bodies = [replace(four.bodies[0], points={**four.bodies[0].points, "W": (0, 120)}), *four.bodies[1:], rod]
+    if has_slider:
+        bodies.append(Body("slider", {"S": (0, 0)}, (145.0, 150.0, direction)))
+        joints.append(Revolute("S", ("rod.S", "slider.S")))
+        joints.append(Translational("way", ("ground.W", "slider.S"), axis=direction, angle=direction))
+    else:
+        joints.append(PointOnLine("way", ("ground.W", "rod.S"), axis=direction))
+    mechanism = replace(four, bodies=tuple(bodies), joints=tuple(joints))
+    report = kinfmu.check(mechanism)
+    (found,) = report.dyads
+    (angle,) = found.transmission
+    assert (angle.coupler, angle.output, angle.is_slide) == ("rod", "slider" if has_slider else "way", True)
+    run = kinfmu.solve(mechanism, crank_angle=np.linspace(0.0, math.tau, 3601))
+    values = np.arccos(np.sin(run["rod.phi"] - direction))  # the normal is 90 degrees ahead of the direction
+    assert angle.smallest == pytest.approx(values.min(), abs=1e-6)
+    assert angle.largest == pytest.approx(values.max(), abs=1e-6)
+    assert f"dyad        rod 120 mm between coupler and the slide {angle.output}" in str(report)
+    assert report.as_json()["dyads"][0]["lengths"] == {"rod": 120.0}
+
+
+def test_a_dyad_belongs_to_the_drivers_that_move_it() -> None:
+    (found,) = kinfmu.check(kinfmu.load("excavator")).dyads
+    assert [angle.driver for angle in found.transmission] == ["bucket_cylinder"]
+    (found,) = kinfmu.check(kinfmu.load("five_bar")).dyads
+    assert [angle.driver for angle in found.transmission] == ["left", "right"]
+    assert found.transmission[0].in_line_at
+    assert {angle.verdict for angle in found.transmission} == {"locks"}
+
+
+@pytest.mark.parametrize("name", ["crank_rocker", "slider_crank", "toggle_press", "stephenson_six_bar", "scotch_yoke"])
+def test_pairs_of_links_of_a_loop_and_links_that_nothing_moves_alone_are_no_further_dyads(name: str) -> None:
+    report = kinfmu.check(kinfmu.load(name))
+    assert report.dyads == ()
+    assert report.as_json()["dyads"] == []

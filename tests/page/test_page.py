@@ -420,6 +420,25 @@ def test_forces_in_joints_are_drawn_to_one_scale_and_only_computed_when_shown(ch
     assert at_pin == pytest.approx([scale * run["P.force_x"][0], scale * run["P.force_y"][0]], rel=1e-6)
 
 
+def test_every_dyad_has_its_transmission_angle_in_the_drawing_and_the_plots(chromium: Browser) -> None:
+    angles = {}
+    for loop in (*(report := kinfmu.check(kinfmu.load("watt_six_bar"))).loops, *report.dyads):
+        (angle,) = loop.transmission
+        angles[f"transmission angle {angle.coupler}-{angle.output}"] = angle
+    assert len(angles) == 2
+    with chromium.open(text_of("watt_six_bar")) as page:
+        offered = page.tab.locator("#plots select option").all_text_contents()
+        assert {f"{name} [deg]" for name in angles} <= {*offered}
+        page.tab.click("#tab-files")
+        for angle in angles.values():
+            page.move(angle.at_smallest)
+            with page.tab.expect_download() as waiting:
+                page.tab.click("#save-svg")
+            shown = f"{round(math.degrees(angle.smallest), 1):g}\N{DEGREE SIGN}"
+            assert f">{shown}</text>" in waiting.value.path().read_text("utf-8")
+        assert page.errors == []
+
+
 def test_click_in_a_plot_moves_the_crank(chromium: Browser) -> None:
     with chromium.open(text_of("crank_rocker")) as page:
         page.tab.click("#tab-plots")

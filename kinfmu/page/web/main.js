@@ -28,7 +28,7 @@ class Page {
         this.linkage = linkage;
         this.design = new Design(linkage);
         this.view = new View();
-        this.show = { names: true, curves: true, traces: false, velocity: false, acceleration: false, transmission: loops.length > 0 && loops.length < 3, centres: false, limits: true, loads: true, forces: false, shaking: false, grid: true };
+        this.show = { names: true, curves: true, traces: false, velocity: false, acceleration: false, transmission: loops.length > 0 && loops.length < 4, centres: false, limits: true, loads: true, forces: false, shaking: false, grid: true };
         this.drawn = interest.map(({ point, colour }) => ({ point, colour })); // points with curves
         this.curves = [];
         this.traces = new Map();
