@@ -9,7 +9,13 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
+PAGES = {  # README.md and the pages of docs by their name, others by their path
+    page.name if page.parent in (ROOT, DOCS) else page.relative_to(ROOT).as_posix(): page
+    for page in (
+        ROOT / "README.md",
+        *sorted([*DOCS.glob("*.md"), *ROOT.glob("fmus/*/*.md"), *ROOT.glob("examples/*/*.md")]),
+    )
+}
 
 PROGRAMS = (
     "kinfmu",

@@ -21,7 +21,7 @@ import pytest
 from click.testing import CliRunner
 
 from kinfmu.cli import main
-from tests.docs.blocks import DOCS, ROOT, blocks, commands
+from tests.docs.blocks import DOCS, PAGES, ROOT, blocks, commands
 from tests.fmu.native.test_hosts import ecos_command
 
 PYTHON = os.environ.get("KINFMU_HOSTS", sys.executable)  # with the hosts
@@ -32,6 +32,7 @@ NOT_RUN = {  # beginnings of the commands and blocks that no page runs in the te
     "scripts/test": "runs the tests",
     "source .venv/bin/activate": "acts on the shell",
     "pip install omsimulator": "downloads a program from a server that is no package registry",
+    "python examples/dc_motor/stability.py": "takes a minute; tests/docs/test_coupling_page.py",
     "kinfmu bench": "measures for minutes; tests/bench runs the parts",
     "kinfmu build mine.toml --fmi 3 --platforms all": "zig compiles for minutes; tests/fmu/native/test_build.py",
     "kinfmu build fourbar --platforms all": "zig compiles for minutes; tests/fmu/native/test_build.py",
@@ -101,8 +102,8 @@ def why_not_run(text: str) -> str | None:
 
 
 def page_text(name: str) -> str:
-    """Return the text of README.md or of a page of docs."""
-    return (ROOT if name == "README.md" else DOCS).joinpath(name).read_text(encoding="utf-8")
+    """Return the text of a page."""
+    return PAGES[name].read_text(encoding="utf-8")
 
 
 def files(name: str) -> dict[str, str]:

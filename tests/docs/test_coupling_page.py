@@ -10,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from kinfmu.cli import main
+from tests.docs.blocks import DOCS
 from tests.docs.follow import accept, follow, page_text, typed
 
 PAGE = page_text("coupling.md")
@@ -45,3 +46,13 @@ def test_constants_and_the_message_of_the_page(tmp_path: Path, monkeypatch: pyte
     assert result.exit_code == 1
     assert result.output.splitlines()[-1].endswith(message)
     assert "logs" not in {path.name for path in tmp_path.iterdir()} or not list((tmp_path / "logs").iterdir())
+
+
+@pytest.mark.long
+def test_the_figure_is_the_one_that_its_command_draws(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    typed("python examples/dc_motor/stability.py F.svg")
+    drawn, committed = (path.read_text(encoding="utf-8") for path in (Path("F.svg"), DOCS / "drive-coupling.svg"))
+    labels = re.compile(r"<!-- (.*?) -->|<text[^>]*>([^<]*)|<(use)")
+    assert len(labels.findall(committed)) > 50
+    assert labels.findall(drawn) == labels.findall(committed)
