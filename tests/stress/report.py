@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tests.stress.branch import EDGE, OUTSIDE
-from tests.stress.trial import NARROW, NEAR_LIMIT, ORDERS, TIGHT, Verdict
+from tests.stress.trial import NARROW, NEAR_LIMIT, ORDERS, ROUNDINGS, TIGHT, Verdict
 
 STATUSES = ("ok", "near_singular", "bridged", "outside", "inconsistent", "not_converged")
 EPS = float(np.finfo(float).eps)
@@ -46,6 +46,7 @@ class Report:
     edge: int = 0
     spared: int = 0
     narrow: int = 0
+    blurred: int = 0
     refused: int = 0  # samples past a limit, reported as such
 
     def take(self, verdict: Verdict) -> None:
@@ -58,6 +59,7 @@ class Report:
         self.gap = max(self.gap, verdict.gap)
         self.spared += verdict.spared
         self.narrow += verdict.narrow
+        self.blurred += verdict.blurred
         self.edge += int((verdict.side == EDGE).sum())
         self.refused += int(((verdict.side == OUTSIDE) & (verdict.statuses == 3)).sum())
         self.faulty[verdict.family] += bool(verdict.faults)
@@ -110,7 +112,8 @@ class Report:
             f"{self.narrow} behind a change point narrower than {NARROW:g} rad or within {NEAR_LIMIT:g} of a limit"
         )
         lines.append(
-            f"{self.digits} samples were judged in 50 digits; the two oracles differed by {self.gap:.1g} of what counts"
+            f"{self.digits} samples were judged in 50 digits; the two oracles differed by {self.gap:.1g} of what "
+            f"counts; {self.blurred} ok samples were off by more, but less than {ROUNDINGS:g} roundings of driver values cause"
         )
         for kind, found in sorted(self.faults.items()):
             lines.append("")
