@@ -113,7 +113,7 @@ class Report:
         )
         lines.append(
             f"{self.digits} samples were judged in 50 digits; the two oracles differed by {self.gap:.1g} of what "
-            f"counts; {self.blurred} ok samples were off by more, but less than {ROUNDINGS:g} roundings of driver values cause"
+            f"counts; {self.blurred} ok samples were off by more, as {ROUNDINGS:g} roundings of driver values are"
         )
         for kind, found in sorted(self.faults.items()):
             lines.append("")
