@@ -105,7 +105,7 @@ def test_near_a_limit_samples_are_judged_by_50_digits(seed: int, family: str) ->
 def test_an_ok_sample_may_be_off_by_some_roundings_of_its_driver_values(
     roundings: float, faults: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A robot, almost stretched, on a four-bar close to its dead centre: the residual, a rounding, counts 72 000 times."""
+    """A robot, almost stretched, on a four-bar near its dead centre: the rounding of a residual counts 72 000 times."""
     monkeypatch.setattr("tests.stress.trial.ROUNDINGS", roundings)
     verdict = trial(1322, "machines with a robot", "native").judged()
     assert len(verdict.faults) == faults
