@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from shlex import quote
 
@@ -41,7 +41,8 @@ class Verification:
         wanted: The reference result there.
         difference: The difference, relative.
         is_a_step_late: True if the results equal those of the sample before, within the tolerance.
-        end: Time [s] of the last row of a host's table; None for an FMU that kinfmu steps itself.
+        ends: Times [s] of the first and the last row of a host's table; None for an FMU that kinfmu steps itself.
+        digits: Digits of the numbers in a host's table, at most; None for an FMU that kinfmu steps itself.
 
     """
 
@@ -56,22 +57,25 @@ class Verification:
     wanted: float
     difference: float
     is_a_step_late: bool
-    end: float | None = None
+    ends: tuple[float, float] | None = None
+    digits: int | None = None
 
     @property
     def ok(self) -> bool:
-        """True if every difference is within the tolerance and no sample is missing, except as in ends_early."""
-        return (not self.missing or self.ends_early) and self.difference <= self.tolerance
+        """True if every difference is within the tolerance and no sample is missing, except as in is_shorter."""
+        return (not self.missing or self.is_shorter) and self.difference <= self.tolerance
 
     @property
-    def ends_early(self) -> bool:
-        """True if a host's table ends before the reference does, has all samples up to there, and half of all.
+    def is_shorter(self) -> bool:
+        """True if a host's table begins late or ends early, and has all samples between, which are half of all.
 
-        The last step of many hosts is missing: they sum up steps, and the sum passes the stop time by rounding.
+        Many hosts write no row before the first step. The last step may be missing, since hosts sum up steps, and the
+        sum passes the stop time by rounding.
         """
-        if self.end is None or not self.missing:
+        if self.ends is None or not self.missing:
             return False
-        return min(self.missing) > self.end and 2 * len(self.missing) <= self.samples
+        first, last = self.ends
+        return all(not first <= t <= last for t in self.missing) and 2 * len(self.missing) <= self.samples
 
     def __str__(self) -> str:
         """Return the result in a few lines."""
@@ -85,19 +89,32 @@ class Verification:
             lines.append(f"not in the results: {listed(self.left_out)}")
         if self.missing:
             lines.append(f"no results at t = {listed(f'{t:g}' for t in self.missing)} [s]{self._reason_of_missing()}")
-        if self.ends_early and self.ok:
+        if self.is_shorter and self.ok:
             there = self.samples - len(self.missing)
             lines.append(f"the results agree at the {there} of {self.samples} samples that they have")
         if self.is_a_step_late:
             lines.append("the results equal the reference of the sample before: this host records outputs a step late")
+        elif self.digits is not None and self.tolerance < self.difference <= self._rounding:
+            lines.append(
+                f"the results have {self.digits} digits, which may be the difference: compare with --tolerance "
+                f"{self._rounding:g}"
+            )
         return "\n".join(lines)
+
+    @property
+    def _rounding(self) -> float:
+        """A tolerance for numbers that are rounded to the digits of the table."""
+        return 10.0 ** (1 - (self.digits or 0))
 
     def _reason_of_missing(self) -> str:
         """Return what to change where a host's table has no row at some samples; '' if kinfmu made the results."""
-        if self.end is None:
+        if self.ends is None:
             return ""
-        if min(self.missing) > self.end:
-            return f": they end at t = {self.end:.10g} s"
+        first, last = self.ends
+        if min(self.missing) > last:
+            return f": they end at t = {last:.10g} s"
+        if max(self.missing) < first:
+            return f": they begin at t = {first:.10g} s"
         return "; a host needs rows at the samples of the reference: choose its steps and its stop time by them"
 
 
@@ -144,10 +161,11 @@ def verify(fmu: str | Path, results: str | Path | None = None, *, tolerance: flo
         raise FmuError(f"{path}: the reference results in {FOLDER} are damaged: {quoted(unknown[0])} is no variable")
     if results is None:
         names, values = _stepped(path, wanted)
-        end = None
+        ends = digits = None
     else:
-        names, values, end = _table_of_host(Path(results), wanted, units, about.interface.length_unit)
-    return _compared(wanted, units, names, values, wanted.tolerance if tolerance is None else tolerance, end)
+        names, values, ends, digits = _table_of_host(Path(results), wanted, units, about.interface.length_unit)
+    found = _compared(wanted, units, names, values, wanted.tolerance if tolerance is None else tolerance)
+    return replace(found, ends=ends, digits=digits)
 
 
 def _stepped(path: Path, wanted: ReferenceResults) -> tuple[tuple[str, ...], FloatArray]:
@@ -166,8 +184,8 @@ def _stepped(path: Path, wanted: ReferenceResults) -> tuple[tuple[str, ...], Flo
 
 def _table_of_host(
     path: Path, wanted: ReferenceResults, units: dict[str, str], length_unit: str
-) -> tuple[tuple[str, ...], FloatArray, float | None]:
-    """Return outputs, their values (n, k) at the times of the reference, and the last time of a host's table.
+) -> tuple[tuple[str, ...], FloatArray, tuple[float, float] | None, int]:
+    """Return outputs, their values (n, k) at the times of the reference, first and last time, and digits.
 
     Values are NaN where the table has none.
     """
@@ -199,7 +217,8 @@ def _table_of_host(
         near = np.flatnonzero(np.abs(table[:, 0] - time) <= _SAME_TIME * wanted.step)
         if len(near):
             found[k] = table[near[-1], 1:]  # of rows at one time the last is after events
-    return tuple(places), found, float(table[:, 0].max()) if len(table) else None
+    ends = (float(table[:, 0].min()), float(table[:, 0].max())) if len(table) else None
+    return tuple(places), found, ends, max((_digits(row[k]) for row in rows for k in columns[1:]), default=0)
 
 
 def _place(name: str, titles: list[str]) -> int | None:
@@ -208,6 +227,11 @@ def _place(name: str, titles: list[str]) -> int | None:
         return titles.index(name)
     behind = [k for k, title in enumerate(titles) if title.endswith((f"::{name}", f".{name}", f"/{name}"))]
     return behind[0] if len(behind) == 1 else None
+
+
+def _digits(text: str) -> int:
+    """Return the number of digits of a number, without zeros before the first one."""
+    return len(text.lower().partition("e")[0].strip(" +-").replace(".", "").lstrip("0"))
 
 
 def _number(text: str) -> float:
@@ -231,7 +255,6 @@ def _compared(
     names: tuple[str, ...],
     found: FloatArray,
     tolerance: float,
-    end: float | None,
 ) -> Verification:
     values = wanted.values[:, [wanted.names.index(name) for name in names]]
     sizes = _sizes(wanted, units)
@@ -255,7 +278,6 @@ def _compared(
         wanted=float(values[row, column]),
         difference=difference if difference >= 0.0 else float("nan"),
         is_a_step_late=difference > tolerance and bool((late <= tolerance).all()),
-        end=end,
     )
 
 

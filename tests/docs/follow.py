@@ -148,7 +148,7 @@ def follow(name: str, folder: Path) -> Followed:
 
 def typed(line: str) -> str:
     """Return what a command prints. The viewer does not open: its recording is written to a file."""
-    program, *words = shlex.split(line)
+    program, *words = (name for word in shlex.split(line) for name in _matching(word) or [word])
     if line.startswith("kinfmu play"):
         return _played(words)
     if program == "kinfmu":
@@ -163,6 +163,11 @@ def typed(line: str) -> str:
     done = subprocess.run([*programs[program], *here], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, (line, done.stdout, done.stderr)
     return done.stdout
+
+
+def _matching(word: str) -> list[str]:
+    """Return the files that a word of a command names by a pattern, as a shell does."""
+    return sorted(map(str, Path().glob(word))) if "*" in word else []
 
 
 def _can_run(text: str) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import subprocess
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -50,6 +51,12 @@ def test_the_table_of_runs_has_each_host_with_version_date_and_tests() -> None:
     for host in HOSTS:
         row = rf"\| \[{host.name}\]\({host.page}\) \| {host.package} \d[\w.]+ \| \d{{4}}-\d\d-\d\d \| \d+ passed \| "
         assert re.search(row, text), host.name
+
+
+@pytest.fixture(autouse=True)
+def native_fmus(monkeypatch: pytest.MonkeyPatch) -> None:
+    """FMUs are of the flavour that users get: pythonfmu's library may abort the process of a host at its end."""
+    monkeypatch.setattr(import_module("kinfmu.fmu.build"), "default_flavour", lambda *_of, **_more: "native")
 
 
 def test_the_page_of_fmpy_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
