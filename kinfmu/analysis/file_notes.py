@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from kinfmu.analysis.singular import DriverRange
+from kinfmu.analysis.driver_path import follow
+from kinfmu.analysis.singular import DriverRange, driver_range
 from kinfmu.analysis.values import LOOKS, degrees, law_values, value_text
 from kinfmu.drivers import AngleDriver, DistanceDriver
 from kinfmu.equations.start_poses import StartValues, is_in_world_coordinates, open_joints_text, start_from_poses
@@ -23,7 +24,7 @@ from kinfmu.mechanism.dimension import Dimension
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.members import NumberPath, path_text
 from kinfmu.mechanism.parameters import dimensions_of
-from kinfmu.plan import SolvePlan
+from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.sweep import solve
 from kinfmu.units import PLAUSIBLE_TURN, Quantity, looks_like_degrees
 
@@ -152,7 +153,7 @@ def _loads(mechanism: Mechanism) -> Iterator[str]:
 
 
 _FAR = 0.5  # [rad]; start angles read off a sketch are nearer to those of a cam
-_LARGE = 600  # coordinates; runs of larger mechanisms with several drivers are not evaluated
+_LARGE = 600  # coordinates; a larger mechanism is not evaluated for a note on its run
 
 
 def run_notes(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Iterator[str]:
@@ -173,6 +174,15 @@ def run_notes(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Iterator[str]:
         times = np.linspace(mechanism.run.start, mechanism.run.stop, LOOKS)
         for event in solve(plan, times).events[:1]:
             yield f"[run] at t = {event.t:.6g} s: {event.text}"
+
+
+def beyond_range(mechanism: Mechanism) -> list[str]:
+    """Return the notes of `run_notes` for a mechanism that can be planned; none for a large one."""
+    if len(mechanism.coordinate_names) > _LARGE:
+        return []
+    plan = compile_plan(mechanism)
+    ranges = [driver_range(follow(plan, 0))] if len(mechanism.drivers) == 1 else []
+    return list(run_notes(plan, ranges))
 
 
 def start_notes(system: System, values: StartValues) -> Iterator[str]:

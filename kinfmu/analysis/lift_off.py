@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -25,8 +26,9 @@ class LiftOff:
 
     joint: the cam's; force: the column of the contact force or moment; sense: 1 if a positive value presses
     follower and cam together, -1 if a negative one does; parts: where it would pull, each from begin to end, in values
-    of the driver or times; of a motion that goes round a part may go on past its end; largest, at: the largest tension,
-    as a positive number, and where it occurs.
+    of the driver or times; of a motion that goes round a part may go on past its end; extent: 'turn' if it would pull
+    at every angle of the driver, 'motion' if during the whole motion, else 'part'; largest, at: the largest tension, of
+    a lever the largest moment that would pull, as a positive number, and where it occurs.
     """
 
     joint: str
@@ -36,6 +38,7 @@ class LiftOff:
     driver: str
     at_unit: str
     parts: tuple[tuple[float, float], ...]
+    extent: str
     largest: float
     at: float
 
@@ -49,6 +52,7 @@ class LiftOff:
             "driver": self.driver,
             "at_unit": self.at_unit,
             "parts": [{"begin": begin, "end": end} for begin, end in self.parts],
+            "extent": self.extent,
             "largest_tension": {"value": self.largest, "at": self.at},
         }
 
@@ -72,6 +76,7 @@ def lift_offs(motion: Motion, cams: Sequence[CamFindings]) -> Iterator[LiftOff]:
         if -float(low.value) <= _ROUNDING * max(-float(low.value), float(high.value)):
             continue
         unit = motion.mechanism.length_unit
+        parts = _negative_parts(track)
         yield LiftOff(
             joint=cam.joint,
             force=name,
@@ -79,19 +84,27 @@ def lift_offs(motion: Motion, cams: Sequence[CamFindings]) -> Iterator[LiftOff]:
             unit=unit_of(name.quantity, unit),
             driver=motion.driver,
             at_unit=unit_of(motion.driver_quantity, unit),
-            parts=tuple(_negative_parts(motion, track)),
+            parts=tuple((float(begin), float(end)) for begin, end in map(motion.driven_at, map(np.array, parts))),
+            extent=_extent(motion, track, parts),
             largest=-float(low.value),
             at=float(motion.driven_at(np.asarray(low.x))),
         )
 
 
-def _negative_parts(motion: Motion, track: Track) -> Iterator[tuple[float, float]]:
-    """Yield the parts of a motion in which a quantity is negative, as values of the driver."""
+def _negative_parts(track: Track) -> list[tuple[float, float]]:
+    """Return the parts of a motion in which a quantity is negative, from argument to argument."""
     crossings = np.sort(track.crossings(np.asarray(0.0))[1])
     ends = [float(track.x[0]), *crossings.tolist(), float(track.x[-1])]
     parts = [(a, b) for a, b in pairwise(ends) if b > a and track.at(np.array([0.5 * (a + b)]))[0] < 0]
     if track.is_closed and len(parts) > 1 and parts[0][0] == ends[0] and parts[-1][1] == ends[-1]:
         parts = [*parts[1:-1], (parts[-1][0], parts[0][1])]  # one part goes on past the end
-    for part in parts:
-        begin, end = (float(one) for one in motion.driven_at(np.array(part)))
-        yield begin, end
+    return parts
+
+
+def _extent(motion: Motion, track: Track, parts: list[tuple[float, float]]) -> str:
+    """Return the extent of the negative parts, as in LiftOff."""
+    if parts != [(float(track.x[0]), float(track.x[-1]))]:
+        return "part"
+    travel = motion.driven_between(track.x[0], track.x[-1])
+    is_turn = motion.driver_quantity.kind == "angle" and travel > math.tau - _ROUNDING
+    return "turn" if is_turn else "motion"

@@ -316,11 +316,13 @@ def _lift_off_text(lift: LiftOff) -> str:
         return degrees(value) if lift.at_unit == "rad" else f"{value:.6g} {lift.at_unit}"
 
     parts = listed([f"{at(begin)} to {at(end)}" for begin, end in lift.parts])
-    kind = "moment" if lift.force.endswith("moment") else "force"
+    extents = {"turn": f"at every angle of {lift.driver}", "motion": "in the whole motion"}
+    where = extents.get(lift.extent, f"from {parts} of {lift.driver}")
     sign = "negative" if lift.sense > 0 else "positive"
+    kind, pull = ("moment", "moment that pulls") if lift.force.endswith("moment") else ("force", "tension")
     return (
-        f"{lift.joint}: the follower lifts off: contact {kind} {lift.force} {sign} from {parts} of {lift.driver}; "
-        f"largest tension {lift.largest:.6g} {lift.unit} ({lift.driver} at {at(lift.at)})"
+        f"{lift.joint}: the follower lifts off: contact {kind} {lift.force} {sign} {where}; "
+        f"largest {pull} {lift.largest:.6g} {lift.unit} ({lift.driver} at {at(lift.at)})"
     )
 
 

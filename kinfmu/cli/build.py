@@ -105,6 +105,7 @@ def build(
 
     It supports co-simulation. A native FMU supports model exchange, too.
     """
+    from kinfmu.analysis.file_notes import beyond_range
     from kinfmu.fmu import build as built
     from kinfmu.fmu.build import default_drive, default_flavour, native_obstacle, platforms_of
 
@@ -138,6 +139,9 @@ def build(
             page=lambda: _page(mech, page),
             progress=progress,
         )
+    if drive == "time":
+        for text in beyond_range(mech):
+            note(text)
     is_native = chosen == "native"
     kinds = "co-simulation and model exchange" if is_native else "co-simulation"
     where = listed(platforms_of(path)) + ("" if is_native else " in hosts that contain Python")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -68,7 +69,7 @@ def check(
             findings["assemblies"] = None if found is None else found.as_json()
         click.echo(json.dumps(findings, indent=2))
     else:
-        click.echo(str(report))
+        click.echo(_text(report))
         if assemblies and (found := _assemblies(report)) is not None:
             click.echo(str(found))
         if matrices and (report.problem is None or report.has_cut_cam):
@@ -102,7 +103,13 @@ def _print_part(path: str, problem: MechanismError, *, as_json: bool) -> None:
     lacks_driver = any(name.startswith("[drivers") for name in part.left_out)  # then none is missing in the file
     advice = None if lacks_driver else report.advice
     report = replace(report, problem=reason, notes=(text,), advice=advice, left_out=part.left_out)
-    click.echo(json.dumps(report.as_json(), indent=2) if as_json else str(report))
+    click.echo(json.dumps(report.as_json(), indent=2) if as_json else _text(report))
+
+
+def _text(report: Report) -> str:
+    """Return the report; without its problem on a terminal, where the error message states it below."""
+    on_terminal = sys.stdout.isatty() and sys.stderr.isatty()
+    return str(replace(report, problem=None) if on_terminal else report)
 
 
 def _assemblies(report: Report) -> Assemblies | None:

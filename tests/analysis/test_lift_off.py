@@ -99,6 +99,16 @@ def test_check_reports_where_sliding_followers_lift_off(joint: str) -> None:
     assert text in str(report)
 
 
+LEVER = (
+    'type = "cam_oscillating"\nbetween = ["ground", "lever"]\ncam = "cam"\namplitude = {amplitude}\n'
+    'phase = "90 deg"\ncontact = "lever.R"\nroller_radius = 0.005\n'
+    "[bodies.ground]\npoints = {{ O = [0, 0], G = [{x}, 0.05] }}\n"
+    "[bodies.lever]\nmass = 1\ninertia = 0.02\ncenter_of_mass = [0, 0]\n"
+    "points = {{ G = [0, 0], R = [{arm}, 0] }}\nstart = {{ x = {x}, y = 0.05, phi = 0 }}\n"
+    '[joints.G]\ntype = "revolute"\nbetween = ["ground.G", "lever.G"]\n'
+)
+
+
 @pytest.mark.parametrize(("side", "sense"), [(-1.0, 1), (1.0, -1)])
 def test_moment_on_a_lever(side: float, sense: int) -> None:
     """A lever with its centre of mass at the pivot: the moment on it is its inertia times its acceleration.
@@ -106,15 +116,7 @@ def test_moment_on_a_lever(side: float, sense: int) -> None:
     With the pivot left of the cam, counter-clockwise is away from the cam; right of it, clockwise.
     """
     amplitude = 0.06 * sense
-    text = HEAD + (
-        f'type = "cam_oscillating"\nbetween = ["ground", "lever"]\ncam = "cam"\namplitude = {amplitude}\n'
-        'phase = "90 deg"\ncontact = "lever.R"\nroller_radius = 0.005\n'
-        f"[bodies.ground]\npoints = {{ O = [0, 0], G = [{side * 0.1}, 0.05] }}\n"
-        f"[bodies.lever]\nmass = 1\ninertia = 0.02\ncenter_of_mass = [0, 0]\n"
-        f"points = {{ G = [0, 0], R = [{-side * 0.1}, 0] }}\nstart = {{ x = {side * 0.1}, y = 0.05, phi = 0 }}\n"
-        '[joints.G]\ntype = "revolute"\nbetween = ["ground.G", "lever.G"]\n'
-    )
-    mechanism = parse(text)
+    mechanism = parse(HEAD + LEVER.format(amplitude=amplitude, x=side * 0.1, arm=-side * 0.1))
     theta = np.linspace(0.1, math.tau, 41)
     run = kinfmu.solve(mechanism, cam_angle=theta, cam_speed=SPEED)
     np.testing.assert_allclose(run["lift.moment"], -0.02 * amplitude * SPEED**2 * np.cos(theta), rtol=1e-11, atol=1e-11)
@@ -125,6 +127,28 @@ def test_moment_on_a_lever(side: float, sense: int) -> None:
     ((begin, end),) = found.parts
     assert (begin, end) == pytest.approx((1.5 * math.pi, 0.5 * math.pi), rel=1e-8)
     assert found.largest == pytest.approx(0.02 * 0.06 * SPEED**2, rel=1e-9)
+    assert found.extent == "part"
+    assert "; largest moment that pulls 4.32 N m (cam at 0 deg)" in str(report)
+
+
+@pytest.mark.parametrize(
+    ("speed", "extent", "where"),
+    [
+        ('law = "constant_speed"\nspeed = "60 rad/s"', "turn", "at every angle of cam"),
+        ('law = "harmonic"\namplitude = 1\nfrequency = 60', "motion", "in the whole motion"),
+    ],
+)
+def test_a_load_on_the_wrong_side_pulls_throughout(speed: str, extent: str, where: str) -> None:
+    """A pivot left of the cam, and a torque on the lever that turns it away from the cam."""
+    cam = HEAD.replace('law = "constant_speed"\nspeed = "60 rad/s"', speed)
+    load = '[loads.spring]\ntype = "torque"\non = "lever"\nlaw = "polynomial"\ncoefficients = ["500 N m"]\n'
+    report = kinfmu.check(parse(cam + LEVER.format(amplitude=0.06, x=-0.1, arm=0.1) + load))
+    assert report.loading is not None
+    (found,) = report.loading.lift_offs
+    assert (found.extent, found.as_json()["extent"]) == (extent, extent)
+    assert f"contact moment lift.moment negative {where}; largest moment that pulls 5" in str(report)
+    if extent == "turn":
+        assert found.largest == pytest.approx(500.0 + 0.02 * 0.06 * SPEED**2, rel=1e-9)
 
 
 def test_a_pressed_follower_has_no_such_line() -> None:

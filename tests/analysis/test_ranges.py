@@ -20,6 +20,8 @@ from kinfmu import (
     RunSettings,
     Translational,
 )
+from kinfmu.analysis.values import value_text
+from kinfmu.mechanism.toml_file import parse
 from tests.analysis.linkages import digger, five_bar_arm, pushed_crank
 from tests.mechanisms import five_bar, fourbar, slider_crank, tight_jaw, with_arm
 
@@ -102,6 +104,41 @@ def test_each_driver_of_a_five_bar_goes_until_its_arms_are_straight() -> None:
     text = str(report)
     assert "each with the other drivers at their start values" in text
     assert text.count("forearm and strut fall in line") == 6  # at four limits and in two transmission angles
+
+
+def test_links_of_a_loop_without_a_name_fall_in_line_too() -> None:
+    """A link from a point of the coupler to a lever that carries a rod and a block: a dead centre of this dyad."""
+    text = """
+name = "feeder"
+units.length = "mm"
+bodies.ground.points = { O = [0, 0], C = [70, 0], D = [190, 0] }
+bodies.crank = { points = { O = [0, 0], P = [20, 0] }, start = { phi = 0 } }
+bodies.coupler = { points = { P = [0, 0], Q = [65, 0], R = [65, 30] }, start = { phi = "20 deg" } }
+bodies.rocker = { points = { C = [0, 0], Q = [40, 0] }, start = { phi = "90 deg" } }
+bodies.link = { points = { R = [0, 0], S = [105, 0] }, start = { phi = 0 } }
+bodies.lever = { points = { D = [0, 0], S = [55, 0], T = [20, 0] }, start = { phi = "90 deg" } }
+bodies.rod = { points = { T = [0, 0], B = [60, 0] }, start = { phi = 0 } }
+bodies.block = { points = { B = [0, 0] }, start = { x = 250, phi = 0 } }
+joints.O = { type = "revolute", between = ["ground.O", "crank.O"] }
+joints.P = { type = "revolute", between = ["crank.P", "coupler.P"] }
+joints.Q = { type = "revolute", between = ["coupler.Q", "rocker.Q"] }
+joints.C = { type = "revolute", between = ["ground.C", "rocker.C"] }
+joints.R = { type = "revolute", between = ["coupler.R", "link.R"] }
+joints.S = { type = "revolute", between = ["lever.S", "link.S"] }
+joints.D = { type = "revolute", between = ["ground.D", "lever.D"] }
+joints.T = { type = "revolute", between = ["lever.T", "rod.T"] }
+joints.B = { type = "revolute", between = ["rod.B", "block.B"] }
+joints.guide = { type = "translational", between = ["ground.O", "block.B"] }
+drivers.motor = { type = "angle", of = "crank", law = "constant_speed", start = 0, speed = "60 rpm" }
+"""
+    report = kinfmu.check(parse(text))
+    (reach,) = report.ranges
+    for limit in reach.limits:
+        assert limit.bodies == ("link", "lever", "rod", "block")
+        at = limit.coordinates
+        assert math.sin(at["link.phi"] - at["lever.phi"]) == pytest.approx(0.0, abs=1e-5)
+        assert f"at {value_text(limit.value, 'mm', 'angle')} link and lever fall in line" in str(report)
+    assert len(reach.limits) == 2
 
 
 def test_cylinders_go_as_far_as_their_triangles() -> None:

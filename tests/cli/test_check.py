@@ -276,6 +276,18 @@ def test_a_file_whose_bodies_or_joints_are_invalid_has_no_report(
     assert result.stderr.count("\n") == 1
 
 
+@pytest.mark.parametrize(("old", "new"), [('speed = "1 deg/s"', 'speed = "60 rmp"'), ("P = [1, 0]", "P = [9, 0]")])
+def test_a_terminal_shows_a_problem_once(old: str, new: str, fourbar_file: Callable[..., Path]) -> None:
+    """Of a file that is reported in part, and of a mechanism that does not close."""
+    on_a_terminal = pytest.importorskip("tests.cli.test_colours").on_a_terminal
+    path = fourbar_file(old, new)
+    shown = on_a_terminal(("-m", "kinfmu", "check", path.name), path.parent, {}).decode()
+    *report, message = shown.splitlines()
+    assert message.startswith("kinfmu: mine.toml: ")
+    assert len(report) > 3
+    assert "problem" not in "".join(report).replace("because of the problem", "")
+
+
 def test_the_figure_is_drawn_at_the_pose_asked_for(command: Command, tmp_path: Path) -> None:
     """45 degrees are not 45 rad, and not the start; the same pose in radians gives the same picture."""
     pictures = []

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import log
+from kinfmu import RunSettings, log
 from kinfmu.cli.messages import patience
 from kinfmu.mechanism import toml_text
 from tests.cli.conftest import Command, read_csv
+from tests.mechanisms import fourbar
 
 
 @pytest.fixture
@@ -164,6 +166,20 @@ def test_a_bare_number_is_reported_where_the_file_writes_another_unit(
         "note: --set: spare = 0.03 is taken in mm; the mechanism file writes it in cm: for these write '0.03 cm'"
     ]
     assert notes("check", "cm.toml", "--set", "spare=3cm") == []
+
+
+def test_build_reports_a_run_beyond_the_range_as_check_does(
+    notes: Callable[..., list[str]], command: Command, tmp_path: Path
+) -> None:
+    """Coupler and rocker stretch where the crank is at acos(1/8), within the run; the inputs of an FMU may not."""
+    text = toml_text.text(replace(fourbar(2.0, 1.0, 1.0, 1.0, start=1.2), run=RunSettings(0.0, 6.0, 0.1)))
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    build = ("build", "mine.toml", "--flavour", "python", "--no-page")
+    (printed,) = notes(*build)
+    assert printed.endswith("beyond the range")
+    assert f"  {printed.replace('note: ', 'note        ')}" in command("check", "mine.toml").stdout.splitlines()
+    assert notes(*build, "--drive", "inputs") == []
+    assert notes(*build, "--set", "crank.speed=0.01rad/s") == []
 
 
 @pytest.mark.parametrize("is_first", [True, False])
