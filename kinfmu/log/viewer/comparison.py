@@ -13,10 +13,11 @@ from kinfmu.log.cdr import nanoseconds
 from kinfmu.log.viewer.blueprint import compared
 from kinfmu.log.viewer.card import plain
 from kinfmu.log.viewer.decimated import decimated
-from kinfmu.log.viewer.differences import common, difference_of, differs, loads_of, most_apart, parameters_apart
+from kinfmu.log.viewer.differences import common, difference_of, differs, loads_of, most_apart
 from kinfmu.log.viewer.linkage import Linkage
 from kinfmu.log.viewer.loads import log_loads
 from kinfmu.log.viewer.package import require_viewer
+from kinfmu.log.viewer.parameters import parameters_apart
 from kinfmu.log.viewer.rerun_file import application, left_out, log_card, log_group, log_status, recording
 from kinfmu.log.viewer.series import Group, groups
 from kinfmu.log.viewer.timeline import Timeline, timeline_of
@@ -143,11 +144,11 @@ def _card(a: Run, b: Run, difference: Run | None, names: tuple[str, str], notes:
         "",
         f"**B**, blue: {plain(names[1])}. {sentence(b)}.",
         "",
-        *[plain(note) for note in notes],
     ]
     if changed := parameters_apart(a, b):
         rows = [f"| {plain(name)} | {plain(one)} | {plain(other)} |" for name, one, other in changed]
-        lines += ["", "| parameter | A | B |", "|---|---:|---:|", *rows, ""]
+        lines += ["| parameter | A | B |", "|---|---:|---:|", *rows, ""]
+    lines += [plain(note) for note in notes]
     if shared := in_common(a, b):
         lines += ["", f"{plain(shared)}.", ""]
     if difference is None:

@@ -1,4 +1,4 @@
-"""Differences of two runs: B - A of what both have, the parameters that differ, and the efforts that differ most."""
+"""Differences of two runs: B - A of what both have, and the efforts that differ most."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from kinfmu.run.axis import axis_of
 from kinfmu.units import CoordinateName, ForceName, SignalName, unit_of
 
 SAME = 1e-9  # of the largest value; smaller differences are not visible
-_TEXTS = ("name", "title", "token", "engine", "generation_tool")  # of a run's info, which are no parameters
 
 
 class Apart(NamedTuple):
@@ -86,13 +85,6 @@ def differs(group: Group, own: Group | None) -> bool:
     return own is None or _size(group.values) > SAME * _size(own.values)
 
 
-def parameters_apart(a: Run, b: Run) -> list[tuple[str, str, str]]:
-    """Return the parameters that differ with their values in both runs, '-' where a run has none."""
-    names = dict.fromkeys(name for name in (*a.info, *b.info) if name not in _TEXTS and "\n" not in name)
-    pairs = [(name, a.info.get(name, "-"), b.info.get(name, "-")) for name in names]
-    return [(name, _short(one), _short(other)) for name, one, other in pairs if one != other]
-
-
 def most_apart(a: Run, difference: Run) -> list[Apart]:
     """Return forces, reactions and signals that differ, those that differ most of their size first."""
     found = []
@@ -113,11 +105,3 @@ def most_apart(a: Run, difference: Run) -> list[Apart]:
 
 def _size(values: FloatArray) -> float:
     return float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
-
-
-def _short(value: str) -> str:
-    """Return a number with six digits; other texts as they are."""
-    try:
-        return f"{float(value):.6g}"
-    except ValueError:
-        return value
