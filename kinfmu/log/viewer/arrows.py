@@ -9,7 +9,7 @@ import numpy as np
 
 from kinfmu.log.viewer.linkage import MARGIN, Linkage, send
 from kinfmu.scene import palette
-from kinfmu.scene.forces import arrows
+from kinfmu.scene.forces import Arrows
 from kinfmu.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def legend_start(scene: Scene, length: float) -> float:
     return float(starts[int(np.argmax(np.round(apart / scene.size, 6)))])
 
 
-def log_arrows(linkage: Linkage) -> frozenset[str]:
+def log_arrows(linkage: Linkage, found: Arrows | None) -> frozenset[str]:
     """Log the forces of joints and loads, as the scene scales them, and return the names of these loads.
 
     Samples without numbers have no arrows.
@@ -42,7 +42,6 @@ def log_arrows(linkage: Linkage) -> frozenset[str]:
     import rerun as rr
 
     run, scene, path = linkage.run, linkage.scene, f"{linkage.root}/forces"
-    found = arrows(run, run.mechanism, scene) if (run.reaction_names or run.force_names) and run.mechanism else None
     if found is None:
         return frozenset()
     look: dict[str, Any] = {

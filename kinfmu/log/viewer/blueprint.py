@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 from kinfmu.log.viewer.linkage import trail_path, trail_time, view_box
 from kinfmu.log.viewer.series import KINDS, ORDERS, Group
 from kinfmu.log.viewer.timeline import Timeline
 from kinfmu.run import Run
 from kinfmu.run.verdict import notable_events
+from kinfmu.scene.forces import Arrows, arrows
 from kinfmu.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -27,13 +30,21 @@ STATUS, LANES = 0.13, 0.17  # of the height of the right side, for the states of
 LEAST_LEGEND, MOST_LEGEND = 0.15, 0.6  # of the run's time, left free after the curves for the legend
 
 
-class Drawn(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Drawn:
     """A linkage of a recording: title of its view, root entity, its run, and what is drawn of it, if anything."""
 
     title: str
     root: str
     run: Run
     scene: Scene | None
+
+    @cached_property
+    def arrows(self) -> Arrows | None:
+        """The arrows of its forces, None without any."""
+        run = self.run
+        has_forces = bool(run.reaction_names or run.force_names)
+        return arrows(run, run.mechanism, self.scene) if has_forces and self.scene and run.mechanism else None
 
 
 def single(
@@ -67,7 +78,7 @@ def single(
     if has_motion:
         rows.append(status_view([""], timeline, [run]))
         shares.append(STATUS * sum(shares) / (1.0 - STATUS) if shares else 1.0)
-    linked = [linkage_view([one.root], timeline, [one.run], [one.scene], one.title) for one in drawn]
+    linked = [linkage_view([one.root], timeline, [one.run], [one.scene], one.title, one.arrows) for one in drawn]
     linkages = (linked[0] if len(linked) == 1 else rrb.Grid(*linked)) if has_motion and linked else None
     left = _left(linkages, [""], [run])
     right = rrb.Vertical(*rows, row_shares=shares)
@@ -237,13 +248,14 @@ def linkage_view(
     runs: Sequence[Run],
     scenes: Sequence[Scene | None],
     title: str = "linkage",
+    forces: Arrows | None = None,
 ) -> rrb.Spatial2DView:
     """Return the view of the linkages with trails; its origin is the root, so that the flip of the plane applies."""
     import rerun as rr
     import rerun.blueprint as rrb
 
     drawn = [(root, run, scene) for root, run, scene in zip(roots, runs, scenes, strict=True) if scene]
-    boxes = [view_box(scene) for _, _, scene in drawn]
+    boxes = [view_box(scene, forces) for _, _, scene in drawn]
     bounds = None
     if boxes:
         x = (min(box[0][0] for box in boxes), max(box[0][1] for box in boxes))

@@ -16,6 +16,7 @@ from kinfmu.log.viewer.timeline import Timeline
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray, Run
 from kinfmu.scene import details, palette
+from kinfmu.scene.forces import Arrows
 from kinfmu.scene.scene import Scene
 from kinfmu.scene.shape import Shape
 
@@ -27,6 +28,7 @@ TRAIL = 0.5  # length of the trail behind a point, as a part of the linkage's si
 LONGEST_TRAIL = 0.2  # of the run's time
 _TRAIL_PIECES = 1500  # of a path over the whole run
 _PIN, _POINT = 0.012, 0.015  # radii, as parts of the size
+_TIP = 0.03  # around the tips of arrows, as a part of the size
 _SUPPORT_NAMES = 0.04  # additional margin below, for the names of supports
 APPLICATION = "kinfmu"
 ROWS = 4096  # larger blocks are slower and take more memory
@@ -72,11 +74,15 @@ def send(
         rec.send_columns(path, [timeline.column(t[rows])], columns(rows))
 
 
-def view_box(scene: Scene) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return ranges of x and of the flipped y that show everything with a margin."""
+def view_box(scene: Scene, forces: Arrows | None = None) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return ranges of x and of the flipped y that show everything with a margin, and the arrows of forces."""
     margin = MARGIN * scene.size
     below = np.array([0.0, _SUPPORT_NAMES * scene.size if scene.supports else 0.0])
     low, high = scene.low - margin - below, scene.high + margin
+    if forces is not None:
+        tips = np.vstack([forces.at[name] + along for name, along in forces.along.items()])
+        edge = _TIP * scene.size
+        low, high = np.fmin(low, np.nanmin(tips, axis=0) - edge), np.fmax(high, np.nanmax(tips, axis=0) + edge)
     return (float(low[0]), float(high[0])), (float(-high[1]), float(-low[1]))
 
 

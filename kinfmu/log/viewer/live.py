@@ -133,7 +133,7 @@ class LiveView:
             if one.scene:
                 linkage = Linkage(self._stream, one.root, timeline, one.run, one.scene)
                 linkage.log_paths(one.scene.paths)
-                log_loads(linkage, log_arrows(linkage))
+                log_loads(linkage, log_arrows(linkage, one.arrows))
         log_card(self._stream, card(run, " ".join([*left_out(run, shown), note]).strip()))
         self._stream.send_blueprint(single(timeline, shown, drawn, groups(shown), forces, solver))
         self._flush()

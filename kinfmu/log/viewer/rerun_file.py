@@ -93,7 +93,7 @@ def write_rrd(run: Run, path: str | Path) -> None:
             if one.scene:
                 linkage = Linkage(rec, one.root, timeline, one.run, one.scene)
                 linkage.log()
-                log_loads(linkage, log_arrows(linkage))
+                log_loads(linkage, log_arrows(linkage, one.arrows))
         for group in (*curves.values(), *forces, *solver):
             log_group(rec, "", timeline, shown, group)
         log_status(rec, "", timeline, timeline.placed(run))

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 import kinfmu
 from kinfmu.log import write_rrd
+from kinfmu.log.viewer.blueprint import Drawn, single
+from kinfmu.log.viewer.linkage import view_box
 from kinfmu.log.viewer.reactions import reactions
+from kinfmu.log.viewer.timeline import timeline_of
 from kinfmu.run import Run
+from kinfmu.scene.scene import drawable
 from tests.log.viewer.test_rerun_file import SCALARS, rows, statics
 from tests.sweep.test_forces import loaded
 
@@ -49,3 +55,29 @@ def test_undetermined_and_missing_reactions_have_no_curves(run: Run) -> None:
     left_out = [name for name in crank.reaction_names if name.owner == crank.reaction_names[0].owner]
     kept = {name for group in reactions(crank.without(left_out)) for name in group.names}
     assert crank.reaction_names[0].owner not in kept
+
+
+def views(part: Any) -> Iterator[Any]:
+    """The views in a container of a layout."""
+    for inner in getattr(part, "contents", ()) if hasattr(part, "grid_columns") else ():
+        yield from views(inner)
+    if not hasattr(part, "grid_columns"):
+        yield part
+
+
+def test_the_view_shows_all_arrows() -> None:
+    run = kinfmu.solve(kinfmu.load("excavator_loaded"))
+    shown, _ = drawable(run)
+    assert shown is not None
+    drawn = Drawn("linkage", "/linkage", run, shown)
+    found = drawn.arrows
+    assert found is not None
+    layout = single(timeline_of([run]), run, [drawn], {}, [], [])
+    (view,) = (view for view in views(layout.root_container) if view.name == "linkage")
+    (bounds,) = view.properties["VisualBounds2D"].range.as_arrow_array().to_pylist()
+    (x0, x1), (y0, y1) = bounds["x_range"], bounds["y_range"]
+    assert x0 < view_box(shown)[0][0]  # of the linkage alone
+    for name, along in found.along.items():
+        x, y = (found.at[name] + along).T
+        assert x0 < np.nanmin(x) <= np.nanmax(x) < x1, name
+        assert y0 < np.nanmin(-y) <= np.nanmax(-y) < y1, name
