@@ -20,10 +20,10 @@ def fit_html(result: FitResult) -> str:
         errors.append((one.name, one.type, one.rms / factor, one.largest / factor, unit))
     constraints = [(one.name, "holds" if one.holds else "violated", one.text) for one in result.constraints]
     return page(
-        f"{result.mechanism.name}: sum of squares {result.squares:.6g}, rms {result.rms:.6g}",
+        f"{result.mechanism.name}: sum of squares {result.squares:.6g}, rms residual {result.rms:.6g}",
         picture(lambda: fit_svg(result), f"Picture of the fit of {result.mechanism.name}"),
         table(parameter_rows(result), ("unknown", "value", "unit", "bounds", "")),
-        table(errors, ("target", "type", "rms", "largest error", "unit")),
+        table(errors, ("target", "type", "rms error", "largest error", "unit")),
         table(constraints, ("constraint", "", "value")) if constraints else "",
     )
 

@@ -39,11 +39,11 @@ def _angles(problem: FitProblem) -> Iterator[tuple[str, Iterable[Any], bool]]:
             yield from _of_sampled(target, sampled[target.name], problem, is_turned)
     members = {one.name: ("targets", one) for one in problem.targets}
     members |= {one.name: ("constraints", one) for one in problem.constraints}  # type: ignore[misc]
-    for aim in problem.measuring.aims if problem.measuring else ():
-        if aim.unit == "rad":
-            table, one = members[aim.name]
-            for key in ("value", "minimum", "maximum"):
-                yield f"[{table}.{aim.name}] {key}", (getattr(one, key, None),), False
+    units = {aim.owner: aim.unit for aim in (problem.measuring.aims if problem.measuring else ())}
+    for name in (name for name, unit in units.items() if unit == "rad"):
+        table, one = members[name]
+        for key in ("value", "minimum", "maximum"):
+            yield f"[{table}.{name}] {key}", (getattr(one, key, None),), False
 
 
 def _of_sampled(

@@ -1,8 +1,9 @@
 """Constraints: conditions that a fitted mechanism shall meet, as penalties on what violates them.
 
-A violation v adds weight * v**2 to the sum that is minimised. At the end of a search the limits are shifted until the
-violation vanishes (method of multipliers; Nocedal and Wright 2006, chapter 17), so that the weight need not be large.
-Every result states the value of each constraint, its limit and whether it holds.
+A violation v adds weight * S * (v / limit)**2 to the sum that is minimised, where S is the sum of squares of the
+targets of a typical design, so that the units of targets and limits do not matter. At the end of a search the limits
+are shifted, and weights raised where that is slow, until the violation vanishes (method of multipliers; Nocedal and
+Wright 2006, chapter 17). Every result states the value of each constraint, its limit and whether it holds.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ class GrashofConstraint:
         shortest: The link that shall be the shortest one, such as the crank, which then turns all the way round; as
             written in `links`. Default: any.
         gap: By how much p + q exceeds s + l at least, a length. Default: 0.
-        weight: Weight of the square of the violation, which is a length.
+        weight: Weight of the square of the violation, as a part of the mean of the lengths.
 
     """
 
@@ -49,7 +50,7 @@ class MarginConstraint:
     Args:
         name: Name of the constraint.
         minimum: Lowest margin.
-        weight: Weight of the square of the violation.
+        weight: Weight of the square of the violation, as a part of the limit.
 
     """
 
@@ -69,7 +70,7 @@ class MeasureConstraint:
         of: Name of a measure of the mechanism, or a measure such as `kinfmu.readings.Range`.
         minimum: Lowest valid value. Default: none.
         maximum: Highest valid value. Default: none.
-        weight: Weight of the square of the violation.
+        weight: Weight of the square of the violation, as a part of the limit.
 
     """
 

@@ -15,11 +15,16 @@ from kinfmu.plan import compile_plan
 from kinfmu.run import FloatArray
 from kinfmu.solver.python.status import Status
 from kinfmu.sweep import Model
+from kinfmu.synthesis.measuring import Aim
 from kinfmu.synthesis.nearest import NotReachedError, crossings, modulo, nearest
 from kinfmu.synthesis.numbers import Bounds
 from kinfmu.synthesis.problem import FitProblem
 from kinfmu.synthesis.sampled import Sampled
 from kinfmu.units import unit_of
+
+VANISHED = 1e-8  # violation, as a part of the limit's size, that counts as none
+SLOW = 0.25  # of a violation: where more than this is left of it after a search, its penalty grows
+STIFFER, STIFFEST = 10.0, 1e5  # by which a penalty's root grows, and the factor at which a violation does not vanish
 
 
 class NotAssembledError(Exception):
@@ -46,7 +51,8 @@ class Evaluation:
         excess: By how much Grashof's conditions are met, one array for each constraint.
         residuals: Of targets and penalties, weighted (r,).
         target_count: Number of residuals that are no penalties.
-        violations: By how much limits are exceeded, in the order of the penalties; negative within them.
+        violations: By how much limits are exceeded, as parts of their sizes, in the order of the penalties; negative
+            within them.
 
     """
 
@@ -92,7 +98,11 @@ class Equations:
         outputs = dict.fromkeys(name for one in problem.sampled for name in (*one.outputs, one.over) if name)
         self.outputs = tuple(outputs)
         self.names = tuple(problem.bounds)
-        self.shifts = np.zeros_like(self.penalty_roots)  # of the limits, while a search makes violations vanish
+        self.scale = (
+            1.0  # root of the sum of squares of the targets of a typical design, to which penalties are relative
+        )
+        self.shifts = np.zeros_like(self._relative_roots)  # of the limits, while a search makes violations vanish
+        self.stiffness = np.ones_like(self.shifts)  # factors of the penalties, of violations that vanish slowly
         self._ranges = np.array([bounds.high - bounds.low for bounds in problem.bounds.values()])
 
     @cached_property
@@ -129,8 +139,9 @@ class Equations:
             aim.root * (found - aim.value) for aim, found in zip(aims, measured, strict=True) if aim.value is not None
         ]
         limits = [aim.excess(found)[0] for aim, found in zip(aims, measured, strict=True) if aim.value is None]
-        violations = np.concatenate([np.array(limits), *(-met for met, _ in lengths)])
-        penalties = self.penalty_roots * np.maximum(violations + self.shifts, 0.0)
+        violations = np.concatenate([np.array(limits), *(-met for met, _ in lengths)]) / self._sizes
+        roots = self.scale * self.stiffness * self._relative_roots
+        penalties = roots * np.maximum(violations + self.shifts, 0.0)
         weighted = [(one.errors * one.target.scale * one.target.roots).ravel() for one in rows]
         targets = np.concatenate([*weighted, np.array(errors)])
         slopes = [-slopes for _, slopes in lengths]
@@ -138,7 +149,7 @@ class Equations:
         jacobian = np.vstack(blocks) * self._ranges
         first = len(targets) + len(limits)
         active = penalties[len(limits) :] > 0.0
-        jacobian[first:] *= (self.penalty_roots[len(limits) :] * active)[:, None]
+        jacobian[first:] *= (roots[len(limits) :] / self._sizes[len(limits) :] * active)[:, None]
         excess = tuple(met for met, _ in lengths)
         found = Evaluation(
             rows, measured, excess, np.concatenate([targets, penalties]), len(targets), np.asarray(violations)
@@ -146,11 +157,38 @@ class Equations:
         return found, jacobian
 
     @cached_property
-    def penalty_roots(self) -> FloatArray:
+    def _relative_roots(self) -> FloatArray:
         """Square roots of the weights of the penalties: of limits of measures, then of Grashof's conditions."""
-        aims = self.measuring.aims if self.measuring else ()
         lengths = [np.full(one.count, one.root) for one in self.problem.lengths]
-        return np.concatenate([np.array([aim.root for aim in aims if aim.value is None]), *lengths])
+        return np.concatenate([np.array([aim.root for aim in self._limited]), *lengths])
+
+    @cached_property
+    def _sizes(self) -> FloatArray:
+        """What violations are parts of: the larger limit of a measure, or 1; the mean of Grashof's lengths."""
+        lengths = [np.full(one.count, one.size) for one in self.problem.lengths]
+        return np.concatenate([np.array([aim.size for aim in self._limited]), *lengths])
+
+    @cached_property
+    def _limited(self) -> list[Aim]:
+        """The measures with limits."""
+        return [aim for aim in (self.measuring.aims if self.measuring else ()) if aim.value is None]
+
+    def tighten(self, before: FloatArray, violations: FloatArray) -> bool:
+        """Shift the limits by the violations that a search left; return whether another search is worthwhile.
+
+        Where a violation shrank too little since `before`, its penalty grows (Nocedal and Wright 2006, algorithm 17.4).
+        """
+        shifts = np.maximum(violations + self.shifts, 0.0)
+        change = np.abs(shifts - self.shifts)
+        slow = (violations > VANISHED) & (violations > SLOW * before)
+        ends = change.max(initial=0.0) <= VANISHED or bool(np.any(slow & (self.stiffness >= STIFFEST)))
+        self.shifts = np.where(slow, shifts / STIFFER**2, shifts)
+        self.stiffness = np.where(slow, self.stiffness * STIFFER, self.stiffness)
+        return not ends
+
+    def relax(self) -> None:
+        """Undo what `tighten` did."""
+        self.shifts, self.stiffness = np.zeros_like(self.shifts), np.ones_like(self.shifts)
 
     def with_measures(self, z: FloatArray, found: Evaluation, jacobian: FloatArray) -> FloatArray:
         """Return the Jacobian with the rows of measures, which cost two motions for each unknown."""
@@ -165,7 +203,8 @@ class Equations:
             if aim.value is not None:
                 factors[row, k] = aim.root
             elif found.residuals[row] > 0.0:
-                factors[row, k] = aim.root * aim.excess(value)[1]
+                stiffness = self.scale * float(self.stiffness[row - found.target_count])
+                factors[row, k] = stiffness * aim.root / aim.size * aim.excess(value)[1]
         if not factors:
             return jacobian
         jacobian = jacobian.copy()

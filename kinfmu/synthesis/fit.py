@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -92,9 +94,15 @@ def fit(
                 f"none of {len(drawn)} designs within the bounds can be assembled and reaches all samples; "
                 f"the reason of {count}: {reason}{''.join(f'; {text}' for text in angle_notes(problem))}"
             )
+        typical = float(np.median([one.squares for one in drawn if np.isfinite(one.total)]))
+        team.equations.scale = math.sqrt(typical) or 1.0
+        scale = team.equations.scale**2  # that of the draws was 1
+        drawn = [
+            replace(one, total=one.squares + scale * (one.total - one.squares)) for one in drawn if one.z is not None
+        ]
         short = team.results("short", _best(drawn, _SHORT * starts), advance)
         long = team.results("long", _best(short, starts), advance)
-        same = Sameness(problem.turns, float(np.median([one.total for one in drawn if np.isfinite(one.total)])))
+        same = Sameness(problem.turns, typical)
         ends = distinct([(one, 1) for one in long], same)
         polished = team.results("fine", [one.z for one, _ in ends[:_POLISHED] if one.z is not None], advance)
         for one in (*short, *long, *polished):
@@ -102,8 +110,12 @@ def fit(
         if progress is not None:
             progress(steps, steps)
         counts = [count for _, count in ends]
-        best = distinct([*zip(polished, counts, strict=False), *ends[_POLISHED:]], same)
-        optima = tuple(Optimum(problem.vector(one.z), one.total, count) for one, count in best if one.z is not None)
+        best = distinct([*zip(polished, counts, strict=False), *ends[_POLISHED:]], same, by_constraints=True)
+        optima = tuple(
+            Optimum(problem.vector(one.z), one.squares, one.total, count, one.holds)
+            for one, count in best
+            if one.z is not None
+        )
         return result_of(team.equations, optima, tried, refused)
 
 

@@ -26,11 +26,15 @@ _STEP = 1e-30  # of a complex-step derivative, which is exact to round-off
 class Lengths:
     """The conditions on four lengths: p + q - s - l >= gap and, if the shortest is named, others - shortest >= 0.
 
+    If the shortest is named, each of the others is taken for the longest in turn: the same, with conditions that have
+    derivatives where two lengths are equal.
+
     Attributes:
         name: Name of the constraint.
         links: The lengths as expressions.
         shortest: Which of them shall be the shortest; None: any.
         gap: Smallest p + q - s - l [length].
+        size: Mean of the lengths as written, of which a violation is a part.
         root: Square root of the weight.
         parameters: All parameters of the mechanism.
 
@@ -40,6 +44,7 @@ class Lengths:
     links: tuple[Expression, ...]
     shortest: int | None
     gap: float
+    size: float
     root: float
     parameters: Mapping[str, Parameter]
 
@@ -72,6 +77,7 @@ class Lengths:
             tuple(read),
             None if shortest is None else list(links).index(shortest),
             gap,
+            sum(abs(float(link.value(known))) for link in read) / 4.0 or 1.0,
             float(read_weights(f"{where} weight", constraint.weight, 1)[0]) ** 0.5,
             mechanism.parameters,
         )
@@ -79,7 +85,12 @@ class Lengths:
     @property
     def count(self) -> int:
         """Number of conditions."""
-        return 1 if self.shortest is None else 4
+        return 1 if self.shortest is None else 6
+
+    @property
+    def gaps(self) -> int:
+        """How many of them, the first ones, are conditions of the gap."""
+        return 1 if self.shortest is None else 3
 
     def excess(self, values: Mapping[str, float], names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
         """Return by how much each condition is met (count,), and its derivatives by parameters (count, names)."""
@@ -89,14 +100,16 @@ class Lengths:
             if name in self.parameters:
                 known = self._known({**values, name: values[name] + 1j * _STEP})  # type: ignore[dict-item]
                 slopes[:, k] = [complex(link.value(known)).imag / _STEP for link in self.links]
-        order = np.argsort(lengths, kind="stable")
-        signs = np.zeros((self.count, 4))
-        signs[0, order] = [-1.0, 1.0, 1.0, -1.0]
-        others = [k for k in range(4) if k != self.shortest]
-        for row, k in enumerate(others if self.shortest is not None else (), start=1):
-            signs[row, k], signs[row, self.shortest] = 1.0, -1.0
-        limits = np.zeros(self.count)
-        limits[0] = self.gap
+        signs, limits = np.zeros((self.count, 4)), np.zeros(self.count)
+        limits[: self.gaps] = self.gap
+        s = self.shortest
+        if s is None:
+            signs[0, np.argsort(lengths, kind="stable")] = [-1.0, 1.0, 1.0, -1.0]
+        else:
+            for row, k in enumerate(k for k in range(4) if k != s):
+                signs[row] = 1.0
+                signs[row, [k, s]] = -1.0
+                signs[row + 3, [k, s]] = 1.0, -1.0
         return signs @ lengths - limits, signs @ slopes
 
     def _known(self, values: Mapping[str, float]) -> dict[str, float]:

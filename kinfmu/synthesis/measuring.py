@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,7 +15,8 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.number import read_constant
 from kinfmu.mechanism.valid import quoted
 from kinfmu.motion import measure_designs
-from kinfmu.readings import LowestMargin, Reading
+from kinfmu.readings import LowestMargin, Reading, TransmissionAngle
+from kinfmu.readings.transfer import TransmissionSide
 from kinfmu.run import FloatArray
 from kinfmu.sweep import Model
 from kinfmu.sweep import compile as compiled
@@ -31,15 +32,33 @@ STEP = 1e-5  # of the range of an unknown, half of a central difference; error: 
 
 @dataclass(frozen=True)
 class Aim:
-    """A measure with the value it shall have, or its limits."""
+    """A measure with the value it shall have, or its limits.
+
+    Attributes:
+        name: Name under which it is measured.
+        owner: Name of the target or constraint.
+        reading: What is measured.
+        value: The value it shall have; None: it has limits.
+        minimum: Lowest valid value; None: none.
+        maximum: Highest valid value; None: none.
+        root: Square root of the weight.
+        unit: Unit of all values.
+
+    """
 
     name: str
+    owner: str
     reading: Reading
     value: float | None
     minimum: float | None
     maximum: float | None
-    root: float  # square root of the weight
+    root: float
     unit: str
+
+    @property
+    def size(self) -> float:
+        """The larger limit without its sign, of which a violation is a part; 1 if it is 0."""
+        return max(abs(limit) for limit in (self.minimum, self.maximum, 0.0) if limit is not None) or 1.0
 
     def excess(self, found: float) -> tuple[float, float]:
         """Return by how much the nearer limit is exceeded, negative within the limits, and its derivative: 1 or -1."""
@@ -77,7 +96,7 @@ class Measuring:
         for aim, value in zip(self.aims, found[:, 0], strict=True):
             if not np.isfinite(value):
                 reason = reasons.get(0, "some samples are not reached")
-                raise KinfmuError(f"measure '{aim.name}' has no value: {reason}")
+                raise KinfmuError(f"measure '{aim.owner}' has no value: {reason}")
         return found[:, 0]
 
     def slopes(
@@ -142,7 +161,7 @@ def measuring_of(
     model = compiled(replace(mechanism, coordinates="all", measures=()))
     inputs = _inputs(model, argument)
     units = measure_designs(model, {}, named, **inputs).units
-    aims = []
+    aims: list[Aim] = []
     for (where, one), reading in zip(both, readings, strict=True):
         unit = units[one.name]
         quantity = Quantity("number") if unit == "1" else quantity_in(unit, mechanism.length_unit)
@@ -157,8 +176,22 @@ def measuring_of(
                 f"{where} minimum = {quoted(one.minimum)} must be between 0 and 1, as 1 / condition is"
             )
         root = float(read_weights(f"{where} weight", one.weight, 1)[0]) ** 0.5
-        aims.append(Aim(one.name, reading, **limits, root=root, unit=unit))
+        for part in _parts(reading, limits["value"], limits["minimum"]):
+            aims.append(Aim(f"measure_{len(aims)}", one.name, part, **limits, root=root, unit=unit))
     return Measuring(model, inputs, aims)
+
+
+def _parts(reading: Reading, value: float | None, minimum: float | None) -> Iterable[Reading]:
+    """Yield what is measured for a target or constraint: both sides of a transmission angle with a highest value.
+
+    An optimum often has equal deviations on both sides, where their maximum has no derivatives.
+    """
+    if value is not None or minimum is not None or not isinstance(reading, TransmissionAngle):
+        yield reading
+        return
+    first, second = reading.coupler
+    for coupler in ((first, second), (second, first)):
+        yield TransmissionSide(reading.name, coupler, reading.output, reading.begin, reading.end)
 
 
 def _renamed(reading: Reading, name: str) -> Reading:

@@ -19,14 +19,18 @@ class Optimum:
 
     Attributes:
         parameters: Values of the unknowns by name.
-        total: Weighted sum of squares, with penalties.
+        squares: Weighted sum of squares of the targets.
+        total: The same with penalties.
         searches: Number of whole searches that ended there.
+        holds: Whether all constraints are met.
 
     """
 
     parameters: Mapping[str, float]
+    squares: float
     total: float
     searches: int
+    holds: bool
 
 
 @dataclass(frozen=True, eq=False)

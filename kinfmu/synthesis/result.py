@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,20 +11,18 @@ import numpy as np
 
 from kinfmu.display import Displayed
 from kinfmu.errors import KinfmuError
-from kinfmu.mechanism.display_unit import DisplayUnit
-from kinfmu.readings import counted_from
 from kinfmu.run import FloatArray
 from kinfmu.sweep.continued import continued
 from kinfmu.synthesis import display_units
+from kinfmu.synthesis.constraint_results import constraint_results
 from kinfmu.synthesis.equations import Equations, Evaluation, NotAssembledError
-from kinfmu.synthesis.outcome import ConstraintResult, FitOutcome, Optimum, TargetErrors
+from kinfmu.synthesis.outcome import FitOutcome, Optimum, TargetErrors
 from kinfmu.synthesis.problem import FitProblem
 from kinfmu.synthesis.text import report
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-HOLDS = 1e-6  # violation relative to the limit, or to 1, up to which a constraint holds
 _NO_EFFECT = 1e-9  # of the largest effect: round-off
 _SAME = 1e-6  # relative difference of sums up to which a mechanism file gives the motion that was fitted
 
@@ -48,7 +47,7 @@ class FitResult(FitOutcome, Displayed):
     """
 
     def __repr__(self) -> str:
-        return f"<Fit of {self.mechanism.name}: sum of squares {self.squares:.6g}, rms {self.rms:.6g}>"
+        return f"<Fit of {self.mechanism.name}: sum of squares {self.squares:.6g}, rms residual {self.rms:.6g}>"
 
     def __str__(self) -> str:
         return "\n".join(report(self))
@@ -78,12 +77,15 @@ def result_of(equations: Equations, optima: Sequence[Optimum], tried: int, refus
     followed = continued(problem.mechanism, settings)
     z = np.array([(best.parameters[name] - b.low) / (b.high - b.low) for name, b in problem.bounds.items()])
     fitted, jacobian = equations.at(z)
-    found, note = fitted, followed.message
+    found, listed, note = fitted, fitted, followed.message
     try:
         again = Equations(problem.of(followed.mechanism), "python")
+        again.scale = equations.scale
         found, _ = again.at(z)
         if abs(found.total - fitted.total) > _SAME * fitted.total + 1e-12:
             note = f"the mechanism file assembles in another way: its sum of squares is {found.squares:.6g}"
+        else:
+            listed = found
     except (KinfmuError, NotAssembledError) as reason:
         note = f"the mechanism does not assemble from its file: {reason}"
     return FitResult(
@@ -93,8 +95,8 @@ def result_of(equations: Equations, optima: Sequence[Optimum], tried: int, refus
         errors=tuple(_errors(problem, found)),
         residuals=found.residuals[: found.target_count],
         squares=found.squares,
-        constraints=tuple(_constraints(problem, found)),
-        optima=tuple(optima),
+        constraints=tuple(constraint_results(problem, found)),
+        optima=(replace(best, squares=listed.squares, total=listed.total), *optima[1:]),
         tried=tried,
         refused=dict(refused),
         idle=_idle(problem, jacobian),
@@ -141,9 +143,9 @@ def _errors(problem: FitProblem, found: Evaluation) -> list[TargetErrors]:
             reached = np.array([[float(value)]])
             result.append(
                 TargetErrors(
-                    aim.name,
+                    aim.owner,
                     "measure",
-                    (aim.name,),
+                    (aim.owner,),
                     (aim.unit,),
                     "",
                     np.empty(0),
@@ -153,35 +155,7 @@ def _errors(problem: FitProblem, found: Evaluation) -> list[TargetErrors]:
                     np.array([size]),
                     size,
                     size,
-                    (display_units.of_measure(problem, aim.name, aim.unit),),
+                    (display_units.of_measure(problem, aim.owner, aim.unit),),
                 )
             )
     return result
-
-
-def _constraints(problem: FitProblem, found: Evaluation) -> list[ConstraintResult]:
-    unit, constraints = problem.mechanism.length_unit, []
-    for one, met in zip(problem.lengths, found.excess, strict=True):
-        gap = float(met[0]) + one.gap
-        text = f"p + q - s - l = {gap:.6g} {unit}, at least {one.gap:.6g} {unit}"
-        if one.shortest is not None:
-            text += (
-                f"; the other links exceed {one.links[one.shortest].text} by {float(met[1:].min()):.6g} {unit} or more"
-            )
-        violation = max(0.0, -float(met.min()))
-        holds = violation <= HOLDS * max(1.0, abs(one.gap))
-        constraints.append(ConstraintResult(one.name, text, violation, holds, DisplayUnit(unit)))
-    for aim, value in zip(problem.measuring.aims if problem.measuring else (), found.measured, strict=True):
-        if aim.value is not None:
-            continue
-        display = display_units.of_measure(problem, aim.name, aim.unit)
-        limits = [f"at least {aim.minimum / display.factor:.6g}"] if aim.minimum is not None else []
-        limits += [f"at most {aim.maximum / display.factor:.6g}"] if aim.maximum is not None else []
-        violation = max(0.0, aim.excess(float(value))[0])
-        size = max(1.0, *(abs(limit) for limit in (aim.minimum, aim.maximum) if limit is not None))
-        shown = display.suffix
-        datum = counted_from(aim.reading.type)
-        number = f"{float(value) / display.factor:.6g}{shown}{datum}"
-        text = f"{aim.reading.type} = {number}, {' and '.join(limits)}{shown}"
-        constraints.append(ConstraintResult(aim.name, text, violation, violation <= HOLDS * size, display))
-    return constraints

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinfmu.run import FloatArray
+from kinfmu.synthesis.constraint_results import constraint_results
 from kinfmu.synthesis.equations import Equations, Evaluation, NotAssembledError
 from kinfmu.synthesis.problem import FitProblem
 
@@ -24,8 +25,7 @@ class Effort(NamedTuple):
     most: int
 
 
-_SHIFTS = 20  # most rounds of the method of multipliers
-_VANISHED = 1e-7  # relative change of the shifts at which they end
+_ROUNDS = 20  # most of the method of multipliers
 SHORT, LONG, FINE = Effort(1e-6, 12), Effort(1e-6, 150), Effort(1e-15, 300)
 
 
@@ -37,6 +37,8 @@ class Found:
         z: (n,) the unknowns as parts of their ranges; None: the start cannot be assembled.
         total: Sum of squares with penalties.
         tried: Number of designs.
+        squares: Sum of squares of the targets.
+        holds: Whether the constraints hold.
         refused: How often designs could not be assembled or did not reach a sample, by reason.
 
     """
@@ -44,6 +46,8 @@ class Found:
     z: FloatArray | None
     total: float
     tried: int
+    squares: float = np.inf
+    holds: bool = True
     refused: Mapping[str, int] = field(default_factory=dict)
 
 
@@ -94,9 +98,10 @@ def search(equations: Equations, z: FloatArray, effort: Effort) -> Found:
 
     z = np.clip(z, 1e-9, 1.0 - 1e-9)  # strictly within the bounds
     if not np.isfinite(residuals(z)).all():
-        return Found(None, np.inf, tried, refused)
+        return Found(None, np.inf, tried, refused=refused)
+    before = np.full_like(equations.shifts, np.inf)
     try:
-        for _ in range(_SHIFTS if effort is FINE else 1):
+        for _ in range(_ROUNDS if effort is FINE else 1):
             last.clear()
             z = least_squares(
                 residuals,
@@ -111,12 +116,19 @@ def search(equations: Equations, z: FloatArray, effort: Effort) -> Found:
                 max_nfev=effort.most,
             ).x
             found, _ = equations.at(z)
-            before, equations.shifts = equations.shifts, np.maximum(found.violations + equations.shifts, 0.0)
-            if np.abs(equations.shifts - before).max(initial=0.0) <= _VANISHED * np.abs(before).max(initial=_VANISHED):
+            if not equations.tighten(before, found.violations):
                 break
+            before = found.violations
     finally:
-        equations.shifts = np.zeros_like(equations.shifts)
-    return Found(z, equations.at(z)[0].total, tried, refused)
+        equations.relax()
+    return found_at(equations, z, tried, refused)
+
+
+def found_at(equations: Equations, z: FloatArray, tried: int = 1, refused: Mapping[str, int] | None = None) -> Found:
+    """Return a design as the end of a search."""
+    found, _ = equations.at(z)
+    holds = all(one.holds for one in constraint_results(equations.problem, found))
+    return Found(z, found.total, tried, found.squares, holds, refused or {})
 
 
 SAME = 1e-3  # of the ranges of the unknowns, between two ends of a search at one optimum
@@ -144,10 +156,15 @@ class Sameness(NamedTuple):
         return bool(np.abs(apart).max() <= SAME) and abs(one.total - other.total) <= most
 
 
-def distinct(found: Sequence[tuple[Found, int]], same: Sameness) -> list[tuple[Found, int]]:
-    """Return optima with the number of searches that ended there, each once, best first."""
+def distinct(
+    found: Sequence[tuple[Found, int]], same: Sameness, *, by_constraints: bool = False
+) -> list[tuple[Found, int]]:
+    """Return optima with the number of searches that ended there, each once, best first.
+
+    by_constraints: Those whose constraints hold precede all others.
+    """
     kept: list[tuple[Found, int]] = []
-    for one, searches in sorted(found, key=lambda pair: pair[0].total):
+    for one, searches in sorted(found, key=lambda pair: (by_constraints and not pair[0].holds, pair[0].total)):
         for k, (other, count) in enumerate(kept):
             if same.holds(one, other):
                 kept[k] = other, count + searches

@@ -15,7 +15,7 @@ from kinfmu.run import FloatArray
 from kinfmu.synthesis.argument import SAMPLES
 from kinfmu.synthesis.equations import Equations, NotAssembledError
 from kinfmu.synthesis.problem import FitProblem
-from kinfmu.synthesis.search import FINE, LONG, SHORT, Found, search
+from kinfmu.synthesis.search import FINE, LONG, SHORT, Found, found_at, search
 
 Task = Literal["draw", "short", "long", "fine"]
 Advance = Callable[[int], None]
@@ -73,7 +73,7 @@ class Team:
             return (_done(self.equations, task, z) for z in starts)
         chunk = max(1, len(starts) // (8 * self.workers))
         with without_main():
-            return self._pool.map(_work, [task] * len(starts), starts, chunksize=chunk)
+            return self._pool.map(_work, [(task, self.equations.scale)] * len(starts), starts, chunksize=chunk)
 
 
 def _equations_of(problem: FitProblem, engine: str, designs: int) -> Equations:
@@ -105,7 +105,8 @@ def _join(problem: FitProblem, engine: str) -> None:
     _equations = Equations(problem, engine)
 
 
-def _work(task: Task, z: FloatArray) -> Found:
+def _work(work: tuple[Task, float], z: FloatArray) -> Found:
+    task, _equations.scale = work
     return _done(_equations, task, z)
 
 
@@ -113,6 +114,6 @@ def _done(equations: Equations, task: Task, z: FloatArray) -> Found:
     if task != "draw":
         return search(equations, z, _EFFORTS[task])
     try:
-        return Found(z, equations.at(z)[0].total, 1)
+        return found_at(equations, z)
     except NotAssembledError as reason:
-        return Found(None, np.inf, 1, {str(reason): 1})
+        return Found(None, np.inf, 1, refused={str(reason): 1})

@@ -12,6 +12,7 @@ from kinfmu.mechanism.display_unit import DisplayUnit
 from kinfmu.readings import counted_from
 from kinfmu.synthesis.angle_notes import angle_notes
 from kinfmu.synthesis.display_units import of_unknown
+from kinfmu.synthesis.numbers import Bounds
 from kinfmu.synthesis.outcome import FitOutcome, TargetErrors, argument_unit
 
 MOST_OPTIMA = 10
@@ -29,7 +30,7 @@ def report(result: FitOutcome) -> list[str]:
         lines.append(f"  {count} of them refused, for example: {reason}")
     lines += [f"  note: {text}" for text in angle_notes(result.problem)]
     unit = argument_unit(result.problem)
-    kinds = {aim.name: aim.reading.type for aim in (result.problem.measuring.aims if result.problem.measuring else ())}
+    kinds = {aim.owner: aim.reading.type for aim in (result.problem.measuring.aims if result.problem.measuring else ())}
     for one in result.errors:
         lines += ["", *_target(one, unit, counted_from(kinds.get(one.name, "")) if one.type == "measure" else "")]
     if result.constraints:
@@ -38,6 +39,7 @@ def report(result: FitOutcome) -> list[str]:
             excess = f"{met.violation / met.display.factor:.3g}{met.display.suffix}"
             verdict = "holds" if met.holds else f"VIOLATED by {excess}"
             lines.append(f"  {met.name}: {verdict}; {met.text}")
+        lines += [f"  note: {text}" for text in constraint_notes(result)]
     lines += ["", "parameters", *aligned([("", "value", "unit", "bounds", ""), *parameter_rows(result)])]
     lines += [f"  note: {text}" for text in parameter_notes(result)]
     lines += ["", "local optima"]
@@ -46,26 +48,28 @@ def report(result: FitOutcome) -> list[str]:
     rows = [
         (
             f"{k}",
-            f"{one.total:.9g}",
+            f"{one.squares:.9g}",
+            *(("hold" if one.holds else "violated",) if result.constraints else ()),
             f"{one.searches}",
             *(f"{value / units[name].factor:.6g}" for name, value in one.parameters.items()),
         )
         for k, one in enumerate(result.optima[:MOST_OPTIMA], start=1)
     ]
-    lines += aligned([("", "sum of squares", "searches", *titles), *rows])
+    constraints = ["constraints"] if result.constraints else []
+    lines += aligned([("", "sum of squares", *constraints, "searches", *titles), *rows])
     if len(result.optima) > MOST_OPTIMA:
         lines.append(f"  and {len(result.optima) - MOST_OPTIMA} more")
     return lines
 
 
 def _unit_of_errors(result: FitOutcome) -> str:
-    """Return the unit of the errors whose squares are summed, and their rms in the unit of the targets."""
+    """Return the unit of the errors whose squares are summed, and the rms residual in the unit of the targets."""
     units = list(dict.fromkeys(one.units[0] for one in result.errors))
     shown = {one.display[0] for one in result.errors}
     if len(units) > 1:
-        return f" (errors in {listed(units)}), rms {result.rms:.6g}"
+        return f" (errors in {listed(units)}), rms residual {result.rms:.6g}"
     display = shown.pop() if len(shown) == 1 else DisplayUnit(units[0])
-    return f" (errors in {units[0]}), rms {result.rms / display.factor:.6g}{display.suffix}"
+    return f" (errors in {units[0]}), rms residual {result.rms / display.factor:.6g}{display.suffix}"
 
 
 def _target(one: TargetErrors, unit: str, datum: str) -> Iterable[str]:
@@ -79,7 +83,7 @@ def _target(one: TargetErrors, unit: str, datum: str) -> Iterable[str]:
         return
     first, factors = one.display[0], np.array([column.factor for column in one.display])
     rms, largest = one.rms / first.factor, one.largest / first.factor
-    yield f"{one.name} ({one.type}): rms {rms:.6g} {first.unit}, largest error {largest:.6g} {first.unit}"
+    yield f"{one.name} ({one.type}): rms error {rms:.6g} {first.unit}, largest error {largest:.6g} {first.unit}"
     degrees = unit == "rad"
     columns = [f"{name} [{unit}]" for name, (unit, _) in zip(one.names, one.display, strict=True)]
     titles = (
@@ -106,11 +110,28 @@ def parameter_rows(result: FitOutcome) -> list[tuple[str, ...]]:
     for name, value in result.parameters.items():
         unit, factor = of_unknown(problem, name)
         low, high = problem.bounds[name]
-        near = 1e-6 * (high - low)
-        at = "at its lower bound" if value - low < near else "at its upper bound" if high - value < near else ""
+        at = _at_bound(value, problem.bounds[name])
         bounds = f"[{low / factor:.6g}, {high / factor:.6g}]"
         rows.append((name, f"{value / factor:.12g}", unit.removeprefix("1"), bounds, at))
     return rows
+
+
+def _at_bound(value: float, bounds: Bounds) -> str:
+    near = 1e-6 * (bounds.high - bounds.low)
+    low, high = value - bounds.low < near, bounds.high - value < near
+    return "at its lower bound" if low else "at its upper bound" if high else ""
+
+
+def constraint_notes(result: FitOutcome) -> list[str]:
+    """Return what to try where constraints are violated."""
+    violated = [one.name for one in result.constraints if not one.holds]
+    if not violated:
+        return []
+    bounds = result.problem.bounds
+    at_bound = [name for name, value in result.parameters.items() if _at_bound(value, bounds[name])]
+    wider = f"widen the bounds of {listed(at_bound)}" if at_bound else "add unknowns"
+    limits = f"the limit{'s' if len(violated) > 1 else ''} of {listed(violated)}"
+    return [f"no design that was found meets all constraints: {wider}, loosen {limits}, or raise --starts"]
 
 
 def parameter_notes(result: FitOutcome) -> list[str]:

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 import kinfmu
 from kinfmu.cli import main
-from kinfmu.mechanism import toml_text
+from kinfmu.mechanism import toml_file, toml_text
 from kinfmu.mechanism.parameters import Parameter
 from kinfmu.readings import Range
 from kinfmu.synthesis import (
@@ -96,7 +96,77 @@ def test_a_constraint_that_cannot_hold_is_reported() -> None:
 
     assert not result.holds
     assert result.constraints[0].violation > 1.0
-    assert "turns: VIOLATED by" in str(result)
+    text = str(result)
+    assert "turns: VIOLATED by" in text
+    assert "note: no design that was found meets all constraints: add unknowns" in text  # none is at a bound
+    assert not any(one.holds for one in result.optima)
+    assert "  violated  " in text.partition("local optima")[2]
+
+
+def test_violations_have_the_least_squares_where_a_constraint_cannot_hold() -> None:
+    links = ["ground", "crank", "coupler", "rocker"]  # 4 m, 0.5 to 2.5 m, 2 to 5 m, 3 m
+    impossible = GrashofConstraint(name="turns", links=links, shortest="crank", gap="5 m")
+
+    result = kinfmu.fit(_problem(constraints=[impossible]), starts=1, engine="python")
+
+    # violations with each link as the longest at crank = 0.5 m: b - 1.5 m, 6.5 m - b, 4.5 m - b
+    assert result.parameters["coupler"] == pytest.approx(25.0 / 6.0, abs=1e-4)
+    assert result.constraints[0].violation == pytest.approx(8.0 / 3.0, abs=1e-4)
+    assert "widen the bounds of crank, loosen the limit of turns, or raise --starts" in str(result)
+
+
+ARCS = {
+    "cup": [(0, 30), (6, 24), (12, 22), (18, 24), (25, 32)],
+    "five": [(0, 20), (6, 26), (12, 28), (18, 26), (25, 18)],
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("points", "limit", "weight"),
+    [("cup", 40.0, 100.0), ("cup", 30.0, 100.0), ("five", 30.0, 100.0), ("five", 30.0, 1e-3)],
+)
+def test_a_limit_in_degrees_holds_for_a_path_in_millimetres(points: str, limit: float, weight: float) -> None:
+    page = Path("docs/fitting.md").read_text(encoding="utf-8")
+    mechanism = toml_file.parse(page.split("```toml\n")[1].partition("```")[0], "guide.toml")
+    bounds = {
+        "ground": (25, 60),
+        "crank": (5, 20),
+        "coupler": (20, 60),
+        "rocker": (20, 60),
+        "px": (5, 40),
+        "py": (-5, 40),
+    }
+    lines = ("coupler.P", "coupler.Q"), ("rocker.C", "rocker.Q")
+    deviation = kinfmu.readings.TransmissionAngle("mu", *lines)
+    good = MeasureConstraint(name="good", of=deviation, maximum=f"{limit} deg", weight=weight)
+    links = GrashofConstraint(
+        name="turns", links=["ground", "crank", "coupler", "rocker"], shortest="crank", gap="2 mm", weight=weight
+    )
+    target = PathTarget(name="arch", of="coupler.pen", points=ARCS[points])
+    result = kinfmu.fit(kinfmu.FitProblem(mechanism, bounds, [target], [links, good]), starts=2)
+
+    assert result.holds, result
+    turn = kinfmu.solve(result.mechanism, crank_angle=np.linspace(0.0, 2.0 * np.pi, 721))
+    assert kinfmu.measure(turn, [deviation])["mu"].value <= np.radians(limit) + 2e-6
+    assert [one.name for one in result.constraints] == ["turns", "good"]
+    assert "note: no design" not in str(result)
+
+
+def test_the_first_line_and_the_first_optimum_have_the_same_sum_of_squares() -> None:
+    mechanism = four_bar()
+    at = np.radians([10.0, 50.0, 90.0, 130.0])
+    traced = kinfmu.solve(mechanism, crank_angle=at)
+    points = list(zip(at, traced["rocker.phi"], strict=True))
+    target = FunctionTarget(name="f", of="rocker.phi", points=points)
+    result = kinfmu.fit(_problem(unknowns={"crank": (0.5, 2.5), "coupler": (2.0, 5.0)}, targets=[target]), starts=2)
+    text = str(result)
+    first = re.search(r"sum of squares (\S+) ", text)
+    row = re.search(r"sum of squares  .*\n +1 +(\S+) ", text)
+    assert first is not None
+    assert row is not None
+    assert first[1] == row[1]
+    assert float(first[1]) < 1e-24
 
 
 def test_a_file_gives_what_python_gives(tmp_path: Path) -> None:
@@ -169,7 +239,7 @@ def test_the_report_shows_numbers_in_the_units_in_which_they_are_written() -> No
     assert values["crank"] == pytest.approx(100.0 * found["crank"], rel=1e-9)
     assert values["tilt"] == pytest.approx(np.degrees(found["tilt"]), rel=1e-9)
     function, measure = result.errors
-    assert f"f (function): rms {np.degrees(function.rms):.6g} deg" in text
+    assert f"f (function): rms error {np.degrees(function.rms):.6g} deg" in text
     assert "rocker.phi [deg], wanted" in text
     for k in range(3):
         assert f" {np.degrees(function.wanted[k, 0]):.6g} " in text
@@ -202,9 +272,11 @@ def test_the_first_line_names_the_unit_of_the_errors() -> None:
     target = FunctionTarget(name="f", of="rocker.phi", points=points, offset=("0 deg", "90 deg"))
     result = kinfmu.fit(_problem(unknowns={"crank": (0.5, 2.5)}, targets=[target]), starts=1, engine="python")
     first = str(result).splitlines()[0]
-    assert f"sum of squares {result.squares:.9g} (errors in rad), rms {np.degrees(result.rms):.6g} deg, " in first
+    assert (
+        f"sum of squares {result.squares:.9g} (errors in rad), rms residual {np.degrees(result.rms):.6g} deg, " in first
+    )
     path = str(kinfmu.fit(_problem(targets=[PATH, target]), starts=1, engine="python")).splitlines()[0]
-    assert " (errors in m, rad), rms " in path
+    assert " (errors in m, rad), rms residual " in path
 
 
 def test_a_design_that_does_not_reach_a_point_is_refused_with_angle_and_status() -> None:

@@ -190,13 +190,15 @@ def test_measures_and_constraints() -> None:
         return ends[0] - ends[1] - mpmath.radians(40)
 
     def violation(x: Sequence[Any]) -> Any:  # 2 coupler is the longest link here
-        return 2 * (x[1] + 2 * x[2] + 2 - x[0] - x[3])
+        size = (LENGTHS["ground"] + LENGTHS["crank"] + 2 * LENGTHS["coupler"] + LENGTHS["rocker"]) / 4
+        return 2 * (x[1] + 2 * x[2] + 2 - x[0] - x[3]) / size
 
     _, x, residuals, jacobian = _of_kinfmu([target], constraints=[grashof, margin])
 
     values, slopes = _differences(lambda x: [swing(x), violation(x)], x)
-    assert residuals[[0, 2]] == pytest.approx(values, abs=1e-9)
-    assert jacobian[[0, 2]] == pytest.approx(slopes, abs=1e-7)
+    assert residuals[[0, 3]] == pytest.approx(values, abs=1e-9)
+    assert jacobian[[0, 3]] == pytest.approx(slopes, abs=1e-7)
     assert residuals[1] > 0.0  # the margin is lower than its limit
-    assert (residuals[3:] == 0.0).all()  # the crank is the shortest link
+    assert (residuals[[2, 4]] == 0.0).all()  # ground and rocker may be the longest link
+    assert (residuals[5:] == 0.0).all()  # the crank is the shortest link
     assert np.abs(jacobian[1]).max() > 0.01
