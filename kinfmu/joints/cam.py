@@ -83,24 +83,27 @@ class Cam(Joint):
             raise MechanismError(
                 f"{where} cam = '{self.cam}' must be another body than the follower and what holds it", joint=self.name
             )
-        why = self.law.why_not_periodic() if self.law.repeats else ""
+        why = _why_not_periodic(self.law, self.led) if self.law.repeats else ""
         if why:
-            raise MechanismError(f"{where} law: {why}{_cure(self.law, self.led)}", joint=self.name)
+            raise MechanismError(f"{where} law: {why}", joint=self.name)
 
 
-def _cure(law: Law, led: str) -> str:
-    """Return what to change of a law that is not periodic; '' where its reason says that."""
+def _why_not_periodic(law: Law, led: str) -> str:
+    """Return why a law is not periodic, and what to change; '' if it is."""
+    why = law.why_not_periodic()
+    if not why:
+        return ""
     if isinstance(law, MotionSequence):
         if abs(sum(segment.duration for segment in law.segments) - TURN) > NEARLY * TURN:
-            return ""
-        rises = [segment.rise for segment in law.segments if segment.rise != 0.0]
-        bare = next((rise for rise in rises if abs(rise) > TURN), None)
-        if led == "angle" and bare is not None:
-            shown = listed(f"{math.degrees(rise):.6g} deg" for rise in rises)
-            return f" ({shown}); a bare angle is in radians: write '{bare:.6g} deg' for degrees"
+            return why
         if led == "angle":
-            return f" ({math.degrees(sum(rises)):.6g} deg); a follower that goes on turn after turn needs a coupling"
-    return "; a follower that goes on turn after turn needs a coupling"
+            rises = [segment.rise for segment in law.segments if segment.rise != 0.0]
+            why = f"the rises of its sequence add up to {math.degrees(sum(rises)):.9g} deg, not to 0"
+            bare = next((rise for rise in rises if abs(rise) > TURN), None)
+            if bare is not None:
+                shown = listed(f"{math.degrees(rise):.6g} deg" for rise in rises)
+                return f"{why} ({shown}); a bare angle is in radians: write '{bare:.6g} deg' for degrees"
+    return f"{why}; a follower that goes on turn after turn needs a coupling"
 
 
 def closing(law: Law) -> tuple[Condition, ...]:

@@ -21,7 +21,7 @@ from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.valid import check_line, check_name, quoted
 from kinfmu.readings import Reading
 from kinfmu.readings.extremes import Maximum, Minimum, Peak, PeakAcceleration, PeakSpeed, Range
-from kinfmu.units import METRES, CoordinateName
+from kinfmu.units import METRES, CoordinateName, factors
 
 _EFFORTS = ("torque", "force", "power")  # nouns of forces of drivers; joints have forces, too
 _OF_MECHANISM = ("shaking_force", "shaking_moment", "kinetic_energy", "potential_energy")
@@ -68,7 +68,10 @@ def check_names(members: Members, points: Mapping[str, str]) -> None:
 
 
 def check_members(
-    members: Members, parameters: Mapping[str, Parameter], expressions: Mapping[NumberPath, Expression]
+    members: Members,
+    parameters: Mapping[str, Parameter],
+    expressions: Mapping[NumberPath, Expression],
+    length_unit: str,
 ) -> None:
     """Raise a MechanismError that states table and key of the first invalid reference or value."""
     if not members.moving_bodies:
@@ -77,11 +80,11 @@ def check_members(
         _check_body_itself(body)
     bodies = members.bodies_by_name
     for body in members.bodies:
-        _with_causes(("bodies", body.name), body.check_mass, parameters, expressions)
+        _with_causes(("bodies", body.name), body.check_mass, parameters, expressions, length_unit)
     acting: tuple[Joint | Driver | Load, ...] = (*members.joints, *members.drivers, *members.loads)
     for member in acting:
         _check_references(bodies, member)
-        _with_causes((table_of(member), member.name), member.check, parameters, expressions)
+        _with_causes((table_of(member), member.name), member.check, parameters, expressions, length_unit)
     _check_names_of_results(members, parameters)
 
 
@@ -227,6 +230,7 @@ def _with_causes(
     check: Callable[[], None],
     parameters: Mapping[str, Parameter],
     expressions: Mapping[NumberPath, Expression],
+    length_unit: str,
 ) -> None:
     """Run a member's own check; an error also states those expressions that give the keys that it names, if any."""
     try:
@@ -239,8 +243,15 @@ def _with_causes(
             raise
         values = dict.fromkeys(name for expression in at_fault.values() for name in expression.names)
         causes = [f"{path_text(place).partition('] ')[2]} = {quoted(e.text)}" for place, e in at_fault.items()]
-        causes += [f"{name} = {float(parameters[name].value)!r}" for name in values]
+        causes += [f"{name} = {_as_written(parameters[name], length_unit)}" for name in values]
         raise type(error)(f"{error} ({listed(causes)})", **error.data) from None
+
+
+def _as_written(parameter: Parameter, length_unit: str) -> str:
+    """Return the value of a parameter in the unit in which it is written."""
+    value = float(parameter.value)
+    factor = factors(parameter.quantity, length_unit).get(parameter.unit) if parameter.quantity else None
+    return repr(value) if factor is None else f"{value / factor:.12g} {parameter.unit}"
 
 
 def _check_reference(bodies: Bodies, where: str, value: Any, reference: Reference, *, is_pair: bool) -> None:

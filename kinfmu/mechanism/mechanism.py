@@ -97,7 +97,7 @@ class Mechanism(Live):
             object.__setattr__(self, key, getattr(members, key))
         object.__setattr__(self, "parameters", MappingProxyType(parameters))
         object.__setattr__(self, "expressions", MappingProxyType(expressions))
-        check_members(members, parameters, expressions)
+        check_members(members, parameters, expressions, self.length_unit)
         check_outputs(members, self.points, self.coordinates)
         if self.measures:
             check_readings(members, coordinate_orders(self))

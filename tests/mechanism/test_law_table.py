@@ -79,6 +79,25 @@ def test_numbers_of_a_law_have_the_units_of_the_driven_quantity_over_time() -> N
     ) == MotionSequence((Segment("dwell", 1.0), Segment("cycloidal", 0.5, 10.0)), repeat=True)
 
 
+def test_rises_that_do_not_add_up_are_reported_in_the_units_of_the_file() -> None:
+    written = (
+        'name = "cam"\nparameters = { swing = "20 deg", back = "15 deg" }\n'
+        "bodies.ground.points = { O = [0, 0], C = [60, 0] }\nbodies.cam.points.O = [0, 0]\n"
+        "bodies.follower.points.C = [0, 0]\n"
+        'joints.O = { type = "revolute", between = ["ground.O", "cam.O"] }\n'
+        'joints.C = { type = "revolute", between = ["ground.C", "follower.C"] }\n'
+        'joints.lift = { type = "cam_oscillating", between = ["ground", "follower"], cam = "cam", law = "sequence", '
+        'repeat = true, segments = [{ law = "cycloidal", duration = "180 deg", rise = "swing" }, '
+        '{ law = "cycloidal", duration = "180 deg", rise = "-back" }] }\n'
+    )
+    with pytest.raises(MechanismError) as caught:
+        parse(written)
+    assert str(caught.value).endswith(
+        "[joints.lift] law: the rises of its sequence add up to 5 deg, not to 0; a follower that goes on turn after "
+        "turn needs a coupling (rise_1 = 'swing', rise_2 = '-back', swing = 20 deg, back = 15 deg)"
+    )
+
+
 def test_numbers_of_a_law_may_be_expressions_of_parameters() -> None:
     mechanism = arm(
         'law = "sequence"\nsegments = [{ law = "cycloidal", rise = "2*h", duration = "T" }, '
@@ -90,7 +109,7 @@ def test_numbers_of_a_law_may_be_expressions_of_parameters() -> None:
     higher = mechanism.with_parameters({"h": "2 cm"}).drivers[0].law
     assert higher.at(10.0) == 40.0
     assert message_of('law = "cycloidal"\nrise = 1\nduration = "T - 2 s"\n[parameters]\nT = "2 s"') == (
-        "duration = 0.0 must be positive (duration = 'T - 2 s', T = 2.0)"
+        "duration = 0.0 must be positive (duration = 'T - 2 s', T = 2 s)"
     )
 
 

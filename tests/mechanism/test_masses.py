@@ -345,7 +345,7 @@ WRONG = {
     "a negative damping": (
         '"2*c"',
         '"-c"',
-        "[loads.dashpot] damping = -3.0 must be 0 or more (damping = '-c', c = 3.0)",
+        "[loads.dashpot] damping = -3.0 must be 0 or more (damping = '-c', c = 3 N s/m)",
     ),
     "an unknown axis of a force": (
         'at = "arm.P"',
