@@ -33,8 +33,10 @@ def test_the_dxf_of_a_cam_is_a_closed_polygon_within_the_tolerance(tmp_path: Pat
     angle = np.arctan2(centres[:, 1], centres[:, 0]) % (2.0 * math.pi)
     on_dwell = (angle > math.radians(121.0)) & (angle < math.radians(179.0))
     np.testing.assert_allclose(np.hypot(*corners[on_dwell].T), 48.0, rtol=1e-12)  # the dwell at 60, less the roller
-    (base,) = space.query("CIRCLE")
+    (base,), (axle,) = space.query("CIRCLE"), space.query("POINT")
     assert base.dxf.radius == pytest.approx(28.0, abs=1e-9)
+    assert (base.dxf.layer, axle.dxf.layer) == ("BASE", "AXLE")
+    assert tuple(base.dxf.center) == tuple(axle.dxf.location) == (0.0, 0.0, 0.0)
     assert f"({len(corners)} corners, within 0.01 mm of the curve)" in result.output
 
 
