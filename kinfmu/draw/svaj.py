@@ -14,9 +14,8 @@ from kinfmu.draw.curves import rows_of
 from kinfmu.draw.overlay import curve_colour, range_of, sheet_title
 from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
 from kinfmu.draw.writing import check_suffix, write
-from kinfmu.errors import FigureError, RequestError
-from kinfmu.motion.breaks import breaks_of, with_jumps
-from kinfmu.motion.jerk import motion_of
+from kinfmu.errors import FigureError
+from kinfmu.motion.motion_curve import MotionCurve, motion_curve
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import rates_per
 from kinfmu.units import Quantity, unit_of
@@ -33,9 +32,9 @@ _LEFT, _RIGHT, _TOP, _BOTTOM, _GAP, _EDGE = 70.0, 24.0, 34.0, 34.0, 12.0, 8.0  #
 def svaj(run: Run, path: str | Path, name: str, *, degrees: bool = False) -> None:
     """Draw displacement s, velocity v, acceleration a and jerk j of a coordinate or a cam's follower over its driver.
 
-    The jerk is exact: it solves the constraint equations, differentiated three times, at every sample. It has gaps at
-    samples that are bridged or near a singular point. v, a and j are derivatives by time or by the driver, as the rates
-    of the run are; their units state it.
+    The jerk is exact: it solves the constraint equations, differentiated three times, at every sample and on both sides
+    of each break of a law, where it jumps. It has gaps at samples that are bridged or near a singular point. v, a and j
+    are derivatives by time or by the driver, as the rates of the run are; their units state it.
 
     Args:
         run: The run.
@@ -53,27 +52,34 @@ def svaj(run: Run, path: str | Path, name: str, *, degrees: bool = False) -> Non
     check_suffix(path)
     if not len(run):
         raise FigureError("the run has no samples to plot")
-    table, kind = motion_of(run, name)
+    curve = motion_curve(run, name)
+    units = units_of(run, curve)
+    rows = curve.drawn()
+    across = driver_axis(run, curve)
+    across = replace(across, values=across.values[rows])
+    write(path, lambda: _sheet(run, across, name, curve.table[rows], units, degrees=degrees))
+
+
+def units_of(run: Run, curve: MotionCurve) -> list[str]:
+    """Return the units of displacement, velocity, acceleration and jerk."""
     per = rates_per(run)
-    units = [unit_of(Quantity(kind, order, per), run.length_unit) for order in range(4)]
-    across = driver_axis(run)
-    write(path, lambda: _sheet(run, across, name, table, units, degrees=degrees))
+    return [unit_of(Quantity(curve.kind, order, per), run.length_unit) for order in range(4)]
 
 
-def driver_axis(run: Run) -> Abscissa:
-    """Return the values of the only driver that moves, or the axis of the run."""
-    moving = [name for name in run.input_names[::3] if np.ptp(run.inputs[:, run.input_names.index(name)]) > 0.0]
-    try:
-        return replace(abscissa(run, moving[0]), name=moving[0].driver) if len(moving) == 1 else abscissa(run)
-    except RequestError:
-        return abscissa(run)
+def driver_axis(run: Run, curve: MotionCurve) -> Abscissa:
+    """Return the values (m,) of the only driver that moves, or of the axis of the run, along a curve."""
+    moving = [k for k in range(0, len(run.input_names), 3) if np.ptp(run.inputs[:, k]) > 0.0]
+    if len(moving) == 1:
+        driven = run.input_names[moving[0]]
+        unit, factor = degrees_of(unit_of(driven.quantity, run.length_unit))
+        return Abscissa(driven.driver, unit, curve.drive[:, moving[0] // 3] * factor, False)
+    along = abscissa(run)
+    return replace(along, values=np.interp(curve.place, np.arange(len(run)), along.values))
 
 
 def _sheet(run: Run, across: Abscissa, name: str, table: FloatArray, units: list[str], *, degrees: bool) -> Figure:
     from matplotlib.figure import Figure
 
-    mechanism = run.mechanism
-    assert mechanism is not None  # noqa: S101  # for the type; the jerk was computed from it
     width = _LEFT + _WIDTH + _RIGHT
     title = sheet_title((run,), ("", ""))
     lines = title_lines(f"{title}: {name}" if title else name, width - 2.0 * _EDGE)
@@ -88,10 +94,7 @@ def _sheet(run: Run, across: Abscissa, name: str, table: FloatArray, units: list
         unit, factor = degrees_of(units[order]) if degrees else (units[order], 1.0)
         values = table[:, order] * factor
         rows = rows_of(values)
-        x, y = across.values[rows], values[rows]
-        if order and len(rows) == len(values):  # a long run has many samples within the width of a line
-            x, y = with_jumps(x, y, breaks_of(run, mechanism, order))
-        axes.plot(x, y, linewidth=1.2, color=ink(curve_colour(_COLOURS[order])))
+        axes.plot(across.values[rows], values[rows], linewidth=1.2, color=ink(curve_colour(_COLOURS[order])))
         dress(axes, "")
         limits = range_of(values)
         if limits:

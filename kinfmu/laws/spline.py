@@ -71,8 +71,13 @@ class Spline(Law):
         return curve(x, self.data)
 
     def breaks(self, order: int, /, **constants: Value) -> Jumps:  # noqa: ARG002  it has none
-        width = self.points[-1][0] - self.points[0][0]
-        return Jumps(jumping_breaks(self.data, order), width if self.ends == PERIODIC else 0.0)
+        if self.ends != PERIODIC:
+            return Jumps(jumping_breaks(self.data, order))
+        first, width = self.points[0][0], self.points[-1][0] - self.points[0][0]
+        breaks, pieces = self.data
+        origin, *last = pieces[-1]
+        before: Piece = (origin - width, *last)  # type: ignore[assignment]  # four parts
+        return Jumps(jumping_breaks(((first, *breaks), (before, *pieces)), order), width)
 
     def check(self, where: str) -> None:
         if self.ends not in ENDS:

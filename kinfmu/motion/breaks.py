@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 import numpy as np
 
 from kinfmu.equations.system import placement
 from kinfmu.joints import CamRoller
+from kinfmu.joints.joint import Joint
 from kinfmu.laws import External, Law
 from kinfmu.mechanism import Mechanism
 from kinfmu.run import FloatArray, Run
@@ -14,81 +18,61 @@ from kinfmu.run.axis import TIME
 AT_SAMPLE = 1e-6  # of the step between samples; a break that is nearer to a sample is at it
 
 
-def breaks_of(run: Run, mechanism: Mechanism, order: int) -> FloatArray:
-    """Return where a law's value or a derivative up to an order jumps, in samples: 2.25 is after the third sample.
+class FollowedLaw(NamedTuple):
+    """A law with its argument over a run: the joint that follows it, or None for a driver over time."""
 
-    The run must hold all coordinates. Laws of drivers count in runs over time.
+    law: Law
+    argument: FloatArray  # (n,), continuous
+    joint: Joint | None
+
+
+class Break(NamedTuple):
+    """A break of a law within a run.
+
+    place: where, in samples: 2.25 is after the third sample; number: of the law; level: the value of its argument.
     """
+
+    place: float
+    number: int
+    level: float
+
+
+def followed_laws(run: Run, mechanism: Mechanism) -> list[FollowedLaw]:
+    """Return the laws of joints, and in runs over time those of drivers; the run must hold all coordinates."""
     columns = [np.asarray(run[name], dtype=float) for name in mechanism.coordinate_names]
     at = placement(mechanism, columns)
-    led: list[tuple[Law, FloatArray]] = []
+    found: list[FollowedLaw] = []
     for joint in mechanism.joints:
         follower = joint.led_by(at)
         if follower is not None:
             law, argument = follower[0], np.broadcast_to(np.asarray(follower[1], dtype=float), (len(run),))
-            led.append((law, np.unwrap(argument) if isinstance(joint, CamRoller) else argument))
+            found.append(FollowedLaw(law, np.unwrap(argument) if isinstance(joint, CamRoller) else argument, joint))
     if run.axis == TIME:
-        led += [(one.law, run.t) for one in mechanism.drivers if not isinstance(one.law, External)]
-    found = [_crossed(argument, law, order) for law, argument in led]
-    return np.unique(np.concatenate([np.empty(0), *found]).round(9))
+        found += [FollowedLaw(one.law, run.t, None) for one in mechanism.drivers if not isinstance(one.law, External)]
+    return found
 
 
-def _crossed(argument: FloatArray, law: Law, order: int) -> FloatArray:
-    """Return where an argument (n,) crosses a break of its law."""
-    jumps = law.own_breaks(order)
-    period = float(jumps.period)
-    found = [np.empty(0)]
-    for place in map(float, jumps.at):
-        along = (argument - place) / (period or 1.0)
-        piece = np.floor(along) if period else np.where(along >= 0.0, 0.0, -1.0)
-        known = np.isfinite(along[:-1]) & np.isfinite(along[1:])
-        (k,) = np.nonzero(known & (np.diff(piece) != 0.0))
-        found.append(k + (np.maximum(piece[k], piece[k + 1]) - along[k]) / (along[k + 1] - along[k]))
-    return np.concatenate(found)
+def breaks_of(laws: list[FollowedLaw], order: int) -> list[Break]:
+    """Return where a law's value or a derivative up to an order jumps; places are those of a straight argument."""
+    found: list[Break] = []
+    for number, (law, argument, _) in enumerate(laws):
+        jumps = law.own_breaks(order)
+        period = float(jumps.period)
+        for at in map(float, jumps.at):
+            along = (argument - at) / (period or 1.0)
+            piece = np.floor(along) if period else np.where(along >= 0.0, 0.0, -1.0)
+            known = np.isfinite(along[:-1]) & np.isfinite(along[1:])
+            for k in np.flatnonzero(known & (np.diff(piece) != 0.0)).tolist():
+                low, high = sorted((int(piece[k]), int(piece[k + 1])))
+                for turn in range(low + 1, high + 1):
+                    place = k + (turn - along[k]) / (along[k + 1] - along[k])
+                    found.append(Break(float(place), number, at + turn * period))
+    return found
 
 
-def with_jumps(x: FloatArray, y: FloatArray, breaks: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a curve (n,), (n,) with a vertical line at each break, from one side of it to the other.
-
-    Both ends continue their side in a straight line. A break without two samples of its own on either side, such as at
-    the points of a table, is a step from one sample to the next; several breaks between two samples are one step. Of a
-    break at the first or last sample, only the side within the run is drawn.
-    """
-    drop: list[int] = []
-    places, xs, ys = [], [], []
-    last = len(x) - 1
-    steps: dict[int, list[float]] = {}  # breaks within each interval that is drawn as a step, by its first sample
-
-    def add(place: float, at: float, value: float) -> None:
-        places.append(place)
-        xs.append(at)
-        ys.append(value)
-
-    def straight(a: int, b: int, at: float) -> float:
-        return float(y[b] + (y[b] - y[a]) / (x[b] - x[a]) * (at - x[b]))
-
-    for place in breaks.tolist():
-        nearest = round(place)
-        is_sample = abs(place - nearest) < AT_SAMPLE
-        left, right = (nearest - 1, nearest + 1) if is_sample else (int(place), int(place) + 1)
-        others = ((breaks != place) & (breaks > left - 1) & (breaks < right + 1)).any()
-        sides = [(left - 1, left)] * (left >= 1) + [(right + 1, right)] * (right < last)
-        is_end = is_sample and nearest in (0, last) and bool(sides)
-        if others or not (len(sides) == 2 or is_end):
-            for first in (nearest - 1, nearest) if is_sample else (left,):
-                steps.setdefault(first, []).append(place)
-            continue
-        drop += [nearest] * is_sample
-        at = float(np.interp(place, np.arange(len(x)), x))
-        for a, b in sides:
-            add(place, at, straight(a, b, at))
-    for first, within in steps.items():
-        if 0 <= first < last:
-            inside = [place for place in within if first + AT_SAMPLE < place < first + 1 - AT_SAMPLE]
-            place = float(np.mean(inside or within))
-            at = float(np.interp(place, np.arange(len(x)), x))
-            add(place, at, float(y[first]))
-            add(place, at, float(y[first + 1]))
-    kept = np.delete(np.arange(len(x)), drop)
-    order = np.argsort(np.concatenate([kept, places]), kind="stable")
-    return np.concatenate([x[kept], xs])[order], np.concatenate([y[kept], ys])[order]
+def bracket(place: float, side: int) -> tuple[int, int]:
+    """Return the two samples between which a side of a place is: -1 before it, 1 after it."""
+    nearest = round(place)
+    if abs(place - nearest) < AT_SAMPLE:
+        return (nearest - 1, nearest) if side < 0 else (nearest, nearest + 1)
+    return math.floor(place), math.floor(place) + 1

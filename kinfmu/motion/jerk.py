@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from kinfmu.equations.jets import Jet
-from kinfmu.equations.system import System, placement
+from kinfmu.equations.system import placement
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.joints.cam import Cam
 from kinfmu.joints.cam_flat_face import CamFlatFace
 from kinfmu.joints.cam_roller import CamRoller
+from kinfmu.joints.joint import Joint
 from kinfmu.laws import External
 from kinfmu.measures.placement import Placement
 from kinfmu.mechanism import Mechanism
+from kinfmu.motion.jet_equations import LEAST_MARGIN, JetEquations, derivative
+from kinfmu.motion.one_sided import OneSided
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import TIME
 from kinfmu.solver.python.status import Status
 from kinfmu.units import CoordinateName
 
 SAME = 1e-9  # of the largest value; by how much inputs may differ from the law of their driver
-LEAST_MARGIN = 1e-6  # 1 / condition of the scaled Jacobian; below it a third derivative has no digits
 
 
 def motion_of(run: Run, name: str) -> tuple[FloatArray, str]:
@@ -54,35 +57,27 @@ def motion_of(run: Run, name: str) -> tuple[FloatArray, str]:
     if missing:
         raise RequestError(f"the jerk needs all coordinates, and the run does not hold {listed(missing)}")
     columns = [tuple(np.asarray(run[place.derivative(k)], dtype=float) for k in range(3)) for place in places]
-    system, targets = System(mechanism), _targets(run, mechanism)
     along = [Jet.of(*_whole(run, one)) for one in columns]
-    phi = system.evaluate(along, targets)
-    at_rest = [Jet.of(target.c[0]) for target in targets]
-    jacobian = np.stack(
-        [
-            np.stack([_column(row, 1, run) for row in system.evaluate(_unit(along, k), at_rest)], -1)
-            for k in range(len(along))
-        ],
-        -1,
-    )  # (n, rows, coordinates)
-    delta = -np.stack([_column(row, 3, run) for row in phi], -1)  # (n, rows)
-    scaled = jacobian / system.scales[:, None] * system.column_scales / system.size
-    u, sizes, v = np.linalg.svd(scaled, full_matrices=False)
-    solved = np.einsum("nij,ni->nj", u, delta / system.scales / system.size)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        jerks = np.einsum("nij,ni->nj", v, solved / sizes) * system.column_scales
-    is_known = run.good & (run.status != Status.BRIDGED) & (sizes[:, -1] > LEAST_MARGIN * sizes[:, 0])
+    jerks, margin = JetEquations(mechanism, len(run)).solved(along, targets_at(run, mechanism), 3)
+    is_known = run.good & (run.status != Status.BRIDGED) & (margin > LEAST_MARGIN)
     full = [Jet((*jet.c[:3], jerks[:, k] / 6.0)) for k, jet in enumerate(along)]
-    value, kind = _quantity(mechanism, name, placement(mechanism, full))
-    table = np.stack([_column(value, order, run) for order in range(4)], -1)
+    table, kind = quantity_table(mechanism, mechanism.joints, name, full, len(run))
     table[~run.good] = np.nan
     table[~is_known, 3] = np.nan
     return table, kind
 
 
-def _quantity(mechanism: Mechanism, name: str, at: Placement) -> tuple[Any, str]:
+def quantity_table(
+    mechanism: Mechanism, joints: Sequence[Joint], name: str, q: Sequence[Jet], count: int
+) -> tuple[FloatArray, str]:
+    """Return a coordinate or the lift of a cam, from the coordinates q at n poses, as `motion_of` does."""
+    value, kind = _quantity(mechanism, joints, name, placement(mechanism, q))
+    return np.stack([derivative(value, order, count) for order in range(4)], -1), kind
+
+
+def _quantity(mechanism: Mechanism, joints: Sequence[Joint], name: str, at: Placement) -> tuple[Any, str]:
     """Return a coordinate or the lift of a cam as a jet, and its kind."""
-    cams = {joint.name: joint for joint in mechanism.joints if isinstance(joint, Cam | CamRoller | CamFlatFace)}
+    cams = {joint.name: joint for joint in joints if isinstance(joint, Cam | CamRoller | CamFlatFace)}
     cam = cams.get(name)
     if isinstance(cam, Cam):
         return cam.follower().value(at) - cam.offset, cam.led
@@ -110,37 +105,48 @@ def _whole(run: Run, columns: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
     return tuple(np.where(run.good, column, 0.0) for column in columns)
 
 
-def _column(value: Any, order: int, run: Run) -> FloatArray:
-    """Return a derivative at all samples."""
-    derivative = value.derivative(order) if isinstance(value, Jet) else (0.0 if order else value)
-    return np.broadcast_to(np.asarray(derivative, dtype=float), (len(run),)).copy()
+def targets_at(
+    run: Run, mechanism: Mechanism, place: FloatArray | None = None, side: FloatArray | None = None
+) -> list[Jet]:
+    """Return the values of all drivers with three derivatives.
 
+    Args:
+        run: The run.
+        mechanism: Its mechanism.
+        place: (n,) where, in samples. Default: at the samples.
+        side: (n,) -1: before these places, 1: after them.
 
-def _unit(along: list[Jet], number: int) -> list[Jet]:
-    """Return the coordinates at rest but one, which has speed 1."""
-    return [Jet.of(jet.c[0], 1.0 if k == number else 0.0) for k, jet in enumerate(along)]
+    Raises:
+        RequestError: A third derivative is not known.
 
-
-def _targets(run: Run, mechanism: Mechanism) -> list[Jet]:
-    """Return the values of all drivers with three derivatives; RequestError if the third one is not known."""
+    """
+    samples = np.arange(len(run))
     found = []
     for driver in mechanism.drivers:
         given = [np.asarray(run[name], dtype=float) for name in driver.inputs()]
         given = [np.where(np.isfinite(column), column, 0.0) for column in given]
-        if not given[2].any():
-            found.append(Jet.of(*given))
-            continue
-        of_law = None
         if run.axis == TIME and not isinstance(driver.law, External):
-            of_law = driver.law.at(Jet.of(run.t, 1.0))
-        if not isinstance(of_law, Jet) or not all(map(_agrees, given, map(of_law.derivative, range(3)))):
+            of_law = _lifted(driver.law.at(Jet.of(run.t, 1.0)))
+            if all(map(_agrees, given, map(of_law.derivative, range(3)))):
+                if place is not None:
+                    t = np.interp(place, samples, run.t)
+                    of_law = _lifted(
+                        (OneSided(driver.law, side) if side is not None else driver.law).at(Jet.of(t, 1.0))
+                    )
+                found.append(of_law)
+                continue
+        if given[2].any():
             raise RequestError(
                 f"the jerk is not known: driver '{driver.name}' has accelerations that are not those of the law in the "
                 "mechanism file, so their rate of change is unknown; run it by its law, or at constant speed"
             )
-        found.append(of_law)
+        found.append(Jet.of(*(one if place is None else np.interp(place, samples, one) for one in given)))
     return found
 
 
+def _lifted(value: Any) -> Jet:
+    return value if isinstance(value, Jet) else Jet.of(value)
+
+
 def _agrees(given: FloatArray, of_law: Any) -> bool:
-    return bool(np.all(np.abs(given - of_law) <= SAME * max(float(np.abs(given).max()), 1e-300)))
+    return bool(np.all(np.abs(given - of_law) <= SAME * max(float(np.abs(given).max(initial=0.0)), 1e-300)))

@@ -135,3 +135,10 @@ def test_a_tridiagonal_system_is_solved(data: st.DataObject) -> None:
         before = lower[k] * x[k - 1] if k else 0.0
         after = upper[k] * x[k + 1] if k < n - 1 else 0.0
         assert before + main[k] * x[k] + after == pytest.approx(right[k], abs=1e-14)
+
+
+def test_the_third_derivative_of_a_periodic_table_jumps_where_its_ends_meet() -> None:
+    points = ((1.0, 0.0), (2.0, 3.0), (3.5, -1.0), (4.0, 1.0), (6.0, 0.0))
+    law = Spline(points, "periodic")
+    assert law.own_breaks(2).at == ()
+    assert law.own_breaks(3) == ((1.0, 2.0, 3.5, 4.0), 5.0)
