@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 
 from kinfmu.analysis.held import alone
 from kinfmu.codegen.python import load_model
@@ -22,6 +24,8 @@ _LARGE = 150  # coordinates; a larger mechanism is followed for one turn only
 _NEAR_LIMIT = 1e-6  # [rad, sizes]; distance from a limit of the poses from which its own is extrapolated
 _REPEATS = 1e-6  # [rad, sizes]; poses closer than this are equal
 _HALVINGS = 60
+_MANY = 200  # poses among which no two extremes of a quantity are neighbours
+_NEAR_END = 16  # poses between the last one and a limit, where coordinates change with the root of the distance
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +57,27 @@ class DriverPath:
         """Return the rates of all coordinates per unit of the driver, by name."""
         rates: dict[str, float] = dict(zip(self.plan.outputs, self.solver.rates(pose, (1.0,)), strict=True))
         return {**dict.fromkeys(self.plan.fixed, 0.0), **rates}
+
+    @cached_property
+    def fine_poses(self) -> tuple[Pose, ...]:
+        """Poses close enough to find the extremes of a quantity between them, up to the limits, in the same order."""
+        parts = math.ceil(_MANY / len(self.poses))
+        found = [self.poses[0]]
+        for before, after in pairwise(self.poses):
+            a, b = before.u[0], after.u[0]
+            between = (self.solver.solve(before, (a + (b - a) * k / parts,)) for k in range(1, parts))
+            found += [*(pose for pose in between if pose.good), after]
+        low, high = (() if limit is None else self._before(limit) for limit in (self.low, self.high))
+        return (*low[::-1], *found, *high)
+
+    def _before(self, limit: Limit) -> tuple[Pose, ...]:
+        """Return poses between the last one of the path and a limit, toward the limit."""
+        start = self.poses[0 if limit is self.low else -1]
+        apart = start.u[0] - limit.u[0]
+        parts = [(k / _NEAR_END) ** 2 for k in range(_NEAR_END - 1, 0, -1)]
+        poses = [self.solver.solve(start, (limit.u[0] + part * apart,)) for part in parts]
+        last = [pose for pose in self._near(limit)[:1] if abs(pose.u[0] - limit.u[0]) < parts[-1] * abs(apart)]
+        return tuple(pose for pose in (*poses, *last) if pose.good)
 
     def zero(self, value: Callable[[Pose], float], low: Pose, high: Pose) -> Pose:
         """Return the pose between two where a value changes its sign, by bisection."""

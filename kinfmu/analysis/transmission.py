@@ -253,15 +253,16 @@ def _extremes(
     def slope(pose: Pose) -> float:
         return cosine.slope(path.coordinates(pose), path.speeds(pose))
 
-    slopes = [slope(pose) for pose in path.poses]
-    if max(map(abs, slopes)) * (path.poses[-1].u[0] - path.poses[0].u[0]) < 1e-9:
+    poses = path.fine_poses
+    slopes = [slope(pose) for pose in poses]
+    if max(map(abs, slopes)) * (poses[-1].u[0] - poses[0].u[0]) < 1e-9:
         return None
     found = []
-    for before, after, a, b in zip(path.poses, path.poses[1:], slopes, slopes[1:], strict=False):
+    for before, after, a, b in zip(poses, poses[1:], slopes, slopes[1:], strict=False):
         if a * b < 0.0:
             pose = path.zero(slope, before, after)
             found.append((cosine.value(path.coordinates(pose)), pose.u[0]))
-    found += [(cosine.value(path.coordinates(pose)), pose.u[0]) for pose in path.poses]
+    found += [(cosine.value(path.coordinates(pose)), pose.u[0]) for pose in poses]
     in_line = []
     for limit in (path.low, path.high):
         if limit is not None:

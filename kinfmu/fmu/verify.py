@@ -23,6 +23,7 @@ from kinfmu.units import every_unit, spelled
 _SAME_TIME = 1e-6  # of a step: hosts sum up time
 _UNIT = re.compile(r"\s*\[([^]]*)\]\s*$")
 _LARGEST_TABLE = 2**28  # [bytes] of a host's results
+_COARSEST = 0.01  # tolerance that is recommended; results of fewer than three digits show nothing
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,7 @@ class Verification:
             lines.append(f"the results agree at the {there} of {self.samples} samples that they have")
         if self.is_a_step_late:
             lines.append("the results equal the reference of the sample before: this host records outputs a step late")
-        elif self.digits is not None and self.tolerance < self.difference <= self._rounding:
+        elif self.digits is not None and self.tolerance < self.difference <= self._rounding <= _COARSEST:
             lines.append(
                 f"the results have {self.digits} digits, which may be the difference: compare with --tolerance "
                 f"{self._rounding:g}"
@@ -206,10 +207,10 @@ def _table_of_host(
     if not places:
         raise FmuError(f"{path}: has no output of the FMU, such as {listed(wanted.names[:3])}")
     columns = [times[0], *places.values()]
-    try:
-        table = np.array([[_number(row[k]) for k in columns] for row in rows], float).reshape(-1, len(columns))
-    except (ValueError, IndexError) as error:
-        raise FmuError(f"{path}: is no table of numbers ({error})") from None
+    table = np.array([[_number(path, k, row, header, place) for place in columns] for k, row in enumerate(rows, 1)])
+    table = table.reshape(-1, len(columns))
+    if len(wrong := np.flatnonzero(~np.isfinite(table[:, 0]))):
+        raise FmuError(f"{path}: row {wrong[0] + 1} after the header has the time {table[wrong[0], 0]}")
     for column, (name, place) in enumerate(places.items(), start=1):
         table[:, column] *= _factor(path, header[place], units[name], length_unit)
     found = np.full((len(wanted.t), len(places)), np.nan)
@@ -234,8 +235,17 @@ def _digits(text: str) -> int:
     return len(text.lower().partition("e")[0].strip(" +-").replace(".", "").lstrip("0"))
 
 
-def _number(text: str) -> float:
-    return float({"true": "1", "false": "0"}.get(text.strip().lower(), text))
+def _number(path: Path, number: int, row: list[str], header: list[str], place: int) -> float:
+    """Return the number in a column of a row, whose own number is for messages."""
+    where = f"{path}: is no table of numbers: row {number} after the header"
+    if place >= len(row):
+        raise FmuError(f"{where} has {len(row)} values, the header {len(header)}")
+    try:
+        value = float({"true": "1", "false": "0"}.get(row[place].strip().lower(), row[place]))
+    except ValueError:
+        text = f"{where}, column {quoted(header[place].strip())}: {quoted(row[place])}"
+        raise FmuError(f"{text}; valid are numbers with a decimal point, such as 1234.5") from None
+    return value
 
 
 def _factor(path: Path, title: str, unit: str, length_unit: str) -> float:

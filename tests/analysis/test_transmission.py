@@ -182,3 +182,19 @@ def test_pairs_of_links_of_a_loop_and_links_that_nothing_moves_alone_are_no_furt
     report = kinfmu.check(kinfmu.load(name))
     assert report.dyads == ()
     assert report.as_json()["dyads"] == []
+
+
+def test_an_extreme_between_the_last_pose_and_a_limit_is_found() -> None:
+    mechanism = kinfmu.load("excavator")
+    report = kinfmu.check(mechanism)
+    (found,) = report.dyads
+    (angle,) = found.transmission
+    reach = next(one for one in report.ranges if one.driver == angle.driver)
+    assert reach.high is not None
+    starts = zip(mechanism.drivers, report.starts, strict=True)
+    inputs = {f"{driver.name}_length": np.full(4001, value) for driver, value in starts}
+    inputs[f"{angle.driver}_length"] = np.linspace(reach.high - 0.05, reach.high - 1e-9, 4001)
+    values = sampled(mechanism, "bucket.Q", "bucket.M", "idler.N", **inputs)
+    assert angle.smallest == pytest.approx(values.min(), abs=1e-8)
+    assert angle.smallest < values[-1] - 0.05
+    assert angle.at_smallest < reach.high - 0.01
