@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 from typing import Annotated, NamedTuple
 
@@ -333,6 +333,25 @@ class ForceName(str):
 
     def __getnewargs__(self) -> tuple[str, str, Quantity]:  # type: ignore[override]  # for copies: what `__new__` takes
         return self.owner, self.noun, self.quantity
+
+
+def force_sizes(names: Iterable[ForceName]) -> dict[ForceName, tuple[ForceName, ForceName]]:
+    """Return the sizes of forces with two components, such as 'pin.force', each with its components.
+
+    Args:
+        names: Names of reactions, such as 'pin.force_x' and 'pin.force_y'.
+
+    Returns:
+        Components along x and y by the name of the size.
+
+    """
+    known = {str(name): name for name in names}
+    found = {}
+    for name in known.values():
+        other = known.get(f"{name.removesuffix('_x')}_y")
+        if name.noun.endswith("force_x") and other is not None:
+            found[ForceName(name.owner, name.noun.removesuffix("_x"), name.quantity)] = (name, other)
+    return found
 
 
 class SignalName(str):

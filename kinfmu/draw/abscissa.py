@@ -57,7 +57,7 @@ def abscissa(run: Run, name: str = "") -> Abscissa:
 
 def unit_in(run: Run, name: str) -> str:
     """Return the unit of a column, also of one that never moves; KinfmuError for an unknown name."""
-    units = {place.name: place.unit for place in run.places(kept=False)}
+    units = run.column_units(kept=False)
     if name not in units:
         per = rates_per(run)
         held = {one.derivative(order): one.quantity(order, per) for one in run.fixed for order in range(3)}

@@ -26,7 +26,7 @@ _BINS = 1500  # of a long run; each shows its least and its greatest value
 def curves(axes: Axes, run: Run, columns: Sequence[str] = (), x: str = "", *, degrees: bool = False) -> Axes:
     """Draw columns of a run into `axes` and return it; arguments and errors as in `plot` with `ax`."""
     names = _columns(run, columns)
-    units = {place.name: place.unit for place in run.places()}
+    units = run.column_units()
     for name in names[1:]:
         if units[name] != units[names[0]]:
             raise FigureError(
@@ -57,7 +57,7 @@ def _columns(run: Run, wanted: Sequence[str]) -> list[str]:
     """Return the names of the columns that were asked for."""
     if isinstance(wanted, str):
         raise RequestError(f"columns: '{wanted}' must be a list of names, such as ['{wanted}']")
-    known = [place.name for place in run.places()]
+    known = list(run.column_units())
     names: dict[str, None] = {}
     for name in wanted or run.names or run.outputs:
         found = [column for column in known if fnmatchcase(column, name)]

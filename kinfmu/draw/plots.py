@@ -264,7 +264,7 @@ def _usual(run: Run, axis: Axis, panel: Panel) -> float:
         return float(np.max(np.abs(run[name]), initial=0.0, where=np.isfinite(run[name])))
     if isinstance(name, ForceName):
         tables = ((run.force_names, run.forces), (run.reaction_names, run.reactions))
-        names, table = next((names, table) for names, table in tables if name in names)
+        names, table = tables[name not in run.force_names]  # the size of a force is like its components
         like = np.asarray(table)[:, [other.quantity == name.quantity for other in names]]
     else:
         like = run.values[run.good][:, [other.is_angle == name.is_angle for other in run.outputs]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -13,7 +14,7 @@ from kinfmu.files.whole_file import suffix_of
 from kinfmu.log.record import description, ending
 from kinfmu.log.target import replacing
 from kinfmu.run import Column, Run
-from kinfmu.run.channels import select
+from kinfmu.run.channels import kept_columns, select
 from kinfmu.run.tables import arrow_table
 
 ROWS = 4096  # of a CSV file converted at once: Python's numbers take four times the memory
@@ -39,7 +40,7 @@ def write_table(run: Run, path: str | Path, columns: Sequence[str] | None = None
         MissingPackageError: Parquet without pyarrow.
 
     """
-    writers: dict[str, Callable[[Run, Path], None]] = {
+    writers: dict[str, Callable[[Run, Path, Sequence[str] | None], None]] = {
         ".csv": partial(_write_csv, units=units),
         ".parquet": _write_parquet,
         ".npz": _write_npz,
@@ -47,19 +48,23 @@ def write_table(run: Run, path: str | Path, columns: Sequence[str] | None = None
     suffix = suffix_of(path)
     if suffix not in writers:
         raise LogError(f"{path}: '{suffix}' is not a known format of tables; known: {listed(writers)}")
-    chosen = run if columns is None else select(run, columns)
     with replacing(path) as temporary:
-        writers[suffix](chosen, temporary)
+        writers[suffix](run, temporary, columns)
 
 
-def _columns(run: Run) -> list[Column]:
-    """Return the run's columns with 0.0 in place of -0.0, whose sign has no meaning in a table."""
-    return [column._replace(values=column.values + 0) for column in run.columns()]
+def _columns(run: Run, names: Sequence[str] | None) -> list[Column]:
+    """Return the columns chosen, with 0.0 in place of -0.0, whose sign has no meaning in a table."""
+    kept = None if names is None else kept_columns(run, names)
+    return [
+        column._replace(values=column.values + 0)
+        for column in select(run, names).columns()
+        if kept is None or column.name in kept
+    ]
 
 
 def csv_lines(run: Run, columns: Sequence[str] | None = None, *, units: bool = False) -> Iterator[str]:
     """Yield the lines of a CSV table, each with its end; arguments and errors as in `write_table`."""
-    chosen = _columns(run if columns is None else select(run, columns))
+    chosen = _columns(run, columns)
     names = [f"{column.name} [{column.unit}]" if units else column.name for column in chosen]
     yield ",".join(map(_quoted, names)) + "\n"
     for start in range(0, len(run), ROWS):
@@ -68,9 +73,9 @@ def csv_lines(run: Run, columns: Sequence[str] | None = None, *, units: bool = F
             yield ",".join(map(repr, row)) + "\n"  # repr: shortest text of the same bits
 
 
-def _write_csv(run: Run, path: Path, *, units: bool) -> None:
+def _write_csv(run: Run, path: Path, names: Sequence[str] | None, *, units: bool) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
-        file.writelines(csv_lines(run, units=units))
+        file.writelines(csv_lines(run, names, units=units))
 
 
 def _quoted(name: str) -> str:
@@ -78,20 +83,23 @@ def _quoted(name: str) -> str:
     return '"' + name.replace('"', '""') + '"' if set(name) & set(',"\n\r') else name
 
 
-def _write_parquet(run: Run, path: Path) -> None:
+def _write_parquet(run: Run, path: Path, names: Sequence[str] | None) -> None:
     try:
         import pyarrow.parquet as pq
     except ImportError:
         raise MissingPackageError(f"{path}: writing Parquet needs pyarrow: pip install pyarrow") from None
 
     info = {f"info.{key}": value for key, value in run.info.items()}
-    about = description(run) | ending(run) | {"mechanism": run.mechanism_text} | info
-    table = arrow_table(_columns(run)).replace_schema_metadata({f"kinfmu.{key}": text for key, text in about.items()})
+    columns = _columns(run, names)
+    about = description(select(run, names)) | ending(run) | {"mechanism": run.mechanism_text} | info
+    about["columns"] = json.dumps([column.name for column in columns], ensure_ascii=False)
+    about["units"] = json.dumps({column.name: column.unit for column in columns}, ensure_ascii=False)
+    table = arrow_table(columns).replace_schema_metadata({f"kinfmu.{key}": text for key, text in about.items()})
     pq.write_table(table, path, compression="zstd", use_dictionary=False, use_byte_stream_split=True)
 
 
-def _write_npz(run: Run, path: Path) -> None:
-    columns = _columns(run)
+def _write_npz(run: Run, path: Path, names: Sequence[str] | None) -> None:
+    columns = _columns(run, names)
     texts = {
         "kinfmu.columns": np.array([column.name for column in columns]),
         "kinfmu.units": np.array([column.unit for column in columns]),

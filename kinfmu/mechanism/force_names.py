@@ -9,7 +9,7 @@ from kinfmu.drivers import Driver
 from kinfmu.joints import Joint
 from kinfmu.loads import Load
 from kinfmu.mechanism.body import Body
-from kinfmu.units import ForceName, Quantity
+from kinfmu.units import ForceName, Quantity, force_sizes
 
 _INERTIAS = {("angle", "angle"): "inertia", ("length", "length"): "mass"}
 _MIXED_INERTIA = "mass_moment"  # of a turning and a sliding driver
@@ -96,8 +96,4 @@ def measured_forces(mechanism: HasForces) -> dict[str, tuple[ForceName, ...]]:
     """
     names = [*force_names(mechanism), *reaction_names_of(mechanism)]
     found: dict[str, tuple[ForceName, ...]] = {str(name): (name,) for name in names}
-    for name in names:
-        size = name.removesuffix("_x")
-        if name.noun in ("force_x", "shaking_force_x") and f"{size}_y" in found:
-            found[size] = (name, *found[f"{size}_y"])
-    return found
+    return found | {str(size): components for size, components in force_sizes(names).items()}

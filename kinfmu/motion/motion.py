@@ -391,10 +391,8 @@ def break_places(run: Run) -> list[float]:
 
 
 def force_of(run: Run, name: str) -> FloatArray:
-    """Return a force of a run, (n,); the size of a pin's force from its components."""
-    if name in (*run.force_names, *run.reaction_names):
-        return np.asarray(run[name], dtype=float)
-    return np.asarray(np.hypot(run[f"{name}_x"], run[f"{name}_y"]))
+    """Return a force of a run, (n,)."""
+    return np.asarray(run[name], dtype=float)
 
 
 def _derived(track: Track, order: int) -> Track:

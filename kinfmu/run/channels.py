@@ -29,16 +29,38 @@ def absent_columns(run: Run, names: Sequence[str] | None) -> frozenset[str]:
             viewers draw by themselves. A minus in front leaves out: ['-error', '-margin'] is all but those. None: all.
 
     Returns:
-        Names of the absent columns. Time and status are always kept, and the inputs of a run over these.
+        Names of the absent columns. Time and status are always kept, and the inputs of a run over these; for the size
+        of a force its components.
 
     Raises:
         RequestError: A name is unknown.
 
     """
-    groups = _groups(run)
-    columns = [place.name for place in run.places()]
+    if names is None:
+        return run.absent
+    sizes, kept = run.force_sizes, kept_columns(run, names)
+    kept |= {component for size, components in sizes.items() if size in kept for component in components}
+    absent = {place.name for place in run.places()} - kept | run.absent
+    return frozenset(absent | {size for size, components in sizes.items() if not absent.isdisjoint(components)})
+
+
+def kept_columns(run: Run, names: Sequence[str]) -> frozenset[str]:
+    """Return the columns of a run that `names` choose, with those that are always kept.
+
+    Args:
+        run: The run, with or without samples.
+        names: As in `absent_columns`.
+
+    Raises:
+        RequestError: A name is unknown.
+
+    """
+    groups, columns = _groups(run), list(run.column_units())
     kept = _kept(names, lambda name: _chosen(name, groups, columns))
-    return frozenset({*columns} - kept - {*ALWAYS, *_of_axis(run)}) | run.absent if names is not None else run.absent
+    minus = (name[1:] for name in names if name.startswith("-"))
+    left_out = {column for name in minus for column in _chosen(name, groups, columns)} - kept
+    without = {size for size, components in run.force_sizes.items() if not left_out.isdisjoint(components)}
+    return frozenset(kept - without) | {*ALWAYS, *_of_axis(run)}
 
 
 def _of_axis(run: Run) -> tuple[str, ...]:
@@ -119,7 +141,7 @@ def chosen_columns(run: Run, names: Sequence[str]) -> tuple[str, ...]:
 
     """
     groups = _groups(run)
-    columns = [place.name for place in run.places(kept=False)]
+    columns = list(run.column_units(kept=False))
     constants = {name.derivative(order) for name in run.fixed for order in range(3)}
     usual = [name for name in columns if name not in ("time", *ALWAYS)]
     kept = dict.fromkeys(usual if names and names[0].startswith("-") else ())
@@ -148,7 +170,7 @@ def coordinates(run: Run, names: Sequence[str]) -> tuple[CoordinateName, ...]:
 
     """
     owners = {name.derivative(order): name for order in range(3) for name in (*run.outputs, *run.fixed)}
-    groups, columns = _groups(run), [place.name for place in run.places()]
+    groups, columns = _groups(run), list(run.column_units())
     kept = dict.fromkeys(columns if names and names[0].startswith("-") else ())
     for name in names:
         if name.startswith("-"):
@@ -168,8 +190,14 @@ def forces(run: Run, names: Sequence[str]) -> tuple[ForceName | SignalName, ...]
         names: As in `absent_columns`. None given, or a minus in front of the first: all but reactions.
 
     """
-    every: tuple[ForceName | SignalName, ...] = (*run.force_names, *run.reaction_names, *run.signal_names)
-    known = {str(name): name for name in every}
+    every: tuple[ForceName | SignalName, ...] = (
+        *run.force_names,
+        *run.reaction_names,
+        *run.force_sizes,
+        *run.signal_names,
+    )
+    of_text = {str(name): name for name in every}
+    known = {column: of_text[column] for column in run.column_units(kept=False) if column in of_text}
     groups = {group: found & known.keys() for group, found in _groups(run).items()}
     usual = {*map(str, run.force_names), *map(str, run.signal_names)}
     kept = usual if not names or names[0].startswith("-") else set()
@@ -199,7 +227,7 @@ def _of_coordinates(
 def _groups(run: Run) -> dict[str, set[str]]:
     """Return columns by the name of their group."""
     points = run.outputs[run.coordinate_count :]
-    every = {place.name for place in run.places(kept=False)}
+    every = set(run.column_units(kept=False))
     return {
         "all": {*every, DRAWN},
         "none": set(),
@@ -209,7 +237,7 @@ def _groups(run: Run) -> dict[str, set[str]]:
         **{name: {f"solver.{name}"} for name in ("status", "residual", "iterations", "margin")},
         "error": {f"solver.error_{name}" for name in ("q", "qd", "qdd")},
         "forces": set(run.force_names),
-        "reactions": set(run.reaction_names),
+        "reactions": {*run.reaction_names, *run.force_sizes},
         "signals": set(run.signal_names),
         "watch": {f"watch.{name}" for name in run.watch_names},
         DRAWN: {DRAWN},

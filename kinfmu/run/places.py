@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import lru_cache
+from types import MappingProxyType
 from typing import Any
 
-from kinfmu.units import CoordinateName, ForceName, InputName, SignalName
+from kinfmu.units import CoordinateName, ForceName, InputName, SignalName, force_sizes
 
 Place = tuple[str, str, int | None]  # of a column: its name, the table, and the number of the column there
 NAMES = ("input_names", "outputs", "force_names", "reaction_names", "signal_names", "watch_names")  # fields of a run
@@ -38,3 +39,9 @@ def tables_of(
 def index_of(*names: Any) -> Mapping[str, tuple[str, int | None]]:
     """Return the table and the number of the column by name."""
     return {name: (table, column) for name, table, column in tables_of(*names)}
+
+
+@lru_cache(maxsize=64)
+def sizes_of(reaction_names: tuple[ForceName, ...]) -> Mapping[ForceName, tuple[ForceName, ForceName]]:
+    """Return the sizes of forces among the reactions, with their components; they are computed, not kept."""
+    return MappingProxyType(force_sizes(reaction_names))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from kinfmu.display import Displayed
 from kinfmu.errors import KinfmuError, listed, suggestion
 from kinfmu.run.axis import TIME, axis_of, rates_per
-from kinfmu.run.places import NAMES, Place, index_of, tables_of
+from kinfmu.run.places import NAMES, Place, index_of, sizes_of, tables_of
 from kinfmu.run.tables import Column, Tabular
 from kinfmu.solver.python.status import Status
 from kinfmu.units import CoordinateName, ForceName, InputName, SignalName, read_coordinate, read_inputs, unit_of
@@ -92,7 +92,7 @@ class Run(Tabular, Displayed):
         accelerations: (n, m), the same.
         force_names: Names of the f efforts, inertias and energies, such as 'crank.torque'; none without masses, loads.
         forces: (n, f) in SI units; None without any.
-        reaction_names: Names of the r reactions of joints, such as 'pin.force_x'.
+        reaction_names: Names of the r reactions of joints, such as 'pin.force_x'. Columns compute sizes: 'pin.force'.
         reactions: (n, r) in N and N m; None without any. NaN where redundant rows share a load in an unknown way.
         shaking: (n, 3) the last columns of `reactions`, shaking force and moment, which need none of the others; None
             where they are not computed by themselves.
@@ -297,6 +297,7 @@ class Run(Tabular, Displayed):
 
         """
         absent = self.absent | frozenset(names)
+        absent |= {size for size, components in self.force_sizes.items() if not absent.isdisjoint(components)}
         tables: dict[str, Any] = {}
         for name, group in groupby(self.places(kept=False), key=lambda place: place.table):
             places = list(group)
@@ -319,9 +320,46 @@ class Run(Tabular, Displayed):
         return blanked if callable(self.__dict__[name]) else blanked()
 
     def columns(self) -> Iterator[Column]:
-        """Yield every column that was kept: time, inputs, values, rates, accelerations, diagnostics, watches."""
+        """Yield every column that was kept: time, inputs, values, rates, accelerations, diagnostics, watches.
+
+        The size of a force in a pin follows its components.
+        """
+        sizes = self._sizes_after(kept=True)
         for place in self.places():
             yield Column(place.name, place.unit, self._column(place.table, place.column))
+            if place.name in sizes:
+                yield Column(sizes[place.name], place.unit, self[sizes[place.name]])
+
+    @property
+    def force_sizes(self) -> Mapping[ForceName, tuple[ForceName, ForceName]]:
+        """Names of the sizes of forces in pins and on the ground, such as 'pin.force', with their two components.
+
+        They are columns that are computed when they are read.
+        """
+        return sizes_of(self.reaction_names)
+
+    def _sizes_after(self, *, kept: bool) -> dict[str, ForceName]:
+        """Return the sizes of forces by the name of the column that they follow."""
+        gone = self.absent if kept else frozenset()
+        return {y: size for size, (_, y) in self.force_sizes.items() if size not in gone}
+
+    def column_units(self, *, kept: bool = True) -> dict[str, str]:
+        """Return the units of the columns by name, in their order.
+
+        Args:
+            kept: False: also columns that were not kept. Default: True.
+
+        Returns:
+            Units such as 'rad', 'mm/s', '1'.
+
+        """
+        units: dict[str, str] = {}
+        sizes = self._sizes_after(kept=kept)
+        for place in self.places(kept=kept):
+            units[place.name] = place.unit
+            if place.name in sizes:
+                units[sizes[place.name]] = place.unit
+        return units
 
     def places(self, *, kept: bool = True) -> Iterator[ColumnPlace]:
         """Yield names, units and places of the columns, in their order.
@@ -374,13 +412,16 @@ class Run(Tabular, Displayed):
             if name in self.absent:
                 raise KinfmuError(f"the run does not hold '{name}': it was not among the channels to keep")
             return self._column(*index[name])
+        for size, (x, y) in self.force_sizes.items():
+            if size == name:
+                return np.asarray(np.hypot(self[x], self[y]))
         still = {
             fixed.derivative(order): 0.0 if order else value
             for fixed, value in self.fixed.items()
             for order in range(3)
         }
         if name not in still:
-            raise KinfmuError(f"the run has no column '{name}'{suggestion(name, [*index, *still])}")
+            raise KinfmuError(f"the run has no column '{name}'{suggestion(name, [*index, *self.force_sizes, *still])}")
         return np.full(len(self.t), still[name])
 
 

@@ -140,7 +140,7 @@ def test_a_column_that_was_not_kept_is_an_empty_panel_with_a_note(run: Run) -> N
 
 def test_a_plot_of_columns_that_were_not_kept_is_refused(heavy: Run, tmp_path: Path) -> None:
     message = (
-        r"the run does not keep O\.force_x, O\.force_y, P\.force_x, \.\.\.; keep them: --channels all, or their names$"
+        r"the run does not keep O\.force_x, O\.force_y, O\.force, \.\.\.; keep them: --channels all, or their names$"
     )
     with pytest.raises(FigureError, match=message):
         plot(select(heavy, ["-reactions"]), tmp_path / "a.svg", ["reactions"])
@@ -189,7 +189,7 @@ def test_reactions_are_plotted_if_they_are_named(heavy: Run) -> None:
     assert {"crank.torque", "kinetic_energy", "rod.ax"} <= set(columns)
     assert not set(heavy.reaction_names) & set(columns)
     (pin,) = stacks_of(heavy, ["O.*"])
-    assert (pin.title, [panel.column for panel in pin.panels]) == ("O", ["O.force_x", "O.force_y"])
+    assert (pin.title, [panel.column for panel in pin.panels]) == ("O", ["O.force_x", "O.force_y", "O.force"])
     assert [panel.unit for panel in pin.panels] == ["N", "N"]
     without = stacks_of(heavy, ["-forces"])
     assert [stack.title for stack in without] == list(heavy.names)
