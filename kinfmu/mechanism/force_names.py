@@ -14,6 +14,8 @@ from kinfmu.units import ForceName, Quantity, force_sizes
 _INERTIAS = {("angle", "angle"): "inertia", ("length", "length"): "mass"}
 _MIXED_INERTIA = "mass_moment"  # of a turning and a sliding driver
 
+NEVER_NEGATIVE = frozenset({"reduced_inertia", "kinetic_energy"})  # sums of masses times squares
+
 
 class HasForces(Protocol):
     """The parts of a mechanism by which forces have names."""

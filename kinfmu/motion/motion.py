@@ -17,6 +17,7 @@ from kinfmu.measures.arithmetic import Value, sqrt
 from kinfmu.measures.placement import GROUND, BodyFrame, Placement, body_of, unit_vector
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.force_names import NEVER_NEGATIVE
 from kinfmu.mechanism.members import kind_of_measured
 from kinfmu.motion.driven_samples import driven_samples
 from kinfmu.motion.driver_values import driven_at, window, within_period
@@ -337,7 +338,9 @@ class Motion:
         if self.force is None:
             unknown = np.full(self.tables[0].shape[:-1], np.nan)
             return Track(self.x, unknown, unknown, unknown, self.is_closed, self.is_seamed)
-        return sampled_track(self.x, self.force(name), is_closed=self.is_closed, is_seamed=self.is_seamed)
+        track = sampled_track(self.x, self.force(name), is_closed=self.is_closed, is_seamed=self.is_seamed)
+        made_of = self.names.forces[name]  # the size of a force is made of two components
+        return replace(track, is_nonnegative=len(made_of) > 1 or made_of[0].noun in NEVER_NEGATIVE)
 
     def _path(self, point: str) -> tuple[Track, Track]:
         """Return the world coordinates of a point, without regard to the window."""

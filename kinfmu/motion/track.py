@@ -50,6 +50,8 @@ class Track:
         is_closed: True if the motion goes round: the last sample is the first, after one period.
         is_seamed: True if derivatives jump at the ends of a motion that goes round. Inside they jump where two samples
             have the same argument, one for each side.
+        is_nonnegative: True for a quantity that is never negative, such as a reduced inertia: then its polynomials are
+            read as 0 where rounding or an error of interpolation makes them negative.
 
     """
 
@@ -59,6 +61,7 @@ class Track:
     acceleration: FloatArray
     is_closed: bool = False
     is_seamed: bool = False
+    is_nonnegative: bool = False
 
     @classmethod
     def of(cls, like: Track, quantity: Taylor) -> Track:
@@ -181,7 +184,8 @@ class Track:
             part = np.empty((*row.shape[:-1], len(x)))  # samples one after another, however the whole is stored
             part[..., 0], part[..., 1:-1], part[..., -1] = at[..., 0], row[..., first:last], at[..., 1]
             rows.append(part)
-        return Track(x, rows[0], rows[1], rows[2])
+        value = np.maximum(rows[0], 0.0) if self.is_nonnegative else rows[0]
+        return Track(x, value, rows[1], rows[2], is_nonnegative=self.is_nonnegative)
 
     def maximum(self) -> Extreme:
         """Return the largest value of each design and where it occurs; NaN for designs with unknown samples."""
@@ -208,7 +212,8 @@ class Track:
         if missing:
             shape = self.value.shape[:-1]
             for sign, (value, x) in zip(missing, maxima(self.x, self._flat, missing), strict=True):
-                self._found[sign] = Extreme((sign * value).reshape(shape), x.reshape(shape))
+                found = (sign * value).reshape(shape)
+                self._found[sign] = Extreme(np.maximum(found, 0.0) if self.is_nonnegative else found, x.reshape(shape))
         return [self._found[sign] for sign in signs]
 
     @cached_property

@@ -121,3 +121,29 @@ def test_peaks_of_check_on_a_cam_with_dwells(begin: str) -> None:
     force = MASS * (GRAVITY + SPEED**2 * LIFT * math.tau / RISE**2)
     assert peak.reaction.name == "lift"
     assert peak.reaction.value == pytest.approx(force, rel=1e-8)
+
+
+@pytest.mark.parametrize("begin", ["40 deg", "40.37 deg"])
+@pytest.mark.parametrize("law", ["cycloidal", "modified_sine", "modified_trapezoid"])
+def test_what_is_never_negative_is_0_in_a_dwell(law: str, begin: str) -> None:
+    """The reduced inertia is m y'^2; between samples next to a dwell its polynomials go below 0 by 1e-11."""
+    mechanism = tappet(law, begin)
+    loading = kinfmu.check(mechanism).loading
+    assert loading is not None
+    (inertia,) = loading.inertias
+    steepest = {"cycloidal": 2.0, "modified_sine": 4.0 * math.pi / (4.0 + math.pi), "modified_trapezoid": 2.0}[law]
+    assert inertia.smallest == 0.0
+    assert inertia.largest == pytest.approx(MASS * (steepest * LIFT / RISE) ** 2, rel=1e-6)
+    run = kinfmu.solve(mechanism, cam_angle=TURN, cam_speed=1.0)
+    part = {"begin": math.radians(100.0), "end": math.radians(120.0)}
+    found = kinfmu.measure(
+        run,
+        [
+            Minimum("inertia", "cam.reduced_inertia"),
+            Minimum("energy", "kinetic_energy"),
+            Minimum("part", "cam.reduced_inertia", **part),
+        ],
+    )
+    assert [found[name].value for name in ("inertia", "energy", "part")] == [0.0, 0.0, 0.0]
+    power = kinfmu.measure(run, [Minimum("power", "cam.power")])["power"].value
+    assert power < -1e-3  # other quantities stay negative
