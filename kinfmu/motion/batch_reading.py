@@ -94,7 +94,9 @@ class BatchReading:
         if not self._readings:
             raise RequestError(f"there are no measures: {mechanism.name} declares none, or measures = []; give some")
         self._asked = dict(zip((one.name for one in self._readings), asked or mechanism.measures, strict=True))
-        self._batch = batch = Batch(model, parameters)
+        given = {name: np.asarray(value, dtype=float) for name, value in inputs.items()}
+        rows = max((len(array) for array in given.values() if array.ndim == 2), default=1)
+        self._batch = batch = Batch(model, parameters, rows)
         self.parameters, self._count = batch.parameters, batch.count
         driven = batch.driven(inputs)
         times = column_of("t", run_times(mechanism.run) if t is None else t)
@@ -102,7 +104,6 @@ class BatchReading:
             times = np.arange(driven[0].shape[-2], dtype=float)
         if len(times) < FEWEST:
             raise RequestError(f"there are {len(times)} samples; measures need {FEWEST} or more")
-        given = {name: np.asarray(value, dtype=float) for name, value in inputs.items()}
         self._model, self._driving = model, Driving(times, driven, given)
         self._tolerance, self._anew = tolerance, anew
         self._needed = needed(mechanism, self._readings)
@@ -147,7 +148,7 @@ class BatchReading:
         quantities = [one for one in self._needed.quantities if one not in self.motion.fixed]
         model, names = quantity_model(self._model, quantities)
         model.load_library()
-        self._compiled = Batch(model, self.parameters)
+        self._compiled = Batch(model, self.parameters, self._count)
         self._count_kept = len(quantities)
         self.motion = replace(self.motion, outputs=model.outputs, computed=names, _tracks={})
         return True

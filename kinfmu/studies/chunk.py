@@ -15,6 +15,7 @@ from kinfmu.errors import StudyError
 from kinfmu.motion import DesignMeasures, measure_designs
 from kinfmu.run import FloatArray
 from kinfmu.studies.definition import REASON, STATUS, Study
+from kinfmu.studies.own_cycle import own_cycles
 from kinfmu.sweep import Model
 
 Columns = dict[str, Any]  # arrays (m,) by column; texts of `reason` by the design's number in the part
@@ -28,17 +29,19 @@ class Job:
         model: The compiled mechanism, with its measures.
         t: (n,) times, or None.
         inputs: Driver values.
+        at_own_speed: As in `StudyMotion`.
 
     """
 
     model: Model
     t: FloatArray | None
     inputs: Mapping[str, FloatArray | float]
+    at_own_speed: bool
 
     @classmethod
     def of(cls, study: Study) -> Job:
         """Return the job of a study; its model is compiled now."""
-        return cls(study.model(), study.motion.t, study.motion.inputs)
+        return cls(study.model(), study.motion.t, study.motion.inputs, study.motion.at_own_speed)
 
     def packed(self) -> bytes:
         """Return the job as bytes."""
@@ -47,6 +50,10 @@ class Job:
     def measure(self, parameters: Mapping[str, FloatArray]) -> DesignMeasures:
         """Measure designs, whose parameters are (m,) by name."""
         driven: Mapping[str, Any] = self.inputs
+        if self.at_own_speed:
+            mechanism = self.model.mechanism
+            driven = own_cycles(mechanism, self.inputs, parameters)
+            parameters = {name: values for name, values in parameters.items() if name in mechanism.parameters}
         return measure_designs(self.model, parameters, t=self.t, **driven)
 
 

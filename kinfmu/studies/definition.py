@@ -24,6 +24,7 @@ from kinfmu.motion.needed import needed
 from kinfmu.plan import compile_plan
 from kinfmu.readings import Reading
 from kinfmu.run import FloatArray
+from kinfmu.studies.own_cycle import can_cycle, law_changing
 from kinfmu.studies.sampling import METHODS, Sampling
 from kinfmu.studies.variation import Grid, read_variation, whole_number
 from kinfmu.sweep import Model, compile, run_times  # noqa: A004  as re.compile
@@ -48,12 +49,15 @@ class StudyMotion:
         t: (n,) times [s], for the laws of the file; None: driver values.
         inputs: Driver values as `solve` takes them; empty: times.
         over: Description of the motion, such as 'one turn of crank'.
+        at_own_speed: Whether `inputs` are the cycle of the design as written, and each design makes its cycle with the
+            start and the speed of its own law.
 
     """
 
     t: FloatArray | None
     inputs: Mapping[str, FloatArray | float]
     over: str
+    at_own_speed: bool = False
 
     def __len__(self) -> int:
         arrays = [self.t] if self.t is not None else [np.atleast_1d(value) for value in self.inputs.values()]
@@ -201,13 +205,12 @@ def define(
         raise RequestError(f"{mechanism.name} declares no measures; give some, as [measures] or measures=")
     mechanism = replace(mechanism, measures=readings)
     _refuse_equal_names([one.name for one in variations], [reading.name for reading in mechanism.measures])
-    motion = _motion(mechanism, t, inputs or {}, over)
-    of_drivers = {constant.name for constant in mechanism.law_constants}
-    constants = [one.name for one in variations if one.name in of_drivers]
-    if constants and motion.t is None:
+    changed = law_changing(mechanism, [one.name for one in variations])
+    motion = _motion(mechanism, t, inputs or {}, over, changes_law=bool(changed))
+    if changed and motion.t is None and not motion.at_own_speed:
         raise RequestError(
-            f"{constants[0]} is a constant of a driver's law, which acts over time: give times "
-            f"([run] start, stop and step in a study file) in place of driver values"
+            f"{changed[0]} changes a driver's law, which acts over time: give times "
+            f"([run] start, stop and step in a study file) in place of driver values, or neither"
         )
     if engine == "auto":
         engine = _engine(len(samples) * len(motion))
@@ -243,8 +246,13 @@ def _refuse_equal_names(parameters: Sequence[str], measures: Sequence[str]) -> N
             taken.add(name)
 
 
-def _motion(mechanism: Mechanism, t: ArrayLike | None, inputs: Mapping[str, ArrayLike], over: str) -> StudyMotion:
-    """Return the motion: the times or driver values given, else one cycle of the driver or the run of the file."""
+def _motion(
+    mechanism: Mechanism, t: ArrayLike | None, inputs: Mapping[str, ArrayLike], over: str, *, changes_law: bool
+) -> StudyMotion:
+    """Return the motion: the times or driver values given, else one cycle of the driver or the run of the file.
+
+    changes_law: Parameters of the study change the law of a driver; without a speed of its own it then makes its run.
+    """
     if inputs and t is not None:
         raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
     if t is not None:
@@ -255,11 +263,14 @@ def _motion(mechanism: Mechanism, t: ArrayLike | None, inputs: Mapping[str, Arra
         longest = max(arrays, key=lambda name: np.size(arrays[name]))
         values = np.atleast_1d(arrays[longest])
         return StudyMotion(None, arrays, over or f"{longest} = {values[0]:.6g} to {values[-1]:.6g}")
-    if len(mechanism.drivers) == 1:
+    if len(mechanism.drivers) == 1 and (can_cycle(mechanism) or not changes_law):
         try:
             found, over = driver_cycle(compile_plan(mechanism))
         except KinfmuError as error:
             raise type(error)(f"the design as written has no motion: {error}", **error.data) from None
+        if found and changes_law:
+            turns = over.partition(" at ")[0]
+            return StudyMotion(None, found, f"{turns} at the speed of each design", at_own_speed=True)
         if found:
             return StudyMotion(None, found, over)
     times = run_times(mechanism.run)

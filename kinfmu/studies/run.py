@@ -65,7 +65,7 @@ def study(
         designs: Number of samples. Powers of two suit Sobol points.
         seed: Of the random numbers.
         t: (n,) times [s] for the laws of the file. Default, without inputs: one cycle of a single driver that turns all
-            the way round, else the run of the file.
+            the way round, at each design's own speed if that varies, else the run of the file.
         engine: 'python', 'native' (generated C) or 'auto', which is native from some hundred designs on.
         output: The Parquet file of the results. Default: none is kept.
         workers: Processes on this machine; 1: this process. Default: one for each core.

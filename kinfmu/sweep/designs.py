@@ -122,17 +122,18 @@ class Batch:
     Args:
         model: The model.
         parameters: Arrays (m,), or numbers and texts that hold for all designs, by name.
+        count: Number of designs if there are no parameters.
 
     Raises:
         RequestError: A name is unknown, or arrays have other lengths.
 
     """
 
-    def __init__(self, model: Solvable, parameters: Mapping[str, ArrayLike | str]) -> None:
+    def __init__(self, model: Solvable, parameters: Mapping[str, ArrayLike | str], count: int = 1) -> None:
         self.model = model
         self.plan = model.plan
         self.parameters = _arrays(model, parameters)
-        self.count = max((len(array) for array in self.parameters.values()), default=1)
+        self.count = max((len(array) for array in self.parameters.values()), default=count)
         self.values = self._rows(self.plan.parameters)
         if model.arguments.opens_expressions:
             self.values = np.array([self._followed(design) for design in range(self.count)])

@@ -11,12 +11,13 @@ from scipy.stats import kstest, qmc
 
 import kinfmu
 from kinfmu.errors import StudyError
+from kinfmu.mechanism import toml_file
 from kinfmu.readings import Minimum, Range
 from kinfmu.studies import StudyResult
 from kinfmu.studies.definition import define
 from kinfmu.studies.sampling import Sampling
 from kinfmu.studies.variation import Tolerance, UniformRange
-from tests.studies.linkage import RANGES, linkage, swing
+from tests.studies.linkage import RANGES, TEXT, linkage, swing
 
 
 def test_measures_are_those_of_the_closed_form_and_of_single_calls() -> None:
@@ -97,6 +98,45 @@ def test_measures_of_the_call_and_times_and_law_constants() -> None:
     assert found.measures == ("height", "swing", "slowest")
     assert (found.units["crank.speed"], found.units["slowest"]) == ("rad/s", "rad/s")
     assert found["slowest"][1] == pytest.approx(2.0 * found["slowest"][0], rel=1e-7)
+
+
+SPEEDS = {"crank.speed": {"from": "60 rpm", "to": "-400 rpm", "count": 4}}
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("varied", ["crank.speed", "crank.start", "w", "crank.speed and crank"])
+def test_every_design_makes_a_cycle_at_its_own_speed_as_check_does(varied: str, engine: str) -> None:
+    mechanism = linkage()
+    grids = {
+        "crank.speed": SPEEDS,
+        "crank.start": {"crank.start": {"values": ["10 deg", "200 deg"]}},
+        "w": {"w": {"values": ["30 rpm", "45 rpm"]}},
+        "crank.speed and crank": {**SPEEDS, "crank": {"values": [20, "21 mm"]}},
+    }[varied]
+    if varied == "w":
+        text = TEXT.replace('speed = "30 rpm"', 'speed = "2*w"')
+        mechanism = toml_file.parse(text.replace('base = "40 mm"', 'base = "40 mm", half = "w/2", w = "15 rpm"'))
+    found = kinfmu.study(mechanism, grids, engine=engine, workers=1)
+    assert len(found) > 1
+    for k in range(len(found)):
+        settings = {name: float(found[name][k]) for name in grids}
+        measured = kinfmu.check(mechanism.with_parameters(settings)).measured
+        assert measured is not None
+        for one in measured.values:
+            assert found[one.name][k] == pytest.approx(one.value, rel=1e-7)
+            columns = [f"{one.name}.at", f"{one.name}.at2"][: len(one.at)]
+            assert [found[column][k] for column in columns] == pytest.approx(one.at, abs=1e-6)
+    assert "one turn of crank at the speed of each design" in str(found)
+
+
+def test_other_law_constants_vary_over_the_run_of_the_file() -> None:
+    text = TEXT.replace('law = "constant_speed", speed = "30 rpm"', 'law = "polynomial", coefficients = [0, 3, 0.5]')
+    mechanism = toml_file.parse(text + "run = { start = 0, stop = 1, step = 0.01 }\n")
+    found = kinfmu.study(mechanism, {"crank.c2": {"values": [0.5, 1.0]}}, workers=1)
+    assert "the run of the file, t = 0 to 1 s" in str(found)
+    for k, value in enumerate(found["crank.c2"]):
+        run = kinfmu.solve(mechanism.with_parameters({"crank.c2": float(value)}))
+        assert found["fastest"][k] == pytest.approx(kinfmu.measure(run)["fastest"].value, rel=1e-9)
 
 
 def test_the_file_says_what_it_was_made_from(tmp_path: Path) -> None:

@@ -55,8 +55,9 @@ WRONG = {
         "the number of designs, of all grids and samples together, = 100000000000000000000000 must be a whole number"
     ),
     f"{CRANK}[run]\nend = 1": "[run] end: unknown key",
-    'mechanism = "hoeken.toml"\n[parameters]\n"crank.speed" = { values = [1, 2] }': (
-        "crank.speed is a constant of a driver's law, which acts over time: give times ([run] start, stop and step"
+    'mechanism = "hoeken.toml"\n[parameters]\n"crank.speed" = { values = [1, 2] }\n[run]\nfrom = 1\nto = 2': (
+        "crank.speed changes a driver's law, which acts over time: give times ([run] start, stop and step in a study "
+        "file) in place of driver values, or neither"
     ),
 }
 WRONG_PARAMETERS = {
