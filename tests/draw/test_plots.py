@@ -190,7 +190,7 @@ def test_reactions_are_plotted_if_they_are_named(heavy: Run) -> None:
     assert not set(heavy.reaction_names) & set(columns)
     (pin,) = stacks_of(heavy, ["O.*"])
     assert (pin.title, [panel.column for panel in pin.panels]) == ("O", ["O.force_x", "O.force_y", "O.force"])
-    assert [panel.unit for panel in pin.panels] == ["N", "N"]
+    assert [panel.unit for panel in pin.panels] == ["N", "N", "N"]
     without = stacks_of(heavy, ["-forces"])
     assert [stack.title for stack in without] == list(heavy.names)
     with pytest.raises(RequestError, match=r"no coordinate 'O\.forse_x'; did you mean 'O\.force_x'\?"):
