@@ -306,6 +306,13 @@ def read_inputs(texts: Sequence[str]) -> tuple[InputName, ...] | None:
     return tuple(inputs) if inputs == list(texts) else None
 
 
+def degrees_of(unit: str) -> tuple[str, float]:
+    """Return the unit in degrees for angles and their rates in time, and its factor; other units as they are."""
+    if unit == "rad" or unit.startswith("rad/s"):
+        return unit.replace("rad", "deg", 1), 1.0 / ANGLES["deg"]
+    return unit, 1.0
+
+
 class ForceName(str):
     """The name of a force, an inertia or an energy of a mechanism, such as 'crank.torque', with the facts it states.
 

@@ -15,12 +15,14 @@ from kinfmu.errors import KinfmuError, MechanismError, RequestError
 from kinfmu.files.whole_file import write_whole
 from kinfmu.joints import CamFlatFace, CamRoller
 from kinfmu.run import FloatArray
+from kinfmu.units import degrees_of
 
 TURN = 2.0 * math.pi
 _FEWEST, _MOST = 180, 100_000  # points of a polygon
 _STARTS = 721  # parameters in a turn from which Newton starts
 _STEPS = 8  # of Newton at most
 _SAME = 1e-13  # [rad]
+_DIGITS = 12  # after the point, of degrees
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,20 +70,20 @@ class CamProfile:
     driver: FloatArray | None = None
     driver_name: str = ""
 
-    def write_csv(self, path: str | Path, *, units: bool = False) -> None:
-        """Write the table into a .csv file; units: True for names such as 'x [mm]'.
+    def write_csv(self, path: str | Path, *, units: bool = False, degrees: bool = False) -> None:
+        """Write the table into a .csv file; units: True for names such as 'x [mm]'; degrees: True for angles in deg.
 
         Raises:
             KinfmuError: The file cannot be written.
 
         """
         try:
-            write_whole(Path(path), "".join(self.csv_lines(units=units)).encode())
+            write_whole(Path(path), "".join(self.csv_lines(units=units, degrees=degrees)).encode())
         except OSError as error:
             raise KinfmuError(f"{path}: cannot be written ({error.strerror or error})") from None
 
-    def columns(self) -> list[tuple[str, str, FloatArray]]:
-        """Return names, units and values (n,) of the table."""
+    def columns(self, *, degrees: bool = False) -> list[tuple[str, str, FloatArray]]:
+        """Return names, units and values (n,) of the table; degrees: True for angles in deg."""
         unit = self.length_unit
         found = [("cam_angle", "rad", self.angle)]
         if self.driver is not None:
@@ -94,14 +96,22 @@ class CamProfile:
             ("pressure_angle", "rad", self.pressure_angle),
             ("radius_of_curvature", unit, self.radius),
         ]
-        return [*found, ("face_offset", unit, self.offset)] if self.pitch is None else found
+        if self.pitch is None:
+            found.append(("face_offset", unit, self.offset))
+        return [_in_degrees(*column) for column in found] if degrees else found
 
-    def csv_lines(self, *, units: bool = False) -> Iterator[str]:
-        """Yield the lines of a CSV table, each with its end; units: True for names such as 'x [mm]'."""
-        columns = self.columns()
+    def csv_lines(self, *, units: bool = False, degrees: bool = False) -> Iterator[str]:
+        """Yield the lines of a CSV table, each with its end; arguments as in `write_csv`."""
+        columns = self.columns(degrees=degrees)
         yield ",".join(f"{name} [{unit}]" if units else name for name, unit, _ in columns) + "\n"
         for row in zip(*((values + 0.0).tolist() for _, _, values in columns), strict=True):
             yield ",".join(map(repr, row)) + "\n"
+
+
+def _in_degrees(name: str, unit: str, values: FloatArray) -> tuple[str, str, FloatArray]:
+    """Return a column with angles in degrees: 45, not 45.00000000000001."""
+    shown, factor = degrees_of(unit)
+    return (name, unit, values) if shown == unit else (name, shown, np.round(values * factor, _DIGITS))
 
 
 def turn_of(placed: PlacedCam, angles: FloatArray) -> FloatArray:

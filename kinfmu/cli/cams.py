@@ -19,9 +19,9 @@ FORMATS = (".csv", ".dxf", ".svg", ".png", ".pdf")
 _FINE = 1e-5  # of the largest distance of the profile from the axle
 
 
-def export_cam(given: str, output: Path, joint: str, tolerance: str | None, *, units: bool) -> None:
+def export_cam(given: str, output: Path, joint: str, tolerance: str | None, *, units: bool, degrees: bool) -> None:
     """Write the profile of a cam of a mechanism, or of the mechanism of a record."""
-    valid = {"run", "output", "cam", "tolerance", "units"}
+    valid = {"run", "output", "cam", "tolerance", "units", "degrees"}
     others = [name for name, value in click.get_current_context().params.items() if value and name not in valid]
     if others:
         options = listed(f"--{name}" for name in others).replace("--other", "a second run").replace("across", "x")
@@ -31,6 +31,9 @@ def export_cam(given: str, output: Path, joint: str, tolerance: str | None, *, u
         raise click.UsageError(f"{output}: the profile of a cam is written as {listed(FORMATS)}")
     if units and suffix != ".csv":
         raise click.UsageError(f"--units: only for .csv, not {suffix}")
+    if degrees and suffix != ".csv":
+        about = "its figure has angles in deg" if suffix != ".dxf" else "a drawing has no angles"
+        raise click.UsageError(f"--degrees: of a cam only for .csv, not {suffix}; {about}")
     if tolerance is not None and suffix != ".dxf":
         raise click.UsageError(f"--tolerance {tolerance}: only for .dxf, not {suffix}")
     from kinfmu.analysis import cam_profile
@@ -58,11 +61,11 @@ def export_cam(given: str, output: Path, joint: str, tolerance: str | None, *, u
             profile = cam_profile(mechanism, joint, tolerance=within)
             about = f" ({len(profile.angle)} corners, within {within:.3g} {unit} of the curve)"
     if output == STANDARD_OUTPUT:
-        for line in profile.csv_lines(units=units):
+        for line in profile.csv_lines(units=units, degrees=degrees):
             click.echo(line, nl=False)
         return
     if suffix == ".csv":
-        profile.write_csv(output, units=units)
+        profile.write_csv(output, units=units, degrees=degrees)
     else:
         from kinfmu.draw import cam
 

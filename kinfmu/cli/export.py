@@ -43,6 +43,20 @@ def _write(run: Run, path: Path, columns: Sequence[str], *, units: bool, width: 
         animate(run, path, width=width)
 
 
+def _write_svaj(run: Run, output: Path, name: str, *, units: bool, degrees: bool) -> None:
+    """Write displacement, velocity, acceleration and jerk as a table."""
+    from kinfmu.log.table import lines_of, write_columns
+    from kinfmu.motion.svaj_table import svaj_columns
+
+    columns = svaj_columns(run, name, degrees=degrees)
+    if output == STANDARD_OUTPUT:
+        for line in lines_of(columns, units=units):
+            click.echo(line, nl=False)
+        return
+    write_columns(run, columns, output, units=units)
+    click.echo(f"written: {output}")
+
+
 def _between(run: Run, start: str | None, stop: str | None) -> Run:
     """Return the samples from start to stop on the axis of the run, both included; all by default."""
     if start is None and stop is None:
@@ -122,9 +136,13 @@ def _on_axis_of(run: Run, text: str) -> float:
     "--svaj",
     metavar="NAME",
     help="Plot displacement, velocity, acceleration and jerk over the driver, of a coordinate such as slider.x or of a "
-    "cam joint's lift.",
+    "cam joint's lift, or write them as a table.",
 )
-@click.option("--degrees", is_flag=True, help="Plot angles in deg. Driver values and angles of --x always are.")
+@click.option(
+    "--degrees",
+    is_flag=True,
+    help="Angles in deg: in plots, where driver values and those of --x always are, and in tables of --svaj and --cam.",
+)
 @click.option(
     "--start", metavar="VALUE", help="First sample: time [s], or driver value of solve --angle, such as 30deg."
 )
@@ -181,7 +199,7 @@ def export(
     if width is not None:
         _check_width(width)
     if cam is not None:
-        export_cam(run, output, cam, tolerance, units=units)
+        export_cam(run, output, cam, tolerance, units=units, degrees=degrees)
         return
     if tolerance is not None:
         raise click.UsageError(f"--tolerance {tolerance}: only for the .dxf of a cam, with --cam")
@@ -200,12 +218,13 @@ def export(
         "--overlay": overlay,
         "--polar": polar,
         "a second run": other,
-        "--svaj": svaj,
-        "--degrees": degrees,
     }
+    if not (svaj and suffix in TABLES):
+        plot_only |= {"--svaj": svaj, "--degrees": degrees}
     given = [name for name, value in plot_only.items() if value]
     if given and suffix not in PLOTS:
-        raise click.UsageError(f"{listed(given)}: only for plots, {listed(PLOTS)}, not {suffix}")
+        also = "; --svaj also for tables" if "--svaj" in given else ""
+        raise click.UsageError(f"{listed(given)}: only for plots, {listed(PLOTS)}, not {suffix}{also}")
     excluded = [name for name in given if name not in ("--svaj", "--degrees")] + ["--columns"] * (columns is not None)
     if svaj and excluded:
         raise click.UsageError(f"--svaj excludes {listed(excluded)}")
@@ -217,6 +236,9 @@ def export(
         valid = listed((*TABLES, *PLOTS))
         raise click.UsageError(f"--columns {columns}: only for tables and plots, {valid}, not {suffix}")
     part = _between(read(Path(run)), start, stop)
+    if svaj and suffix in TABLES:
+        _write_svaj(part, output, svaj, units=units, degrees=degrees)
+        return
     if output == STANDARD_OUTPUT:
         for line in csv_lines(part, names_in(columns), units=units):
             click.echo(line, nl=False)

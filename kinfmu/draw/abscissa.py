@@ -9,7 +9,7 @@ import numpy as np
 from kinfmu.errors import FigureError
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import DEGREE, axis_of, rates_per
-from kinfmu.units import unit_of
+from kinfmu.units import degrees_of, unit_of
 
 TICK_STEPS = (1, 1.5, 3, 4.5, 6, 9, 10)  # of degrees: 30, 45, 60, 90; of other quantities matplotlib chooses
 
@@ -64,13 +64,6 @@ def unit_in(run: Run, name: str) -> str:
         run[name]  # reports an unknown name
         return unit_of(held[name], run.length_unit)
     return units[name]
-
-
-def degrees_of(unit: str) -> tuple[str, float]:
-    """Return the unit in degrees for angles and their rates in time, and its factor; other units as they are."""
-    if unit == "rad" or unit.startswith("rad/s"):
-        return unit.replace("rad", "deg", 1), 1.0 / DEGREE
-    return unit, 1.0
 
 
 def labelled(name: str, unit: str) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinfmu.draw.abscissa import TICK_STEPS, Abscissa, abscissa, degrees_of, labelled, unit_in
+from kinfmu.draw.abscissa import TICK_STEPS, Abscissa, abscissa, labelled, unit_in
 from kinfmu.draw.chart import SMALL, dress, numbers, powers_of_ten
 from kinfmu.draw.curves import LOST, gaps, rows_of
 from kinfmu.draw.polar import radial_scale
@@ -18,6 +18,7 @@ from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import ROUND_OFF, axis_of, shown_range
 from kinfmu.run.channels import chosen_columns
 from kinfmu.scene import palette
+from kinfmu.units import degrees_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from kinfmu.draw.abscissa import TICK_STEPS, axis_label, degrees_of
+from kinfmu.draw.abscissa import TICK_STEPS, axis_label
 from kinfmu.draw.chart import SMALL, dress, numbers, powers_of_ten
 from kinfmu.draw.curves import LOST, curves, gaps, rows_of
 from kinfmu.draw.overlay import (
@@ -28,7 +28,7 @@ from kinfmu.errors import FigureError, listed
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import ROUND_OFF, Axis, axis_of, shown_range
 from kinfmu.scene import palette
-from kinfmu.units import CoordinateName, ForceName, SignalName
+from kinfmu.units import CoordinateName, ForceName, SignalName, degrees_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

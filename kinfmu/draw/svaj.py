@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinfmu.draw.abscissa import TICK_STEPS, Abscissa, abscissa, degrees_of, labelled
+from kinfmu.draw.abscissa import TICK_STEPS, Abscissa, abscissa, labelled
 from kinfmu.draw.chart import SMALL, dress, numbers
 from kinfmu.draw.curves import rows_of
 from kinfmu.draw.overlay import curve_colour, range_of, sheet_title
@@ -16,9 +16,9 @@ from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, titl
 from kinfmu.draw.writing import check_suffix, write
 from kinfmu.errors import FigureError
 from kinfmu.motion.motion_curve import MotionCurve, motion_curve
+from kinfmu.motion.svaj_table import units_of
 from kinfmu.run import FloatArray, Run
-from kinfmu.run.axis import rates_per
-from kinfmu.units import Quantity, unit_of
+from kinfmu.units import degrees_of, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,12 +58,6 @@ def svaj(run: Run, path: str | Path, name: str, *, degrees: bool = False) -> Non
     across = driver_axis(run, curve)
     across = replace(across, values=across.values[rows])
     write(path, lambda: _sheet(run, across, name, curve.table[rows], units, degrees=degrees))
-
-
-def units_of(run: Run, curve: MotionCurve) -> list[str]:
-    """Return the units of displacement, velocity, acceleration and jerk."""
-    per = rates_per(run)
-    return [unit_of(Quantity(curve.kind, order, per), run.length_unit) for order in range(4)]
 
 
 def driver_axis(run: Run, curve: MotionCurve) -> Abscissa:

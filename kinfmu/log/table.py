@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ from kinfmu.run import Column, Run
 from kinfmu.run.channels import kept_columns, select
 from kinfmu.run.tables import arrow_table
 
+SUFFIXES = (".csv", ".parquet", ".npz")
 ROWS = 4096  # of a CSV file converted at once: Python's numbers take four times the memory
 
 
@@ -40,16 +40,28 @@ def write_table(run: Run, path: str | Path, columns: Sequence[str] | None = None
         MissingPackageError: Parquet without pyarrow.
 
     """
-    writers: dict[str, Callable[[Run, Path, Sequence[str] | None], None]] = {
-        ".csv": partial(_write_csv, units=units),
-        ".parquet": _write_parquet,
-        ".npz": _write_npz,
-    }
-    suffix = suffix_of(path)
-    if suffix not in writers:
-        raise LogError(f"{path}: '{suffix}' is not a known format of tables; known: {listed(writers)}")
+    _check_suffix(path)
+    write_columns(select(run, columns), _columns(run, columns), path, units=units)
+
+
+def write_columns(run: Run, columns: Sequence[Column], path: str | Path, *, units: bool = False) -> None:
+    """Write columns that are computed from a run, as `write_table` does those of the run; errors as there."""
+    suffix = _check_suffix(path)
     with replacing(path) as temporary:
-        writers[suffix](run, temporary, columns)
+        if suffix == ".csv":
+            with temporary.open("w", encoding="utf-8", newline="") as file:
+                file.writelines(lines_of(columns, units=units))
+        elif suffix == ".parquet":
+            _write_parquet(run, temporary, columns)
+        else:
+            _write_npz(run, temporary, columns)
+
+
+def _check_suffix(path: str | Path) -> str:
+    suffix = suffix_of(path)
+    if suffix not in SUFFIXES:
+        raise LogError(f"{path}: '{suffix}' is not a known format of tables; known: {listed(SUFFIXES)}")
+    return suffix
 
 
 def _columns(run: Run, names: Sequence[str] | None) -> list[Column]:
@@ -64,18 +76,17 @@ def _columns(run: Run, names: Sequence[str] | None) -> list[Column]:
 
 def csv_lines(run: Run, columns: Sequence[str] | None = None, *, units: bool = False) -> Iterator[str]:
     """Yield the lines of a CSV table, each with its end; arguments and errors as in `write_table`."""
-    chosen = _columns(run, columns)
+    return lines_of(_columns(run, columns), units=units)
+
+
+def lines_of(chosen: Sequence[Column], *, units: bool = False) -> Iterator[str]:
+    """Yield the lines of a CSV table of columns, each with its end; units as in `write_table`."""
     names = [f"{column.name} [{column.unit}]" if units else column.name for column in chosen]
     yield ",".join(map(_quoted, names)) + "\n"
-    for start in range(0, len(run), ROWS):
+    for start in range(0, len(chosen[0].values), ROWS):
         block = (column.values[start : start + ROWS].tolist() for column in chosen)
         for row in zip(*block, strict=True):
             yield ",".join(map(repr, row)) + "\n"  # repr: shortest text of the same bits
-
-
-def _write_csv(run: Run, path: Path, names: Sequence[str] | None, *, units: bool) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
-        file.writelines(csv_lines(run, names, units=units))
 
 
 def _quoted(name: str) -> str:
@@ -83,23 +94,21 @@ def _quoted(name: str) -> str:
     return '"' + name.replace('"', '""') + '"' if set(name) & set(',"\n\r') else name
 
 
-def _write_parquet(run: Run, path: Path, names: Sequence[str] | None) -> None:
+def _write_parquet(run: Run, path: Path, columns: Sequence[Column]) -> None:
     try:
         import pyarrow.parquet as pq
     except ImportError:
         raise MissingPackageError(f"{path}: writing Parquet needs pyarrow: pip install pyarrow") from None
 
     info = {f"info.{key}": value for key, value in run.info.items()}
-    columns = _columns(run, names)
-    about = description(select(run, names)) | ending(run) | {"mechanism": run.mechanism_text} | info
+    about = description(run) | ending(run) | {"mechanism": run.mechanism_text} | info
     about["columns"] = json.dumps([column.name for column in columns], ensure_ascii=False)
     about["units"] = json.dumps({column.name: column.unit for column in columns}, ensure_ascii=False)
     table = arrow_table(columns).replace_schema_metadata({f"kinfmu.{key}": text for key, text in about.items()})
     pq.write_table(table, path, compression="zstd", use_dictionary=False, use_byte_stream_split=True)
 
 
-def _write_npz(run: Run, path: Path, names: Sequence[str] | None) -> None:
-    columns = _columns(run, names)
+def _write_npz(run: Run, path: Path, columns: Sequence[Column]) -> None:
     texts = {
         "kinfmu.columns": np.array([column.name for column in columns]),
         "kinfmu.units": np.array([column.unit for column in columns]),

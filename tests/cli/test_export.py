@@ -194,7 +194,44 @@ def test_displacement_velocity_acceleration_and_jerk_are_plotted(command: Comman
     assert ">j [rad/rad³]<" in Path("run.svg").read_text(encoding="utf-8")
     message = refuses("export", "run.mcap", "-o", "run.svg", "--svaj", "rocker.phi", "--polar", "--columns", "q")
     assert message == "--svaj excludes --polar, --columns"
-    assert "--svaj: only for plots" in refuses("export", "run.mcap", "-o", "run.csv", "--svaj", "rocker.phi")
+    message = refuses("export", "run.mcap", "-o", "run.gif", "--svaj", "rocker.phi")
+    assert message == "--svaj: only for plots, .svg, .png, .pdf, not .gif; --svaj also for tables"
+    message = refuses("export", "run.mcap", "-o", "run.csv", "--degrees")
+    assert message == "--degrees: only for plots, .svg, .png, .pdf, not .csv"
+
+
+def test_displacement_velocity_acceleration_and_jerk_are_a_table(command: Command, refuses: Callable[..., str]) -> None:
+    assert command("solve", "cam_roller", "-o", "run.mcap", "--times", "0:2:0.01").exit_code == 0
+    export = ("export", "run.mcap", "--svaj", "lever.phi")
+    printed = command(*export, "-o", "-", "--units").stdout.splitlines()
+    names = "time [s],cam_angle [rad],position [rad],velocity [rad/s],acceleration [rad/s2],jerk [rad/s3],side [1]"
+    assert printed[0] == names
+    assert command(*export, "-o", "run.csv", "--units", "--degrees").stdout == "written: run.csv\n"
+    header, *lines = Path("run.csv").read_text(encoding="utf-8").splitlines()
+    assert header == names.replace("rad", "deg")
+    table = np.array([[float(text) for text in line.split(",")] for line in lines])
+    radians = np.array([[float(text) for text in line.split(",")] for line in printed[1:]])
+    np.testing.assert_allclose(table[:, 1:6], np.degrees(radians[:, 1:6]), rtol=1e-14)
+    run = kinfmu.log.read("run.mcap")
+    samples = radians[radians[:, 6] == 0.0]
+    for k, name in enumerate(("time", "cam_angle", "lever.phi", "lever.omega", "lever.alpha")):
+        np.testing.assert_allclose(samples[:, k], run[name], rtol=1e-13, atol=1e-13)
+    limits = radians[radians[:, 6] != 0.0]
+    assert len(limits) >= 4
+    np.testing.assert_array_equal(limits[:, 6], [-1.0, 1.0] * (len(limits) // 2))
+    assert (np.abs(np.diff(limits[:, 5])[::2]) > 1.0).all()  # the jerk jumps
+    assert command(*export, "-o", "run.npz").exit_code == 0
+    with np.load("run.npz") as arrays:
+        np.testing.assert_array_equal(arrays["jerk"], radians[:, 5])
+        assert arrays["kinfmu.units"].tolist()[-2:] == ["rad/s3", "1"]
+    parquet = pytest.importorskip("pyarrow.parquet")
+    assert command(*export, "-o", "run.parquet", "--degrees").exit_code == 0
+    read = parquet.read_table("run.parquet")
+    assert read.schema.field("jerk").metadata == {b"unit": b"deg/s3"}
+    np.testing.assert_array_equal(read.column("jerk").to_numpy(), table[:, 5])
+    message = refuses(*export, "-o", "run.csv", "--columns", "q", "--polar")
+    assert message == "--polar: only for plots, .svg, .png, .pdf, not .csv"
+    assert refuses(*export, "-o", "run.csv", "--columns", "q") == "--svaj excludes --columns"
 
 
 def test_a_pose_is_drawn_for_cad(record: Path, command: Command, refuses: Callable[..., str]) -> None:

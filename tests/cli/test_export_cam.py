@@ -49,12 +49,33 @@ def test_the_table_of_a_cam_is_printed(tmp_path: Path) -> None:
     assert (tmp_path / "cam.csv").read_text(encoding="utf-8").startswith("cam_angle,x,y,")
 
 
+def test_the_angles_of_the_table_of_a_cam_are_in_degrees_on_request(tmp_path: Path) -> None:
+    tables = []
+    for options in ((), ("--degrees",)):
+        path = tmp_path / "cam.csv"
+        assert export("cam_roller", "--cam", "pitch", "-o", str(path), "--units", *options).exit_code == 0
+        header, *lines = path.read_text(encoding="utf-8").splitlines()
+        tables.append((header.split(","), np.array([[float(text) for text in line.split(",")] for line in lines])))
+    (names, radians), (shown, degrees) = tables
+    angles = [k for k, name in enumerate(names) if name.endswith("[rad]")]
+    assert [names[k].split()[0] for k in angles] == ["cam_angle", "follower", "pressure_angle"]
+    assert shown == [name.replace("[rad]", "[deg]") for name in names]
+    np.testing.assert_array_equal(degrees[:, 0], np.arange(361.0))
+    np.testing.assert_allclose(degrees[:, angles], np.degrees(radians[:, angles]), atol=1e-11)
+    lengths = [k for k in range(len(names)) if k not in angles]
+    np.testing.assert_array_equal(degrees[:, lengths], radians[:, lengths])
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (("--cam", "pitsch", "-o", "a.csv"), "--cam: 'pitsch' is not a cam joint of cam_roller; did you mean 'pitch'?"),
         (("--cam", "pitch", "-o", "a.gif"), "a.gif: the profile of a cam is written as .csv, .dxf, .svg, .png, .pdf"),
         (("--cam", "pitch", "-o", "a.svg", "--units"), "--units: only for .csv, not .svg"),
+        (
+            ("--cam", "pitch", "-o", "a.svg", "--degrees"),
+            "--degrees: of a cam only for .csv, not .svg; its figure has angles in deg",
+        ),
         (("--cam", "pitch", "-o", "a.csv", "--tolerance", "1mm"), "--tolerance 1mm: only for .dxf, not .csv"),
         (("--cam", "pitch", "-o", "a.dxf", "--tolerance", "0mm"), "--tolerance 0mm: must be a positive length"),
         (("--cam", "pitch", "-o", "a.svg", "--polar"), "--cam pitch excludes --polar"),
