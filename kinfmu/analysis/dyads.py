@@ -1,4 +1,4 @@
-"""Dyads: two links between bodies that move before them, with the transmission angle where the links meet."""
+"""Dyads: two links between bodies that are solved before them, with the transmission angle where the links meet."""
 
 from __future__ import annotations
 

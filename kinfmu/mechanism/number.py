@@ -31,7 +31,7 @@ EXAMPLES = {
 }
 
 
-class Written(float):
+class NumberWithUnit(float):
     """A float with the text that gave it, such as '60 deg', and the unit in it."""
 
     __slots__ = ("text", "unit")
@@ -39,7 +39,7 @@ class Written(float):
     text: str
     unit: str
 
-    def __new__(cls, value: float, text: str, unit: str) -> Written:
+    def __new__(cls, value: float, text: str, unit: str) -> NumberWithUnit:
         number = super().__new__(cls, value)
         number.text, number.unit = text, unit
         return number
@@ -87,22 +87,22 @@ def read_number(where: str, value: object, quantity: Quantity | None, length_uni
             factor, (_, usual) = factors(quantity, length_unit)[literal.unit], every_unit(length_unit)[literal.unit]
             number = number if factor == usual else number * (factor / usual)  # the unit of two quantities
         check_number(where, number, value)
-        return Written(number, value, literal.unit) if literal.unit else number
+        return NumberWithUnit(number, value, literal.unit) if literal.unit else number
     if not is_number(value):
         valid = f"a number or text such as '{_example(quantity, length_unit)}'"
         raise MechanismError(f"{where} = {quoted(value)} must be {valid}")
     check_number(where, value)
-    return value if isinstance(value, Written) else float(value)  # type: ignore[arg-type]  # is_number has checked it
+    return value if isinstance(value, NumberWithUnit) else float(value)  # type: ignore[arg-type]  # is_number has checked it
 
 
-def written_in(value: object) -> str:
+def given_unit(value: object) -> str:
     """Return the unit in which a number was written; '' if there is none."""
-    return str(value.unit) if isinstance(value, Written) else ""
+    return str(value.unit) if isinstance(value, NumberWithUnit) else ""
 
 
 def in_unit_of(old: object, value: float, quantity: Quantity, length_unit: str) -> float:
     """Return a number in the unit of another one, rounded there to 15 digits; itself if that one has no unit."""
-    unit = written_in(old)
+    unit = given_unit(old)
     factor = factors(quantity, length_unit).get(unit)
     if factor is None:
         return value
@@ -126,7 +126,7 @@ def read_constant(where: str, value: object, quantity: Quantity, length_unit: st
             raise MechanismError(f"{where} = {quoted(value)} must be {valid}")
         return number
     check_number(where, value)
-    return value if isinstance(value, Written) else float(value)  # type: ignore[arg-type]  # check_number has checked it
+    return value if isinstance(value, NumberWithUnit) else float(value)  # type: ignore[arg-type]  # check_number has checked it
 
 
 def expression_error(

@@ -12,7 +12,7 @@ from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.conversion import converted
 from kinfmu.mechanism.dimension import UNKNOWN, Dimension
 from kinfmu.mechanism.expression import Computed, Expression
-from kinfmu.mechanism.number import Written, read_number, written_in
+from kinfmu.mechanism.number import NumberWithUnit, given_unit, read_number
 from kinfmu.mechanism.operations import WORDS
 from kinfmu.mechanism.valid import check_line, check_name, check_number, quoted
 from kinfmu.units import Quantity, every_unit
@@ -61,8 +61,8 @@ def read_parameter(name: str, parameter: Parameter | float | str, length_unit: s
     check_line(f"[parameters] {name} description", parameter.description)
     value = read_number(f"[parameters] {name}", parameter.value, parameter.quantity, length_unit)
     quantity, unit = parameter.quantity, parameter.unit
-    if isinstance(parameter.value, str | Written) and not isinstance(value, Expression):
-        unit = written_in(value)
+    if isinstance(parameter.value, str | NumberWithUnit) and not isinstance(value, Expression):
+        unit = given_unit(value)
         if quantity is None and unit:
             quantity, _ = every_unit(length_unit)[unit]
     return Parameter(value, quantity, parameter.description, unit)  # type: ignore[arg-type]  # computed later

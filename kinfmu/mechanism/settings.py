@@ -16,7 +16,7 @@ from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.display_unit import DisplayUnit, display_unit, written_unit
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.members import NumberPath
-from kinfmu.mechanism.number import in_unit_of, read_constant, read_number, unit_advice, written_in
+from kinfmu.mechanism.number import given_unit, in_unit_of, read_constant, read_number, unit_advice
 from kinfmu.mechanism.parameters import NUMBER, Parameter
 from kinfmu.mechanism.valid import is_number, quoted
 from kinfmu.units import Quantity, unit_of
@@ -177,7 +177,7 @@ class Settable:
 
         """
         setting = self.constants.get(name) or self.parameters[name]
-        own = setting.unit if isinstance(setting, Parameter) else written_in(setting.value)
+        own = setting.unit if isinstance(setting, Parameter) else given_unit(setting.value)
         return display_unit(setting.quantity, self._length_unit, written_unit(values, self._length_unit) or own)
 
     def _expression(self, name: str) -> Expression | None:

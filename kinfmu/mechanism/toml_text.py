@@ -14,7 +14,7 @@ from kinfmu.mechanism.body import RunSettings
 from kinfmu.mechanism.declared import keys_of
 from kinfmu.mechanism.expression import Computed
 from kinfmu.mechanism.mechanism import Mechanism
-from kinfmu.mechanism.number import Written, read_number
+from kinfmu.mechanism.number import NumberWithUnit, read_number
 from kinfmu.mechanism.parameters import Parameter
 from kinfmu.units import Quantity, unit_of
 
@@ -86,7 +86,7 @@ def _keys(member: Any) -> Iterator[str]:
 
 def _as_written(value: Any, quantity: Quantity | None, length_unit: str) -> Any:
     """Return the text with a unit that gave a number, if it still gives it; else the value."""
-    if isinstance(value, Written):
+    if isinstance(value, NumberWithUnit):
         with suppress(MechanismError):
             return value.text if read_number("", value.text, quantity, length_unit) == value else value
     return value
