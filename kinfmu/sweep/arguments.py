@@ -52,7 +52,6 @@ class Arguments:
         self._places = {parameter.name: k for k, parameter in enumerate(plan.parameters)}
         self._constant_places = {constant.name: k for k, constant in enumerate(constants)}
         self.opens_expressions = any(plan.mechanism.parameters[name].expression for name in self._places)
-        self._of_drivers = frozenset(constant.name for constant in plan.law_constants)
         self._positive = {k for k, constant in enumerate(constants) if constant.is_positive}
 
     def setting(self, given: Settings) -> Setting:
@@ -154,10 +153,9 @@ class Arguments:
         return dict(zip(nodes, evaluate(list(nodes.values()), known), strict=True))
 
     def mechanism_with(self, setting: Setting) -> Mechanism | Callable[[], Mechanism]:
-        """Return the mechanism with parameters and loads as set, or a function that makes it when it is first read."""
-        own = {name: value for name, value in setting.given.items() if name not in self._of_drivers}
-        mechanism = self.mechanism
-        return (lambda: mechanism.with_parameters(own)) if own else mechanism
+        """Return the mechanism with parameters and law constants as set, or a function that makes it when it is read."""
+        mechanism, given = self.mechanism, dict(setting.given)
+        return (lambda: mechanism.with_parameters(given)) if given else mechanism
 
     def info(self, setting: Setting, engine: str) -> dict[str, str]:
         mechanism = self.mechanism

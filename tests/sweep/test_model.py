@@ -50,6 +50,15 @@ def test_the_run_holds_the_mechanism_with_its_parameters() -> None:
     assert run.info["b"] == "41.0"
 
 
+def test_the_run_holds_the_mechanism_with_its_law_constants() -> None:
+    values: dict[str, float | str] = {"crank.speed": "30 rpm", "a": 39.0}
+    run = kinfmu.compile(leg()).solve([0.0, 0.1], parameters=values)
+    values["a"] = 37.0  # which no longer concerns the run
+    assert run.mechanism is not None
+    assert run.mechanism.settable.constants["crank.speed"].value == pytest.approx(np.pi)
+    assert run.mechanism.parameters["a"].value == 39.0
+
+
 def test_parameters_by_expressions_follow_the_others_in_the_run() -> None:
     run = kinfmu.compile(leg()).solve([0.0], parameters={"a": 39.0})
     assert run.mechanism is not None
