@@ -13,8 +13,8 @@ import numpy as np
 from kinfmu.analysis.cams import CamFindings
 from kinfmu.cams import pressing_sign
 from kinfmu.mechanism.force_names import names_of_rows
+from kinfmu.motion.history import History
 from kinfmu.motion.motion import Motion
-from kinfmu.motion.track import Track
 from kinfmu.units import unit_of
 
 _ROUNDING = 1e-9  # of the largest contact force; smaller tensions are rounding
@@ -67,16 +67,16 @@ def lift_offs(motion: Motion, cams: Sequence[CamFindings]) -> Iterator[LiftOff]:
             continue
         (name,) = names_of_rows(cam.cam.joint)
         sense = pressing_sign(cam.cam)
-        track = motion.track(name)
+        history = motion.history(name)
         if sense < 0:
-            track = track.negative()
-        if not track.is_known:
+            history = history.negative()
+        if not history.is_known:
             continue
-        low, high = track.extremes()
+        low, high = history.extremes()
         if -float(low.value) <= _ROUNDING * max(-float(low.value), float(high.value)):
             continue
         unit = motion.mechanism.length_unit
-        parts = _negative_parts(track)
+        parts = _negative_parts(history)
         yield LiftOff(
             joint=cam.joint,
             force=name,
@@ -85,26 +85,26 @@ def lift_offs(motion: Motion, cams: Sequence[CamFindings]) -> Iterator[LiftOff]:
             driver=motion.driver,
             at_unit=unit_of(motion.driver_quantity, unit),
             parts=tuple((float(begin), float(end)) for begin, end in map(motion.driven_at, map(np.array, parts))),
-            extent=_extent(motion, track, parts),
+            extent=_extent(motion, history, parts),
             largest=-float(low.value),
             at=float(motion.driven_at(np.asarray(low.x))),
         )
 
 
-def _negative_parts(track: Track) -> list[tuple[float, float]]:
+def _negative_parts(history: History) -> list[tuple[float, float]]:
     """Return the parts of a motion in which a quantity is negative, from argument to argument."""
-    crossings = np.sort(track.crossings(np.asarray(0.0))[1])
-    ends = [float(track.x[0]), *crossings.tolist(), float(track.x[-1])]
-    parts = [(a, b) for a, b in pairwise(ends) if b > a and track.at(np.array([0.5 * (a + b)]))[0] < 0]
-    if track.is_closed and len(parts) > 1 and parts[0][0] == ends[0] and parts[-1][1] == ends[-1]:
+    crossings = np.sort(history.crossings(np.asarray(0.0))[1])
+    ends = [float(history.x[0]), *crossings.tolist(), float(history.x[-1])]
+    parts = [(a, b) for a, b in pairwise(ends) if b > a and history.at(np.array([0.5 * (a + b)]))[0] < 0]
+    if history.is_closed and len(parts) > 1 and parts[0][0] == ends[0] and parts[-1][1] == ends[-1]:
         parts = [*parts[1:-1], (parts[-1][0], parts[0][1])]  # one part goes on past the end
     return parts
 
 
-def _extent(motion: Motion, track: Track, parts: list[tuple[float, float]]) -> str:
+def _extent(motion: Motion, history: History, parts: list[tuple[float, float]]) -> str:
     """Return the extent of the negative parts, as in LiftOff."""
-    if parts != [(float(track.x[0]), float(track.x[-1]))]:
+    if parts != [(float(history.x[0]), float(history.x[-1]))]:
         return "part"
-    travel = motion.driven_between(track.x[0], track.x[-1])
+    travel = motion.driven_between(history.x[0], history.x[-1])
     is_turn = motion.driver_quantity.kind == "angle" and travel > math.tau - _ROUNDING
     return "turn" if is_turn else "motion"

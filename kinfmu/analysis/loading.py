@@ -234,8 +234,8 @@ class _Forces:
         """Return the smallest and the largest value of a force, each with the driver value or time at which it is."""
         run, values = self._run, force_of(self._run, name)
         if self._motion is not None and np.isfinite(values).all():
-            motion, track = self._motion, self._motion.track(name)
-            low, high = track.extremes()
+            motion, history = self._motion, self._motion.history(name)
+            low, high = history.extremes()
             return (
                 (float(low.value), float(motion.driven_at(np.asarray(low.x)))),
                 (float(high.value), float(motion.driven_at(np.asarray(high.x)))),

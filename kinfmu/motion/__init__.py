@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from kinfmu.motion.designs import DesignMeasures, measure_designs
+from kinfmu.motion.history import Extreme, History
 from kinfmu.motion.measure import MeasuredValue, MeasuredValues, measure
 from kinfmu.motion.motion import Motion
-from kinfmu.motion.track import Extreme, Track
 
 __all__ = [
     "DesignMeasures",
     "Extreme",
+    "History",
     "MeasuredValue",
     "MeasuredValues",
     "Motion",
-    "Track",
     "measure",
     "measure_designs",
 ]

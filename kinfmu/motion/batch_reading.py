@@ -18,6 +18,7 @@ from kinfmu.mechanism.force_names import measured_forces
 from kinfmu.mechanism.settings import LawConstant
 from kinfmu.motion.design_points import dependent_numbers, points_of_designs
 from kinfmu.motion.driven_samples import driven_samples
+from kinfmu.motion.history import FEWEST
 from kinfmu.motion.measure import (
     MeasuredValue,
     chosen_measures,
@@ -31,7 +32,6 @@ from kinfmu.motion.needed import QuantityRead, needed
 from kinfmu.motion.quantity_model import quantity_model
 from kinfmu.motion.quintic import FloatArray, use_compiled
 from kinfmu.motion.splitting import has_breaks
-from kinfmu.motion.track import FEWEST
 from kinfmu.plan.plan import PlanParameter
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.readings import Finding, LowestMargin, PressureAngle, Reading
@@ -150,7 +150,7 @@ class BatchReading:
         model.load_library()
         self._compiled = Batch(model, self.parameters, self._count)
         self._count_kept = len(quantities)
-        self.motion = replace(self.motion, outputs=model.outputs, computed=names, _tracks={})
+        self.motion = replace(self.motion, outputs=model.outputs, computed=names, _histories={})
         return True
 
     def _measure_compiled(self, part: slice) -> dict[int, str]:
@@ -303,7 +303,7 @@ class BatchReading:
         fixed = {**motion.fixed, **self._fixed_of(batch)}
         drive = motion.drive and replace(motion.drive, is_closed=False)
         return replace(
-            motion, tables=(tables[0], tables[1], tables[2]), fixed=fixed, is_closed=False, drive=drive, _tracks={}
+            motion, tables=(tables[0], tables[1], tables[2]), fixed=fixed, is_closed=False, drive=drive, _histories={}
         )
 
     @cached_property

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from kinfmu.errors import RequestError
+from kinfmu.motion.history import History
 from kinfmu.motion.quintic import FloatArray
-from kinfmu.motion.track import Track
 from kinfmu.run.axis import TIME, HasAxis, axis_of, rates_per
 
 
@@ -24,7 +24,7 @@ class DrivenSamples(NamedTuple):
     per: str
     order: slice
     driver: str
-    drive: Track | None
+    drive: History | None
 
 
 def driven_samples(run: HasAxis) -> DrivenSamples:
@@ -45,7 +45,7 @@ def driven_samples(run: HasAxis) -> DrivenSamples:
     u, ud, udd = (run.inputs[order, column + k] for k in range(3))
     if per != "time":
         ud, udd = np.ones_like(x), np.zeros_like(x)
-    return DrivenSamples(x, per, order, run.input_names[column].driver, Track(x, u, ud, udd))
+    return DrivenSamples(x, per, order, run.input_names[column].driver, History(x, u, ud, udd))
 
 
 def _argument_of(run: HasAxis) -> tuple[FloatArray, str]:

@@ -1,17 +1,17 @@
-"""The value of the driver over a motion, a track: its value at an argument, and the part between two values."""
+"""The value of the driver over a motion, a history: its value at an argument, and the part between two values."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from kinfmu.errors import RequestError
+from kinfmu.motion.history import History
 from kinfmu.motion.quintic import FloatArray
-from kinfmu.motion.track import Track
 
 _SAME = 1e-9  # of the travel of the driver; values closer than this are equal
 
 
-def driven_at(drive: Track, x: FloatArray) -> FloatArray:
+def driven_at(drive: History, x: FloatArray) -> FloatArray:
     """Return values of the driver at arguments (...), which may be in the period before or after the motion."""
     if drive.is_linear:
         return np.asarray(drive.rate[0] * x + (drive.value[0] - drive.rate[0] * drive.x[0]))
@@ -21,14 +21,14 @@ def driven_at(drive: Track, x: FloatArray) -> FloatArray:
     return np.asarray(np.where(np.isnan(x), np.nan, found + turns * travel))
 
 
-def within_period(drive: Track, values: FloatArray) -> FloatArray:
+def within_period(drive: History, values: FloatArray) -> FloatArray:
     """Return values (...) with the end of a motion that goes round replaced by its begin."""
     first, last = drive.value[0], drive.value[-1]
     is_end = drive.is_closed & (np.abs(values - last) <= _SAME * np.abs(last - first))
     return np.asarray(np.where(is_end, first, values))
 
 
-def window(drive: Track, begin: float | None, end: float | None) -> tuple[float, float]:
+def window(drive: History, begin: float | None, end: float | None) -> tuple[float, float]:
     """Return the first and last argument between two values of the driver; None: its first or last.
 
     Raises:
@@ -57,7 +57,7 @@ def window(drive: Track, begin: float | None, end: float | None) -> tuple[float,
     return start, stop
 
 
-def _argument_at(drive: Track, value: float) -> float:
+def _argument_at(drive: History, value: float) -> float:
     """Return the argument at which a driver that moves in one direction has a value that it reaches."""
     for k in (0, -1):
         if value == drive.value[k]:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from kinfmu.equations.taylor import Taylor
 from kinfmu.measures.arithmetic import sqrt
+from kinfmu.motion.history import History
 from kinfmu.motion.quintic import FloatArray, IntArray
-from kinfmu.motion.track import Track
 
 _ROUNDS = 5  # of linearizing and exchanging; the line and the circle need two or three
 _EXCHANGES = 60  # per round; each makes the smallest possible distance larger
@@ -33,7 +33,7 @@ class FittedShape(ABC):
 
     @abstractmethod
     def distance(self, x: Any, y: Any) -> Any:
-        """Return the distance of points (..., n) with its sign; also of tracks, as Taylor numbers."""
+        """Return the distance of points (..., n) with its sign; also of histories, as Taylor numbers."""
 
     @abstractmethod
     def basis(self, x: FloatArray, y: FloatArray) -> FloatArray:
@@ -77,7 +77,7 @@ class Circle(FittedShape):
         return np.stack([np.ones_like(x), np.cos(angle), np.sin(angle)], axis=-1)
 
 
-def deviation(x: Track, y: Track, shape: type[Line] | type[Circle]) -> FloatArray:
+def deviation(x: History, y: History, shape: type[Line] | type[Circle]) -> FloatArray:
     """Return the largest distance of a path from the line or circle for which it is smallest.
 
     Args:
@@ -91,9 +91,9 @@ def deviation(x: Track, y: Track, shape: type[Line] | type[Circle]) -> FloatArra
     """
     leading = x.value.shape[:-1]
     known = (x.is_known & y.is_known).reshape(-1)
-    x, y = (_flat(track, known) for track in (x, y))
+    x, y = (_flat(history, known) for history in (x, y))
     middle = [t.value.mean(-1, keepdims=True) for t in (x, y)]  # small numbers keep more digits
-    x, y = (Track.of(t, t.taylor - m) for t, m in zip((x, y), middle, strict=True))
+    x, y = (History.of(t, t.taylor - m) for t, m in zip((x, y), middle, strict=True))
     size = np.maximum(np.ptp(x.value, axis=-1), np.ptp(y.value, axis=-1))
     best = shape(x.value, y.value)
     contacts = _exchange(best, x.value, y.value, size)
@@ -108,14 +108,14 @@ def deviation(x: Track, y: Track, shape: type[Line] | type[Circle]) -> FloatArra
     return np.where(known, found, np.nan).reshape(leading)
 
 
-def _largest(shape: FittedShape, x: Track, y: Track) -> FloatArray:
-    return Track.of(x, shape.distance(x.taylor, y.taylor)).largest_size().value
+def _largest(shape: FittedShape, x: History, y: History) -> FloatArray:
+    return History.of(x, shape.distance(x.taylor, y.taylor)).largest_size().value
 
 
-def _flat(track: Track, known: NDArray[np.bool_]) -> Track:
-    """Return a track with one axis of designs, and zeros for designs with unknown samples."""
-    value, rate, acceleration = (np.where(known[:, None], row.reshape(-1, len(track.x)), 0.0) for row in track.rows)
-    return Track(track.x, value, rate, acceleration)
+def _flat(history: History, known: NDArray[np.bool_]) -> History:
+    """Return a history with one axis of designs, and zeros for designs with unknown samples."""
+    value, rate, acceleration = (np.where(known[:, None], row.reshape(-1, len(history.x)), 0.0) for row in history.rows)
+    return History(history.x, value, rate, acceleration)
 
 
 def _length(x: Any, y: Any) -> Any:
@@ -155,7 +155,7 @@ def _exchange(shape: FittedShape, x: FloatArray, y: FloatArray, size: FloatArray
     return contacts
 
 
-def _polished(shape: FittedShape, x: Track, y: Track, contacts: IntArray) -> FloatArray:
+def _polished(shape: FittedShape, x: History, y: History, contacts: IntArray) -> FloatArray:
     """Return the parameters with contacts between the samples: extremes of the distance nearest to the samples."""
     at = x.x[contacts]
     low = x.x[np.maximum(contacts - 1, 0)]
@@ -174,7 +174,7 @@ def _polished(shape: FittedShape, x: Track, y: Track, contacts: IntArray) -> Flo
     return shape.parameters
 
 
-def _turned(fitted: FloatArray, x: Track, y: Track, contacts: IntArray) -> FloatArray:
+def _turned(fitted: FloatArray, x: History, y: History, contacts: IntArray) -> FloatArray:
     """Return the lines whose deviation is smallest among directions near the fitted ones, by golden sections.
 
     The strip around an oval touches it at two points only: two of the three contacts are neighbours. Elsewhere the
@@ -184,11 +184,11 @@ def _turned(fitted: FloatArray, x: Track, y: Track, contacts: IntArray) -> Float
     parameters = fitted.copy()
     if not is_double.any():
         return parameters
-    x, y = (Track(t.x, t.value[is_double], t.rate[is_double], t.acceleration[is_double]) for t in (x, y))
+    x, y = (History(t.x, t.value[is_double], t.rate[is_double], t.acceleration[is_double]) for t in (x, y))
 
     def strip(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the half width of the strip at an angle, and its offset."""
-        across = Track.of(x, np.cos(theta)[:, None] * y.taylor - np.sin(theta)[:, None] * x.taylor)
+        across = History.of(x, np.cos(theta)[:, None] * y.taylor - np.sin(theta)[:, None] * x.taylor)
         low, high = (extreme.value for extreme in across.extremes())
         return 0.5 * (high - low), 0.5 * (high + low)
 

@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.motion.history import History
 from kinfmu.motion.quintic import FloatArray, ranges
-from kinfmu.motion.track import Track
 
 _SAME_POSE = 1e-9  # [rad, sizes]; a motion whose first and last pose differ by less goes round
 _SAME_RATE = 1e-6  # of the largest; the same for rates and accelerations
@@ -19,13 +19,15 @@ _FEW = 5  # samples
 Ranges = Callable[[FloatArray], tuple[FloatArray, FloatArray]]  # smallest and largest number of each row (..., n)
 
 
-def goes_round(tracks: Sequence[tuple[Track, bool]], is_known: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
+def goes_round(
+    histories: Sequence[tuple[History, bool]], is_known: NDArray[np.bool_] | None = None
+) -> NDArray[np.bool_]:
     """Return whether motions go round: quantities, rates and accelerations of the last sample are those of the first.
 
     They are compared with their largest values, of angles and of other quantities.
 
     Args:
-        tracks: One or more quantities, each with True if it is an angle, which may be whole turns further.
+        histories: One or more quantities, each with True if it is an angle, which may be whole turns further.
         is_known: (...) True for the designs whose samples all have numbers: of those a few samples usually show that
             the motion is large enough, and the others are not looked at. Default: every sample is looked at.
 
@@ -34,20 +36,20 @@ def goes_round(tracks: Sequence[tuple[Track, bool]], is_known: NDArray[np.bool_]
 
     """
     if is_known is not None:
-        found = is_known & _ends_agree(tracks, _ranges_of_few)
+        found = is_known & _ends_agree(histories, _ranges_of_few)
         if (found == is_known).all():
             return np.asarray(found)
-    return _ends_agree(tracks, ranges)
+    return _ends_agree(histories, ranges)
 
 
 @np.errstate(invalid="ignore")  # of samples without numbers
-def _ends_agree(tracks: Sequence[tuple[Track, bool]], ranges_of: Ranges) -> NDArray[np.bool_]:
+def _ends_agree(histories: Sequence[tuple[History, bool]], ranges_of: Ranges) -> NDArray[np.bool_]:
     is_same, moves = np.asarray(True), np.asarray(False)
     for order in range(3):
         scales: dict[bool, FloatArray] = {}
         apart: list[tuple[FloatArray, bool]] = []
-        for track, is_angle in tracks:
-            row = track.rows[order]
+        for history, is_angle in histories:
+            row = history.rows[order]
             low, high = ranges_of(row)
             is_same = is_same & (low <= high)  # both are NaN where a sample has no numbers
             difference = row[..., -1] - row[..., 0]

@@ -23,13 +23,13 @@ from kinfmu.motion.driven_samples import driven_samples
 from kinfmu.motion.driver_values import driven_at, window, within_period
 from kinfmu.motion.fitting import Circle, Line, deviation
 from kinfmu.motion.going_round import goes_round
+from kinfmu.motion.history import FEWEST, History
 from kinfmu.motion.margins import lowest
 from kinfmu.motion.needed import Cosine, PathCoordinate, QuantityRead, cosine_between, is_angle, value_of
 from kinfmu.motion.quantity_names import QuantityNames
 from kinfmu.motion.quintic import FloatArray, IntArray
-from kinfmu.motion.sampled import sampled_track
+from kinfmu.motion.sampled import sampled_history
 from kinfmu.motion.splitting import ORDER, Break, distinct, law_breaks, split_at
-from kinfmu.motion.track import FEWEST, Track
 from kinfmu.run import Run
 from kinfmu.run.axis import TIME
 from kinfmu.units import CoordinateName, Quantity
@@ -68,7 +68,7 @@ class Motion:
     tables: tuple[FloatArray, FloatArray, FloatArray]
     outputs: Sequence[CoordinateName]
     fixed: Mapping[CoordinateName, Value]
-    drive: Track | None
+    drive: History | None
     points: Mapping[str, tuple[Value, Value]]
     driver: str = TIME
     margin: FloatArray | None = None
@@ -77,7 +77,7 @@ class Motion:
     force: Callable[[str], FloatArray] | None = None
     computed: Mapping[QuantityRead, CoordinateName] = field(default_factory=dict)
     is_seamed: bool = False
-    _tracks: dict[QuantityRead, Track] = field(default_factory=dict, repr=False)
+    _histories: dict[QuantityRead, History] = field(default_factory=dict, repr=False)
     _names: QuantityNames | None = field(default=None, repr=False)  # the same object in all parts and all designs
     _windows: dict[tuple[float | None, float | None, bool], tuple[float, float]] = field(
         default_factory=dict, repr=False
@@ -112,7 +112,7 @@ class Motion:
             run.margin[order] if with_margin else None,
             force=lambda name: force_of(run, name)[order],
         )
-        outputs = [(motion.quantity_track(name), name.is_angle) for name in run.outputs]
+        outputs = [(motion.quantity_history(name), name.is_angle) for name in run.outputs]
         is_closed = bool(outputs) and bool(goes_round(outputs))
         return motion._split(motion.breaks(over_time=run.axis == TIME), is_closed=is_closed).going_round(is_closed)
 
@@ -123,17 +123,17 @@ class Motion:
         for joint in self.mechanism.joints:
             with suppress(RequestError):  # the motion does not hold the bodies
                 led = joint.led_by(self._placement(joint.bodies()))
-                laws += [(led[0], self._as_track(led[1]))] if led else []
-        for law, track in laws:
-            if track.is_known:
-                found += law_breaks(track, law.own_breaks(ORDER), law.own_breaks())
+                laws += [(led[0], self._as_history(led[1]))] if led else []
+        for law, history in laws:
+            if history.is_known:
+                found += law_breaks(history, law.own_breaks(ORDER), law.own_breaks())
         return distinct(found, self.x)
 
     def _split(self, breaks: Sequence[Break], *, is_closed: bool) -> Motion:
         """Return the motion with samples on both sides of each break."""
         split = split_at(self.x, breaks, is_closed=is_closed)
         if split.is_empty:
-            return replace(self, is_seamed=split.is_seamed, _tracks={})
+            return replace(self, is_seamed=split.is_seamed, _histories={})
         force = self.force
         return replace(
             self,
@@ -143,14 +143,14 @@ class Motion:
             margin=None if self.margin is None else self.margin[split.source],
             force=None if force is None else lambda name: split.samples(force(name)),
             is_seamed=split.is_seamed,
-            _tracks={},
+            _histories={},
         )
 
     def goes_round(
         self, quantities: Sequence[QuantityRead], is_known: NDArray[np.bool_] | None = None
     ) -> NDArray[np.bool_]:
         """Return (...) whether quantities go round, whatever else moves; is_known: designs without gaps, if known."""
-        moving = [(self.quantity_track(one), is_angle(one)) for one in quantities if one not in self.fixed]
+        moving = [(self.quantity_history(one), is_angle(one)) for one in quantities if one not in self.fixed]
         return goes_round(moving, is_known) if moving else np.full(self.tables[0].shape[:-2], self.is_closed)
 
     def going_round(self, is_closed: bool) -> Motion:
@@ -158,7 +158,7 @@ class Motion:
         if is_closed == self.is_closed:
             return self
         drive = replace(self.drive, is_closed=is_closed) if self.drive else None
-        return replace(self, is_closed=is_closed, drive=drive, _tracks={})
+        return replace(self, is_closed=is_closed, drive=drive, _histories={})
 
     def of_designs(self, chosen: IntArray) -> Motion:
         """Return the motion of some of the designs, of one leading axis."""
@@ -173,7 +173,7 @@ class Motion:
             fixed={name: rows(value) for name, value in self.fixed.items()},
             points={name: (rows(x), rows(y)) for name, (x, y) in self.points.items()},
             margin=None,
-            _tracks={},
+            _histories={},
         )
 
     def __post_init__(self) -> None:
@@ -187,9 +187,9 @@ class Motion:
         return self._names
 
     @property
-    def argument(self) -> Track:
-        """The argument itself as a track: what rates are derivatives by, and the driver where it is one."""
-        return Track(self.x, self.x, np.ones_like(self.x), np.zeros_like(self.x), self.is_closed, self.is_seamed)
+    def argument(self) -> History:
+        """The argument itself as a history: what rates are derivatives by, and the driver where it is one."""
+        return History(self.x, self.x, np.ones_like(self.x), np.zeros_like(self.x), self.is_closed, self.is_seamed)
 
     @property
     def driver_quantity(self) -> Quantity:
@@ -219,7 +219,7 @@ class Motion:
         key = (begin, end, self.is_closed)
         if key not in self._windows:
             self._windows[key] = window(self.argument if self.drive is None else self.drive, begin, end)
-        return replace(self, window=self._windows[key], _tracks=self._tracks)
+        return replace(self, window=self._windows[key], _histories=self._histories)
 
     def require_closed(self, word: str) -> None:
         """Raise a RequestError unless the motion goes round; word: what needs that."""
@@ -240,23 +240,23 @@ class Motion:
         over, under = kinds[::-1] if inverse else kinds
         return Quantity("number") if over == under else Quantity(over, 1, under)
 
-    def track(self, of: str | PoseQuantity) -> Track:
+    def history(self, of: str | PoseQuantity) -> History:
         """Return a quantity over the motion: a coordinate, a rate of one, or a measured quantity."""
         return self._cut(self._whole(of))
 
-    def derivative(self, of: str | PoseQuantity, order: Literal[1, 2]) -> Track:
+    def derivative(self, of: str | PoseQuantity, order: Literal[1, 2]) -> History:
         """Return the speed (order 1) or acceleration (2) of a quantity; of a point 'body.point' its magnitude."""
         if isinstance(of, str) and of in self.mechanism.body_points:
-            x, y = (_derived(track, order).taylor for track in self._path(of))
-            return self._cut(self._as_track(sqrt(x * x + y * y)))
+            x, y = (_derived(history, order).taylor for history in self._path(of))
+            return self._cut(self._as_history(sqrt(x * x + y * y)))
         return self._cut(_derived(self._whole(of), order))
 
-    def speed_ratio(self, of: str | PoseQuantity, to: str | None) -> Track:
+    def speed_ratio(self, of: str | PoseQuantity, to: str | None) -> History:
         """Return the speed of a quantity over that of another; to: a coordinate, None: the driver."""
         if to is None and self.drive is None:
             raise RequestError("a ratio of speeds needs the key 'to' where several drivers move")
         below = self.drive if to is None and self.drive is not None else self._whole(to or "")
-        return self._cut(self._as_track(self._whole(of).derivative().taylor / below.derivative().taylor))
+        return self._cut(self._as_history(self._whole(of).derivative().taylor / below.derivative().taylor))
 
     def vector(self, between: tuple[str, str]) -> Vector:
         """Return the vector from one point to another, in the world."""
@@ -272,17 +272,17 @@ class Motion:
         at = self._placement((body_of(point), body))
         frame = at.poses[body]
         p_x, p_y = at.point(point)
-        v_x, v_y = (self._as_track(one).derivative().taylor for one in (p_x - frame.x, p_y - frame.y))
-        turning = self._as_track(frame.phi + 0.0 * p_x).derivative().taylor
+        v_x, v_y = (self._as_history(one).derivative().taylor for one in (p_x - frame.x, p_y - frame.y))
+        turning = self._as_history(frame.phi + 0.0 * p_x).derivative().taylor
         return v_x + turning * (p_y - frame.y), v_y - turning * (p_x - frame.x)
 
-    def cosine(self, a: Vector, b: Vector) -> Track:
+    def cosine(self, a: Vector, b: Vector) -> History:
         """Return the cosine of the angle between two vectors."""
-        return self._cut(self._as_track(cosine_between(a, b)))
+        return self._cut(self._as_history(cosine_between(a, b)))
 
-    def line_cosine(self, first: tuple[str, str], second: tuple[str, str]) -> Track:
+    def line_cosine(self, first: tuple[str, str], second: tuple[str, str]) -> History:
         """Return the cosine of the angle between two lines, each from a point to another."""
-        return self._cut(self.quantity_track(Cosine(first, second)))
+        return self._cut(self.quantity_history(Cosine(first, second)))
 
     def arc_sine(self, sine: FloatArray) -> FloatArray:
         """Return the angle [rad] of a sine that may exceed 1 by rounding."""
@@ -295,11 +295,11 @@ class Motion:
 
     def path_distance(self, point: str, targets: Sequence[tuple[float, float]]) -> tuple[FloatArray, FloatArray]:
         """Return the largest distance of targets from the path of a point, and where the path is closest to it."""
-        p_x, p_y = (track.taylor for track in self._path(point))
+        p_x, p_y = (history.taylor for history in self._path(point))
         value, x = np.asarray(-np.inf), np.asarray(np.nan)
         for t_x, t_y in targets:
             d_x, d_y = p_x - float(t_x), p_y - float(t_y)
-            nearest = self._cut(self._as_track(d_x * d_x + d_y * d_y)).minimum()
+            nearest = self._cut(self._as_history(d_x * d_x + d_y * d_y)).minimum()
             distance = np.sqrt(np.maximum(nearest.value, 0.0))
             is_worse = ~(distance <= value)
             value, x = np.where(is_worse, distance, value), np.where(is_worse, nearest.x, x)
@@ -311,46 +311,46 @@ class Motion:
             raise RequestError("the motion has no margins")
         return lowest(self.x, self.margin, self.window, is_closed=self.is_closed)
 
-    def quantity_track(self, quantity: QuantityRead) -> Track:
+    def quantity_history(self, quantity: QuantityRead) -> History:
         """Return a quantity that measures read, without regard to the window."""
-        if quantity not in self._tracks:
-            self._tracks[quantity] = self._new_track(quantity)
-        return self._tracks[quantity]
+        if quantity not in self._histories:
+            self._histories[quantity] = self._new_history(quantity)
+        return self._histories[quantity]
 
-    def _new_track(self, quantity: QuantityRead) -> Track:
+    def _new_history(self, quantity: QuantityRead) -> History:
         if quantity in self.computed:
             return self._coordinate(self.computed[quantity])
         if isinstance(quantity, CoordinateName):
             return self._coordinate(quantity)
-        return self._as_track(value_of(quantity, self._placement))
+        return self._as_history(value_of(quantity, self._placement))
 
-    def _whole(self, of: str | PoseQuantity) -> Track:
-        """Return a quantity as `track` does, without regard to the window."""
+    def _whole(self, of: str | PoseQuantity) -> History:
+        """Return a quantity as `history` does, without regard to the window."""
         if of in self.names.forces:
-            return self._force_track(str(of))
+            return self._force_history(str(of))
         if isinstance(of, str):
             name, order = self.names.orders.get(of, (of, 0))
-            return _derived(self.quantity_track(name), order)  # type: ignore[arg-type]  # unknown names are refused
-        return self.quantity_track(of)
+            return _derived(self.quantity_history(name), order)  # type: ignore[arg-type]  # unknown names are refused
+        return self.quantity_history(of)
 
-    def _force_track(self, name: str) -> Track:
+    def _force_history(self, name: str) -> History:
         """Return a force, of which only samples are known."""
         if self.force is None:
             unknown = np.full(self.tables[0].shape[:-1], np.nan)
-            return Track(self.x, unknown, unknown, unknown, self.is_closed, self.is_seamed)
-        track = sampled_track(self.x, self.force(name), is_closed=self.is_closed, is_seamed=self.is_seamed)
+            return History(self.x, unknown, unknown, unknown, self.is_closed, self.is_seamed)
+        history = sampled_history(self.x, self.force(name), is_closed=self.is_closed, is_seamed=self.is_seamed)
         made_of = self.names.forces[name]  # the size of a force is made of two components
-        return replace(track, is_nonnegative=len(made_of) > 1 or made_of[0].noun in NEVER_NEGATIVE)
+        return replace(history, is_nonnegative=len(made_of) > 1 or made_of[0].noun in NEVER_NEGATIVE)
 
-    def _path(self, point: str) -> tuple[Track, Track]:
+    def _path(self, point: str) -> tuple[History, History]:
         """Return the world coordinates of a point, without regard to the window."""
-        return self.quantity_track(PathCoordinate(point, "x")), self.quantity_track(PathCoordinate(point, "y"))
+        return self.quantity_history(PathCoordinate(point, "x")), self.quantity_history(PathCoordinate(point, "y"))
 
-    def _coordinate(self, name: str) -> Track:
-        """Return the track of a coordinate."""
+    def _coordinate(self, name: str) -> History:
+        """Return the history of a coordinate."""
         if name in self.fixed:
             constant = self.fixed[name] + np.zeros_like(self.x)  # type: ignore[index]  # a name is a text
-            return Track(self.x, constant, 0.0 * constant, 0.0 * constant, self.is_closed, self.is_seamed)
+            return History(self.x, constant, 0.0 * constant, 0.0 * constant, self.is_closed, self.is_seamed)
         if name not in self.outputs:
             raise RequestError(
                 f"there is no output '{name}', which a measure needs; solve or compile the mechanism with it, or with "
@@ -358,28 +358,28 @@ class Motion:
             )
         k = [str(output) for output in self.outputs].index(name)
         value, rate, acceleration = (table[..., k] for table in self.tables)
-        return Track(self.x, value, rate, acceleration, self.is_closed, self.is_seamed)
+        return History(self.x, value, rate, acceleration, self.is_closed, self.is_seamed)
 
-    def _cut(self, track: Track) -> Track:
-        """Return the part of a track that is in the window."""
+    def _cut(self, history: History) -> History:
+        """Return the part of a history that is in the window."""
         if self.window is None:
-            return track
-        return track.part(*self.window)
+            return history
+        return history.part(*self.window)
 
     def _placement(self, bodies: Sequence[str]) -> Placement:
         """Return bodies with their poses over the motion."""
         poses = {
             body: GROUND
             if body == GROUND_NAME
-            else BodyFrame.of(*(self.quantity_track(CoordinateName(body, axis)).taylor for axis in ("x", "y", "phi")))
+            else BodyFrame.of(*(self.quantity_history(CoordinateName(body, axis)).taylor for axis in ("x", "y", "phi")))
             for body in {*bodies, GROUND_NAME}
         }
         return Placement(poses, self.points)
 
-    def _as_track(self, value: Value) -> Track:
-        """Return a computed quantity as a track of this motion."""
-        like = Track(self.x, self.x, self.x, self.x, self.is_closed, self.is_seamed)
-        return Track.of(like, value if isinstance(value, Taylor) else Taylor(float(value)))
+    def _as_history(self, value: Value) -> History:
+        """Return a computed quantity as a history of this motion."""
+        like = History(self.x, self.x, self.x, self.x, self.is_closed, self.is_seamed)
+        return History.of(like, value if isinstance(value, Taylor) else Taylor(float(value)))
 
 
 def break_places(run: Run) -> list[float]:
@@ -398,6 +398,6 @@ def force_of(run: Run, name: str) -> FloatArray:
     return np.asarray(run[name], dtype=float)
 
 
-def _derived(track: Track, order: int) -> Track:
+def _derived(history: History, order: int) -> History:
     """Return the derivative of an order 0 to 2."""
-    return (lambda: track, track.derivative, track.second_derivative)[order]()
+    return (lambda: history, history.derivative, history.second_derivative)[order]()

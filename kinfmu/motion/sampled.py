@@ -7,16 +7,16 @@ from itertools import pairwise
 
 import numpy as np
 
+from kinfmu.motion.history import History
 from kinfmu.motion.quintic import FloatArray, IntArray
-from kinfmu.motion.track import Track
 
 _WIDE, _NARROW = 7, 5  # samples of a polynomial: of degree 6, and of degree 4 to judge it
 _ROUGH = 1e-3  # of the range of 7 samples; where the rates of both polynomials differ by more in a step, it has a kink
 _PERIODIC = 1e-6  # of the range; a quantity whose first and last sample differ by less goes round
 
 
-def sampled_track(x: FloatArray, value: FloatArray, *, is_closed: bool, is_seamed: bool = False) -> Track:
-    """Return the track of samples (n,) at x, with the rates of the polynomial of degree 6 through 7 samples.
+def sampled_history(x: FloatArray, value: FloatArray, *, is_closed: bool, is_seamed: bool = False) -> History:
+    """Return the history of samples (n,) at x, with the rates of the polynomial of degree 6 through 7 samples.
 
     Extremes have an error of order h^7 (h: distance of the samples). Where the samples do not follow a smooth curve, at
     jumps and kinks and if they are too few, rates are 0 in the samples, so that extremes are those of samples.
@@ -30,28 +30,28 @@ def sampled_track(x: FloatArray, value: FloatArray, *, is_closed: bool, is_seame
     """
     cuts = np.flatnonzero(np.diff(x) == 0.0) + 1
     if not len(cuts):
-        return replace(_smooth_track(x, value, is_closed=is_closed and not is_seamed), is_closed=is_closed)
+        return replace(_smooth_history(x, value, is_closed=is_closed and not is_seamed), is_closed=is_closed)
     parts = [(x[a:b], value[a:b]) for a, b in pairwise([0, *cuts.tolist(), len(x)])]
     joins = is_closed and not is_seamed and abs(float(value[-1] - value[0])) <= _PERIODIC * float(np.ptp(value))
     if joins:  # the last part goes on in the first
         (first_x, first), (last_x, last) = parts[0], parts[-1]
         parts[0] = np.concatenate([last_x[:-1] - (x[-1] - x[0]), first_x]), np.concatenate([last[:-1], first])
         del parts[-1]
-    tracks = [_smooth_track(*part, is_closed=False) for part in parts]
-    rows = [np.concatenate([row[k] for row in (track.rows for track in tracks)]) for k in (1, 2)]
+    histories = [_smooth_history(*part, is_closed=False) for part in parts]
+    rows = [np.concatenate([row[k] for row in (history.rows for history in histories)]) for k in (1, 2)]
     if joins:
         count = len(last_x) - 1
         rows = [np.concatenate([row[count:], row[: count + 1]]) for row in rows]
-    return Track(x, value, rows[0], rows[1], is_closed, is_seamed)
+    return History(x, value, rows[0], rows[1], is_closed, is_seamed)
 
 
-def _smooth_track(x: FloatArray, value: FloatArray, *, is_closed: bool) -> Track:
-    """Return the track of samples between which no derivative is known to jump."""
+def _smooth_history(x: FloatArray, value: FloatArray, *, is_closed: bool) -> History:
+    """Return the history of samples between which no derivative is known to jump."""
     span = float(np.ptp(value)) if len(value) else 0.0
     wraps = is_closed and abs(float(value[-1] - value[0])) <= _PERIODIC * span
     if len(x) <= _WIDE or not np.isfinite(value).all():
         nothing = np.where(np.isfinite(value), 0.0, np.nan)
-        return Track(x, value, nothing, nothing, is_closed)
+        return History(x, value, nothing, nothing, is_closed)
     rate, acceleration, extent = _rates(x, value, _WIDE, wraps=wraps)
     narrow, _, _ = _rates(x, value, _NARROW, wraps=wraps)
     step = np.gradient(x)
@@ -59,7 +59,7 @@ def _smooth_track(x: FloatArray, value: FloatArray, *, is_closed: bool) -> Track
     near = np.convolve(is_rough, np.ones(_WIDE), "same") > 0.0  # polynomials near a kink see it too
     if wraps:
         near[0] = near[-1] = near[0] or near[-1]
-    return Track(x, value, np.where(near, 0.0, rate), np.where(near, 0.0, acceleration), is_closed)
+    return History(x, value, np.where(near, 0.0, rate), np.where(near, 0.0, acceleration), is_closed)
 
 
 def _rates(x: FloatArray, value: FloatArray, count: int, *, wraps: bool) -> tuple[FloatArray, FloatArray, FloatArray]:

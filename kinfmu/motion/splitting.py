@@ -16,8 +16,8 @@ import numpy as np
 
 from kinfmu.laws.law import Jumps
 from kinfmu.mechanism import Mechanism
+from kinfmu.motion.history import History
 from kinfmu.motion.quintic import FloatArray, IntArray
-from kinfmu.motion.track import Track
 
 ORDER = 5  # derivatives up to this one count: those of the polynomials between samples
 _SAME = 1e-6  # of the distance of samples; a break that is closer to a sample is at it
@@ -93,14 +93,14 @@ class Splitting:
                 found[limit.number] = base + weights @ (values[limit.near] - base)
         return found
 
-    def driver(self, track: Track) -> Track:
-        """Return the track of a driver at the new samples; a constant speed stays constant to the last bit."""
-        if track.is_linear:
-            rate = np.full_like(self.x_split, track.rate[0])
-            return Track(self.x_split, track.at(self.x_split)[0], rate, 0.0 * rate, track.is_closed)
-        value, rate, acceleration = (row[:, None] for row in track.rows)
+    def driver(self, history: History) -> History:
+        """Return the history of a driver at the new samples; a constant speed stays constant to the last bit."""
+        if history.is_linear:
+            rate = np.full_like(self.x_split, history.rate[0])
+            return History(self.x_split, history.at(self.x_split)[0], rate, 0.0 * rate, history.is_closed)
+        value, rate, acceleration = (row[:, None] for row in history.rows)
         rows = [row[:, 0] for row in self.tables((value, rate, acceleration))]
-        return Track(self.x_split, rows[0], rows[1], rows[2], track.is_closed)
+        return History(self.x_split, rows[0], rows[1], rows[2], history.is_closed)
 
     def _distance(self, limit: _Limit, most: int) -> tuple[float, ...]:
         """Return where the samples of a limit are, as seen from it."""
@@ -190,17 +190,17 @@ def _weights(distances: tuple[float, ...], orders: int) -> FloatArray:
     return np.asarray(found * np.repeat(scales, len(d)) / np.array(scales)[:, None])
 
 
-def law_breaks(track: Track, jumps: Jumps, sharp: Jumps) -> list[Break]:
+def law_breaks(history: History, jumps: Jumps, sharp: Jumps) -> list[Break]:
     """Return where the argument of a law takes the values at which the law has breaks.
 
     Args:
-        track: The argument over the motion; angles from an arc tangent may jump by whole turns.
+        history: The argument over the motion; angles from an arc tangent may jump by whole turns.
         jumps: Where derivatives up to `ORDER` jump.
         sharp: Those of them at which already the value, first or second derivative jumps.
 
     """
-    value, period = np.unwrap(track.value), float(jumps.period)
-    along = Track(track.x, value, track.rate, track.acceleration)
+    value, period = np.unwrap(history.value), float(jumps.period)
+    along = History(history.x, value, history.rate, history.acceleration)
     low, high = float(value.min()), float(value.max())
     margin = _SAME * float(np.abs(np.diff(value)).max(initial=0.0))
     found = []
@@ -210,7 +210,7 @@ def law_breaks(track: Track, jumps: Jumps, sharp: Jumps) -> list[Break]:
         if period > 0.0:
             turns = range(math.ceil((low - margin - one) / period), math.floor((high + margin - one) / period) + 1)
         for level in (one + k * period for k in turns):
-            ends = [track.x[k] for k in (0, -1) if abs(value[k] - level) <= margin]
+            ends = [history.x[k] for k in (0, -1) if abs(value[k] - level) <= margin]
             found += [Break(float(x), is_jump) for x in (*ends, *along.crossings(np.asarray(level))[1].tolist())]
     return found
 

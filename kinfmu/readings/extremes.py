@@ -21,7 +21,7 @@ class Minimum(Reading):
     end: End = None
 
     def read(self, motion: Motion) -> Finding:
-        low = motion.track(self.of).minimum()
+        low = motion.history(self.of).minimum()
         return Finding(low.value, motion.quantity(self.of), (low.x,))
 
 
@@ -37,7 +37,7 @@ class Maximum(Reading):
     end: End = None
 
     def read(self, motion: Motion) -> Finding:
-        high = motion.track(self.of).maximum()
+        high = motion.history(self.of).maximum()
         return Finding(high.value, motion.quantity(self.of), (high.x,))
 
 
@@ -56,8 +56,8 @@ class Range(Reading):
     end: End = None
 
     def read(self, motion: Motion) -> Finding:
-        track = motion.track(self.of)
-        low, high = track.extremes()
+        history = motion.history(self.of)
+        low, high = history.extremes()
         return Finding(high.value - low.value, motion.quantity(self.of), (low.x, high.x))
 
 
@@ -73,7 +73,7 @@ class Peak(Reading):
     end: End = None
 
     def read(self, motion: Motion) -> Finding:
-        peak = motion.track(self.of).largest_size()
+        peak = motion.history(self.of).largest_size()
         return Finding(peak.value, motion.quantity(self.of), (peak.x,))
 
 

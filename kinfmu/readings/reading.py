@@ -1,6 +1,6 @@
 """The contract of a reading: one number that a designer reads off a motion, declared in `[measures]`.
 
-A reading is a formula in the words of a motion: tracks of quantities, their extremes, crossings and derivatives. The
+A reading is a formula in the words of a motion: histories of quantities, their extremes, crossings and derivatives. The
 package `kinfmu.motion` computes these on arrays; this package only declares the readings, as a mechanism file holds
 them.
 """

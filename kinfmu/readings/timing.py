@@ -26,12 +26,12 @@ class TimeRatio(Reading):
 
     def read(self, motion: Motion) -> Finding:
         motion.require_closed(self.type)
-        track = motion.track(self.of)
-        low, high = (extreme.x for extreme in track.extremes())
+        history = motion.history(self.of)
+        low, high = (extreme.x for extreme in history.extremes())
         stroke = abs(high - low)
-        other = track.span - stroke
-        longer = 0.5 * (track.span + abs(stroke - other))
-        return Finding(longer / (track.span - longer), Quantity("number"), (low, high))
+        other = history.span - stroke
+        longer = 0.5 * (history.span + abs(stroke - other))
+        return Finding(longer / (history.span - longer), Quantity("number"), (low, high))
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,6 @@ class Dwell(Reading):
             raise MechanismError(f"[measures.{self.name}] band = {float(self.band):g} must be positive")
 
     def read(self, motion: Motion) -> Finding:
-        track = motion.track(self.of)
-        start, stop = (track if self.near == "maximum" else track.negative()).stay(self.band)
+        history = motion.history(self.of)
+        start, stop = (history if self.near == "maximum" else history.negative()).stay(self.band)
         return Finding(motion.driven_between(start, stop), motion.driver_quantity, (start, stop))

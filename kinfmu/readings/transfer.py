@@ -98,8 +98,8 @@ class VelocityRatio(Reading):
     end: End = None
 
     def read(self, motion: Motion) -> Finding:
-        track = motion.speed_ratio(self.of, self.to)
-        found = track.maximum() if self.extreme == "maximum" else track.minimum()
+        history = motion.speed_ratio(self.of, self.to)
+        found = history.maximum() if self.extreme == "maximum" else history.minimum()
         return Finding(found.value, motion.ratio_quantity(self.of, self.to), (found.x,))
 
 

@@ -15,7 +15,7 @@ from kinfmu.mechanism.number import read_constant
 from kinfmu.mechanism.toml_file import document_of, read_measures, text_in
 from kinfmu.mechanism.toml_tables import check_keys, refuse_mechanism, table_of
 from kinfmu.mechanism.valid import quoted
-from kinfmu.motion.track import FEWEST
+from kinfmu.motion.history import FEWEST
 from kinfmu.run import MOST_SAMPLES
 from kinfmu.studies.definition import SAMPLES, SEED, Study, define
 from kinfmu.studies.sampling import METHODS

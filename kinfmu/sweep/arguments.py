@@ -153,7 +153,7 @@ class Arguments:
         return dict(zip(nodes, evaluate(list(nodes.values()), known), strict=True))
 
     def mechanism_with(self, setting: Setting) -> Mechanism | Callable[[], Mechanism]:
-        """Return the mechanism with parameters and law constants as set, or a function that makes it when it is read."""
+        """Return the mechanism with parameters and law constants as set, or a function that makes it when read."""
         mechanism, given = self.mechanism, dict(setting.given)
         return (lambda: mechanism.with_parameters(given)) if given else mechanism
 

@@ -11,7 +11,7 @@ import pytest
 import kinfmu
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism.toml_file import parse
-from kinfmu.motion.sampled import sampled_track
+from kinfmu.motion.sampled import sampled_history
 from kinfmu.readings import Maximum, Minimum, Peak, PeakSpeed, Range
 from tests.analysis.test_loading import ARM
 from tests.sweep.test_forces import loaded
@@ -50,10 +50,10 @@ def test_kinks_jumps_and_few_samples_give_extremes_of_the_samples() -> None:
     kink = np.where(x < 0.503, x, 0.503 - 0.2 * (x - 0.503))
     jump = np.where(x < 0.503, x**2, x - 1.0)
     for value in (kink, jump, np.sin(200.0 * x)):
-        track = sampled_track(x, value, is_closed=False)
-        assert track.maximum().value <= value.max() + 1e-9
-        assert track.minimum().value >= value.min() - 1e-9
-    few = sampled_track(x[:4], np.array([0.0, 2.0, 1.0, 0.0]), is_closed=False)
+        history = sampled_history(x, value, is_closed=False)
+        assert history.maximum().value <= value.max() + 1e-9
+        assert history.minimum().value >= value.min() - 1e-9
+    few = sampled_history(x[:4], np.array([0.0, 2.0, 1.0, 0.0]), is_closed=False)
     assert few.maximum().value == 2.0
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kinfmu.motion import Track, quintic
+from kinfmu.motion import History, quintic
 from kinfmu.motion.going_round import goes_round
 from kinfmu.motion.quintic import ranges, use_compiled
 
@@ -23,8 +23,8 @@ def sine(frequency: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.sin(f * X), f * np.cos(f * X), -f * f * np.sin(f * X)
 
 
-def track_of(rows: tuple[np.ndarray, np.ndarray, np.ndarray]) -> Track:
-    return Track(X, *(np.array(row) for row in rows))
+def history_of(rows: tuple[np.ndarray, np.ndarray, np.ndarray]) -> History:
+    return History(X, *(np.array(row) for row in rows))
 
 
 @pytest.mark.usefixtures("arithmetic")
@@ -37,22 +37,22 @@ def test_a_design_with_an_unknown_sample_does_not_go_round(
 ) -> None:
     rows = tuple(np.array([row, row, 2.0 * row]) for row in sine(1.0))
     rows[order][1, place] = unknown
-    other = track_of(tuple(np.array([row, row, row]) for row in sine(2.0)))  # type: ignore[arg-type]
-    assert goes_round([(track_of(rows), is_angle), (other, False)]).tolist() == [True, False, True]  # type: ignore[arg-type]
+    other = history_of(tuple(np.array([row, row, row]) for row in sine(2.0)))  # type: ignore[arg-type]
+    assert goes_round([(history_of(rows), is_angle), (other, False)]).tolist() == [True, False, True]  # type: ignore[arg-type]
 
 
 @pytest.mark.usefixtures("arithmetic")
 def test_the_last_sample_is_compared_with_the_first_one_of_each_quantity() -> None:
     turning = (X, np.ones_like(X), np.zeros_like(X))
     still = (np.ones_like(X), np.zeros_like(X), np.zeros_like(X))
-    assert goes_round([(track_of(turning), True)])
-    assert not goes_round([(track_of(turning), False)])
-    assert not goes_round([(track_of(still), False)])
-    assert goes_round([(track_of(still), False), (track_of(sine(3.0)), False)])
-    assert not goes_round([(track_of(sine(1.0)), False), (track_of(sine(0.5)), False)])
+    assert goes_round([(history_of(turning), True)])
+    assert not goes_round([(history_of(turning), False)])
+    assert not goes_round([(history_of(still), False)])
+    assert goes_round([(history_of(still), False), (history_of(sine(3.0)), False)])
+    assert not goes_round([(history_of(sine(1.0)), False), (history_of(sine(0.5)), False)])
     value, rate, acceleration = sine(1.0)
     for off, goes in ((1e-10, True), (1e-8, False)):
-        assert goes_round([(track_of((value + off * X, rate, acceleration)), False)]) == goes
+        assert goes_round([(history_of((value + off * X, rate, acceleration)), False)]) == goes
 
 
 @pytest.mark.usefixtures("arithmetic")
@@ -64,11 +64,11 @@ def test_of_designs_without_gaps_a_few_samples_decide_unless_they_are_too_small(
     off = 1e-10 * X
     values = np.array([large + off, bump + off, large + 10.0 * X, off * 0.0, large])
     values[4, 5] = np.nan
-    track, is_known = track_of((values, 0.0 * values, 0.0 * values)), np.array([True, True, True, True, False])
+    history, is_known = history_of((values, 0.0 * values, 0.0 * values)), np.array([True, True, True, True, False])
     expected = [True, True, False, False, False]
-    assert goes_round([(track, False)]).tolist() == expected
-    assert goes_round([(track, False)], is_known).tolist() == expected
-    assert goes_round([(Track(X, *(row[:1] for row in track.rows)), False)], is_known[:1]).tolist() == [True]
+    assert goes_round([(history, False)]).tolist() == expected
+    assert goes_round([(history, False)], is_known).tolist() == expected
+    assert goes_round([(History(X, *(row[:1] for row in history.rows)), False)], is_known[:1]).tolist() == [True]
 
 
 @pytest.mark.usefixtures("arithmetic")

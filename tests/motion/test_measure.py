@@ -11,7 +11,7 @@ import pytest
 import kinfmu
 from kinfmu.errors import MechanismError, RequestError
 from kinfmu.measures import AngleBetween, DistanceBetween
-from kinfmu.motion import Motion, Track
+from kinfmu.motion import History, Motion
 from kinfmu.readings import (
     READINGS,
     Dwell,
@@ -85,7 +85,7 @@ def test_many_designs_at_once_equal_each_alone() -> None:
     tables = tuple(np.stack([motion.tables[k] for motion in alone]) for k in range(3))
     tables[0][2, 100] = np.nan
     margin = np.stack([motion.margin for motion in alone if motion.margin is not None])
-    many = replace(alone[0], tables=tables, margin=margin, _tracks={})
+    many = replace(alone[0], tables=tables, margin=margin, _histories={})
     readings = (
         Range("", "rocker.phi"),
         PeakAcceleration("", "coupler.x"),
@@ -110,8 +110,8 @@ def test_many_designs_at_once_equal_each_alone() -> None:
 def test_two_leading_axes_of_designs_keep_their_shape() -> None:
     x = np.linspace(0.0, 2.0 * math.pi, 181)
     phase = np.arange(6.0).reshape(2, 3, 1)
-    track = Track(x, np.sin(x - phase), np.cos(x - phase), -np.sin(x - phase), is_closed=True)
-    high = track.maximum()
+    history = History(x, np.sin(x - phase), np.cos(x - phase), -np.sin(x - phase), is_closed=True)
+    high = history.maximum()
     assert high.value == pytest.approx(np.ones((2, 3)), rel=1e-12)
     assert high.x == pytest.approx((0.5 * math.pi + phase[..., 0]) % (2.0 * math.pi), abs=1e-9)
 
@@ -119,18 +119,18 @@ def test_two_leading_axes_of_designs_keep_their_shape() -> None:
 def test_two_extremes_between_two_samples_are_both_seen() -> None:
     x = np.array([0.0, 1.0, 2.0])
     curve = np.polynomial.Polynomial.fromroots([0.5, 0.9]).integ()  # rises, falls from 0.5 to 0.9, rises
-    track = Track(x, *(curve.deriv(order)(x) if order else curve(x) for order in range(3))).part(0.0, 1.0)
-    assert track.maximum() == pytest.approx((curve(0.5), 0.5), abs=1e-14)
-    assert track.minimum() == pytest.approx((0.0, 0.0), abs=1e-14)
-    assert track.part(0.1, 1.0).negative().maximum().x == 0.1
-    assert track.part(0.6, 1.0).minimum() == pytest.approx((curve(0.9), 0.9), abs=1e-14)
+    history = History(x, *(curve.deriv(order)(x) if order else curve(x) for order in range(3))).part(0.0, 1.0)
+    assert history.maximum() == pytest.approx((curve(0.5), 0.5), abs=1e-14)
+    assert history.minimum() == pytest.approx((0.0, 0.0), abs=1e-14)
+    assert history.part(0.1, 1.0).negative().maximum().x == 0.1
+    assert history.part(0.6, 1.0).minimum() == pytest.approx((curve(0.9), 0.9), abs=1e-14)
 
 
 def test_a_crossing_at_the_end_of_a_closed_motion_is_seen_despite_rounding() -> None:
     value = np.cos(TURN + 0.2003)
     value[[0, -1]] = math.cos(0.2003) + np.array([-1e-13, 1e-13])
-    track = Track(TURN, value, -np.sin(TURN + 0.2003), -np.cos(TURN + 0.2003), is_closed=True)
-    start, stop = track.stay(1.0 - math.cos(0.2003))
+    history = History(TURN, value, -np.sin(TURN + 0.2003), -np.cos(TURN + 0.2003), is_closed=True)
+    start, stop = history.stay(1.0 - math.cos(0.2003))
     assert float(stop - start) == pytest.approx(2.0 * 0.2003, rel=1e-9)
 
 

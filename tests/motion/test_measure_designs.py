@@ -11,7 +11,7 @@ import kinfmu
 from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.measures import AngleBetween, DistanceBetween
 from kinfmu.mechanism.toml_file import parse
-from kinfmu.motion import Track, quintic
+from kinfmu.motion import History, quintic
 from kinfmu.motion.quintic import use_compiled
 from kinfmu.readings import (
     READINGS,
@@ -255,10 +255,10 @@ def test_compiled_and_python_arithmetic_are_equal_to_the_bit(monkeypatch: pytest
         use_compiled()
         for library in (quintic._compiled, []):
             monkeypatch.setattr(quintic, "_compiled", library)
-            track = Track(x, value, rate, -speed * speed * np.sin(speed * x + phase), is_closed)
-            tracks = (track, track.derivative(), track.second_derivative(), track.negative())
-            found.append([*(row for one in tracks for row in one.rows), *(e for one in tracks for e in one.maximum()),
-                          *(e for one in tracks for e in one.minimum()), *tracks[2].largest_size()])  # fmt: skip
+            history = History(x, value, rate, -speed * speed * np.sin(speed * x + phase), is_closed)
+            histories = (history, history.derivative(), history.second_derivative(), history.negative())
+            extremes = [e for one in histories for pair in (one.maximum(), one.minimum()) for e in pair]
+            found.append([*(row for one in histories for row in one.rows), *extremes, *histories[2].largest_size()])
         for compiled, plain in zip(*found, strict=True):
             np.testing.assert_array_equal(compiled, plain)
         assert np.isnan(found[0][-1][3])

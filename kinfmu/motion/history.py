@@ -1,6 +1,6 @@
-"""Tracks: a quantity with its first and second derivative at the samples of a motion, for one design or for many.
+"""Historys: a quantity with its first and second derivative at the samples of a motion, for one design or for many.
 
-Between two samples a track is the polynomial of degree 5 with the values and derivatives of both (Hermite).
+Between two samples a history is the polynomial of degree 5 with the values and derivatives of both (Hermite).
 Extremes and crossings of a level are those of the polynomials, not of the samples.
 """
 
@@ -39,7 +39,7 @@ class Extreme(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class History:
     """A quantity over a motion.
 
     Attributes:
@@ -64,8 +64,8 @@ class Track:
     is_nonnegative: bool = False
 
     @classmethod
-    def of(cls, like: Track, quantity: Taylor) -> Track:
-        """Return a quantity computed from the tracks of a motion as a track of the same motion."""
+    def of(cls, like: History, quantity: Taylor) -> History:
+        """Return a quantity computed from the histories of a motion as a history of the same motion."""
         parts = (np.asarray(part, float) for part in (quantity.f, quantity.d1, quantity.d2))
         shape = np.broadcast_shapes(*(np.shape(part) for part in (quantity.f, quantity.d1, quantity.d2)), like.x.shape)
         value, rate, acceleration = (np.broadcast_to(part, shape) for part in parts)
@@ -73,7 +73,7 @@ class Track:
 
     @property
     def taylor(self) -> Taylor:
-        """The track as a number with two derivatives, with which formulas compute."""
+        """The history as a number with two derivatives, with which formulas compute."""
         return Taylor(self.value, self.rate, self.acceleration)
 
     @property
@@ -96,23 +96,23 @@ class Track:
         """Value, rate and acceleration."""
         return self.value, self.rate, self.acceleration
 
-    def negative(self) -> Track:
-        """Return the track of the negative quantity."""
-        return Track.of(self, -self.taylor)
+    def negative(self) -> History:
+        """Return the history of the negative quantity."""
+        return History.of(self, -self.taylor)
 
-    def derivative(self) -> Track:
-        """Return the track of the first derivative.
+    def derivative(self) -> History:
+        """Return the history of the first derivative.
 
         Its own second derivative is estimated from three neighbouring samples, with an error of order h^6 (h: distance
         of the samples): the polynomial of degree 8 with their values, rates and accelerations.
         """
         _, third, _ = self._higher
-        return Track(self.x, self.rate, self.acceleration, third, self.is_closed, self.is_seamed)
+        return History(self.x, self.rate, self.acceleration, third, self.is_closed, self.is_seamed)
 
-    def second_derivative(self) -> Track:
-        """Return the track of the second derivative; its own derivatives are estimated as in `derivative`."""
+    def second_derivative(self) -> History:
+        """Return the history of the second derivative; its own derivatives are estimated as in `derivative`."""
         _, third, fourth = self._higher
-        return Track(self.x, self.acceleration, third, fourth, self.is_closed, self.is_seamed)
+        return History(self.x, self.acceleration, third, fourth, self.is_closed, self.is_seamed)
 
     @cached_property
     def _higher(self) -> Rows:
@@ -161,8 +161,8 @@ class Track:
         c1 = derived(c)
         return polynomial(c, s), polynomial(c1, s) / h, polynomial(derived(c1), s) / h**2
 
-    def part(self, begin: float, end: float) -> Track:
-        """Return the track between two arguments; of a motion that goes round also across its end.
+    def part(self, begin: float, end: float) -> History:
+        """Return the history between two arguments; of a motion that goes round also across its end.
 
         Args:
             begin: First argument.
@@ -174,7 +174,7 @@ class Track:
             turn = self.value[..., -1:] - self.value[..., :1]
             turns = (turn, 0.0 * turn, 0.0 * turn)
             rows = [np.concatenate([row, row[..., 1:] + more], -1) for row, more in zip(self.rows, turns, strict=True)]
-            whole = Track(np.concatenate([self.x, self.x[1:] + self.span]), rows[0], rows[1], rows[2])
+            whole = History(np.concatenate([self.x, self.x[1:] + self.span]), rows[0], rows[1], rows[2])
         steps = np.diff(self.x)
         least = _NEAR * float(np.min(steps[steps > 0.0]))
         first, last = np.searchsorted(whole.x, begin + least, "right"), np.searchsorted(whole.x, end - least, "left")
@@ -185,7 +185,7 @@ class Track:
             part[..., 0], part[..., 1:-1], part[..., -1] = at[..., 0], row[..., first:last], at[..., 1]
             rows.append(part)
         value = np.maximum(rows[0], 0.0) if self.is_nonnegative else rows[0]
-        return Track(x, value, rows[1], rows[2], is_nonnegative=self.is_nonnegative)
+        return History(x, value, rows[1], rows[2], is_nonnegative=self.is_nonnegative)
 
     def maximum(self) -> Extreme:
         """Return the largest value of each design and where it occurs; NaN for designs with unknown samples."""
