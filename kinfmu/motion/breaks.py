@@ -26,7 +26,7 @@ class FollowedLaw(NamedTuple):
     joint: Joint | None
 
 
-class Break(NamedTuple):
+class LawBreak(NamedTuple):
     """A break of a law within a run.
 
     place: where, in samples: 2.25 is after the third sample; number: of the law; level: the value of its argument.
@@ -52,9 +52,9 @@ def followed_laws(run: Run, mechanism: Mechanism) -> list[FollowedLaw]:
     return found
 
 
-def breaks_of(laws: list[FollowedLaw], order: int) -> list[Break]:
+def breaks_of(laws: list[FollowedLaw], order: int) -> list[LawBreak]:
     """Return where a law's value or a derivative up to an order jumps; places are those of a straight argument."""
-    found: list[Break] = []
+    found: list[LawBreak] = []
     for number, (law, argument, _) in enumerate(laws):
         jumps = law.own_breaks(order)
         period = float(jumps.period)
@@ -66,7 +66,7 @@ def breaks_of(laws: list[FollowedLaw], order: int) -> list[Break]:
                 low, high = sorted((int(piece[k]), int(piece[k + 1])))
                 for turn in range(low + 1, high + 1):
                     place = k + (turn - along[k]) / (along[k + 1] - along[k])
-                    found.append(Break(float(place), number, at + turn * period))
+                    found.append(LawBreak(float(place), number, at + turn * period))
     return found
 
 

@@ -1,4 +1,4 @@
-"""Historys: a quantity with its first and second derivative at the samples of a motion, for one design or for many.
+"""Histories: a quantity with its first and second derivative at the samples of a motion, for one design or for many.
 
 Between two samples a history is the polynomial of degree 5 with the values and derivatives of both (Hermite).
 Extremes and crossings of a level are those of the polynomials, not of the samples.
