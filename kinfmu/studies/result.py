@@ -34,7 +34,9 @@ class StudyResult(StudyRows, Displayed):
     def __str__(self) -> str:
         return summary(self)
 
-    def figure(self, path: str | Path | None = None, measures: Sequence[str] = (), *, ax: Axes | None = None) -> None:
+    def figure(
+        self, path: str | Path | None = None, measures: Sequence[str] | str = (), *, ax: Axes | None = None
+    ) -> None:
         """Draw the results into a .svg, .png or .pdf file, or one measure into Axes of matplotlib.
 
         One grid: the measures over it. Two grids: their contours. Tolerances alone: what each contributes. Any others:
@@ -42,7 +44,7 @@ class StudyResult(StudyRows, Displayed):
 
         Args:
             path: The file.
-            measures: Names of the measures to draw. Default: all.
+            measures: Names of the measures to draw, or one name. Default: all.
             ax: Axes to draw into, in place of a file: one measure over one or two grids or over one parameter, or the
                 contributions to it.
 
@@ -55,4 +57,4 @@ class StudyResult(StudyRows, Displayed):
         """
         from kinfmu.studies.figure import draw
 
-        draw(self, path, ax, tuple(measures))
+        draw(self, path, ax, (measures,) if isinstance(measures, str) else tuple(measures))

@@ -60,7 +60,7 @@ def test_one_measure_is_drawn_into_axes(kind: str, tmp_path: Path) -> None:
     tables, labels = IN_AXES[kind]
     found = kinfmu.study(linkage(), tables, designs=16, workers=1)
     left, right = Figure().subplots(1, 2)
-    found.figure(ax=left, measures=("swing",))
+    found.figure(ax=left, measures="swing")
     assert picture_of(found) == kind
     assert left.has_data()
     assert not right.has_data()
@@ -76,7 +76,7 @@ def test_one_measure_is_drawn_into_axes(kind: str, tmp_path: Path) -> None:
     ):
         found.figure(ax=right)
     with pytest.raises(StudyError, match=r"^the study has no measure 'swin'; did you mean 'swing'"):
-        found.figure(ax=right, measures=("swin",))
+        found.figure(ax=right, measures="swin")
     for path, ax in ((None, None), (tmp_path / "a.svg", right)):
         with pytest.raises(FigureError, match=r"^figure needs a path, or Axes of matplotlib as ax=; give one of both$"):
             found.figure(path, ("swing",), ax=ax)
