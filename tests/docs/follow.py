@@ -136,6 +136,7 @@ def follow(name: str, folder: Path) -> Followed:
                 outputs |= {line: typed(line) for line in commands(block) if _can_run(line)}
             elif block.kind == "python" and _can_run(block.text):
                 if block.file.endswith(".py"):  # a command below starts it
+                    assert not Path(block.file).exists(), f"{name}: two blocks for {block.file}, or a sentence names it"
                     Path(block.file).write_text(block.text, encoding="utf-8")
                 elif in_host or HOSTS.search(block.text):
                     in_host += block.text
