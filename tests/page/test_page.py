@@ -439,6 +439,30 @@ def test_every_dyad_has_its_transmission_angle_in_the_drawing_and_the_plots(chro
         assert page.errors == []
 
 
+@pytest.mark.parametrize(
+    ("more", "shown"),
+    [
+        ('[points]\nbase = "ground.O"\nram = "piston.S"', ["ram.x"]),
+        ('[points]\nbase = "ground.O"', ["piston.x"]),
+        (
+            '[points]\nram = "piston.S"\n[loads.cut]\ntype = "force"\nat = "piston.S"\nx = -5000',
+            ["crank.torque", "ram.x"],
+        ),
+    ],
+)
+def test_the_first_plots_are_of_coordinates_that_move(chromium: Browser, more: str, shown: list[str]) -> None:
+    mech = parse(toml_text(kinfmu.load("slider_crank")) + more)
+    with chromium.open(kinfmu.page.page(mech)) as page:
+        page.tab.click("#tab-plots")
+        page.settle()
+        chosen = page.tab.locator("#plots .plot select")
+        assert [chosen.nth(k).input_value() for k in range(chosen.count())] == shown
+        for k in range(chosen.count()):
+            value = page.get(f"[...k.plots.table.columns[{k}]]")
+            assert max(value) - min(value) > 10.0
+        assert page.errors == []
+
+
 def test_click_in_a_plot_moves_the_crank(chromium: Browser) -> None:
     with chromium.open(text_of("crank_rocker")) as page:
         page.tab.click("#tab-plots")

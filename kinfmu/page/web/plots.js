@@ -37,16 +37,16 @@ function rank(linkage, output) {
     return linkage.data.interest.some((one) => one.name === output.owner) ? 0 : 1;
 }
 
-// Return the first quantities to plot.
+// Return the first quantities to plot. A point that slides has only one coordinate that moves, a point of the ground none.
 export function defaults(linkage, all) {
     const { interest, loops, drivers } = linkage.data;
-    if (linkage.part.forces.length) {
-        const effort = all.find((one) => one.id === `${drivers[0].name}.torque` || one.id === `${drivers[0].name}.force`);
-        if (effort) return [effort.id, ...(interest.length ? [`${interest[0].name}.y`] : [])];
-    }
-    if (interest.length) return [`${interest[0].name}.x`, `${interest[0].name}.y`];
+    const known = (owner, ...kinds) => kinds.map((kind) => `${owner}.${kind}`).filter((id) => all.some((one) => one.id === id));
+    const place = interest.map(({ name }) => known(name, "x", "y")).find((moving) => moving.length) || [];
+    const [effort] = linkage.part.forces.length ? known(drivers[0].name, "torque", "force") : [];
+    if (effort) return [effort, ...place.slice(-1)];
+    if (place.length) return place;
     const output = loops.length ? loops[0].output : linkage.bodies[linkage.bodies.length - 1];
-    const wanted = [`${output}.phi`, `${output}.x`].filter((id) => all.some((one) => one.id === id));
+    const wanted = known(output, "phi", "x");
     return wanted.length ? wanted.slice(0, 1) : all.slice(0, 1).map((one) => one.id);
 }
 
