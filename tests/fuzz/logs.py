@@ -15,7 +15,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import redirect_stdout
+from contextlib import redirect_stdout, suppress
 from functools import cache
 from io import StringIO
 from multiprocessing.connection import Connection
@@ -36,6 +36,7 @@ from tests.fuzz.summary import Summary, seeds
 
 MOTION = "motion.mcap"
 PATIENCE = 60.0  # [s] for a process
+ATTEMPTS = 6  # to interrupt a command before it ends
 UNPRIVILEGED = 65534  # a user without rights
 LONG, PIECE, MOST_GROWTH = 100_000, 2000, 8 * 2**20  # samples, samples of a piece, [bytes] that the memory may grow by
 
@@ -293,29 +294,43 @@ def _command(pipe: Connection, arguments: list[str], folder: Path) -> None:
     main(arguments)
 
 
-def _ended(draw: random.Random, folder: Path, fmu: Path) -> Iterator[str]:
-    """SIGTERM or SIGHUP at any moment: no hidden files, no temporary folders, records are whole."""
-    number = draw.choice([signal.SIGTERM, signal.SIGHUP])
-    (folder / "temporary").mkdir()
-    commands = [
+def _commands(fmu: Path) -> list[list[str]]:
+    """Return the commands that `_ended` interrupts."""
+    return [
         ["simulate", str(fmu), "--step", "0.01", "--mcap", "run.mcap", "--rrd", "run.rrd"],
         ["simulate", str(fmu), "--step", "0.5", "--mcap", "run.mcap", "--rrd", "run.rrd"],
         ["solve", "fourbar", "--engine", "python", "--times", "0:180:0.02", "-o", "run.csv"],
         ["solve", "fourbar", "--engine", "python", "--times", "0:180:0.02", "-o", "run.mcap"],
     ]
-    arguments = draw.choice(commands)
-    process, pipe = _process(_command, arguments, folder)
-    pipe.recv()
-    time.sleep(0.1 + 1.2 * draw.random())
-    os.kill(process.pid, number)
-    process.join(PATIENCE)
-    if process.exitcode not in (0, 128 + number, -number):  # -number: before the command line began
-        yield f"{arguments[0]} ended with status {process.exitcode} at {number.name}"
-    left = [*_hidden(folder), *(path.name for path in (folder / "temporary").iterdir())]
-    if left:
-        yield f"{arguments[0]} left behind {left} at {number.name}"
-    if (folder / "run.mcap").exists() and not read(folder / "run.mcap").outputs:
-        yield "the record is not whole"
+
+
+def _ended(draw: random.Random, folder: Path, fmu: Path) -> Iterator[str]:
+    """SIGTERM or SIGHUP at any moment: no hidden files, no temporary folders, records are whole.
+
+    A command that ends before its signal is judged by the same rules, and started again with half the pause.
+    """
+    number = draw.choice([signal.SIGTERM, signal.SIGHUP])
+    (folder / "temporary").mkdir()
+    arguments = draw.choice(_commands(fmu))
+    pause = 0.1 + 1.2 * draw.random()
+    for _ in range(ATTEMPTS):
+        process, pipe = _process(_command, arguments, folder)
+        pipe.recv()
+        time.sleep(pause)
+        with suppress(ProcessLookupError):
+            os.kill(process.pid, number)
+        process.join(PATIENCE)
+        if process.exitcode not in (0, 128 + number, -number):  # -number: before the command line began
+            yield f"{arguments[0]} ended with status {process.exitcode} at {number.name}"
+        left = [*_hidden(folder), *(path.name for path in (folder / "temporary").iterdir())]
+        if left:
+            yield f"{arguments[0]} left behind {left} at {number.name}"
+        if (folder / "run.mcap").exists() and not read(folder / "run.mcap").outputs:
+            yield "the record is not whole"
+        if process.exitcode != 0 or left:
+            return
+        pause /= 2.0
+    yield f"{arguments[0]} was not interrupted: it ended before {number.name} {ATTEMPTS} times"
 
 
 def _long(pipe: Connection, path: Path, samples: int) -> None:
