@@ -92,15 +92,16 @@ def checked_settings(mechanism: Mechanism, settings: Sequence[tuple[str, str]], 
     from kinfmu.mechanism.settings import read_tolerance
 
     settable, known = mechanism.settable, (*mechanism.settable.names, *of_run)
-    for setting, text in settings:
+    for setting, _ in settings:
         if setting in _ELSEWHERE and setting not in known:
             raise click.UsageError(f"--set: {setting} {_ELSEWHERE[setting]}")
-        constant = settable.constants.get(setting)
-        if constant is not None and constant.quantity == Quantity("angle"):
-            _note_degrees(setting, text)
     values = {setting: _value(text) for setting, text in settings if setting not in of_run}
-    for text in filter(None, (settable.note_on_bare(setting, [value]) for setting, value in values.items())):
-        note(f"--set: {text}")
+    for setting, value in values.items():
+        constant = settable.constants.get(setting)
+        if text := settable.note_on_bare(setting, [value]):
+            note(f"--set: {text}")
+        elif constant is not None and constant.quantity == Quantity("angle") and isinstance(value, float):
+            _note_degrees(setting, value)
     run = as_values([(setting, text) for setting, text in settings if setting in of_run])
     try:
         for setting in values:
@@ -140,7 +141,6 @@ def _value(text: str) -> float | str:
         return text
 
 
-def _note_degrees(name: str, text: str) -> None:
-    value = _value(text)
-    if isinstance(value, float) and looks_like_degrees(value):
-        note(f"{name} = {text} rad, {in_turns(value)}; write {name}={text}deg for degrees")
+def _note_degrees(name: str, value: float) -> None:
+    if looks_like_degrees(value):
+        note(f"{name} = {value:.12g} rad, {in_turns(value)}; write {name}={value:.12g}deg for degrees")

@@ -154,17 +154,17 @@ class Settable:
         return in_unit_of(setting.value, value, setting.quantity or NUMBER, self._length_unit)
 
     def note_on_bare(self, name: str, values: Iterable[object]) -> str:
-        """Return a note if one of the values is bare and the file writes the parameter in another unit; else ''."""
-        parameter = self.parameters.get(name)
-        if parameter is None or not (parameter.unit and parameter.quantity):
+        """Return a note if one of the values is bare and the file writes the setting in another unit; else ''."""
+        setting = self.constants.get(name) or self.parameters.get(name)
+        if setting is None or not setting.quantity:
             return ""
-        taken = unit_of(parameter.quantity, self._length_unit)
+        unit, taken = _unit_in_file(setting), unit_of(setting.quantity, self._length_unit)
         bare = next((value for value in values if is_number(value) and value != 0), None)
-        if parameter.unit == taken or bare is None:
+        if unit in ("", taken) or bare is None:
             return ""
         return (
-            f"{name} = {bare:.12g} is taken in {taken}; the mechanism file writes it in {parameter.unit}: "
-            f"for these write '{bare:.12g} {parameter.unit}'"
+            f"{name} = {bare:.12g} is taken in {taken}; the mechanism file writes it in {unit}: "
+            f"for these write '{bare:.12g} {unit}'"
         )
 
     def display_unit(self, name: str, values: Iterable[object] = ()) -> DisplayUnit:
@@ -177,8 +177,8 @@ class Settable:
 
         """
         setting = self.constants.get(name) or self.parameters[name]
-        own = setting.unit if isinstance(setting, Parameter) else given_unit(setting.value)
-        return display_unit(setting.quantity, self._length_unit, written_unit(values, self._length_unit) or own)
+        unit = written_unit(values, self._length_unit) or _unit_in_file(setting)
+        return display_unit(setting.quantity, self._length_unit, unit)
 
     def _expression(self, name: str) -> Expression | None:
         """Return the expression of a parameter or of a number of a joint, driver or load, if it has one."""
@@ -190,6 +190,11 @@ class Settable:
             if path[0] in ("drivers", "joints", "loads")
         }
         return self._expressions[paths[name]] if name in paths else None
+
+
+def _unit_in_file(setting: Parameter | LawConstant) -> str:
+    """Return the unit in which the mechanism file writes a parameter or law constant; '' if there is none."""
+    return setting.unit if isinstance(setting, Parameter) else given_unit(setting.value)
 
 
 @contextmanager

@@ -154,7 +154,7 @@ def test_a_constant_of_an_angle_that_looks_like_degrees_is_reported(notes: Calla
         "note: crank.start = 90 rad, 14.3 turns; write crank.start=90deg for degrees"
     ]
     assert notes(*call, "--set", "crank.start=90deg") == []
-    assert notes(*call, "--set", "crank.speed=90") == []
+    assert notes(*call, "--set", "crank.speed=90deg/s") == []
 
 
 def test_a_bare_number_is_reported_where_the_file_writes_another_unit(
@@ -166,6 +166,33 @@ def test_a_bare_number_is_reported_where_the_file_writes_another_unit(
         "note: --set: spare = 0.03 is taken in mm; the mechanism file writes it in cm: for these write '0.03 cm'"
     ]
     assert notes("check", "cm.toml", "--set", "spare=3cm") == []
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        ("check", "toggle_press"),
+        ("solve", "toggle_press", "-o", "run.csv", "--times", "0:0.1:0.1"),
+        ("simulate", "toggle_press", "--stop", "0.01", "--mcap", "a.mcap", "--rrd", "a.rrd"),
+        ("build", "toggle_press", "--flavour", "python", "--no-page"),
+    ],
+)
+@pytest.mark.parametrize(
+    ("setting", "text"),
+    [
+        (
+            "crank.speed=3",
+            "crank.speed = 3 is taken in rad/s; the mechanism file writes it in rpm: for these write '3 rpm'",
+        ),
+        ("work.start=2", "work.start = 2 is taken in N; the mechanism file writes it in kN: for these write '2 kN'"),
+        ("work.start=2kN", None),
+    ],
+)
+def test_a_bare_constant_of_a_law_is_reported_where_the_file_writes_another_unit(
+    call: tuple[str, ...], setting: str, text: str | None, notes: Callable[..., list[str]]
+) -> None:
+    noted = [line for line in notes(*call, "--set", setting) if "--set" in line]
+    assert noted == ([f"note: --set: {text}"] if text else [])
 
 
 def test_build_reports_a_run_beyond_the_range_as_check_does(
