@@ -22,6 +22,7 @@ from kinfmu.motion.history import FEWEST
 from kinfmu.motion.measure import (
     MeasuredValue,
     chosen_measures,
+    known_values,
     listed_measures,
     read_value,
     reason_without_value,
@@ -244,7 +245,10 @@ class BatchReading:
                 except RequestError as error:
                     reasons |= {k: str(error) for k in chosen.tolist() if k not in reasons}
                     continue
-                value[chosen] = found.value
+                value[chosen], lack = known_values(found)
+                for k, text in zip(chosen.tolist(), np.broadcast_to(lack, len(chosen)).tolist(), strict=True):
+                    if text and good[k].all():
+                        reasons.setdefault(k, text)
                 for column, x in enumerate(found.at):
                     at[chosen, column] = some.driven_at(x)
             for k in np.flatnonzero(is_solved & ~np.isfinite(value)).tolist():

@@ -16,7 +16,8 @@ from kinfmu.mechanism.force_names import measured_forces
 from kinfmu.motion.motion import Motion
 from kinfmu.motion.needed import needed
 from kinfmu.readings import LowestMargin, Reading
-from kinfmu.run import Run
+from kinfmu.readings.reading import Finding
+from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import HasAxis, axis_of
 from kinfmu.units import unit_of
 
@@ -138,21 +139,30 @@ def read_value(run: Run, motion: Motion, reading: Reading) -> MeasuredValue:
     try:
         quantities = needed(motion.mechanism, [reading]).quantities
         motion = motion.going_round(bool(motion.goes_round(quantities)))
-        found = reading.read(motion.part(reading.begin, reading.end))
+        with np.errstate(all="ignore"):  # quotients at samples where the driver rests are NaN
+            found = reading.read(motion.part(reading.begin, reading.end))
     except RequestError as error:
         raise RequestError(f"[measures.{reading.name}]: {error}") from None
-    value = float(found.value)
+    value, lack = known_values(found)
     at = tuple(float(motion.driven_at(np.asarray(x))) for x in found.at)
     return MeasuredValue(
         name=reading.name,
         type=reading.type,
-        value=value,
+        value=float(value),
         unit=unit_of(found.quantity, unit),
         driver=motion.driver,
         at=at,
         at_unit=unit_of(motion.driver_quantity, unit),
-        reason="" if np.isfinite(value) else _reason(run, reading),
+        reason="" if np.isfinite(value) else str(lack) or _reason(run, reading),
     )
+
+
+def known_values(found: Finding) -> tuple[FloatArray, NDArray[np.str_]]:
+    """Return the values of designs, NaN where there is none, and the reasons that the reading states, else ''."""
+    value, reason = np.asarray(found.value, dtype=float), np.full(np.shape(found.value), "")
+    for is_lacking, text in found.lacks:
+        reason = np.where((reason == "") & is_lacking, text, reason)
+    return np.where(np.isfinite(value) & (reason == ""), value, np.nan), reason
 
 
 def _reason(run: Run, reading: Reading) -> str:

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.equations.system import size_of
 from kinfmu.equations.taylor import Taylor
 from kinfmu.errors import RequestError
 from kinfmu.measures import PoseQuantity
@@ -36,6 +37,8 @@ from kinfmu.units import CoordinateName, Quantity
 
 SHAPES: dict[str, type[Line] | type[Circle]] = {"line": Line, "circle": Circle}
 Vector = tuple[Taylor, Taylor]
+_STILL = 1e-9  # [rad, sizes]; of rates: of their largest value; a quantity that changes by less does not move
+_TURNED = 1.0  # [rad]; the ends of a motion that goes round differ by nothing or by whole turns
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,6 +229,33 @@ class Motion:
         if not self.is_closed:
             raise RequestError(f"{word} needs a motion that goes round: its last pose must be the first")
 
+    def at_rest(self, of: str | PoseQuantity) -> tuple[NDArray[np.bool_], str]:
+        """Return (...) True for the designs in which a quantity does not move, and that as text."""
+        history = self.history(of)
+        low, high = (extreme.value for extreme in history.extremes())
+        quantity = self.quantity(of)
+        largest = np.maximum(np.abs(low), np.abs(high))
+        size = 1.0 if quantity.kind == "angle" else size_of(self.mechanism)
+        least = _STILL * (size if quantity.order == 0 else largest)
+        return np.asarray(high - low <= least), f"{_name(of)} does not move"
+
+    def turning_on(self, of: str | PoseQuantity, so: str) -> tuple[NDArray[np.bool_], str]:
+        """Return (...) True for the designs in which an angle turns on where the motion goes round; so: what follows.
+
+        Its first value differs from its last one by whole turns; which values are the extremes depends on where the
+        motion begins.
+        """
+        history = self.history(of)
+        turn = np.abs(history.value[..., -1] - history.value[..., 0])
+        is_angle = self.quantity(of) == Quantity("angle")
+        found = np.asarray((turn > _TURNED) & (history.is_closed and is_angle))
+        return found, f"{_name(of)} turns all the way round, {so}"
+
+    def ratio(self, a: FloatArray, b: FloatArray) -> FloatArray:
+        """Return a / b; NaN or infinite where b is 0."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.divide(a, b))
+
     def quantity(self, of: str | PoseQuantity, order: int = 0) -> Quantity:
         """Return what a quantity, or its derivative of an order, measures."""
         if of in self.names.forces:
@@ -396,6 +426,10 @@ def break_places(run: Run) -> list[float]:
 def force_of(run: Run, name: str) -> FloatArray:
     """Return a force of a run, (n,)."""
     return np.asarray(run[name], dtype=float)
+
+
+def _name(of: str | PoseQuantity) -> str:
+    return of if isinstance(of, str) else "the quantity"
 
 
 def _derived(history: History, order: int) -> History:

@@ -27,11 +27,16 @@ End = Annotated[float | None, LawQuantity("argument"), "value of the driver at t
 
 
 class Finding(NamedTuple):
-    """What a reading found: numbers (...), what they measure, the arguments of the motion where they occur."""
+    """What a reading found.
+
+    value: numbers (...). quantity: what they measure. at: arguments of the motion where they occur. lacks: why designs
+    whose samples all have numbers have no value: True for these designs (...), and the reason.
+    """
 
     value: PerDesign
     quantity: Quantity
     at: tuple[PerDesign, ...] = ()
+    lacks: tuple[tuple[PerDesign, str], ...] = ()
 
 
 class Reading(ABC):

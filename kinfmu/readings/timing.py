@@ -25,13 +25,15 @@ class TimeRatio(Reading):
     of: Measured
 
     def read(self, motion: Motion) -> Finding:
-        motion.require_closed(self.type)
+        lacks = motion.at_rest(self.of), motion.turning_on(self.of, "so it has no two strokes")
+        if not lacks[0][0].all():
+            motion.require_closed(self.type)
         history = motion.history(self.of)
         low, high = (extreme.x for extreme in history.extremes())
         stroke = abs(high - low)
         other = history.span - stroke
         longer = 0.5 * (history.span + abs(stroke - other))
-        return Finding(longer / (history.span - longer), Quantity("number"), (low, high))
+        return Finding(motion.ratio(longer, history.span - longer), Quantity("number"), (low, high), lacks)
 
 
 @dataclass(frozen=True)
@@ -54,4 +56,5 @@ class Dwell(Reading):
     def read(self, motion: Motion) -> Finding:
         history = motion.history(self.of)
         start, stop = (history if self.near == "maximum" else history.negative()).stay(self.band)
-        return Finding(motion.driven_between(start, stop), motion.driver_quantity, (start, stop))
+        lacks = (motion.turning_on(self.of, f"so it has no {self.near}"),)
+        return Finding(motion.driven_between(start, stop), motion.driver_quantity, (start, stop), lacks)

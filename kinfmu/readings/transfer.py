@@ -100,7 +100,8 @@ class VelocityRatio(Reading):
     def read(self, motion: Motion) -> Finding:
         history = motion.speed_ratio(self.of, self.to)
         found = history.maximum() if self.extreme == "maximum" else history.minimum()
-        return Finding(found.value, motion.ratio_quantity(self.of, self.to), (found.x,))
+        lacks = () if self.to is None else (motion.at_rest(self.to),)
+        return Finding(found.value, motion.ratio_quantity(self.of, self.to), (found.x,), lacks)
 
 
 @dataclass(frozen=True)
@@ -117,4 +118,6 @@ class MechanicalAdvantage(Reading):
 
     def read(self, motion: Motion) -> Finding:
         fastest = motion.speed_ratio(self.of, self.to).largest_size()
-        return Finding(1.0 / fastest.value, motion.ratio_quantity(self.of, self.to, inverse=True), (fastest.x,))
+        lacks = [motion.at_rest(one) for one in (self.of, self.to) if one is not None]
+        value = motion.ratio(1.0, fastest.value)
+        return Finding(value, motion.ratio_quantity(self.of, self.to, inverse=True), (fastest.x,), tuple(lacks))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -335,3 +336,37 @@ def test_margins_of_designs_need_no_mechanism_of_each_design(engine: str, monkey
     for name in ("all", "part"):
         assert found[name].tolist() == [one[name].value for one in expected]
         assert found.at[name][:, 0].tolist() == [one[name].at[0] for one in expected]
+
+
+NO_VALUE = (
+    (TimeRatio("m", "crank.phi"), "crank.phi turns all the way round, so it has no two strokes"),
+    (TimeRatio("m", "rocker.x"), "rocker.x does not move"),
+    (TimeRatio("m", "crank.omega"), "crank.omega does not move"),
+    (Dwell("m", "crank.phi", 0.1), "crank.phi turns all the way round, so it has no maximum"),
+    (Dwell("m", "crank.phi", 0.1, "minimum"), "crank.phi turns all the way round, so it has no minimum"),
+    (VelocityRatio("m", "rocker.phi", "rocker.x"), "rocker.x does not move"),
+    (MechanicalAdvantage("m", "rocker.x"), "rocker.x does not move"),
+    (MechanicalAdvantage("m", "rocker.phi", "crank.y"), "crank.y does not move"),
+)
+
+
+@pytest.mark.parametrize(("reading", "reason"), NO_VALUE)
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_what_has_no_value_of_an_angle_that_turns_on_or_of_a_constant_is_stated(
+    engine: str, reading: Reading, reason: str
+) -> None:
+    model = kinfmu.compile(replace(crank_rocker(), coordinates="all"), engine=engine)
+    found = kinfmu.measure_designs(model, {"crank_link": [14.0, 15.0]}, [reading], crank_angle=TURN)
+    assert found.reasons == {0: reason, 1: reason}
+    assert np.isnan(found["m"]).all()
+    assert_as_measured(found, model, [reading], crank_angle=TURN)
+
+
+@pytest.mark.parametrize("of", ["crank.phi", "rocker.x", "crank.omega"])
+def test_every_kind_of_measure_of_a_turning_angle_and_of_a_constant_has_a_value_or_a_reason(of: str) -> None:
+    model = kinfmu.compile(replace(crank_rocker(), coordinates="all"))
+    kinds = [Minimum, Maximum, Range, Peak, PeakSpeed, PeakAcceleration, TimeRatio, VelocityRatio, MechanicalAdvantage]
+    for reading in [Dwell("m", of, 0.1), *(kind("m", of) for kind in kinds)]:
+        found = kinfmu.measure_designs(model, {"crank_link": [14.0, 15.0]}, [reading], crank_angle=TURN)
+        assert np.isfinite(found["m"]).all() == (not found.reasons)
+        assert_as_measured(found, model, [reading], crank_angle=TURN)
