@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kinfmu.analysis.driver_path import DriverPath, follow
+from kinfmu.analysis.cam_driver import CamDriver, cam_driver
+from kinfmu.analysis.driver_path import DriverPath
 from kinfmu.analysis.values import degrees
 from kinfmu.cams import (
     CAM_JOINTS,
@@ -27,40 +28,39 @@ from kinfmu.cams import (
 )
 from kinfmu.cams.profile import TURN, angles_within, profile_at
 from kinfmu.cams.traced import traced
-from kinfmu.drivers import Driver
 from kinfmu.errors import KinfmuError, MechanismError, RequestError, listed, suggestion
 from kinfmu.joints import CamFlatFace, CamOscillating, CamTranslating
 from kinfmu.laws import Harmonic, Law, MotionSequence, Spline
-from kinfmu.measures import AngleBetween
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.origin import in_world
-from kinfmu.run import FloatArray
-from kinfmu.solver.python import Pose
 
 SLIDING_LIMIT, SWINGING_LIMIT = math.radians(30.0), math.radians(45.0)  # [rad], usual for pressure angles
 _ANGLES = 361  # of a table by default, one a degree
 _ROUNDING = 1e-9  # of a lift; lifts to both sides that differ less are equal
-_SAME_ANGLE = 1e-7  # [rad]; closer angles are equal
 
 
 @dataclass(frozen=True)
 class CamFindings:
     """What a check finds of one cam.
 
-    cam: placed, None where it cannot be; critical: its values over a turn; driver: in whose values `at` gives places;
-    reason: why there are no values.
+    cam: placed, None where it cannot be; critical: its values over a turn; turned_by: the driver in whose values places
+    are reported, None where there are no values; reason: why there are none.
     """
 
     joint: str
     cam: PlacedCam | None
     critical: Critical | None
-    driver: str
-    at: Callable[[float], float]
+    turned_by: CamDriver | None
     length_unit: str
     reason: str = ""
+
+    @property
+    def driver(self) -> str:
+        """The name of the driver in whose values places are reported, '' where there are none."""
+        return "" if self.turned_by is None else self.turned_by.name
 
     @property
     def element(self) -> str:
@@ -88,28 +88,37 @@ class CamFindings:
     def program(self) -> tuple[tuple[str, float, float], ...]:
         """The parts of a law with segments, by begin: 'rise', 'dwell' or 'return', begin and end as driver values.
 
-        A rise moves the follower away from the cam while the driver's value grows.
+        A rise moves the follower away from the cam while the driver's value grows. A cam that makes several turns in a
+        period of the driver has each part as often.
         """
-        if self.cam is None or self.critical is None or not isinstance(law := self.cam.joint.law, MotionSequence):
+        if self.cam is None or self.turned_by is None or not isinstance(law := self.cam.joint.law, MotionSequence):
             return ()
         edges = law.begin + np.cumsum([0.0, *(segment.duration for segment in law.segments)])
         angles = traced(self.cam, edges).angle  # of the cam
         outwards = pressing_sign(self.cam)
         parts = []
         for segment, (a, b) in zip(law.segments, pairwise(angles.tolist()), strict=True):
-            ends = [self.at(a % TURN), self.at(b % TURN)]
-            inside = (self.at((a + 0.01 * (b - a)) % TURN) - ends[0]) % TURN  # small if the driver's value grows
-            grows = inside < math.pi
-            lifted = segment.rise * outwards * (1.0 if grows else -1.0)
-            begin, end = ends if grows else ends[::-1]
-            begin = 0.0 if TURN - begin < _SAME_ANGLE else begin
-            end = TURN if end < _SAME_ANGLE else end
-            parts.append(("rise" if lifted > 0.0 else "return" if lifted < 0.0 else "dwell", begin, end))
+            is_along = (b > a) != self.turned_by.is_backward  # the law's argument grows with the driver's value
+            lifted = segment.rise * outwards * (1.0 if is_along else -1.0)
+            part = "rise" if lifted > 0.0 else "return" if lifted < 0.0 else "dwell"
+            parts += [(part, *ends) for ends in self.turned_by.parts(*sorted((a, b)))]
         return tuple(sorted(parts, key=lambda part: part[1]))
+
+    def at(self, angle: float) -> float:
+        """Return the value of the driver at an angle of the cam [rad]."""
+        return angle if self.turned_by is None else self.turned_by.at(angle)
 
     def place(self, angle: float) -> str:
         """Return an angle of the cam as the value of the driver: 'cam at 40 deg'."""
         return f"{self.driver} at {degrees(self.at(angle))}"
+
+    @property
+    def undercut(self) -> tuple[tuple[float, float], ...]:
+        """The parts of the driver's period in which the profile is cut, by begin, each from begin to end."""
+        if self.critical is None or self.turned_by is None:
+            return ()
+        cuts = self.critical.undercut
+        return tuple(sorted(part for cut in cuts for part in self.turned_by.parts(cut.begin, cut.end)))
 
     def length(self, value: float) -> str:
         return f"{round(value, 9) + 0.0:.6g} {self.length_unit}"
@@ -146,7 +155,7 @@ class CamFindings:
                 joint=self.joint,
             )
         if found.undercut:
-            parts = [f"{self.place(cut.begin)} to {degrees(self.at(cut.end))}" for cut in found.undercut]
+            parts = [f"{self.driver} at {degrees(begin)} to {degrees(end)}" for begin, end in self.undercut]
             return MechanismError(f"{where} {self._undercut(cam, found)} from {listed(parts)}", joint=self.joint)
         if found.gouge is not None:
             depth = self.length(found.gouge.value)
@@ -196,7 +205,7 @@ class CamFindings:
                 "smallest_convex_radius": one(found.convex) if self.cam.is_known else None,
                 "smallest_concave_radius": one(found.concave) if self.cam.is_known else None,
                 "smallest_pitch_radius": one(found.pitch),
-                "undercut": [{"begin": self.at(cut.begin), "end": self.at(cut.end)} for cut in found.undercut],
+                "undercut": [{"begin": begin, "end": end} for begin, end in self.undercut],
                 "gouge": one(found.gouge),
                 "face": None if found.width is None else {"low": one(found.width[0]), "high": one(found.width[1])},
             }
@@ -262,9 +271,9 @@ def cam_profile(
     plan = compile_plan(mechanism)
     placed = placed_cam(mechanism, found, _poses(plan))
     unit = mechanism.length_unit
-    name, at = _driver(plan, placed, None)
+    turned_by = cam_driver(plan, placed, None)
     profile_at(placed, np.zeros(1), unit)  # an unknown roller is reported before its consequences
-    problem = CamFindings(joint, placed, critical_values(placed), name, at, unit).problem()
+    problem = CamFindings(joint, placed, critical_values(placed), turned_by, unit).problem()
     if problem is not None:
         raise problem
     if tolerance is not None:
@@ -272,9 +281,10 @@ def cam_profile(
     else:
         asked = np.linspace(0.0, TURN, _ANGLES) if angles is None else np.asarray(angles, dtype=float).reshape(-1)
     profile = profile_at(placed, asked, unit)
-    if at is float:
+    if turned_by.transmission is None:
         return profile  # the driver's value is the cam's angle, or no single driver turns the cam
-    return replace(profile, driver=np.array([at(one) for one in asked.tolist()]), driver_name=name)
+    values = np.array([turned_by.at(one) for one in asked.tolist()])
+    return replace(profile, driver=values, driver_name=turned_by.name)
 
 
 def cam_findings(plan: SolvePlan, paths: Sequence[DriverPath]) -> tuple[CamFindings, ...]:
@@ -287,11 +297,11 @@ def cam_findings(plan: SolvePlan, paths: Sequence[DriverPath]) -> tuple[CamFindi
         poses = poses or _poses(plan)
         try:
             placed = placed_cam(mechanism, joint, poses)
-            name, at = _driver(plan, placed, paths)
-            found.append(CamFindings(joint.name, placed, critical_values(placed), name, at, mechanism.length_unit))
+            turned_by = cam_driver(plan, placed, paths)
+            found.append(CamFindings(joint.name, placed, critical_values(placed), turned_by, mechanism.length_unit))
         except KinfmuError as reason:
             text = str(reason).removeprefix(f"cam '{joint.name}': ").removeprefix(f"{NO_PROFILE}: ")
-            found.append(CamFindings(joint.name, None, None, "", float, mechanism.length_unit, text))
+            found.append(CamFindings(joint.name, None, None, None, mechanism.length_unit, text))
     return tuple(found)
 
 
@@ -313,62 +323,3 @@ def _poses(plan: SolvePlan) -> dict[str, tuple[float, float, float]]:
     rows = in_world(plan.origin, plan.anchor.q).reshape(-1, 3).tolist()
     bodies = [body.name for body in plan.mechanism.moving_bodies]
     return {GROUND_NAME: (0.0, 0.0, 0.0), **{body: (x, y, phi) for body, (x, y, phi) in zip(bodies, rows, strict=True)}}
-
-
-def _turns(drivers: Sequence[Driver], placed: PlacedCam) -> Driver | None:
-    """Return the driver whose value is the angle of the cam against its holder."""
-    for driver in drivers:
-        quantity = driver.measured()
-        is_of_cam = isinstance(quantity, AngleBetween) and quantity.of == placed.cam
-        if is_of_cam and (getattr(quantity, "to", None) or GROUND_NAME) == placed.holder:
-            return driver
-    return None
-
-
-def _driver(
-    plan: SolvePlan, placed: PlacedCam, paths: Sequence[DriverPath] | None
-) -> tuple[str, Callable[[float], float]]:
-    """Return the name of the driver that turns a cam, and its value at an angle of the cam.
-
-    That of the cam itself where no single driver turns it all the way round.
-    """
-    drivers = plan.mechanism.drivers
-    direct = _turns(drivers, placed)
-    if direct is not None:
-        return direct.name, float
-    if len(drivers) == 1 and drivers[0].quantity.kind == "angle":
-        path = follow(plan, 0) if paths is None else next(iter(paths), None)
-        if path is not None and path.turns is not None:
-            way = _Turning(path, placed)
-            if way.is_whole:
-                return drivers[0].name, way.driver_at
-    return placed.cam, float
-
-
-class _Turning:
-    """The angle of a cam over the path of its driver."""
-
-    def __init__(self, path: DriverPath, placed: PlacedCam) -> None:
-        self.path, self.placed = path, placed
-        self.angles: FloatArray = np.array([self._angle(pose) for pose in path.poses])
-
-    @property
-    def is_whole(self) -> bool:
-        """True if the cam makes a turn, always in one direction."""
-        steps = np.diff(self.angles)
-        return bool((np.all(steps > 0.0) or np.all(steps < 0.0)) and abs(steps.sum()) > TURN - 1e-6)
-
-    def driver_at(self, angle: float) -> float:
-        """Return the first driver value at an angle of the cam, modulo turns of the driver."""
-        low = float(self.angles.min())
-        wanted = low + (angle - low) % TURN
-        for (before, after), (a, b) in zip(pairwise(self.path.poses), pairwise(self.angles.tolist()), strict=True):
-            if min(a, b) <= wanted <= max(a, b):
-                at = self.path.zero(lambda pose: self._angle(pose) - wanted, before, after).u[0]
-                return at % ((self.path.turns or 1) * TURN)
-        return math.nan
-
-    def _angle(self, pose: Pose) -> float:
-        q = self.path.coordinates(pose)
-        held = 0.0 if self.placed.holder == GROUND_NAME else q[f"{self.placed.holder}.phi"]
-        return float(q[f"{self.placed.cam}.phi"] - held)

@@ -82,6 +82,8 @@ class DriverPath:
     def zero(self, value: Callable[[Pose], float], low: Pose, high: Pose) -> Pose:
         """Return the pose between two where a value changes its sign, by bisection."""
         at_low = value(low)
+        if at_low == 0.0:
+            return low
         for _ in range(_HALVINGS):
             u = 0.5 * (low.u[0] + high.u[0])
             middle = self.solver.solve(low, (u,))

@@ -15,6 +15,7 @@ from kinfmu.cams import pressing_sign
 from kinfmu.mechanism.force_names import names_of_rows
 from kinfmu.motion.history import History
 from kinfmu.motion.motion import Motion
+from kinfmu.run.axis import TIME
 from kinfmu.units import unit_of
 
 _ROUNDING = 1e-9  # of the largest contact force; smaller tensions are rounding
@@ -25,8 +26,9 @@ class LiftOff:
     """A contact of a cam that would have to pull.
 
     joint: the cam's; force: the column of the contact force or moment; sense: 1 if a positive value presses
-    follower and cam together, -1 if a negative one does; parts: where it would pull, each from begin to end, in values
-    of the driver or times; of a motion that goes round a part may go on past its end; extent: 'turn' if it would pull
+    follower and cam together, -1 if a negative one does; parts: where it would pull, each from begin to end in the
+    direction of growing values of the driver, or in times if it turns back or several drivers move (driver: 'time'); of
+    a motion that goes round a part may go on past its end; extent: 'turn' if it would pull
     at every angle of the driver, 'motion' if during the whole motion, else 'part'; largest, at: the largest tension, of
     a lever the largest moment that would pull, as a positive number, and where it occurs.
     """
@@ -77,18 +79,28 @@ def lift_offs(motion: Motion, cams: Sequence[CamFindings]) -> Iterator[LiftOff]:
             continue
         unit = motion.mechanism.length_unit
         parts = _negative_parts(history)
+        direction = 0 if motion.drive is None else _direction(motion.drive)
+        driven_at = motion.driven_at if direction else np.asarray
+        driven = [driven_at(np.array(part)[:: direction or 1]).tolist() for part in parts]
         yield LiftOff(
             joint=cam.joint,
             force=name,
             sense=sense,
             unit=unit_of(name.quantity, unit),
-            driver=motion.driver,
-            at_unit=unit_of(motion.driver_quantity, unit),
-            parts=tuple((float(begin), float(end)) for begin, end in map(motion.driven_at, map(np.array, parts))),
+            driver=motion.driver if direction else TIME,
+            at_unit=unit_of(motion.driver_quantity, unit) if direction else "s",
+            parts=tuple((begin, end) for begin, end in driven[:: direction or 1]),
             extent=_extent(motion, history, parts),
             largest=-float(low.value),
-            at=float(motion.driven_at(np.asarray(low.x))),
+            at=float(driven_at(np.asarray(low.x))),
         )
+
+
+def _direction(drive: History) -> int:
+    """Return 1 if the driver's value never falls, -1 if it never grows, 0 if it turns back."""
+    least = _ROUNDING * float(np.abs(drive.rate).max())
+    falls, grows = bool(np.any(drive.rate < -least)), bool(np.any(drive.rate > least))
+    return 0 if falls and grows else -1 if falls else 1
 
 
 def _negative_parts(history: History) -> list[tuple[float, float]]:

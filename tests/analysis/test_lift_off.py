@@ -99,6 +99,37 @@ def test_check_reports_where_sliding_followers_lift_off(joint: str) -> None:
     assert text in str(report)
 
 
+@pytest.mark.parametrize("speed", ["60 rad/s", "-60 rad/s"])
+def test_a_part_of_lift_off_goes_forwards_whichever_way_the_cam_turns(speed: str) -> None:
+    text = (HEAD + JOINTS["up"] + SLIDING).replace('phase = "90', 'phase = "60')
+    mechanism = parse(text.replace("60 rad/s", speed))
+    report = kinfmu.check(mechanism)
+    assert report.loading is not None
+    (found,) = report.loading.lift_offs
+    ((begin, end),) = found.parts
+    inside = begin + (end - begin) % math.tau * np.linspace(0.001, 0.999, 9)
+    around = end + (begin - end) % math.tau * np.linspace(0.001, 0.999, 9)
+    for angles, pulls in ((inside, True), (around, False)):
+        run = kinfmu.solve(mechanism, cam_angle=angles, cam_speed=SPEED)
+        assert ((run["lift.force"] < 0.0) == pulls).all()
+
+
+def test_lift_off_under_a_driver_that_turns_back_is_reported_in_time() -> None:
+    text = HEAD.replace(
+        'law = "constant_speed"\nspeed = "60 rad/s"', 'law = "harmonic"\namplitude = 1.5\nfrequency = 50'
+    )
+    mechanism = parse(text + JOINTS["up"] + SLIDING + "[run]\nstop = 0.11\nstep = 0.001")
+    report = kinfmu.check(mechanism)
+    assert report.loading is not None
+    (found,) = report.loading.lift_offs
+    assert (found.driver, found.at_unit, found.extent) == ("time", "s", "part")
+    t = np.linspace(0.0, 0.11, 1001)
+    pulls = kinfmu.solve(mechanism, t)["lift.force"] < 0.0
+    is_inside = np.any([(t >= begin) & (t <= end) for begin, end in found.parts], axis=0)
+    np.testing.assert_array_equal(pulls, is_inside)
+    assert " s of time; largest tension" in str(report)
+
+
 LEVER = (
     'type = "cam_oscillating"\nbetween = ["ground", "lever"]\ncam = "cam"\namplitude = {amplitude}\n'
     'phase = "90 deg"\ncontact = "lever.R"\nroller_radius = 0.005\n'

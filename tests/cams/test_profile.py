@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -203,11 +204,13 @@ def test_values_are_critical_where_they_are_reported() -> None:
     assert cam.critical.convex.at == pytest.approx(dense.angle[k], abs=3e-4)
 
 
-def test_a_geared_cam_is_reported_at_the_angle_of_the_driver() -> None:
-    """The driver makes two turns for one of the cam, the other way."""
-    plain = followers.lifted_roller(8.0)
+def geared(plain: kinfmu.Mechanism, ratio: float) -> kinfmu.Mechanism:
+    """Return the mechanism with a motor: the cam turns by `ratio` times its angle."""
     ground, cam, follower = plain.bodies
-    mechanism = kinfmu.Mechanism(
+    gear = kinfmu.Coupling(
+        "gear", kinfmu.AngleBetween("motor"), kinfmu.AngleBetween("cam"), kinfmu.ConstantSpeed(0.0, ratio)
+    )
+    return kinfmu.Mechanism(
         "geared",
         [
             kinfmu.Body("ground", {**ground.points, "M": (-90.0, 0.0)}),
@@ -215,29 +218,49 @@ def test_a_geared_cam_is_reported_at_the_angle_of_the_driver() -> None:
             follower,
             kinfmu.Body("motor", {"M": (0, 0)}),
         ],
-        [
-            *plain.joints,
-            kinfmu.Revolute("M", ("ground.M", "motor.M")),
-            _gear(),
-        ],
+        [*plain.joints, kinfmu.Revolute("M", ("ground.M", "motor.M")), gear],
         [kinfmu.AngleDriver("motor", "motor")],
         length_unit="mm",
     )
-    (direct,), (geared,) = kinfmu.check(plain).cams, kinfmu.check(mechanism).cams
+
+
+def test_a_geared_cam_is_reported_at_the_angle_of_the_driver() -> None:
+    """The driver makes two turns for one of the cam, the other way."""
+    plain = followers.lifted_roller(8.0)
+    mechanism = geared(plain, -0.5)
+    (direct,), (found,) = kinfmu.check(plain).cams, kinfmu.check(mechanism).cams
     assert direct.steepest is not None
-    assert geared.steepest is not None
-    assert geared.steepest.value == pytest.approx(direct.steepest.value, abs=1e-9)
-    assert geared.driver == "motor"
-    assert geared.at(1.0) == pytest.approx((-2.0) % (2.0 * TURN), abs=1e-9)
+    assert found.steepest is not None
+    assert found.steepest.value == pytest.approx(direct.steepest.value, abs=1e-9)
+    assert found.driver == "motor"
+    assert found.at(1.0) == pytest.approx((-2.0) % (2.0 * TURN), abs=1e-9)
     profile = kinfmu.cam_profile(mechanism, "lift", np.array([0.5, 1.0]))
     assert profile.driver == pytest.approx([(-1.0) % (2.0 * TURN), (-2.0) % (2.0 * TURN)], abs=1e-9)
     assert [name for name, _, _ in profile.columns()][:2] == ["cam_angle", "motor_angle"]
 
 
-def _gear() -> kinfmu.Coupling:
-    return kinfmu.Coupling(
-        "gear", kinfmu.AngleBetween("motor"), kinfmu.AngleBetween("cam"), kinfmu.ConstantSpeed(0.0, -0.5)
-    )
+@pytest.mark.parametrize("ratio", [1.0, -1.0, 2.0, -3.0, 0.5, -0.5, 1.5])
+def test_parts_of_a_geared_cam_go_forwards_over_the_whole_period_of_the_driver(ratio: float) -> None:
+    plain = followers.lifted_roller(31.0)
+    (direct,), (found,) = kinfmu.check(plain).cams, kinfmu.check(mechanism := geared(plain, ratio)).cams
+    turns = next(turns for turns in (1, 2) if (ratio * turns).is_integer())  # of the motor in a period
+    assert len(found.undercut) == abs(ratio) * turns * len(direct.undercut)
+    ((low, high),) = direct.undercut
+    period = turns * TURN
+    for begin, end in found.undercut:
+        assert (end - begin) % period == pytest.approx((high - low) / abs(ratio), abs=1e-8)
+        inside = begin + (end - begin) % period * np.linspace(0.001, 0.999, 9)
+        assert ((ratio * inside % TURN > low) & (ratio * inside % TURN < high)).all()
+    assert str(kinfmu.check(mechanism)).count("motor at") >= len(found.undercut)
+    program = found.program
+    assert len(program) == abs(ratio) * turns * len(direct.program)
+    assert (program[0][1], program[-1][2]) == (0.0, pytest.approx(period))
+    for (_, _, end), (_, begin, _) in pairwise(program):
+        assert end == pytest.approx(begin, abs=1e-8)
+    for part, begin, end in program:
+        run = kinfmu.solve(mechanism, motor_angle=np.linspace(begin, end, 11)[1:-1])
+        speed = run["follower.vy"]
+        assert {"rise": (speed > 0.0).all(), "return": (speed < 0.0).all(), "dwell": (speed == 0.0).all()}[part]
 
 
 WRONG: dict[str, tuple[Any, str]] = {
