@@ -23,6 +23,7 @@ from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.dimension import Dimension
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.members import NumberPath, path_text
+from kinfmu.mechanism.number import given_unit
 from kinfmu.mechanism.parameters import dimensions_of
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.sweep import solve
@@ -31,11 +32,11 @@ from kinfmu.units import PLAUSIBLE_TURN, Quantity, looks_like_degrees
 _TABLES = (Spline, MotionSequence)  # laws that keep their last value beyond their end
 
 
-def file_notes(mechanism: Mechanism) -> Iterator[str]:
+def file_notes(mechanism: Mechanism, written: Mechanism | None = None) -> Iterator[str]:
     """Yield a line for unused parameters and one for each angle that looks like degrees without a unit.
 
     Also one for each driven distance that starts below 0, for each cam or load that turns beyond the end of its law,
-    and for gravity without masses.
+    and for gravity without masses. written: the mechanism as in its file, whose angles count.
     """
     unused = mechanism.unused_parameters
     if unused:
@@ -51,6 +52,11 @@ def file_notes(mechanism: Mechanism) -> Iterator[str]:
     yield from _lengths_without_a_unit(mechanism)
     yield from _cams(mechanism)
     yield from _loads(mechanism)
+    yield from _bare_angles(mechanism if written is None else written)
+
+
+def _bare_angles(mechanism: Mechanism) -> Iterator[str]:
+    """Yield a line for each angle without a unit that is probably in degrees."""
     large: dict[tuple[NumberPath, float], tuple[NumberPath, float]] = {}  # a rise and its return are one mistake
     cams = {joint.name for joint in mechanism.joints if isinstance(joint, Cam)}
 
@@ -59,6 +65,7 @@ def file_notes(mechanism: Mechanism) -> Iterator[str]:
         is_turns = ("law" in place and place[1] not in cams) or place[0] == "drivers"
         if (
             quantity == Quantity("angle")
+            and not given_unit(value)
             and abs(value) > PLAUSIBLE_TURN
             and (not is_turns or looks_like_degrees(value))
         ):

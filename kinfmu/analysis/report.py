@@ -65,18 +65,20 @@ class Report(Findings, Displayed):
         return pose_matrices(self.plan, self.redundancy, self.range)
 
 
-def check(mechanism: Mechanism) -> Report:
+def check(mechanism: Mechanism, *, written: Mechanism | None = None) -> Report:
     """Check a mechanism: mobility, redundancy, plan, drivers, loops, singular points, ranges, cams, measures, forces.
 
     Args:
         mechanism: The mechanism to check.
+        written: The mechanism as in its file, for notes on numbers that are there; default: the same. Parameters and
+            law constants that are set, and the start poses that follow from them, are not in the file.
 
     Returns:
         The report. An error of the mechanism is not raised; it is the report's `problem`.
 
     """
     require_mechanism(mechanism, "check")
-    notes = [*file_notes(mechanism), *part_notes(mechanism)]
+    notes = [*file_notes(mechanism, written), *part_notes(mechanism)]
     local, origin = localized(mechanism)
     system = System(local)
     redundancy = find_redundancy(system)

@@ -59,7 +59,7 @@ def check(
     mech = checked_settings(loaded, settings).mechanism()
     value = _value(mech, mechanism, at, picture)
     with errors_of(mechanism):
-        report = checked(mech)
+        report = checked(mech, written=loaded)
     if as_json:
         findings = report.as_json()
         if matrices and (report.problem is None or report.has_cut_cam):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -262,6 +263,14 @@ def export(
     click.echo(f"written: {output}")
 
 
+def _record_command(mechanism: str) -> str:
+    """Return the command that makes a record of a mechanism, to follow 'a record (.mcap)'; '' for a record."""
+    if suffix_of(mechanism) == ".mcap":
+        return ""
+    name = mechanism.replace(":", "_") if gallery.has(mechanism) else mechanism
+    return f": kinfmu solve {quote(mechanism)} -o {quote(str(Path(name).with_suffix('.mcap')))}"
+
+
 def _export_page(given: str, output: Path, start: str | None, stop: str | None) -> None:
     """Write the page of a record, from start to stop, or of a mechanism."""
     is_record = suffix_of(given) == ".mcap"
@@ -271,7 +280,7 @@ def _export_page(given: str, output: Path, start: str | None, stop: str | None) 
         options = "no other options than --start and --stop" if is_record else "no other options"
         raise click.UsageError(
             f"{given}: of a mechanism only a page (.html) is written, or with --cam a cam; a page has {options}; a "
-            f"table, plot or animation needs a record (.mcap)"
+            f"table, plot or animation needs a record (.mcap){_record_command(given)}"
         )
     if is_record:
         from kinfmu.log import read

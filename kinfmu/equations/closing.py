@@ -167,7 +167,7 @@ def followed(
     shortest = _SHORTEST if trust is None else _ROUNDED
     done, step = 0.0, min(1.0, _LONGEST / length)
     here = first = there = margin(system, q) if trust else 0.0
-    while done < 1.0 and step * length >= shortest:
+    while done < 1.0 and (step == 1.0 or step * length >= shortest):  # a way of round-off is one step
         step = min(step, 1.0 - done)
         ahead = target if step == 1.0 - done else u + step * way
         jacobian = whole.jacobian(q)

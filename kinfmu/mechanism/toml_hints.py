@@ -55,7 +55,23 @@ def _twice(lines: list[str], number: int) -> str:
         return f"{table} is written twice"
     full = ".".join(filter(None, (table, name)))
     first = next((k for k in range(1, number) if ".".join(filter(None, _written(lines, k))) == full), None)
+    if first is None and (found := _given_above(lines, number, full)):
+        parent, line = found
+        if re.match(rf" *{_KEY} *\{{", lines[line - 1]):
+            key = full.removeprefix(f"{parent}.")
+            return f"'{parent}' is a table in braces in line {line}: write {key} = ... inside the braces"
+        return f"'{full}': '{parent}' has a value in line {line}, so it is not a table"
     return f"'{full}' is written twice" + (f", first in line {first}" if first else "") + "; keep one"
+
+
+def _given_above(lines: list[str], number: int, full: str) -> tuple[str, int] | None:
+    """Return the key above the line `number` that a name extends, such as 'a' of 'a.b', and its line; None: no such."""
+    parents = {full[:k] for k, sign in enumerate(full) if sign == "."}
+    for k in range(1, number):
+        name = ".".join(filter(None, _written(lines, k)))
+        if name in parents and not _HEADER.match(lines[k - 1]):
+            return name, k
+    return None
 
 
 def _written(lines: list[str], number: int) -> tuple[str, str]:

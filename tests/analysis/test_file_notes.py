@@ -14,6 +14,7 @@ from kinfmu.errors import MechanismError
 from kinfmu.joints.cam import CamOscillating
 from kinfmu.laws.sequence import MotionSequence, Segment
 from kinfmu.mechanism.toml_file import parse
+from kinfmu.sweep.continued import continued
 from tests.mechanism.test_wrong_files import CRANK_ROCKER, DRIVER
 
 
@@ -272,3 +273,18 @@ def test_an_offset_that_turns_an_oscillating_follower_far_from_its_start_pose_is
     ]
     assert bool(found) == is_noted
     assert all("check offset = " in note for note in found)
+
+
+def test_angles_that_are_set_are_not_reported_as_numbers_of_the_file() -> None:
+    for phi in ('"60 deg"', "1.0"):
+        written = parse(CRANK_ROCKER.replace('phi = "60 deg"', f"phi = {phi}", 1))
+        for start in ("400 deg", 60.0):
+            mechanism = continued(written, {"crank.start": start}).mechanism
+            assert not [note for note in check(mechanism, written=written).notes if "bare angle" in note]
+    assert not [note for note in check(parse(CRANK_ROCKER.replace('"60 deg"', '"420 deg"'))).notes if "bare" in note]
+
+
+@pytest.mark.parametrize("start", ["61 rad", "400 rad", "3495.0425 deg"])
+def test_a_start_that_differs_from_the_law_by_rounding_is_followed_to_it(start: str) -> None:
+    mechanism = continued(parse(CRANK_ROCKER), {"crank.start": start}).mechanism
+    assert not [note for note in check(mechanism).notes if "cannot be reached" in note]

@@ -57,6 +57,9 @@ def test_suggested_commands_name_the_file_also_in_folders_with_blanks_and_quotes
     says("new", "fourbar", mine)
     says("check", mine)
     says("solve", mine, "-o", folder / "solved.csv")
+    says("export", mine, "-o", folder / "mine.gif", status=2)
+    assert suggested["export"] == {"solve": [str(mine), "-o", str(folder / "mine.mcap")]}
+    assert command("solve", *suggested.pop("export")["solve"]).exit_code == 0
     says("build", mine, "-o", fmu, "--flavour", "python")
     says("simulate", fmu, "--stop", 0.2, "--step", 0.1, "--mcap", run)
     says("export", run, "-o", folder / "run.csv")

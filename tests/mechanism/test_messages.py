@@ -391,6 +391,31 @@ def test_a_key_written_twice_is_named_with_both_lines() -> None:
         assert message(text + twice) == f"not valid TOML: {expected}"
 
 
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (
+            'bodies.rod = { start = { phi = 1 } }\nbodies.rod.mass = "2 kg"\n',
+            "line 3: 'bodies.rod' is a table in braces in line 2: write mass = ... inside the braces",
+        ),
+        (
+            "[bodies]\nrod = { start = { phi = 1 } }\nrod.start.x = 1\n",
+            "line 4: 'bodies.rod' is a table in braces in line 3: write start.x = ... inside the braces",
+        ),
+        (
+            "[bodies]\nrod = { start = { phi = 1 } }\n[bodies.rod.points]\nA = [0, 0]\n",
+            "line 4: 'bodies.rod' is a table in braces in line 3: write points = ... inside the braces",
+        ),
+        (
+            "units = 1\nunits.length = 2\n",
+            "line 3: 'units.length': 'units' has a value in line 2, so it is not a table",
+        ),
+    ],
+)
+def test_a_key_of_a_table_in_braces_is_reported_with_the_line_of_the_braces(text: str, expected: str) -> None:
+    assert message(f'name = "a"\n{text}') == f"not valid TOML: {expected}"
+
+
 def test_a_decimal_comma_in_text_is_named() -> None:
     found = message(f'{FOURBAR}\n[parameters]\nlink = "127,5 mm"\n')
     assert found.endswith("character 4: expected one of + - * / **, found ','; a decimal has a point, not a comma")
