@@ -170,19 +170,42 @@ def follow(plan: SolvePlan, number: int) -> DriverPath:
 
 
 def _turned(solver: Solver, plan: SolvePlan, path: float) -> tuple[_Leg, int | None]:
-    """Return the path over full turns of 2 pi or -2 pi, and the number after which the mechanism repeats."""
-    whole = _Leg([], [])
-    pose = solver.anchor
+    """Return the path over full turns of 2 pi or -2 pi, and the number after which the mechanism repeats.
+
+    If laws of couplings or cams do not repeat with every turn, the same pose may come back with another rate or before
+    another rise: then the poses of all turns are compared, of twice as many as a mechanism may repeat after.
+    """
     most = 1 if len(plan.mechanism.coordinate_names) > _LARGE else MOST_TURNS
-    for turn in range(1, most + 1):
-        leg = _leg(solver, pose, path, 1.0)
-        whole = _Leg(whole.poses + leg.poses, whole.bridges + leg.bridges, leg.limit, leg.stopped)
-        if not whole.is_whole:
-            return whole, None
-        pose = whole.poses[-1]
-        if _is_back(plan, solver.outputs(solver.anchor), solver.outputs(pose)):
-            return whole, turn
-    return whole, None
+    is_periodic = not any(joint.law.why_not_periodic() for joint in plan.mechanism.joints if hasattr(joint, "law"))
+    legs: list[_Leg] = []
+    outputs = [solver.outputs(solver.anchor)]
+    periods: list[int] = []  # numbers of turns after which all poses so far have repeated
+    for turn in range(1, 2 * most + 1):
+        leg = _leg(solver, legs[-1].poses[-1] if legs else solver.anchor, path, 1.0)
+        legs.append(leg)
+        if not leg.is_whole:
+            return _joined(legs), None
+        outputs += map(solver.outputs, leg.poses)
+        periods += [turn] if turn <= most else []
+        periods = [n for n in periods if _repeats(plan, outputs, n * len(leg.poses), len(leg.poses))]
+        if periods and (is_periodic or turn == 2 * most):
+            return _joined(legs[: periods[0]]), periods[0]
+        if turn >= most and not periods:
+            break
+    return _joined(legs[:most]), None
+
+
+def _joined(legs: list[_Leg]) -> _Leg:
+    """Return legs that follow each other as one."""
+    poses = [pose for leg in legs for pose in leg.poses]
+    bridges = {bridge.centre: bridge for leg in legs for bridge in leg.bridges}
+    return _Leg(poses, [*bridges.values()], legs[-1].limit, legs[-1].stopped)
+
+
+def _repeats(plan: SolvePlan, outputs: list[tuple[float, ...]], period: int, last: int) -> bool:
+    """Return True if each of the last poses equals the one a period before it, where there is one."""
+    later = range(max(len(outputs) - 1 - last, period), len(outputs))
+    return all(_is_back(plan, outputs[k - period], outputs[k]) for k in later)
 
 
 def _is_back(plan: SolvePlan, before: tuple[float, ...], after: tuple[float, ...]) -> bool:

@@ -12,9 +12,8 @@ import numpy as np
 from kinfmu.analysis.driver_path import follow
 from kinfmu.analysis.singular import DriverRange, driver_range
 from kinfmu.errors import KinfmuError
-from kinfmu.laws import ConstantSpeed, Spline
+from kinfmu.laws import ConstantSpeed
 from kinfmu.laws.law import NEARLY
-from kinfmu.laws.spline import PERIODIC
 from kinfmu.loads.following import Following
 from kinfmu.mechanism import Mechanism
 from kinfmu.motion import MeasuredValue, measure
@@ -25,7 +24,7 @@ from kinfmu.sweep import solve
 from kinfmu.units import unit_of
 
 SAMPLES_PER_TURN = 360
-_MOST_TURNS = 24  # of a table of a load
+_MOST_TURNS = 24  # of the law of a load
 
 
 @dataclass(frozen=True)
@@ -86,16 +85,14 @@ def _motion(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> tuple[Run, s
 def turns_of_cycle(mechanism: Mechanism, turns: int) -> int:
     """Return the turns after which the loads repeat too, such as two for the gas force of a four-stroke engine.
 
-    turns: after which the pose repeats. Loads whose table repeats after no whole number of turns do not count.
+    turns: after which the pose repeats. Loads whose law repeats after no whole number of turns do not count.
     """
     for load in mechanism.loads:
-        if not (isinstance(load, Following) and load.over is not None and load.over.kind == "angle"):
+        if not (isinstance(load, Following) and load.over is not None and load.over.kind == "angle" and load.law.period):
             continue
-        law = load.law
-        if isinstance(law, Spline) and law.ends == PERIODIC:
-            own = (float(law.points[-1][0]) - float(law.points[0][0])) / math.tau
-            if abs(own - round(own)) <= NEARLY and 1 <= round(own) <= _MOST_TURNS:
-                turns = math.lcm(turns, round(own))
+        times = math.tau / load.law.period  # in a turn
+        own = (n for n in range(1, _MOST_TURNS + 1) if round(n * times) and abs(n * times - round(n * times)) <= NEARLY)
+        turns = math.lcm(turns, next(own, 1))
     return turns
 
 

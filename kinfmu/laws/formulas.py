@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 from kinfmu.errors import MechanismError
-from kinfmu.laws.law import NEARLY, Constant, ConstantPath, Frequency, Law, LawQuantity, Led, LedRate, Phase
+from kinfmu.laws.law import NEARLY, TURN, Constant, ConstantPath, Frequency, Law, LawQuantity, Led, LedRate, Phase
 from kinfmu.measures.arithmetic import Value, sine_of_line
 
 HIGHEST_DEGREE = 20  # the value of a polynomial of a higher degree is mostly rounding error
@@ -108,6 +108,10 @@ class Harmonic(Law):
 
     def target(self, x: Value, **constants: Value) -> Value:
         return constants["start"] + constants["amplitude"] * sine_of_line(constants["frequency"], x, constants["phase"])
+
+    @property
+    def period(self) -> float:
+        return TURN / abs(self.frequency) if self.frequency else 0.0
 
     def why_not_periodic(self) -> str:
         if abs(self.frequency - round(self.frequency)) <= NEARLY:

@@ -135,6 +135,11 @@ class Law(ABC):
         """True if its table declares it periodic."""
         return False
 
+    @property
+    def period(self) -> float:
+        """Distance after which f repeats, 0 if it does not or is constant."""
+        return 0.0
+
     def zeros(self) -> Mapping[str, Value]:
         """Return descriptions and values of numbers that are 0 if f(x + 2 pi) is f(x), in any arithmetic."""
         return {}

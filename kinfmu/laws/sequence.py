@@ -110,6 +110,12 @@ class MotionSequence(Law):
     def repeats(self) -> bool:
         return self.repeat
 
+    @property
+    def period(self) -> float:
+        rises = [segment.rise for segment in self.segments]
+        is_back = abs(sum(rises)) <= NEARLY * max((abs(rise) for rise in rises), default=0.0)
+        return float(sum(segment.duration for segment in self.segments)) if self.repeat and is_back else 0.0
+
     def zeros(self) -> Mapping[str, Value]:
         whole = sum(segment.duration for segment in self.segments)
         rises = [segment.rise for segment in self.segments if segment.law != DWELL]

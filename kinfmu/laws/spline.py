@@ -107,6 +107,10 @@ class Spline(Law):
     def repeats(self) -> bool:
         return self.ends == PERIODIC
 
+    @property
+    def period(self) -> float:
+        return float(self.points[-1][0] - self.points[0][0]) if self.repeats else 0.0
+
     def why_not_periodic(self) -> str:
         if self.ends != PERIODIC:
             return "its table does not repeat; set ends = 'periodic'"

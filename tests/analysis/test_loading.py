@@ -123,6 +123,38 @@ def test_the_cycle_of_a_four_stroke_engine_is_two_turns() -> None:
     assert found.over.startswith("2 turns of crank")
 
 
+@pytest.mark.parametrize(
+    ("law", "turns"),
+    [
+        ('law = "harmonic", amplitude = 2, frequency = 0.5', "2 turns"),
+        ('law = "harmonic", amplitude = 2, frequency = 1.25', "4 turns"),
+        ('law = "harmonic", amplitude = 2, frequency = 3', "one turn"),
+        (
+            'law = "sequence", repeat = true, segments = [{ law = "cycloidal", rise = 2, duration = "540 deg" },'
+            ' { law = "cycloidal", rise = -2, duration = "540 deg" }]',
+            "3 turns",
+        ),
+    ],
+)
+def test_the_cycle_lasts_until_the_law_of_a_load_repeats(law: str, turns: str) -> None:
+    text = f"""
+name = "wheel"
+[bodies]
+ground.points = {{ O = [0, 0] }}
+wheel = {{ points = {{ O = [0, 0] }}, inertia = 1, mass = 1 }}
+[joints]
+O = {{ type = "revolute", between = ["ground.O", "wheel.O"] }}
+[drivers]
+wheel = {{ type = "angle", of = "wheel", law = "constant_speed", speed = 1 }}
+[loads]
+work = {{ type = "torque", on = "wheel", over = {{ measure = "angle", of = "wheel" }}, {law} }}
+"""
+    found = kinfmu.check(parse(text)).loading
+    assert found is not None
+    assert found.over.startswith(f"{turns} of wheel")
+    assert abs(found.efforts[0].value) == pytest.approx(2.0, rel=1e-9)
+
+
 def test_peaks_lie_between_the_samples() -> None:
     """Slider-crank with all mass in the slider: torque, inertia and guide force by closed forms, their peaks by mpmath.
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 import kinfmu
+from kinfmu.mechanism.toml_file import parse
 from kinfmu.readings import Maximum, Minimum, PeakSpeed, Range, TimeRatio
 
 
@@ -29,6 +30,39 @@ def test_a_driver_that_turns_round_is_measured_over_one_turn_at_its_speed() -> N
     assert found["values"][0]["name"] == "stroke"
     assert found["values"][0]["at"] == pytest.approx([math.pi, 0.0], abs=1e-12)
     assert found["refused"] == {}
+
+
+def test_a_follower_that_rises_every_second_turn_is_measured_over_two_turns() -> None:
+    text = """
+name = "tappet"
+gravity = { x = 0, y = -9.81 }
+[bodies]
+ground.points = { O = [0, 0] }
+cam.points = { O = [0, 0] }
+stem = { points = { F = [0, 0] }, mass = 1 }
+[joints]
+O = { type = "revolute", between = ["ground.O", "cam.O"] }
+guide = { type = "translational", between = ["ground.O", "stem.F"], axis = "90 deg" }
+[joints.lift]
+type = "cam_translating"
+between = ["ground.O", "stem.F"]
+cam = "cam"
+axis = "90 deg"
+offset = 0.032
+law = "harmonic"
+amplitude = 0.005
+frequency = 0.5
+[drivers]
+cam = { type = "angle", of = "cam", law = "constant_speed", speed = 1 }
+[measures]
+stroke = { type = "range", of = "stem.y" }
+"""
+    report = kinfmu.check(parse(text))
+    assert report.measured is not None
+    assert report.measured.over == "2 turns of cam at 1 rad/s"
+    assert report.measured.values[0].value == pytest.approx(0.01, rel=1e-12)
+    assert report.loading is not None
+    assert report.loading.over == "2 turns of cam at 1 rad/s"
 
 
 def test_another_motion_is_the_run_of_the_file_and_refusals_have_a_reason() -> None:

@@ -219,6 +219,59 @@ def test_a_geared_linkage_turns_until_it_is_back() -> None:
     assert reach.turns * turns_of_pinion == pytest.approx(round(reach.turns * turns_of_pinion), abs=1e-12)
 
 
+COUPLED = """
+name = "coupled"
+[bodies]
+ground.points = {{ O = [0, 0], W = [1, 0] }}
+crank.points = {{ O = [0, 0] }}
+arm.points = {{ W = [0, 0] }}
+[joints]
+O = {{ type = "revolute", between = ["ground.O", "crank.O"] }}
+W = {{ type = "revolute", between = ["ground.W", "arm.W"] }}
+[joints.law]
+type = "coupling"
+input = {{ measure = "angle", of = "crank" }}
+output = {{ measure = "angle", of = "arm" }}
+{law}
+[drivers.crank]
+type = "angle"
+of = "crank"
+law = "constant_speed"
+speed = "60 rpm"
+"""
+
+
+def sequence(*rises: str, repeat: str = "true") -> str:
+    """A law of one whole turn for each entry: the arm rises by it and returns; none for "0 deg"."""
+    parts = []
+    for rise in rises:
+        up = f'{{ law = "cycloidal", rise = "{rise}", duration = "90 deg" }}'
+        down = f'{{ law = "cycloidal", rise = "-{rise}", duration = "90 deg" }}'
+        parts += [up, down, '{ law = "dwell", duration = "180 deg" }']
+    return f'law = "sequence"\nrepeat = {repeat}\nsegments = [{", ".join(parts)}]'
+
+
+@pytest.mark.parametrize(
+    ("law", "turns"),
+    [
+        ('law = "harmonic"\namplitude = "30 deg"\nfrequency = 0.5', 2),  # back after one turn, with another rate
+        ('law = "harmonic"\namplitude = "30 deg"\nfrequency = 1.5', 2),
+        ('law = "harmonic"\namplitude = "30 deg"\nfrequency = 0.5\nphase = "90 deg"', 2),
+        ('law = "harmonic"\namplitude = "30 deg"\nfrequency = 2', 1),
+        (sequence("20 deg", "30 deg"), 2),  # at rest after every turn
+        (sequence("20 deg", "20 deg", "30 deg"), 3),
+        (sequence("20 deg", "30 deg", "20 deg", "25 deg"), 4),
+        (sequence("20 deg", repeat="false"), None),
+    ],
+)
+def test_a_mechanism_repeats_where_the_motion_does_not_only_the_pose(law: str, turns: int | None) -> None:
+    report = kinfmu.check(parse(COUPLED.format(law=law)))
+    assert report.range is not None
+    assert report.range.turns == turns
+    if turns is None:
+        assert "crank: no limit from" in str(report)
+
+
 def test_a_rack_never_comes_back_and_has_no_limit() -> None:
     mechanism = Mechanism(
         "rack_drive",
