@@ -88,7 +88,9 @@ def turns_of_cycle(mechanism: Mechanism, turns: int) -> int:
     turns: after which the pose repeats. Loads whose law repeats after no whole number of turns do not count.
     """
     for load in mechanism.loads:
-        if not (isinstance(load, Following) and load.over is not None and load.over.kind == "angle" and load.law.period):
+        if not (
+            isinstance(load, Following) and load.over is not None and load.over.kind == "angle" and load.law.period
+        ):
             continue
         times = math.tau / load.law.period  # in a turn
         own = (n for n in range(1, _MOST_TURNS + 1) if round(n * times) and abs(n * times - round(n * times)) <= NEARLY)

@@ -22,6 +22,7 @@ from kinfmu.draw.writing import check_target, write
 from kinfmu.errors import listed
 from kinfmu.joints import Coordinate, Distance, Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.scene.cams import cam_shapes
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.load_shapes import load_text
@@ -65,6 +66,7 @@ def figure(
         `ax`; None for a file.
 
     Raises:
+        RequestError: `mechanism` is something else, such as a run.
         FigureError: The suffix is unknown, the file cannot be written, `at` cannot be reached, or neither or both of
             `path` and `ax` are given.
         MissingPackageError: matplotlib is not installed.
@@ -72,6 +74,7 @@ def figure(
         MechanismError: The mechanism is invalid.
 
     """
+    require_mechanism(mechanism, "figure")
     check_target("figure", path, ax)
     if path is None:
         return sheet_of(instant(mechanism, at, with_gap=True), ax).axes

@@ -54,7 +54,10 @@ def _argument_of(run: HasAxis) -> tuple[FloatArray, str]:
         return run.t, "time"
     per = rates_per(run)
     if run.axis not in run.input_names:
-        changes = "several drivers change" if len(run.input_names) > 3 else "no driver moves"
+        moved = [name for name in run.input_names[::3] if np.ptp(run.inputs[:, run.input_names.index(name)]) > 0.0]
+        if len(moved) == 1:
+            raise RequestError(f"measures need values of {moved[0]} that ascend or descend; here some do not")
+        changes = "several drivers change" if moved else "no driver moves"
         raise RequestError(f"measures need samples over time or over one driver; here {changes}")
     column = run.input_names.index(run.axis)
     speed = run.inputs[:, column + 1]

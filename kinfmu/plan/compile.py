@@ -38,6 +38,7 @@ def compile_plan(
     Args:
         mechanism: The mechanism.
         outputs: Names of the outputs to solve for; default: all. Loops that no output depends on are not solved.
+            Columns keep the order of the mechanism.
         parameters: Names of the parameters that are settable; default: all that are given as numbers.
         solved: Coordinates of bodies to solve for though they are no outputs: forces depend on them.
 

@@ -127,9 +127,9 @@ def axis_for(u: FloatArray, names: tuple[str, ...]) -> str:
 
     u: (n, d) values of the drivers; names: of these inputs, (d,).
     """
-    if len(u) == len(names) == 1:
+    if len(names) == 1 and len(u) <= 1:
         return names[0]
-    moved = [k for k, column in enumerate(u.T) if column.min() < column.max()]
+    moved = [k for k, column in enumerate(u.T) if len(column) and column.min() < column.max()]
     return names[moved[0]] if len(moved) == 1 and _is_monotonic(u[:, moved[0]]) else SAMPLE
 
 

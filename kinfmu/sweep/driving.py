@@ -172,13 +172,15 @@ def column_of(name: str, values: ArrayLike, rows: int = 1) -> FloatArray:
 
 
 def numbers_of(name: str, values: ArrayLike, what: str = "numbers") -> FloatArray:
-    """Return an array of floats; raise a RequestError for truth values and what is no number."""
+    """Return an array of floats; raise a RequestError for truth values, complex numbers and what is no number."""
     if type(values) is np.ndarray and values.dtype is _DOUBLE:
         return values
     is_truth = isinstance(values, bool) or getattr(getattr(values, "dtype", None), "kind", "") == "b"
     if is_truth or (isinstance(values, list | tuple) and bool in set(map(type, values))):
         raise RequestError(f"{name} must be {what}, not true or false")
     try:
+        if np.iscomplexobj(values):  # numpy would drop the imaginary parts
+            raise RequestError(f"{name} must be {what}, not complex")
         return np.asarray(values, dtype=float)
     except (TypeError, ValueError):
         raise RequestError(f"{name} must be {what}") from None

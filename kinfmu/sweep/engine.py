@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import combinations
 from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -63,12 +64,21 @@ def tables_for(out: Tables | None, shape: tuple[int, int], order: Literal["C", "
         rows, columns = shape
         whole = np.empty((3, *shape)) if order == "C" else np.empty((3, columns, rows)).transpose(0, 2, 1)
         return tuple(whole)  # type: ignore[return-value]  # three; the system provides one large array faster
-    for name, array in zip(("values", "rates", "accelerations"), out, strict=True):
+    names = ("values", "rates", "accelerations")
+    if not isinstance(out, tuple | list) or len(out) != len(names):
+        given = f"{len(out)}" if isinstance(out, tuple | list) else type(out).__name__
+        raise RequestError(f"out must be three arrays, ({', '.join(names)}), not {given}")
+    for name, array in zip(names, out, strict=True):
         _refuse_table(name, array, shape)
-    return out
+    for (name, array), (other, following) in combinations(zip(names, out, strict=True), 2):
+        if np.shares_memory(array, following):
+            raise RequestError(f"out: {name} and {other} share memory; each needs an array of its own")
+    return tuple(out)  # type: ignore[return-value]  # three
 
 
-def _refuse_table(name: str, array: FloatArray, shape: tuple[int, ...]) -> None:
+def _refuse_table(name: str, array: object, shape: tuple[int, ...]) -> None:
+    if not isinstance(array, np.ndarray):
+        raise RequestError(f"out: {name} must be a numpy array, float64 of shape {shape}, not {type(array).__name__}")
     if array.shape != shape or array.dtype != np.float64:
         raise RequestError(f"out: {name} must be float64 of shape {shape}, not {array.dtype} of {array.shape}")
     if not array.flags.writeable:

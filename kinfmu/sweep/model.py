@@ -49,6 +49,7 @@ def compile(  # noqa: A001  as re.compile
     Args:
         mechanism: The mechanism.
         outputs: Names of the outputs to solve for; default: all. What they do not depend on is not solved.
+            Columns keep the order of the mechanism.
         parameters: Names of the parameters that stay arguments; default: all that are not written as expressions. The
             others are numbers in the generated code, which is faster. One written as an expression can be named too.
         engine: 'python'; 'native', generated C, which is compiled now, or found in the cache; or 'auto', native where

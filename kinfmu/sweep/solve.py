@@ -49,6 +49,7 @@ def solve(
         parameters: Values of parameters and law constants, such as {"crank_length": 0.2, "crank.speed": "30 rpm"}.
             Other geometry is reached by continuation from the pose of the geometry as written.
         outputs: Names of the outputs to solve for; default: all. What they do not depend on is not solved.
+            Columns keep the order of the mechanism.
         engine: 'python'; 'native', generated C, compiled on first use and then cached; or 'auto', native if there are
             enough samples to pay for compiling and a compiler is found.
         tolerance: Residual relative to the size above which a sample is not ok; positive.

@@ -16,7 +16,7 @@ import kinfmu
 from kinfmu import Angle, AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, gallery
 from kinfmu.draw import figure
 from kinfmu.draw.instant import instant, pose_note
-from kinfmu.errors import AssemblyError, FigureError, MissingPackageError
+from kinfmu.errors import AssemblyError, FigureError, MissingPackageError, RequestError
 from kinfmu.mechanism import toml_file, toml_text
 from tests.gallery_members import every_member
 from tests.mechanisms import fourbar, reference_fourbar
@@ -250,3 +250,9 @@ def test_a_figure_shows_where_the_law_starts_or_reports_it() -> None:
     shown = instant(toml_file.parse(text, "radians.toml"))
     assert shown.value("crank") == pytest.approx(60.0)  # radians, not turned back by whole turns
     assert pose_note(shown) == ""
+
+
+def test_a_figure_of_something_else_than_a_mechanism_is_refused(tmp_path: Path) -> None:
+    run = kinfmu.solve(kinfmu.load("fourbar"), [0.0])
+    with pytest.raises(RequestError, match=r"^figure needs a Mechanism, not Run; "):
+        figure(run, tmp_path / "run.svg")  # type: ignore[call-overload]

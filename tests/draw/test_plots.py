@@ -161,6 +161,8 @@ def test_what_cannot_be_plotted_is_reported(run: Run, tmp_path: Path) -> None:
         plot(wide, tmp_path / "run.svg")
     with pytest.raises(FigureError, match="the run has no samples to plot"):
         plot(fourbar(np.array([])), tmp_path / "run.svg")
+    with pytest.raises(FigureError, match="the run has no samples to plot"):
+        plot(kinfmu.solve(kinfmu.load("fourbar"), crank_angle=[]), tmp_path / "run.svg")
     assert not list(tmp_path.iterdir())
 
 

@@ -13,6 +13,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
+import kinfmu
 from kinfmu.errors import LogError
 from kinfmu.log import read, write_mcap
 from kinfmu.log.mcap_writer import McapWriter
@@ -86,6 +87,13 @@ def test_a_run_without_samples_reads_back(run: Run, tmp_path: Path) -> None:
     empty = without_samples(run)
     write_mcap(empty, tmp_path / "run.mcap")
     assert_same(empty, read(tmp_path / "run.mcap"))
+
+
+def test_a_run_over_no_driver_values_reads_back(tmp_path: Path) -> None:
+    empty = kinfmu.solve(kinfmu.load("slider_crank"), crank_angle=[])
+    write_mcap(empty, tmp_path / "run.mcap")
+    back = read(tmp_path / "run.mcap")
+    assert (len(back), back.axis, back.outputs) == (0, "crank_angle", empty.outputs)
 
 
 def test_negative_zero_infinity_and_bits_of_nan_survive(run: Run, tmp_path: Path) -> None:

@@ -286,7 +286,7 @@ def test_the_result_is_a_table() -> None:
         ({"crank": [1.0]}, [READ[0]], {"crank_angle": TURN}, "there is no parameter 'crank'"),
         ({"height": [1.0]}, ["swing"], {"crank_angle": TURN}, "there is no measure 'swing'; measures: rest, part"),
         ({"height": [1.0]}, [READ[0]], {"crank_angle": [0.0, 1.0]}, "there are 2 samples; measures need 3 or more"),
-        ({"height": [1.0]}, [READ[0]], {"crank_angle": [0.0, 1.0, 1.0]}, "measures need samples over time or over one"),
+        ({"height": [1.0]}, [READ[0]], {"crank_angle": [0.0, 1.0, 1.0]}, "measures need values of crank_angle"),
         ({"height": [1.0]}, [READ[0]], {"t": [0.0, 1.0, 2.0], "crank_angle": TURN}, "give times or inputs, not both"),
         (
             {"height": [1.0]},
@@ -316,7 +316,12 @@ def test_what_a_model_lacks_is_named_with_what_helps() -> None:
         RequestError, match=r"there is no output 'coupler.x', .*; solve or compile the mechanism with it"
     ):
         kinfmu.measure_designs(model, {"height": [1.0]}, [Range("far", of="coupler.x")], crank_angle=TURN)
-    with pytest.raises(RequestError, match="here no driver moves"):
+    far = [Range("far", of="rocker.phi")]
+    with pytest.raises(
+        RequestError, match=r"^measures need values of crank_angle that ascend or descend; here some do not$"
+    ):
+        kinfmu.measure_designs(model, {"height": [1.0]}, far, crank_angle=[0.1, 0.3, 0.2])
+    with pytest.raises(RequestError, match=r"here no driver moves$"):
         kinfmu.measure_designs(model, {"height": [1.0]}, [Range("far", of="rocker.phi")], crank_angle=[1.0, 1.0, 1.0])
 
 

@@ -164,6 +164,7 @@ def test_derivatives_that_are_not_requested_are_not_computed() -> None:
         ({"a": ["1 mm", "2 mm"]}, {}, "parameter 'a' must be numbers"),
         ({"a": [True, 1.0]}, {}, "parameter 'a' must be numbers, or text .*, not true or false"),
         ({"a": np.array([True])}, {}, "parameter 'a' must be numbers, or text .*, not true or false"),
+        ({"a": np.array([1.0, 1j])}, {}, "parameter 'a' must be numbers, or text .*, not complex"),
         (
             {"a": [38.0, 39.0], "crank.speed": [1.0, 2.0]},
             {"crank_angle": [0.0]},

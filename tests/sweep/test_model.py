@@ -35,6 +35,11 @@ def test_a_model_solves_as_solve_does(name: str) -> None:
     assert model.outputs == model.solve([0.0]).outputs
 
 
+def test_columns_keep_the_order_of_the_mechanism() -> None:
+    model = kinfmu.compile(kinfmu.load("crank_rocker"), ["rocker.phi", "coupler.x"])
+    assert model.outputs == ("coupler.x", "rocker.phi")
+
+
 def test_parameters_are_arguments_in_any_order_of_calls() -> None:
     model = kinfmu.compile(leg())
     sets: list[dict[str, float | str]] = [{"a": 38.0 + k, "crank.speed": "30 rpm"} for k in range(4)]

@@ -307,6 +307,25 @@ def test_times_and_tables_may_be_views_of_others() -> None:
         kinfmu.solve(mechanism, t, engine="native", out=out)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_tables_that_share_memory_are_refused(engine: str) -> None:
+    mechanism = kinfmu.load("crank_rocker")
+    t = np.linspace(0.0, 1.0, 5)
+    whole = np.zeros((14, 7))
+    one, apart = whole[:5], whole[9:]
+    for out, names in (
+        ((one, one, one), "values and rates"),
+        ((one, whole[4:9], apart), "values and rates"),  # by a row
+        ((one, apart, whole[:10:2]), "values and accelerations"),
+        ((apart, one, whole[4:9]), "rates and accelerations"),
+    ):
+        with pytest.raises(KinfmuError, match=f"^out: {names} share memory; each needs an array of its own$"):
+            kinfmu.solve(mechanism, t, engine=engine, out=out)
+    between = np.zeros((5, 3, 7))  # side by side in memory
+    run = kinfmu.solve(mechanism, t, engine=engine, out=tuple(between[:, k] for k in range(3)))  # type: ignore[arg-type]
+    np.testing.assert_array_equal(run.rates, kinfmu.solve(mechanism, t, engine=engine).rates)
+
+
 def test_only_what_angles_turn_in_sines_and_cosines_is_taken_to_repeat() -> None:
     def repeats(name: str) -> bool:
         return "KF_REPEATS 1" in emit_lanes(compile_plan(kinfmu.load(name)))["lane_sizes.h"]
