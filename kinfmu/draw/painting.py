@@ -13,7 +13,7 @@ from kinfmu.run import FloatArray
 from kinfmu.scene import details, palette
 from kinfmu.scene.details import box
 from kinfmu.scene.instant import Instant
-from kinfmu.scene.shape import Shape
+from kinfmu.scene.shape import Shape, guides_of_cams
 
 DASHES = (0, (7.0, 2.0, 1.5, 2.0))  # of a pitch circle or curve
 _GREY, _LIGHT_GREY = palette.darker(palette.GROUND), palette.lighter(palette.BAR)  # edge and area without a body
@@ -58,6 +58,7 @@ class Painter:
         self.names: list[Name] = []
         self._sheet, self._found = sheet, found
         self._width = BAR * sheet.fine  # [pt], of a link
+        self._guides = guides_of_cams(found)
         self._racks = {rack.name for rack in self._all("rack")}
 
     def _all(self, *kinds: str) -> list[Shape]:
@@ -101,17 +102,25 @@ class Painter:
                 self._sheet.line(spoke.points, 1.0, edge, matters=0.4)
 
     def cams(self) -> None:
-        """Paint cams in their bodies' colours, and their rollers."""
+        """Paint cams in their bodies' colours over the blocks of their followers, and rollers over both."""
         sheet = self._sheet
-        for shape in self._all("cam", "pitch", "roller"):
-            edge = palette.darker(shape.colour)
-            if shape.kind == "cam":
-                fill = palette.lighter(palette.lighter(shape.colour))
-                sheet.line(shape.points, 1.2, edge, closed=True, fill=fill, matters=1.0)
-            elif shape.kind == "pitch":
-                sheet.line(shape.points, 0.7, edge, closed=True, style=DASHES, matters=0.3)
-            else:
-                sheet.circle(shape.points[0], shape.radius, 1.0, edge, fill=PAPER, matters=0.8)
+        for pitch in self._all("pitch"):
+            edge = palette.darker(pitch.colour)
+            sheet.line(pitch.points, 0.7, edge, closed=True, style=DASHES, matters=0.3)
+        self._rollers(PAPER)
+        for block in self._all("block"):
+            if block.name in self._guides:
+                self._block(block)
+        for cam in self._all("cam"):
+            fill = palette.lighter(palette.lighter(cam.colour))
+            sheet.line(cam.points, 1.2, palette.darker(cam.colour), closed=True, fill=fill, matters=1.0)
+        if self._guides:
+            self._rollers(None)
+
+    def _rollers(self, fill: palette.Colour | None) -> None:
+        for roller in self._all("roller"):
+            edge = palette.darker(roller.colour)
+            self._sheet.circle(roller.points[0], roller.radius, 1.0, edge, fill=fill, matters=0.8)
 
     def ground(self) -> None:
         """Paint supports and rails."""
@@ -177,13 +186,15 @@ class Painter:
     def slides(self) -> None:
         """Paint slots and blocks."""
         for shape in self._all("slot", "block", "die"):
-            edge, fill = palette.darker(shape.colour), palette.lighter(shape.colour)
             if shape.kind == "slot":
-                self._slot(shape.points, edge, fill)
-            else:
-                size = self._sheet.ornament
-                corners = box(shape.points[0], shape.towards, details.BLOCK * size, details.BLOCK_WIDTH * size)
-                self._sheet.line(corners, 1.1, edge, closed=True, fill=fill, matters=1.5)
+                self._slot(shape.points, palette.darker(shape.colour), palette.lighter(shape.colour))
+            elif shape.kind == "die" or shape.name not in self._guides:
+                self._block(shape)
+
+    def _block(self, block: Shape) -> None:
+        size, edge = self._sheet.ornament, palette.darker(block.colour)
+        corners = box(block.points[0], block.towards, details.BLOCK * size, details.BLOCK_WIDTH * size)
+        self._sheet.line(corners, 1.1, edge, closed=True, fill=palette.lighter(block.colour), matters=1.5)
 
     def _slot(self, ends: FloatArray, edge: palette.Colour, fill: palette.Colour) -> None:
         along = ends[1] - ends[0]

@@ -13,7 +13,7 @@ from kinfmu.run import FloatArray, Run
 from kinfmu.scene import details, palette
 from kinfmu.scene.placing import world
 from kinfmu.scene.scene import Scene, drawable
-from kinfmu.scene.shape import Shape
+from kinfmu.scene.shape import Shape, guides_of_cams
 
 WIDTH, ICON = 640, 100  # [px]
 _EDGE = 30.0  # [px] around everything
@@ -128,7 +128,11 @@ def _lines(found: Scene, row: int, size: float) -> Iterator[PictureLine]:
             yield PictureLine(good, palette.GROUND, 1.2, is_dashed=True)
     order = ("support", "rail", "bed", "slot", "belt")
     frames = {name: pose[row] for name, pose in found.frames.items()}
-    shapes = sorted(found.shapes, key=lambda shape: shape.kind not in order)
+    guides = guides_of_cams(found.shapes)
+    shapes = sorted(
+        found.shapes,
+        key=lambda shape: shape.kind not in order and not (shape.kind == "block" and shape.name in guides),
+    )
     for shape in shapes:
         if shape.kind != "pitch" and shape.frame in frames:
             drawn = shape.placed(frames)

@@ -37,7 +37,8 @@ _PAINT = {  # kinds whose size follows from one pose
     "barrel": _Paint(1.4),
     "shaft": _Paint(0.6),
     "block": _Paint(1.8),
-    **dict.fromkeys(("cam", "roller", "wheel", "spoke", "belt"), _Paint(0.4, -0.3)),
+    "roller": _Paint(0.4, 1.2),  # on the block of its follower
+    **dict.fromkeys(("cam", "wheel", "spoke", "belt"), _Paint(0.4, -0.3)),
 }
 
 

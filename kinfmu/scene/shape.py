@@ -21,7 +21,7 @@ of `frames`: bars, cylinders, and the blocks of pins.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -108,6 +108,17 @@ class Shape:
             return first, np.arctan2(way[:, 1], way[:, 0]), np.hypot(*way.T)
         angle = math.atan2(self.towards[1], self.towards[0]) + poses[self.other or self.frame][:, 2]
         return first, angle, np.zeros(len(first))
+
+
+def guides_of_cams(found: Iterable[Shape]) -> frozenset[str]:
+    """Return the names of the blocks of followers, which are drawn behind their cams.
+
+    In the middle of such a block is often a roller that is smaller than the block.
+    """
+    found = list(found)
+    cams = {shape.name for shape in found if shape.kind == "cam"}
+    followers = {shape.frame for shape in found if shape.kind == "contact" and shape.name in cams}
+    return frozenset(shape.name for shape in found if shape.kind == "block" and shape.frame in followers)
 
 
 def bar_frame(joint: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +16,16 @@ from kinfmu.analysis import cam_profile
 from kinfmu.draw.cam import _figure
 from kinfmu.draw.instant import instant
 from kinfmu.draw.sheet import ink
+from kinfmu.fmu.picture import picture
 from kinfmu.joints import CamFlatFace, CamOscillating, CamRoller, CamTranslating
 from kinfmu.joints.joint import Joint
 from kinfmu.laws import Harmonic, Law, MotionSequence, Segment, Spline
+from kinfmu.log.urdf import robot_description
 from kinfmu.scene import palette
 from kinfmu.scene.cams import CamShape, cam_shapes
 from kinfmu.scene.details import on_face
-from kinfmu.scene.shape import Shape
+from kinfmu.scene.scene import scene
+from kinfmu.scene.shape import Shape, guides_of_cams
 
 QUARTER = 0.5 * math.pi
 RADIUS = 6.0  # of the roller
@@ -209,3 +213,47 @@ def test_a_profile_that_its_roller_cuts_at_another_place_is_not_drawn() -> None:
         shape = translating(CamRoller("contact", ("cam.O", "follower.tip"), law, radius), QUARTER)
         assert (shape.profile is not None) == is_drawn
         assert shape.pitch is not None
+
+
+@pytest.fixture
+def tappet() -> Mechanism:
+    """A cam whose follower slides with the roller's centre, so that its block is round the roller."""
+    contact = CamTranslating("contact", ("ground.O", "follower.tip"), "cam", lift(12.0), QUARTER, 30.0, RADIUS)
+    guide = Translational("guide", ("ground.G", "follower.tip"), QUARTER)
+    return cam(Body("follower", {"tip": (0, 0)}, (5, 30, 0)), guide, contact, 0.4)
+
+
+def test_the_block_of_a_follower_hides_neither_cam_nor_roller_in_figures(tappet: Mechanism) -> None:
+    patches = sorted(kinfmu.draw.figure(tappet, ax=Figure().subplots()).patches, key=lambda patch: patch.zorder)
+    follower = ink(palette.lighter(palette.body(1)))
+    (block,) = (k for k, patch in enumerate(patches) if patch.get_facecolor()[:3] == follower)
+    (profile,) = (
+        k for k, patch in enumerate(patches) if len(patch.get_path().vertices) > 300 and patch.get_facecolor()[3]
+    )
+    sizes = [np.ptp(patch.get_path().vertices, axis=0) for patch in patches]
+    rollers = [k for k, size in enumerate(sizes) if size == pytest.approx([2.0 * RADIUS] * 2)]
+    assert rollers[0] < block < profile < rollers[1]
+    assert patches[rollers[1]].get_facecolor()[3] == 0.0
+
+
+def test_the_block_of_a_follower_hides_neither_cam_nor_roller_in_fmus_and_records(tappet: Mechanism) -> None:
+    run = kinfmu.solve(tappet, [0.0])
+    drawn = picture(run)
+    assert drawn is not None
+    (block,) = (k for k, line in enumerate(drawn.lines) if line.is_filled and line.colour == palette.body(1))
+    (profile,) = (k for k, line in enumerate(drawn.lines) if line.is_filled and line.colour == palette.body(0))
+    assert block < profile
+    text = robot_description("tappet", scene(run, tappet), 1.0)
+    visuals = re.search(r'<link name="follower">(.*?)</link>', text)
+    assert visuals is not None
+    boxes = re.findall(r'<origin xyz="\S+ \S+ (\S+)" rpy="[^"]*"/><geometry><box size="\S+ \S+ (\S+)"', visuals[1])
+    tops = sorted((float(size), float(height) + 0.5 * float(size)) for height, size in boxes)
+    *sides, (_, block_top) = tops  # the block is the largest box
+    assert len(sides) >= 24  # of the roller
+    assert all(top > block_top for _, top in sides)
+
+
+def test_blocks_of_followers_are_known(tappet: Mechanism) -> None:
+    assert guides_of_cams(scene(kinfmu.solve(tappet, [0.0]), tappet).shapes) == {"guide"}
+    others = [kinfmu.load(name) for name in ("cam_roller", "slider_crank", "rack_steering")]
+    assert not any(guides_of_cams(scene(kinfmu.solve(one, [0.0]), one).shapes) for one in others)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -284,3 +285,19 @@ def test_the_page_states_why_a_contact_force_is_unknown(chromium: Browser) -> No
     with chromium.open(page_of(parse(text))) as page:
         page.tab.click("#tab-show")
         assert page.tab.get_by_text("contact force unknown").count() == 0
+
+
+def test_the_block_of_a_follower_is_behind_the_cam_and_under_the_edge_of_the_roller(chromium: Browser) -> None:
+    mechanism = parse(HEAD + JOINTS["up"] + SLIDING)
+    with chromium.open(page_of(mechanism)) as page:
+        page.tab.click("#tab-files")
+        with page.tab.expect_download() as waiting:
+            page.tab.click("#save-svg")
+        drawn = waiting.value.path().read_text("utf-8").splitlines()
+        scale = page.get("k.view.scale")
+        assert page.errors == []
+    (block,) = (k for k, line in enumerate(drawn) if re.match(r'<path d="M[^LZ]*(L[^LZ]*){3}Z" fill="(?!none)', line))
+    (profile,) = (k for k, line in enumerate(drawn) if line.count("L") > 300 and 'fill="none"' not in line)
+    filled, edge = (k for k, line in enumerate(drawn) if f'r="{0.01 * scale:.2f}"' in line)
+    assert filled < block < profile < edge
+    assert 'fill="none"' in drawn[edge]

@@ -18,7 +18,7 @@ from kinfmu.run import FloatArray, Run
 from kinfmu.scene import details, palette
 from kinfmu.scene.forces import Arrows
 from kinfmu.scene.scene import Scene
-from kinfmu.scene.shape import Shape
+from kinfmu.scene.shape import Shape, guides_of_cams
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -187,6 +187,8 @@ class Linkage:
             if shape.kind in ("link", "rib", "rod", "face") and (face.kind, face.frame) == ("face", shape.frame):
                 line = details.on_face(line, face, paint.radius * self.size)
         order = paint.order + self.scene.bodies.get(shape.frame, 0) / 100.0
+        if shape.kind == "block" and shape.name in guides_of_cams(self.scene.shapes):
+            order = _PAINT["cam"].order - 1.0
         self.frames.line(entity, line, paint.radius, own, order, label, label in self.names)
 
     def _points(self, path: str, frame: str) -> None:

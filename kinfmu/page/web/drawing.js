@@ -123,23 +123,38 @@ class Painter {
 
     // ---- shapes
 
+    // Larger wheels first; cams over the blocks of their followers, and the edge of the roller over both: it is often in the
+    // middle of a block that is larger.
     wheels() {
-        const wheels = this.all("wheel", "cam", "roller").sort((a, b) => (b.radius || 0) - (a.radius || 0));
-        for (const shape of wheels) {
-            const points = this.at(shape).map((p) => this.dot(p));
-            const style = { width: 1.5, colour: this.edge(shape.colour), fill: this.isGhost ? null : paleOf(shape.colour, this.theme) };
-            if (shape.kind === "cam") {
-                this.pen.line(points, { ...style, closed: true });
-                this.names.coverAll(points, 1.5, true);
-            } else {
-                this.pen.circle(...points[0], shape.radius * this.view.scale, shape.kind === "wheel" ? { ...style, dash: [7, 3] } : style);
-                this.names.coverCircle(points[0], shape.radius * this.view.scale);
-            }
-        }
+        for (const shape of this.all("wheel").sort((a, b) => b.radius - a.radius)) this.circle(shape, { dash: [7, 3] });
         for (const shape of this.all("pitch")) this.pen.line(this.at(shape).map((p) => this.dot(p)), { width: 1.1, colour: this.edge(shape.colour), closed: true, dash: [9, 3, 2, 3] });
+        for (const shape of this.all("roller")) this.circle(shape);
+        const guides = this.all("block").filter((shape) => this.isOfFollower(shape));
+        for (const shape of guides) this.block(shape);
+        for (const shape of this.all("cam")) {
+            const points = this.at(shape).map((p) => this.dot(p));
+            this.pen.line(points, { ...this.area(shape), closed: true });
+            this.names.coverAll(points, 1.5, true);
+        }
+        if (guides.length) for (const shape of this.all("roller")) this.circle(shape, { fill: null });
         for (const shape of this.all("spoke", "belt")) {
             this.pen.line(this.at(shape).map((p) => this.dot(p)), { width: 1.4, colour: this.edge(shape.colour) });
         }
+    }
+
+    area(shape) {
+        return { width: 1.5, colour: this.edge(shape.colour), fill: this.isGhost ? null : paleOf(shape.colour, this.theme) };
+    }
+
+    circle(shape, style = {}) {
+        const [centre] = this.at(shape).map((p) => this.dot(p));
+        const radius = shape.radius * this.view.scale;
+        this.pen.circle(...centre, radius, { ...this.area(shape), ...style });
+        this.names.coverCircle(centre, radius);
+    }
+
+    isOfFollower(shape) {
+        return this.linkage.data.cams.some((cam) => cam.follower === shape.frame);
     }
 
     // Racks are drawn over the links: a rack is often a link too.
@@ -271,24 +286,27 @@ class Painter {
     }
 
     slides() {
-        const s = 1.2 * this.size;
         for (const shape of this.all("slot", "block", "die")) {
-            const points = this.at(shape).map((p) => this.dot(p));
-            const [edge, fill] = [this.edge(shape.colour), this.fill(shape.colour)];
             if (shape.kind === "slot") {
-                const [a, b] = points;
+                const [a, b] = this.at(shape).map((p) => this.dot(p));
+                const [edge, fill] = [this.edge(shape.colour), this.fill(shape.colour)];
                 this.pen.line([a, b], { width: 1.55 * this.width + 1.4, colour: edge });
                 this.pen.line([a, b], { width: 1.55 * this.width - 1.4, colour: fill });
                 this.pen.line([a, b], { width: 0.75 * this.width + 1.2, colour: edge });
                 this.pen.line([a, b], { width: 0.75 * this.width - 1.2, colour: this.theme.paper });
                 this.names.cover(a, b, 1.55 * this.width);
-            } else {
-                const [x, y] = shape.kind === "die" ? [shape.direction[0], -shape.direction[1]] : this.direction(shape);
-                const corner = (i, j) => [points[0][0] + s * (13 * i * x - 8 * j * y), points[0][1] + s * (13 * i * y + 8 * j * x)];
-                this.pen.line([corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)], { width: 1.5, colour: edge, fill, closed: true });
-                this.names.cover(corner(-0.4, 0), corner(0.4, 0), 16 * s);
-            }
+            } else if (shape.kind === "die" || !this.isOfFollower(shape)) this.block(shape);
         }
+    }
+
+    block(shape) {
+        const s = 1.2 * this.size;
+        const [centre] = this.at(shape).map((p) => this.dot(p));
+        const [x, y] = shape.kind === "die" ? [shape.direction[0], -shape.direction[1]] : this.direction(shape);
+        const corner = (i, j) => [centre[0] + s * (13 * i * x - 8 * j * y), centre[1] + s * (13 * i * y + 8 * j * x)];
+        const style = { width: 1.5, colour: this.edge(shape.colour), fill: this.fill(shape.colour), closed: true };
+        this.pen.line([corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)], style);
+        this.names.cover(corner(-0.4, 0), corner(0.4, 0), 16 * s);
     }
 
     cylinders() {
