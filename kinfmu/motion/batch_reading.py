@@ -16,6 +16,7 @@ from kinfmu.equations.graph import Node, evaluate, symbols
 from kinfmu.errors import KinfmuError, RequestError, listed
 from kinfmu.mechanism.force_names import measured_forces
 from kinfmu.mechanism.settings import LawConstant
+from kinfmu.motion.crowding import is_crowded
 from kinfmu.motion.design_points import dependent_numbers, points_of_designs
 from kinfmu.motion.driven_samples import driven_samples
 from kinfmu.motion.history import FEWEST
@@ -375,7 +376,7 @@ class BatchReading:
         """Return the names of measures that are read design by design: their numbers or samples differ."""
         plan, driven = self._model.plan, self._driving.driven
         names = {reading.name for reading in self._readings}
-        if has_breaks(self._model.mechanism, over_time=driven is None):
+        if has_breaks(self._model.mechanism, over_time=driven is None) or is_crowded(self.motion.x):
             return names
         if driven is None:
             behind = {symbol.name for symbol in symbols([node for law in plan.laws for node in law[1:]])}

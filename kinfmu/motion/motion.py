@@ -20,6 +20,7 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.force_names import NEVER_NEGATIVE
 from kinfmu.mechanism.members import kind_of_measured
+from kinfmu.motion.crowding import is_crowded, spread
 from kinfmu.motion.driven_samples import driven_samples
 from kinfmu.motion.driver_values import driven_at, window, within_period
 from kinfmu.motion.fitting import Circle, Line, deviation
@@ -115,9 +116,29 @@ class Motion:
             run.margin[order] if with_margin else None,
             force=lambda name: force_of(run, name)[order],
         )
+        motion = motion._spread()
         outputs = [(motion.quantity_history(name), name.is_angle) for name in run.outputs]
         is_closed = bool(outputs) and bool(goes_round(outputs))
-        return motion._split(motion.breaks(over_time=run.axis == TIME), is_closed=is_closed).going_round(is_closed)
+        breaks = motion.breaks(over_time=run.axis == TIME)
+        return motion._split(breaks, is_closed=is_closed)._spread().going_round(is_closed)
+
+    def _spread(self) -> Motion:
+        """Return the motion without samples that are so close to others that they add nothing but rounding."""
+        if not is_crowded(self.x):
+            return self
+        kept = spread(self.x, self.tables[1], self.tables[2])
+        force, drive = self.force, self.drive
+        return replace(
+            self,
+            x=self.x[kept],
+            tables=tuple(table[kept] for table in self.tables),  # type: ignore[arg-type]  # three of them
+            drive=drive and replace(
+                drive, x=drive.x[kept], **{name: getattr(drive, name)[kept] for name in ("value", "rate", "acceleration")}
+            ),
+            margin=None if self.margin is None else self.margin[kept],
+            force=None if force is None else lambda name: force(name)[kept],
+            _histories={},
+        )
 
     def breaks(self, *, over_time: bool) -> list[Break]:
         """Return where derivatives of laws of drivers and joints jump; over_time: drivers follow their laws."""
