@@ -22,6 +22,7 @@ class PoseQuantity(ABC):
     type: ClassVar[str]  # its name in mechanism files
     kind: ClassVar[str]
     is_absolute: ClassVar[bool] = False  # True if it depends on the world's origin
+    is_root: ClassVar[bool] = False  # True if it is a square root, with a kink where it is 0
 
     @abstractmethod
     def bodies(self) -> tuple[str, ...]:
@@ -89,6 +90,7 @@ class DistanceBetween(PoseQuantity):
 
     type: ClassVar[str] = "distance"
     kind: ClassVar[str] = "length"
+    is_root: ClassVar[bool] = True
 
     between: Annotated[PointPair, "the two points"]
 

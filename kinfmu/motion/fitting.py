@@ -80,6 +80,8 @@ class Circle(FittedShape):
 def deviation(x: History, y: History, shape: type[Line] | type[Circle]) -> FloatArray:
     """Return the largest distance of a path from the line or circle for which it is smallest.
 
+    A line is a circle whose radius grows without bound.
+
     Args:
         x: World coordinate x of the path, (..., n).
         y: World coordinate y.
@@ -105,6 +107,11 @@ def deviation(x: History, y: History, shape: type[Line] | type[Circle]) -> Float
     for candidate in candidates:
         best.parameters = candidate
         found = np.fmin(found, _largest(best, x, y))
+    if isinstance(best, Circle):
+        is_line = Line(x.value, y.value).distance(x.value, y.value).std(axis=-1) < found  # else no line is better
+        if is_line.any():
+            x, y = (History(t.x, t.value[is_line], t.rate[is_line], t.acceleration[is_line]) for t in (x, y))
+            found[is_line] = np.fmin(found[is_line], deviation(x, y, Line))
     return np.where(known, found, np.nan).reshape(leading)
 
 

@@ -6,7 +6,7 @@ Extremes and crossings of a level are those of the polynomials, not of the sampl
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
@@ -21,13 +21,16 @@ from kinfmu.motion.quintic import (
     coefficients,
     derived,
     higher_derivatives,
+    highest_controls,
     maxima,
     neighbours,
+    peaks,
     polynomial,
     root,
 )
 
 FEWEST = 3  # samples that an estimate of a third derivative needs
+_ROUNDING = 1e-13  # of the range of a quantity
 _NEAR = 1e-9  # of the smallest distance of samples; a part begins at a sample that is closer
 
 
@@ -52,6 +55,8 @@ class History:
             have the same argument, one for each side.
         is_nonnegative: True for a quantity that is never negative, such as a reduced inertia: then its polynomials are
             read as 0 where rounding or an error of interpolation makes them negative.
+        is_root: True for a square root, such as a distance. Where it comes close to 0 it has a kink or a sharp bend;
+            there the polynomials of its square are read, which is smooth.
 
     """
 
@@ -62,6 +67,7 @@ class History:
     is_closed: bool = False
     is_seamed: bool = False
     is_nonnegative: bool = False
+    is_root: bool = False
 
     @classmethod
     def of(cls, like: History, quantity: Taylor) -> History:
@@ -107,11 +113,15 @@ class History:
         of the samples): the polynomial of degree 8 with their values, rates and accelerations.
         """
         _, third, _ = self._higher
+        if self.is_root:
+            third = np.where(self._is_near_zero, 0.0, third)
         return History(self.x, self.rate, self.acceleration, third, self.is_closed, self.is_seamed)
 
     def second_derivative(self) -> History:
         """Return the history of the second derivative; its own derivatives are estimated as in `derivative`."""
         _, third, fourth = self._higher
+        if self.is_root:
+            third, fourth = (np.where(self._is_near_zero, 0.0, one) for one in (third, fourth))
         return History(self.x, self.acceleration, third, fourth, self.is_closed, self.is_seamed)
 
     @cached_property
@@ -185,7 +195,7 @@ class History:
             part[..., 0], part[..., 1:-1], part[..., -1] = at[..., 0], row[..., first:last], at[..., 1]
             rows.append(part)
         value = np.maximum(rows[0], 0.0) if self.is_nonnegative else rows[0]
-        return History(x, value, rows[1], rows[2], is_nonnegative=self.is_nonnegative)
+        return replace(self, x=x, value=value, rate=rows[1], acceleration=rows[2], is_closed=False, is_seamed=False)
 
     def maximum(self) -> Extreme:
         """Return the largest value of each design and where it occurs; NaN for designs with unknown samples."""
@@ -214,7 +224,34 @@ class History:
             for sign, (value, x) in zip(missing, maxima(self.x, self._flat, missing), strict=True):
                 found = (sign * value).reshape(shape)
                 self._found[sign] = Extreme(np.maximum(found, 0.0) if self.is_nonnegative else found, x.reshape(shape))
+            if self.is_root and self._is_near_zero.any():
+                is_near = self._is_near_zero.any(axis=-1)
+                for sign, square in zip(missing, self._square._largest(*missing), strict=True):
+                    value, x = self._found[sign]
+                    root_of = np.sqrt(np.maximum(square.value, 0.0))
+                    self._found[sign] = Extreme(np.where(is_near, root_of, value), np.where(is_near, square.x, x))
         return [self._found[sign] for sign in signs]
+
+    @cached_property
+    def _is_near_zero(self) -> NDArray[np.bool_]:
+        """(..., n) True for samples of a square root from which it reaches 0 within two steps, at its rate there."""
+        step = np.max(np.diff(self.x), initial=0.0)
+        return np.asarray((self.value == 0.0) | (self.value <= 2.0 * step * np.abs(self.rate)))
+
+    @cached_property
+    def _square(self) -> History:
+        """The square, smooth where the quantity is 0; there, where it has no rate, with those of the samples beside."""
+        rate, acceleration = np.where(self.value == 0.0, 0.0, (self.rate, self.acceleration))
+        beside = np.abs(np.concatenate([rate[..., 1:2], rate, rate[..., -2:-1]], axis=-1))
+        steepest = np.where(self.value == 0.0, np.maximum(beside[..., 2:], beside[..., :-2]), rate)
+        return History(
+            self.x,
+            self.value**2,
+            2.0 * self.value * rate,
+            2.0 * (steepest**2 + self.value * acceleration),
+            self.is_closed,
+            self.is_seamed,
+        )
 
     @cached_property
     def _found(self) -> dict[float, Extreme]:
@@ -232,13 +269,15 @@ class History:
 
         """
         flat = (self.value - level[..., None]).reshape(-1, len(self.x))
-        rates, accelerations = (rows.reshape(flat.shape) for rows in (self.rate, self.acceleration))
+        rows = [flat, *(row.reshape(flat.shape) for row in (self.rate, self.acceleration))]
         h = np.diff(self.x)
-        is_above = flat >= 0.0
-        design, place = np.nonzero((is_above[:, 1:] != is_above[:, :-1]) & self.is_known.reshape(-1)[:, None])
-        low, high = ([rows[design, place + side] for rows in (flat, rates, accelerations)] for side in (0, 1))
-        s = root(coefficients(low, high, h[place]), np.zeros(len(design)), np.ones(len(design)))
-        x = self.x[place] + s * h[place]
+        is_above, is_known = flat >= 0.0, self.is_known.reshape(-1)[:, None]
+        design, place = np.nonzero((is_above[:, 1:] != is_above[:, :-1]) & is_known)
+        c = coefficients(*([row[design, place + side] for row in rows] for side in (0, 1)), h[place])
+        x = self.x[place] + root(c, np.zeros(len(design)), np.ones(len(design))) * h[place]
+        for sign in (1.0, -1.0):
+            twice, at = _crossings_and_back(self.x, [sign * row for row in rows], is_known)
+            design, x = np.append(design, twice), np.append(x, at)
         if self.is_closed:  # a crossing at the end itself is hidden where rounding puts its two samples on other sides
             is_equal = np.abs(flat[:, -1] - flat[:, 0]) <= _NEAR * np.ptp(flat, axis=1)
             hidden = np.flatnonzero(is_equal & (is_above[:, -1] != is_above[:, 0]))
@@ -268,6 +307,25 @@ class History:
         start, stop = np.where(start == -np.inf, self.x[0], start), np.where(stop == np.inf, self.x[-1], stop)
         known, shape = np.isfinite(top), highest.x.shape
         return tuple(np.where(known, one, np.nan).reshape(shape) for one in (start, stop))  # type: ignore[return-value]
+
+
+def _crossings_and_back(
+    x: FloatArray, rows: list[FloatArray], is_known: NDArray[np.bool_]
+) -> tuple[IntArray, FloatArray]:
+    """Return where rows (m, n) that are below 0 at two neighbouring samples are above 0 between them, as `crossings`."""
+    h, (f, _, _) = np.diff(x), rows
+    is_below = is_known & (f < 0.0)
+    design, place = np.nonzero(is_below[:, 1:] & is_below[:, :-1] & (highest_controls(h, rows) > 0.0))
+    least = _ROUNDING * np.ptp(f, axis=1)[design]
+    c = coefficients(*([row[design, place + side] for row in rows] for side in (0, 1)), h[place])
+    found: tuple[list[IntArray], list[FloatArray]] = [np.empty(0, int)], [np.empty(0)]
+    for which, s in peaks(c):
+        is_above = polynomial(c[:, which], s) > least[which]
+        chosen, top = np.flatnonzero(which)[is_above], s[is_above]
+        for low, high in ((np.zeros_like(top), top), (top, np.ones_like(top))):
+            found[0].append(design[chosen])
+            found[1].append(x[place[chosen]] + root(c[:, chosen], low, high) * h[place[chosen]])
+    return np.concatenate(found[0]), np.concatenate(found[1])
 
 
 def neighbours_within(x: FloatArray, *, is_closed: bool) -> tuple[IntArray, IntArray]:

@@ -370,10 +370,13 @@ class Motion:
 
     def _new_history(self, quantity: QuantityRead) -> History:
         if quantity in self.computed:
-            return self._coordinate(self.computed[quantity])
-        if isinstance(quantity, CoordinateName):
-            return self._coordinate(quantity)
-        return self._as_history(value_of(quantity, self._placement))
+            history = self._coordinate(self.computed[quantity])
+        elif isinstance(quantity, CoordinateName):
+            history = self._coordinate(quantity)
+        else:
+            history = self._as_history(value_of(quantity, self._placement))
+        is_root = isinstance(quantity, PoseQuantity) and quantity.is_root
+        return replace(history, is_root=True) if is_root else history
 
     def _whole(self, of: str | PoseQuantity) -> History:
         """Return a quantity as `history` does, without regard to the window."""

@@ -7,7 +7,7 @@ many designs are measured and a compiler is found.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -80,28 +80,37 @@ def maxima(x: FloatArray, rows: Rows, signs: Sequence[float]) -> list[tuple[Floa
 
 
 def _largest(x: FloatArray, rows: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
-    f, v, a = rows
+    f = rows[0]
     is_known = np.logical_and.reduce([np.isfinite(row).all(axis=-1) for row in rows])
     h = np.diff(x)
     k = np.argmax(f, axis=1)  # of unknown samples the first
     value, at = np.take_along_axis(f, k[:, None], 1)[:, 0].copy(), x[k]
+    design, place = np.nonzero((highest_controls(h, rows) > value[:, None]) & is_known[:, None])
+    c = coefficients(*([row[design, place + side] for row in rows] for side in (0, 1)), h[place])
+    for which, s in peaks(c):
+        where = x[place[which]] + s * h[place[which]]
+        _keep_largest(value, at, design[which], polynomial(c[:, which], s), where)
+    return np.where(is_known, value, np.nan), np.where(is_known, at, np.nan)
+
+
+def highest_controls(h: FloatArray, rows: Sequence[FloatArray]) -> FloatArray:
+    """Return (m, n - 1): the largest of the inner control points of each interval, of the lengths h."""
+    f, v, a = rows
     c0 = h * v[:, :-1] * 0.2
     c1 = f[:, :-1] + c0
     c2 = c1 + c0 + h * h * a[:, :-1] * 0.05
     c5 = h * v[:, 1:] * 0.2
     c4 = f[:, 1:] - c5
     c3 = c4 - c5 + h * h * a[:, 1:] * 0.05
-    highest = np.maximum(np.maximum(c1, c2), np.maximum(c3, c4))
-    design, place = np.nonzero((highest > value[:, None]) & is_known[:, None])
-    low, high = ([row[design, place + side] for row in (f, v, a)] for side in (0, 1))
-    c = coefficients(low, high, h[place])
+    return np.asarray(np.maximum(np.maximum(c1, c2), np.maximum(c3, c4)))
+
+
+def peaks(c: FloatArray) -> Iterator[tuple[NDArray[np.bool_], FloatArray]]:
+    """Yield peaks between s = 0 and 1, at most two of each polynomial: which of them have one, and where."""
     slope = derived(c)
     for begin, end in _peak_brackets(c):
         is_peak = (polynomial(slope, begin) > 0.0) & (polynomial(slope, end) < 0.0)
-        s = root(slope[:, is_peak], begin[is_peak], end[is_peak])
-        where = x[place[is_peak]] + s * h[place[is_peak]]
-        _keep_largest(value, at, design[is_peak], polynomial(c[:, is_peak], s), where)
-    return np.where(is_known, value, np.nan), np.where(is_known, at, np.nan)
+        yield is_peak, root(slope[:, is_peak], begin[is_peak], end[is_peak])
 
 
 def higher_derivatives(
