@@ -11,7 +11,7 @@ import numpy as np
 from kinfmu.motion.quintic import FloatArray, IntArray
 
 _CLOSE = 0.1  # of the mean distance of samples
-_ALIKE = 0.03  # of the largest acceleration; samples that differ by more follow a steep change and are all kept
+_EQUAL = 0.03  # of the largest acceleration; samples that differ by more follow a steep change and are all kept
 _ROUNDING = 1e-9  # of the largest rate over the mean distance; the same for accelerations that are 0 but for rounding
 
 
@@ -22,7 +22,7 @@ def is_crowded(x: FloatArray) -> bool:
 
 
 def spread(x: FloatArray, rates: FloatArray, accelerations: FloatArray) -> IntArray:
-    """Return the numbers of the samples to keep: the ends, both sides of breaks, and no two that are close and alike.
+    """Return the numbers of the samples to keep: ends, both sides of breaks, of close and nearly equal ones the first.
 
     Args:
         x: (n,) ascending arguments; a break is there twice.
@@ -33,13 +33,15 @@ def spread(x: FloatArray, rates: FloatArray, accelerations: FloatArray) -> IntAr
     mean = _mean(x)
     with np.errstate(invalid="ignore"):
         sizes = [np.nanmax(np.abs(table), axis=0, initial=0.0) for table in (accelerations, rates)]
-    limit = _ALIKE * sizes[0] + _ROUNDING * sizes[1] / mean
+    limit = _EQUAL * sizes[0] + _ROUNDING * sizes[1] / mean
     is_break = np.zeros(len(x), dtype=bool)
     before = np.flatnonzero(np.diff(x) == 0.0)
     is_break[[0, -1, *before, *(before + 1)]] = True
     kept = [0]
     for k in range(1, len(x)):
-        while x[k] - x[kept[-1]] < _CLOSE * mean and (np.abs(accelerations[k] - accelerations[kept[-1]]) <= limit).all():
+        while (
+            x[k] - x[kept[-1]] < _CLOSE * mean and (np.abs(accelerations[k] - accelerations[kept[-1]]) <= limit).all()
+        ):
             if not is_break[k]:
                 break
             if is_break[kept[-1]]:

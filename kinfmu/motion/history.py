@@ -24,6 +24,7 @@ from kinfmu.motion.quintic import (
     highest_controls,
     maxima,
     neighbours,
+    of_intervals,
     peaks,
     polynomial,
     root,
@@ -31,6 +32,8 @@ from kinfmu.motion.quintic import (
 
 FEWEST = 3  # samples that an estimate of a third derivative needs
 _ROUNDING = 1e-13  # of the range of a quantity
+_LEVEL = 0.382  # of the range; where no dwell is likely to be
+_REPEATED = 1e-6  # of the range; values that differ by less are the same
 _NEAR = 1e-9  # of the smallest distance of samples; a part begins at a sample that is closer
 
 
@@ -101,6 +104,11 @@ class History:
     def rows(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Value, rate and acceleration."""
         return self.value, self.rate, self.acceleration
+
+    def samples(self, numbers: IntArray) -> History:
+        """Return the history of some of the samples."""
+        value, rate, acceleration = (row[..., numbers] for row in self.rows)
+        return replace(self, x=self.x[numbers], value=value, rate=rate, acceleration=acceleration)
 
     def negative(self) -> History:
         """Return the history of the negative quantity."""
@@ -240,10 +248,10 @@ class History:
 
     @cached_property
     def _square(self) -> History:
-        """The square, smooth where the quantity is 0; there, where it has no rate, with those of the samples beside."""
+        """The square, which is smooth at 0; samples that are 0 have no rate of their own, but that of a neighbour."""
         rate, acceleration = np.where(self.value == 0.0, 0.0, (self.rate, self.acceleration))
-        beside = np.abs(np.concatenate([rate[..., 1:2], rate, rate[..., -2:-1]], axis=-1))
-        steepest = np.where(self.value == 0.0, np.maximum(beside[..., 2:], beside[..., :-2]), rate)
+        near = np.abs(np.concatenate([rate[..., 1:2], rate, rate[..., -2:-1]], axis=-1))
+        steepest = np.where(self.value == 0.0, np.maximum(near[..., 2:], near[..., :-2]), rate)
         return History(
             self.x,
             self.value**2,
@@ -273,7 +281,7 @@ class History:
         h = np.diff(self.x)
         is_above, is_known = flat >= 0.0, self.is_known.reshape(-1)[:, None]
         design, place = np.nonzero((is_above[:, 1:] != is_above[:, :-1]) & is_known)
-        c = coefficients(*([row[design, place + side] for row in rows] for side in (0, 1)), h[place])
+        c = of_intervals(rows, h, design, place)
         x = self.x[place] + root(c, np.zeros(len(design)), np.ones(len(design))) * h[place]
         for sign in (1.0, -1.0):
             twice, at = _crossings_and_back(self.x, [sign * row for row in rows], is_known)
@@ -283,6 +291,34 @@ class History:
             hidden = np.flatnonzero(is_equal & (is_above[:, -1] != is_above[:, 0]))
             design, x = np.append(design, hidden), np.append(x, np.full(len(hidden), self.x[-1]))
         return design, x
+
+    def repeats(self) -> IntArray:
+        """Return (...) how many times the quantity of a motion that goes round repeats on the way: once or more.
+
+        It does so k times if it rises k times through a level, or k times a whole number, and has the same values one
+        k-th of the period later.
+        """
+        low, high = self.extremes()
+        shape = self.value.shape[:-1]
+        level = (low.value + _LEVEL * (high.value - low.value)).reshape(-1, 1)
+        is_above = self._flat[0][:, :-1] >= level
+        rises = np.count_nonzero(is_above & ~np.roll(is_above, 1, axis=1), axis=1)
+        found = np.ones(len(rises), dtype=int)
+        for design in np.flatnonzero(rises > 1).tolist():
+            own = self.of_designs(np.array([design]))
+            within = _REPEATED * float(np.ptp(own.value))
+            for count in range(int(rises[design]), 1, -1):
+                later = self.x + self.span / count
+                later = np.where(later > self.x[-1], later - self.span, later)
+                if rises[design] % count == 0 and (np.abs(own.at(later)[0] - own.value) <= within).all():
+                    found[design] = count
+                    break
+        return found.reshape(shape)
+
+    def of_designs(self, numbers: IntArray) -> History:
+        """Return the history of some designs, counted over all leading axes; each may be there more than once."""
+        value, rate, acceleration = (row[numbers] for row in self._flat)
+        return replace(self, value=value, rate=rate, acceleration=acceleration)
 
     def stay(self, band: float) -> tuple[FloatArray, FloatArray]:
         """Return where the quantity enters and leaves the band below its maximum, around the place of the maximum.
@@ -312,12 +348,12 @@ class History:
 def _crossings_and_back(
     x: FloatArray, rows: list[FloatArray], is_known: NDArray[np.bool_]
 ) -> tuple[IntArray, FloatArray]:
-    """Return where rows (m, n) that are below 0 at two neighbouring samples are above 0 between them, as `crossings`."""
+    """Return where rows (m, n) below 0 at two neighbouring samples are above 0 between them, as `crossings` does."""
     h, (f, _, _) = np.diff(x), rows
     is_below = is_known & (f < 0.0)
     design, place = np.nonzero(is_below[:, 1:] & is_below[:, :-1] & (highest_controls(h, rows) > 0.0))
     least = _ROUNDING * np.ptp(f, axis=1)[design]
-    c = coefficients(*([row[design, place + side] for row in rows] for side in (0, 1)), h[place])
+    c = of_intervals(rows, h, design, place)
     found: tuple[list[IntArray], list[FloatArray]] = [np.empty(0, int)], [np.empty(0)]
     for which, s in peaks(c):
         is_above = polynomial(c[:, which], s) > least[which]

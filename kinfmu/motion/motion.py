@@ -25,7 +25,7 @@ from kinfmu.motion.driven_samples import driven_samples
 from kinfmu.motion.driver_values import driven_at, window, within_period
 from kinfmu.motion.fitting import Circle, Line, deviation
 from kinfmu.motion.going_round import goes_round
-from kinfmu.motion.history import FEWEST, History
+from kinfmu.motion.history import FEWEST, Extreme, History
 from kinfmu.motion.margins import lowest
 from kinfmu.motion.needed import Cosine, PathCoordinate, QuantityRead, cosine_between, is_angle, value_of
 from kinfmu.motion.quantity_names import QuantityNames
@@ -38,6 +38,8 @@ from kinfmu.units import CoordinateName, Quantity
 
 SHAPES: dict[str, type[Line] | type[Circle]] = {"line": Line, "circle": Circle}
 Vector = tuple[Taylor, Taylor]
+_SLOW = 1e-6  # of the largest speed; of two quantities that turn together both are
+_RESTING = 1e-12  # of the largest speed, at a sample
 _STILL = 1e-9  # [rad, sizes]; of rates: of their largest value; a quantity that changes by less does not move
 _TURNED = 1.0  # [rad]; the ends of a motion that goes round differ by nothing or by whole turns
 
@@ -127,14 +129,12 @@ class Motion:
         if not is_crowded(self.x):
             return self
         kept = spread(self.x, self.tables[1], self.tables[2])
-        force, drive = self.force, self.drive
+        force = self.force
         return replace(
             self,
             x=self.x[kept],
             tables=tuple(table[kept] for table in self.tables),  # type: ignore[arg-type]  # three of them
-            drive=drive and replace(
-                drive, x=drive.x[kept], **{name: getattr(drive, name)[kept] for name in ("value", "rate", "acceleration")}
-            ),
+            drive=self.drive and self.drive.samples(kept),
             margin=None if self.margin is None else self.margin[kept],
             force=None if force is None else lambda name: force(name)[kept],
             _histories={},
@@ -304,10 +304,44 @@ class Motion:
 
     def speed_ratio(self, of: str | PoseQuantity, to: str | None) -> History:
         """Return the speed of a quantity over that of another; to: a coordinate, None: the driver."""
+        over, under = self._speeds(of, to)
+        with np.errstate(all="ignore"):  # samples at which the other is at rest have no ratio
+            return self._cut(self._as_history(over.taylor / under.taylor))
+
+    def largest_ratio(self, of: str | PoseQuantity, to: str | None) -> Extreme:
+        """Return the largest size of a ratio of speeds: infinite where it has no bound."""
+        found, pole = self.speed_ratio(of, to).largest_size(), self._pole(of, to)
+        return Extreme(np.where(np.isnan(pole), found.value, np.inf), np.where(np.isnan(pole), found.x, pole))
+
+    def unbounded_ratio(self, of: str | PoseQuantity, to: str) -> tuple[NDArray[np.bool_], str]:
+        """Return (...) True for the designs in which a ratio of speeds has no bound, and that as text."""
+        return ~np.isnan(self._pole(of, to)), f"{_name(to)} turns back, where the ratio has no bound"
+
+    def _pole(self, of: str | PoseQuantity, to: str | None) -> FloatArray:
+        """Return (...) the first place where a ratio of speeds has no bound, NaN for designs without one.
+
+        There the other quantity turns back while the first one moves.
+        """
+        over, under = map(self._cut, self._speeds(of, to))
+        over, under = (
+            History.of(one, one.taylor + 0.0 * other.taylor) for one, other in ((over, under), (under, over))
+        )  # both with an axis of designs if one has it
+        design, x = under.crossings(np.zeros(under.value.shape[:-1]))
+        speeds = np.abs(under.value.reshape(-1, len(under.x)))
+        resting = np.nonzero(speeds <= _RESTING * speeds.max(axis=1, keepdims=True))
+        design, x = np.append(design, resting[0]), np.append(x, under.x[resting[1]])
+        own = over.of_designs(design)
+        moves = np.abs(own.at(x[:, None])[0][:, 0]) > _SLOW * np.abs(own.value).max(axis=1)
+        first = np.full(len(speeds), np.inf)
+        np.minimum.at(first, design[moves], x[moves])
+        return np.where(np.isfinite(first), first, np.nan).reshape(over.value.shape[:-1])
+
+    def _speeds(self, of: str | PoseQuantity, to: str | None) -> tuple[History, History]:
+        """Return the speeds of a quantity and of another, as in `speed_ratio`, without regard to the window."""
         if to is None and self.drive is None:
             raise RequestError("a ratio of speeds needs the key 'to' where several drivers move")
         below = self.drive if to is None and self.drive is not None else self._whole(to or "")
-        return self._cut(self._as_history(self._whole(of).derivative().taylor / below.derivative().taylor))
+        return self._whole(of).derivative(), below.derivative()
 
     def vector(self, between: tuple[str, str]) -> Vector:
         """Return the vector from one point to another, in the world."""

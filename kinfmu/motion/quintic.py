@@ -86,7 +86,7 @@ def _largest(x: FloatArray, rows: Sequence[FloatArray]) -> tuple[FloatArray, Flo
     k = np.argmax(f, axis=1)  # of unknown samples the first
     value, at = np.take_along_axis(f, k[:, None], 1)[:, 0].copy(), x[k]
     design, place = np.nonzero((highest_controls(h, rows) > value[:, None]) & is_known[:, None])
-    c = coefficients(*([row[design, place + side] for row in rows] for side in (0, 1)), h[place])
+    c = of_intervals(rows, h, design, place)
     for which, s in peaks(c):
         where = x[place[which]] + s * h[place[which]]
         _keep_largest(value, at, design[which], polynomial(c[:, which], s), where)
@@ -165,6 +165,12 @@ def coefficients(low: list[FloatArray], high: list[FloatArray], h: FloatArray) -
             f, v, 0.5 * a, 10.0 * df - 4.0 * dv + 0.5 * da, -15.0 * df + 7.0 * dv - da, 6.0 * df - 3.0 * dv + 0.5 * da
         )
     )
+
+
+def of_intervals(rows: Sequence[FloatArray], h: FloatArray, design: IntArray, place: IntArray) -> FloatArray:
+    """Return the coefficients (6, ...) of intervals of the lengths h, by designs and numbers of the sample before."""
+    low, high = ([row[design, place + side] for row in rows] for side in (0, 1))
+    return coefficients(low, high, h[place])
 
 
 def polynomial(c: FloatArray, s: FloatArray) -> FloatArray:

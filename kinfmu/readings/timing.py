@@ -16,7 +16,8 @@ from kinfmu.units import Quantity
 class TimeRatio(Reading):
     """Time of the slower stroke over that of the faster one (quick return), of a motion that goes round.
 
-    The strokes lie between the smallest and the largest value of the quantity, one after the other.
+    The strokes lie between the smallest and the largest value of the quantity, one after the other. Of a quantity that
+    repeats on the way, as over several turns of a crank, they are those of one repeat.
     """
 
     type: ClassVar[str] = "time_ratio"
@@ -30,10 +31,10 @@ class TimeRatio(Reading):
             motion.require_closed(self.type)
         history = motion.history(self.of)
         low, high = (extreme.x for extreme in history.extremes())
-        stroke = abs(high - low)
-        other = history.span - stroke
-        longer = 0.5 * (history.span + abs(stroke - other))
-        return Finding(motion.ratio(longer, history.span - longer), Quantity("number"), (low, high), lacks)
+        period = history.span / history.repeats()
+        stroke = abs(high - low) % period
+        longer = 0.5 * (period + abs(period - 2.0 * stroke))
+        return Finding(motion.ratio(longer, period - longer), Quantity("number"), (low, high), lacks)
 
 
 @dataclass(frozen=True)

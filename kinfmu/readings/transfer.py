@@ -86,7 +86,10 @@ class PressureAngle(Reading):
 
 @dataclass(frozen=True)
 class VelocityRatio(Reading):
-    """Extreme of the speed of a quantity over that of another: omega_out / omega_in."""
+    """Extreme of the speed of a quantity over that of another: omega_out / omega_in.
+
+    Where the other one turns back while the quantity moves, the ratio has no bound, so that there is no extreme.
+    """
 
     type: ClassVar[str] = "velocity_ratio"
 
@@ -100,13 +103,16 @@ class VelocityRatio(Reading):
     def read(self, motion: Motion) -> Finding:
         history = motion.speed_ratio(self.of, self.to)
         found = history.maximum() if self.extreme == "maximum" else history.minimum()
-        lacks = () if self.to is None else (motion.at_rest(self.to),)
+        lacks = () if self.to is None else (motion.at_rest(self.to), motion.unbounded_ratio(self.of, self.to))
         return Finding(found.value, motion.ratio_quantity(self.of, self.to), (found.x,), lacks)
 
 
 @dataclass(frozen=True)
 class MechanicalAdvantage(Reading):
-    """Lowest mechanical advantage: force or torque out over in, the inverse of the largest velocity ratio."""
+    """Lowest mechanical advantage: force or torque out over in, the inverse of the largest velocity ratio.
+
+    It is 0 where the other quantity turns back while the first one moves.
+    """
 
     type: ClassVar[str] = "mechanical_advantage"
 
@@ -117,7 +123,7 @@ class MechanicalAdvantage(Reading):
     end: End = None
 
     def read(self, motion: Motion) -> Finding:
-        fastest = motion.speed_ratio(self.of, self.to).largest_size()
+        fastest = motion.largest_ratio(self.of, self.to)
         lacks = [motion.at_rest(one) for one in (self.of, self.to) if one is not None]
         value = motion.ratio(1.0, fastest.value)
         return Finding(value, motion.ratio_quantity(self.of, self.to, inverse=True), (fastest.x,), tuple(lacks))

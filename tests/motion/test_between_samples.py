@@ -13,7 +13,17 @@ import kinfmu
 from kinfmu.measures import DistanceBetween
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.motion.history import History
-from kinfmu.readings import Dwell, Maximum, Minimum, PeakSpeed, Reading, Roundness, Straightness
+from kinfmu.readings import (
+    Dwell,
+    Maximum,
+    MechanicalAdvantage,
+    Minimum,
+    PeakSpeed,
+    Reading,
+    Roundness,
+    Straightness,
+    VelocityRatio,
+)
 
 FMUS = Path(__file__).parents[2] / "fmus"
 TO_Z = DistanceBetween(("ground.Z", "piston.S"))
@@ -112,3 +122,53 @@ def test_designs_whose_distance_passes_zero(engine: str) -> None:
     found = kinfmu.measure_designs(model, {"z": levels}, readings, crank_angle=angles)
     assert found["low"] == pytest.approx([0.0, 0.0, 250.0 - R - ROD], abs=1e-6)
     assert found["high"] == pytest.approx([max(R + ROD - z, z - (ROD - R)) for z in levels], rel=1e-9)
+
+
+@pytest.mark.parametrize("start", [0.0, 0.00872, 0.004])
+@pytest.mark.parametrize("count", [361, 37])
+def test_ratios_of_speeds_across_a_dead_centre(start: float, count: int) -> None:
+    angles = start + np.linspace(0.0, 2.0 * math.pi, count)
+    readings: list[Reading] = [
+        VelocityRatio("high", "rod.phi", "piston.x"),
+        VelocityRatio("low", "rod.phi", "piston.x", extreme="minimum"),
+        MechanicalAdvantage("advantage", "rod.phi", "piston.x"),
+        VelocityRatio("inside", "rod.phi", "piston.x", begin=0.5, end=2.5),
+        VelocityRatio("of_driver", "piston.x"),
+    ]
+    found = measured(angles, *readings)
+    for name in ("high", "low"):
+        assert math.isnan(found[name].value)
+        assert found[name].reason == "piston.x turns back, where the ratio has no bound"
+    assert found["advantage"].value == 0.0
+    assert math.sin(found["advantage"].at[0]) == pytest.approx(0.0, abs=1e-6)
+    assert math.isfinite(found["inside"].value)
+    assert found["of_driver"].value == pytest.approx(47.163189, rel=1e-4)
+
+
+def test_designs_whose_ratios_have_no_bound() -> None:
+    angles = 0.004 + np.linspace(0.0, 2.0 * math.pi, 361)
+    text = (FMUS / "slider_crank" / "mechanism.toml").read_text("utf-8").replace("S = [144, 0]", 'S = ["rod", 0]')
+    readings = [VelocityRatio("ratio", "rod.phi", "piston.x"), MechanicalAdvantage("advantage", "rod.phi", "piston.x")]
+    model = kinfmu.compile(parse("parameters.rod = 144\n" + text))
+    found = kinfmu.measure_designs(model, {"rod": [144.0, 130.0]}, readings, crank_angle=angles)
+    assert np.isnan(found["ratio"]).all()
+    assert found["advantage"].tolist() == [0.0, 0.0]
+    assert found.reasons == dict.fromkeys((0, 1), "piston.x turns back, where the ratio has no bound")
+
+
+def test_two_quantities_that_turn_together_have_a_ratio() -> None:
+    text = (FMUS / "slider_crank" / "mechanism.toml").read_text("utf-8")
+    text += """
+[bodies.wheel]
+points = { W = [0, 0] }
+[joints.W]
+type = "revolute"
+between = ["ground.O", "wheel.W"]
+[joints.gear]
+type = "gear"
+between = ["rod", "wheel"]
+ratio = 0.5
+"""
+    run = kinfmu.solve(parse(text), crank_angle=0.004 + np.linspace(0.0, 2.0 * math.pi, 361))
+    found = kinfmu.measure(run, [VelocityRatio("ratio", "wheel.phi", "rod.phi")])["ratio"]
+    assert abs(found.value) in (pytest.approx(2.0, rel=1e-6), pytest.approx(0.5, rel=1e-6))
