@@ -14,7 +14,7 @@ from kinfmu.equations.closing import motion_samples, null_space
 from kinfmu.equations.part import Part
 from kinfmu.equations.redundancy import Redundancy
 from kinfmu.equations.system import FloatArray, System
-from kinfmu.errors import KinfmuError, MobilityError, listed
+from kinfmu.errors import AssemblyError, KinfmuError, MobilityError, listed
 from kinfmu.joints import Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
@@ -206,13 +206,18 @@ def _toml(value: Any) -> str:
     return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
-def clearer_problem(problem: KinfmuError, redundancy: Redundancy, advice: DriverAdvice | None) -> KinfmuError:
+def clearer_problem(
+    problem: KinfmuError, system: System, redundancy: Redundancy, advice: DriverAdvice | None
+) -> KinfmuError:
     """Return the problem, or one that names drivers of one degree of freedom while another is free."""
+    if isinstance(problem, AssemblyError) and redundancy.mobility < 0 and len(system.coordinates) <= _LARGE:
+        stiff = stiff_joints(system.mechanism, redundancy)
+        return AssemblyError(f"{problem} {_is_pin(stiff)}", **problem.data) if stiff else problem
     if advice is None or redundancy.inconsistent:
         return problem
     is_of_mobility = isinstance(problem, MobilityError)
     if advice.stiff and is_of_mobility:
-        return MobilityError(f"{problem}; is {listed(advice.stiff)} a revolute joint?", **problem.data)
+        return MobilityError(f"{problem}; {_is_pin(advice.stiff)}", **problem.data)
     if advice.idle and not advice.surplus and is_of_mobility:
         return MobilityError(f"{problem}; or leave out {advice.idle}, which no other body follows", **problem.data)
     if not advice.surplus or not advice.loose:
@@ -227,3 +232,7 @@ def clearer_problem(problem: KinfmuError, redundancy: Redundancy, advice: Driver
         f"{listed(conflicts)}, while {listed(advice.loose_bodies)} can still move{instead}",
         mobility=redundancy.mobility,
     )
+
+
+def _is_pin(stiff: Sequence[str]) -> str:
+    return f"is {listed(stiff)} a revolute joint?"

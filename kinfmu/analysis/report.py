@@ -87,7 +87,7 @@ def check(mechanism: Mechanism, *, written: Mechanism | None = None) -> Report:
     except KinfmuError as problem:
         advice = driver_advice(system, redundancy)
         loops = find_named_loops(mechanism, redundancy, ())
-        problem = _after_probable_cause(clearer_problem(problem, redundancy, advice), system, advice)
+        problem = _after_probable_cause(clearer_problem(problem, system, redundancy, advice), system, advice)
         return Report(mechanism, redundancy, problem, None, (), loops, advice, tuple(notes))
     notes += start_notes(system, redundancy.assembly.start)
     paths = []

@@ -75,7 +75,8 @@ def _count(report: Findings) -> Iterator[ReportLine]:
     driven = [f"driven by {_names(driver.name for driver in mechanism.drivers)}"] if mechanism.drivers else []
     invalid = [name for name in report.left_out if name.startswith("[drivers")]
     without = [f"without {listed(invalid)}"] if invalid else []
-    yield ReportLine("mobility", f"{report.mobility}, {listed([*driven, *without] or ['no driver'])}")
+    mobility = f"{report.mobility}" if report.mobility >= 0 else "none: the joints do not close"
+    yield ReportLine("mobility", f"{mobility}, {listed([*driven, *without] or ['no driver'])}")
     if report.gruebler != report.mobility:
         yield ReportLine("", f"Gruebler's count gives {report.gruebler}, because it counts redundant rows")
 

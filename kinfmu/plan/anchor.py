@@ -34,7 +34,7 @@ def find_anchor(system: System, assembly: AssembledStart, kept: Sequence[int]) -
     """
     start, found = assembly
     if found is None:
-        raise _does_not_close(system, start, kept)
+        raise does_not_close(system, start, kept)
     if found.margin <= SINGULAR:
         names = listed(driver.name for driver in system.mechanism.drivers)
         if not closes_nearby(system, found):
@@ -53,7 +53,7 @@ def find_anchor(system: System, assembly: AssembledStart, kept: Sequence[int]) -
     return found
 
 
-def _does_not_close(system: System, start: StartValues, kept: Sequence[int]) -> AssemblyError:
+def does_not_close(system: System, start: StartValues, kept: Sequence[int]) -> AssemblyError:
     """Return the error of the loop that does not close, with its gap and the pose that has it."""
     loop = find_open_loop(system, start, kept)
     cure = (
@@ -62,6 +62,8 @@ def _does_not_close(system: System, start: StartValues, kept: Sequence[int]) -> 
     opened = open_joints_text(system, start_from_poses(system).q)
     if opened:  # an earlier loop may have closed far from its start poses
         cure += f"; in the start poses of the file {opened}"
+    if len(kept) > len(system.coordinates):
+        cure += f"; {len(kept)} rows of the joints hold {len(system.coordinates)} coordinates: is a joint too many?"
     return AssemblyError(
         f"the mechanism does not close near its start pose ({_at(system, start.u)}): {loop}; {cure}",
         joint=loop.joint,

@@ -19,6 +19,7 @@ from kinfmu.joints.joint import Condition
 from kinfmu.measures import DistanceBetween
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.members import NumberPath, path_text
+from kinfmu.plan.anchor import does_not_close
 from kinfmu.plan.trace import Tracer
 from kinfmu.units import Quantity
 
@@ -80,7 +81,10 @@ def refuse_inconsistent(system: System, redundancy: Redundancy) -> None:
 
 
 def refuse_mobility(system: System, redundancy: Redundancy) -> None:
-    """Raise a MobilityError if there are not as many drivers as degrees of freedom."""
+    """Raise a MobilityError if there are not as many drivers as degrees of freedom.
+
+    Joints with more independent rows than there are coordinates close in no pose: then an AssemblyError.
+    """
     names = [driver.name for driver in system.mechanism.drivers]
     mobility = redundancy.mobility
     if len(names) == mobility > 0:
@@ -93,10 +97,12 @@ def refuse_mobility(system: System, redundancy: Redundancy) -> None:
             f"add {missing} {'driver' if missing == 1 else 'drivers'}, or joints",
             mobility=mobility,
         )
-    if mobility == 0:
+    if mobility < 0 and redundancy.assembly.pose is None:
+        raise does_not_close(system, redundancy.assembly.start, redundancy.kept)
+    if mobility <= 0:
         raise MobilityError(
-            "[drivers] mobility is 0: the joints leave no motion, so there is nothing to drive",
-            mobility=0,
+            f"[drivers] mobility is {mobility}: the joints leave no motion, so there is nothing to drive",
+            mobility=mobility,
         )
     raise MobilityError(
         f"[drivers] mobility is {mobility} but there {_are(names)}: remove {len(names) - mobility}",

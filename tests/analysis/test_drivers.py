@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
 
 import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Fixed, Mechanism, Revolute, Translational
-from kinfmu.errors import MobilityError
+from kinfmu.errors import AssemblyError, MobilityError
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text
 from tests.mechanisms import five_bar, fourbar
@@ -138,3 +139,18 @@ def test_drivers_that_match_need_no_advice() -> None:
     report = kinfmu.check(five_bar())
     assert report.advice is None
     assert report.as_json()["advice"] is None
+
+
+@pytest.mark.parametrize(("lengths", "end"), [((8, 1, 3.5, 3), ""), ((6, 2, 5, 2), " is weld a revolute joint?")])
+def test_too_many_joints_that_do_not_close_are_no_advice_to_remove_drivers(
+    lengths: tuple[float, ...], end: str
+) -> None:
+    linkage = fourbar(*lengths)
+    weld = Fixed("weld", ("crank.P", "coupler.P"), math.pi)
+    report = kinfmu.check(replace(linkage, joints=(*linkage.joints, weld)))
+    assert report.mobility == -2
+    assert isinstance(report.problem, AssemblyError)
+    assert str(report.problem).startswith("the mechanism does not close near its start pose (")
+    assert str(report.problem).endswith(f"; 11 rows of the joints hold 9 coordinates: is a joint too many?{end}")
+    assert "remove" not in str(report)
+    assert "  mobility    none: the joints do not close, driven by crank" in str(report)
