@@ -23,6 +23,7 @@ from kinfmu.readings import Reading
 from kinfmu.readings.extremes import Maximum, Minimum, Peak, PeakAcceleration, PeakSpeed, Range
 from kinfmu.units import METRES, CoordinateName, factors
 
+NO_DRIVER = "[drivers] there is no driver: "  # before a measure that needs one
 _EFFORTS = ("torque", "force", "power")  # nouns of forces of drivers; joints have forces, too
 _OF_MECHANISM = ("shaking_force", "shaking_moment", "kinetic_energy", "potential_energy")
 OF_FORCES = (Minimum, Maximum, Range, Peak)  # measures that read forces
@@ -147,6 +148,12 @@ def _check_reading(members: Members, known: Mapping[str, Any], reading: Reading)
             continue
         if value not in known and not is_point:
             cause = _why_no_force(members, value)
+            if cause.startswith("there is no driver") and not members.drivers:
+                body = value.rpartition(".")[0]
+                raise MechanismError(
+                    f"{NO_DRIVER}{where}{key.name}: {quoted(value)} is the effort of one; add [drivers.{body}] with "
+                    "the keys type, of and law"
+                )
             if cause:
                 raise MechanismError(f"{where}{key.name}: {quoted(value)} is not there: {cause}")
             near = suggestion(value, [*known, *forces])

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism.body import MASS_KEYS
+from kinfmu.mechanism.checks import NO_DRIVER
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.mechanism.repeats import expanded
 from kinfmu.mechanism.toml_file import document_of, mechanism_of, text_in
@@ -20,7 +21,7 @@ _STEPS = (  # what is left out, until the rest is valid
     ("measures", "loads", "gravity", _MASSES, "drivers", "run", "points", "outputs"),
 )
 _FORCES = ("loads", "gravity", _MASSES)  # all or none of them: some alone give wrong forces
-_ENTRY = re.compile(r"\[(?:(measures|drivers)\.|(points)\] )([\w-]+)")
+_ENTRY = re.compile(rf"(?:{re.escape(NO_DRIVER)})?" r"\[(?:(measures|drivers)\.|(points)\] )([\w-]+)")
 _TABLE = re.compile(rf"\[(?:bodies\.[\w-]+\] (?:{'|'.join(MASS_KEYS)})\b|(loads|gravity|run|outputs)\b)")
 _MOST_ENTRIES = 20  # left out one by one
 

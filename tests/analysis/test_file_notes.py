@@ -238,11 +238,15 @@ def test_a_measure_of_an_effort_does_not_hide_what_the_mechanism_lacks() -> None
     report = check(parse(heavy.replace(pin, "") + EFFORT))
     assert "mobility is 3 but there is 1 driver" in str(report.problem)
     assert f"[joints] {pin.strip()}" in str(report)
+    undriven = heavy.partition("[drivers")[0]
+    other = undriven + '[drivers]\nb = { type = "angle", of = "bar", law = "constant_speed" }\n'
+    measure = r"\[measures\.motor\] of: 'crank.torque' is"
     for text, message in (
-        (heavy.partition("[drivers")[0], "'crank.torque' is not there: there is no driver 'crank'; drivers: none"),
-        (SIX_BAR, "'crank.torque' is not there: without masses and loads there are no forces; give a body a mass, .*"),
+        (undriven, rf"\[drivers\] there is no driver: {measure} the effort of one; add \[drivers\.crank\] with .*"),
+        (other, f"{measure} not there: there is no driver 'crank'; drivers: b"),
+        (SIX_BAR, f"{measure} not there: without masses and loads there are no forces; give a body a mass, .*"),
     ):
-        with pytest.raises(MechanismError, match=rf"\[measures\.motor\] of: {message}$"):
+        with pytest.raises(MechanismError, match=rf"^mechanism: {message}$"):
             parse(text + EFFORT)
 
 

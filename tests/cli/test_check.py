@@ -198,7 +198,8 @@ _PEAK = '[measures.peak]\ntype = "maximum"\nof = "crank.torque"\n'
         (
             _DRIVER,
             _PEAK,
-            "[measures.peak] of: 'crank.torque' is not there: there is no driver 'crank'; drivers: none",
+            "[drivers] there is no driver: [measures.peak] of: 'crank.torque' is the effort of one; add "
+            "[drivers.crank] with the keys type, of and law",
             "[measures.peak]",
             [
                 "mobility    1, no driver",
