@@ -34,7 +34,8 @@ class TimeRatio(Reading):
         period = history.span / history.repeats()
         stroke = abs(high - low) % period
         longer = 0.5 * (period + abs(period - 2.0 * stroke))
-        return Finding(motion.ratio(longer, period - longer), Quantity("number"), (low, high), lacks)
+        at = tuple(history.x[0] + (x - history.x[0]) % period for x in (low, high))
+        return Finding(motion.ratio(longer, period - longer), Quantity("number"), at, lacks)
 
 
 @dataclass(frozen=True)
