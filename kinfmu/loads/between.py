@@ -63,7 +63,8 @@ class Spring(BetweenPoints):
 
         e = -(preload + stiffness (s - free_length))   along   s = |d|,   d = r_j + A_j s_b - r_i - A_i s_a
 
-    It pulls if it is longer than the free length and pushes if it is shorter. Its ends must not meet.
+    It pulls if it is longer than the free length and pushes if it is shorter. Where its ends meet it has no direction,
+    unless `free_length` is written as 0, without `preload`: then its force is -stiffness d, at every d.
     """
 
     type: ClassVar[str] = "spring"
@@ -77,13 +78,36 @@ class Spring(BetweenPoints):
     preload: Annotated[Force, "tension at the free length, as wound into extension springs [N]"] = 0.0
     metre: float = field(default=1.0, repr=False, compare=False, metadata={"internal": True})  # unit of length [m]
 
+    @property
+    def is_proportional(self) -> bool:
+        """True if its force is proportional to d, so that it needs no direction; then s are the components of d."""
+        return all(
+            isinstance(value, float | int) and value == 0.0 and not hasattr(value, "expression")
+            for value in (self.free_length, self.preload)
+        )
+
     def with_unit(self, length_unit: str) -> Spring:
         return replace(self, metre=METRES[length_unit])
 
+    def measured(self, at: Placement) -> tuple[Value, ...]:
+        return at.vector(self.between) if self.is_proportional else super().measured(at)
+
+    def kinds(self) -> tuple[str, ...]:
+        return ("length", "length") if self.is_proportional else super().kinds()
+
+    def check_start(self, at: Placement) -> None:
+        if not self.is_proportional:
+            super().check_start(at)
+
     def efforts(self, at: Placement, s: Sequence[Value], sd: Sequence[Value], x: Value) -> tuple[Value, ...]:  # noqa: ARG002
+        if self.is_proportional:
+            return tuple(-(self.stiffness * one) for one in s)
         return (-(self.preload + self.stiffness * self._extension(s)),)
 
     def energy(self, s: Sequence[Value]) -> Value:
+        if self.is_proportional:
+            d_x, d_y = s
+            return 0.5 * self.stiffness * (d_x * d_x + d_y * d_y)
         extension = self._extension(s)
         return (self.preload + 0.5 * self.stiffness * extension) * extension
 

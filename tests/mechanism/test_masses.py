@@ -422,6 +422,16 @@ def test_a_spring_whose_points_meet_at_the_start_has_no_direction() -> None:
     )
 
 
+def test_the_points_of_a_spring_without_free_length_may_meet_at_the_start() -> None:
+    met, apart = ('T = ["l", "l"]', 'T = ["l", 0]'), ("\ndamping", '\nbetween = ["ground.O", "arm.P"]\ndamping')
+    dashpot = ('type = "damper"\nbetween = ["ground.T", "arm.P"]', 'type = "damper"')
+    mechanism = arm("m", met, dashpot, apart, ('free_length = "l/4"', "free_length = 0"), ('preload = "F"', ""))
+    run = kinfmu.solve(mechanism, [0.0, 0.1])
+    assert run["potential_energy"][0] == pytest.approx(0.0, abs=1e-15)
+    weight, push, motor = 2.0 * 9.81 * 0.2 / 3.0, 12.0 * 0.2, 1.0 - 2.0
+    assert run["arm.torque"][0] == pytest.approx(weight - push - motor, rel=1e-12)  # the spring has no force
+
+
 def test_a_condition_on_a_mass_is_tested_again_when_an_fmu_sets_its_parameter() -> None:
     conditions = {condition.label: condition.required for condition in compile_plan(arm("mm")).conditions}
     assert conditions == {

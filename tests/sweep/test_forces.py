@@ -287,3 +287,36 @@ def test_native_forces_of_repeated_numbers_equal_those_of_arrays(count: int) -> 
     assert single.forces.tobytes() == arrays.forces.tobytes()
     assert np.allclose(single.forces, again.forces, rtol=1e-12, atol=1e-12)
     assert np.allclose(single.reactions, again.reactions, rtol=1e-9, atol=1e-9, equal_nan=True)
+
+
+MET = """
+name = "met"
+units.length = "mm"
+gravity = { x = 0, y = "-9.81 m/s2" }
+bodies.ground.points = { O = [0, 0], Z = [80, 0] }
+bodies.crank.points = { O = [0, 0], P = [40, 0] }
+bodies.rod = { mass = "1 kg", rod = ["P", "S"], points = { P = [0, 0], S = [120, 0] }, start = { x = 40 } }
+bodies.slide = { mass = "2 kg", points = { S = [0, 0] }, start = { x = 160 } }
+joints.O = { type = "revolute", between = ["ground.O", "crank.O"] }
+joints.P = { type = "revolute", between = ["crank.P", "rod.P"] }
+joints.S = { type = "revolute", between = ["rod.S", "slide.S"] }
+joints.guide = { type = "translational", between = ["ground.O", "slide.S"] }
+drivers.crank = { type = "angle", of = "crank", law = "constant_speed", speed = "60 rpm" }
+loads.return = { type = "spring", between = ["ground.Z", "slide.S"], stiffness = "1 N/mm", free_length = 0 }
+"""  # after half a second the slide is on Z
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("count", [3, 41])
+def test_a_spring_without_free_length_acts_where_its_ends_meet(engine: str, count: int) -> None:
+    """At the inner dead centre the slide does not move: the torque carries half of the rod's weight at P."""
+    model = kinfmu.compile(toml_file.parse(MET), engine=engine)
+    t = np.linspace(0.4, 0.6, count)
+    run = model.solve(t)
+    assert (run["slide.x"][count // 2] - 80.0) == pytest.approx(0.0, abs=1e-12)
+    assert run["crank.torque"][count // 2] == pytest.approx(-0.5 * 9.81 * 0.04, rel=1e-9)
+    assert run["potential_energy"][count // 2] == pytest.approx(0.0, abs=1e-15)
+    assert np.isfinite(run.forces).all()
+    assert np.isfinite(run.reactions).all()
+    near = model.solve(t=[0.5 - 1e-6, 0.5 + 1e-6])  # 6e-6 rad away
+    assert near["crank.torque"].mean() == pytest.approx(run["crank.torque"][count // 2], abs=1e-10)
