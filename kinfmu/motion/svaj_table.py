@@ -19,8 +19,9 @@ def units_of(run: Run, curve: MotionCurve) -> list[str]:
 def svaj_columns(run: Run, name: str, *, degrees: bool = False) -> list[Column]:
     """Return time, values of the drivers, position, velocity, acceleration, jerk and side of a quantity.
 
-    There is a row for each sample, of side 0. At each break of a law two more rows hold the limits before it, of side
-    -1, and after it, of side 1. Without time on the axis of the run there is no column of it. Numbers that are not
+    There is a row for each sample, of side 0. At each break of a law two more rows hold the limits before it in the
+    order of the run, of side -1, and after it, of side 1. A sample exactly at a break has the value of the piece on the
+    right of the law, which is before the break where the law's argument falls. Without time on the axis of the run there is no column of it. Numbers that are not
     known are NaN.
 
     Args:

@@ -11,7 +11,9 @@ import pytest
 import kinfmu
 from kinfmu.draw.svaj import _sheet, driver_axis
 from kinfmu.motion.motion_curve import motion_curve
+from kinfmu.motion.svaj_table import svaj_columns
 from kinfmu.run import FloatArray, Run
+from tests.cams import followers
 
 
 def cam_run(step: float) -> Run:
@@ -56,3 +58,18 @@ def test_the_jerk_of_a_cam_from_a_table_has_no_slopes_at_the_ends_of_its_dwells(
     slanted = (np.diff(x) > 0.0) & (np.abs(np.diff(y)) > 0.05 * np.ptp(y))
     assert not slanted.any()
     assert np.ptp(y) > 10.0
+
+
+@pytest.mark.parametrize(("speed", "of_sample"), [(1.0, 1), (-1.0, -1)])
+def test_sides_are_in_the_order_of_the_run_whichever_way_the_cam_turns(speed: float, of_sample: int) -> None:
+    """A dwell ends where a rise begins; a sample at the break has the jerk of the law's right piece, the rise."""
+    angles = speed * np.array([-0.2, -0.1, 0.0, 0.1, 0.2])
+    run = kinfmu.solve(followers.lifted_roller(8.0), cam_angle=angles, cam_speed=speed)
+    found = {column.name: column.values for column in svaj_columns(run, "lift")}
+    at_break = found["cam_angle"] == 0.0
+    assert found["side"][at_break].tolist() == [-1, 0, 1]
+    before, sample, after = found["jerk"][at_break]
+    rise = speed**3 * 15.0 * 4.0 * math.pi**2 / math.radians(120.0) ** 3  # of a cycloid of height 15 over 120 deg
+    assert {-1: before, 1: after}[of_sample] == pytest.approx(rise, rel=1e-9)
+    assert {-1: before, 1: after}[-of_sample] == pytest.approx(0.0, abs=1e-9)
+    assert sample == pytest.approx(rise, rel=1e-9)
