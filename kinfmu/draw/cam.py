@@ -29,7 +29,7 @@ _DXF = ".dxf"
 _FIGURE, _PLOT = 300.0, (270.0, 124.0)  # [pt]
 _LEFT, _BOTTOM, _TOP, _GAP, _EDGE = 46.0, 36.0, 44.0, 62.0, 10.0  # [pt]
 _LIMITS = {False: 30.0, True: 45.0}  # [deg] of the pressure angle, for sliding and swinging followers
-_ARROW = 0.5  # radius of the arrow about the axle, of the base circle
+_ARROW, _ROTATION = 0.5, 0.7  # radii of the arrows about the axle, of the base circle
 _FLAT = 20.0  # of the largest distance from the axle; larger radii of curvature are not plotted
 
 
@@ -37,9 +37,10 @@ def cam(profile: CamProfile, path: str | Path) -> None:
     """Draw the profile of a cam into a figure (.svg, .png, .pdf) or a CAD drawing (.dxf).
 
     A figure shows profile, pitch curve, base circle and the roller or face at the first angle, with an arrow in the
-    sense in which the angle of the cam grows, and next to them
-    pressure angle and radius of curvature over the cam's angle. A drawing has the closed polygons through the points of
-    profile and pitch curve, the base circle and the axle as a point, on the layers PROFILE, PITCH, BASE and AXLE.
+    sense in which the angle of the cam grows. Of a geared cam a second arrow shows how it turns while the value of its
+    driver grows. Next to them are pressure angle and radius of curvature over the cam's angle. A drawing has the closed
+    polygons through the points of profile and pitch curve, the base circle and the axle as a point, on the layers
+    PROFILE, PITCH, BASE and AXLE.
 
     Args:
         profile: The profile, from `kinfmu.cam_profile`; for a drawing with its argument `tolerance`.
@@ -141,24 +142,35 @@ def _outline(axes: Axes, profile: CamProfile) -> None:
     dress(axes, "")
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.06)
-    _legend(axes)
+    _legend(axes, "left")
     unit = profile.length_unit
     axes.set_xlabel(f"x of {profile.cam} [{unit}]", fontsize=SMALL, color=ink(GREY), labelpad=1.0, parse_math=False)
     axes.set_ylabel(f"y of {profile.cam} [{unit}]", fontsize=SMALL, color=ink(GREY), labelpad=1.0, parse_math=False)
 
 
-def _legend(axes: Axes) -> None:
-    """Write the names of the lines above the axes."""
-    look: dict[str, Any] = {"ncols": 4, "frameon": False, "fontsize": SMALL, "labelcolor": ink(GREY)}
+def _legend(axes: Axes, side: str) -> None:
+    """Write the names of the lines above the axes, from their left or right end on."""
+    look: dict[str, Any] = {"ncols": 5, "frameon": False, "fontsize": SMALL, "labelcolor": ink(GREY)}
     look |= {"borderaxespad": 0.2, "borderpad": 0.2, "handlelength": 1.8, "columnspacing": 1.2}
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), **look)
+    is_left = side == "left"
+    axes.legend(loc="lower left" if is_left else "lower right", bbox_to_anchor=(0.0 if is_left else 1.0, 1.0), **look)
 
 
 def _turning(axes: Axes, profile: CamProfile) -> None:
-    """Draw an arrow about the axle in the sense in which the cam's angle grows."""
-    route = arc(profile.axle, _ARROW * _base_radius(profile), np.radians(20.0), np.radians(110.0))
-    axes.plot(*route.T, color=ink(COLOUR), lw=1.2, label="angle of the cam")
-    head: dict[str, Any] = {"arrowstyle": "-|>", "color": ink(COLOUR), "lw": 1.2, "shrinkA": 0.0, "shrinkB": 0.0}
+    """Draw arrows about the axle: the sense in which the cam's angle grows, and that in which its driver turns it."""
+    _arrow(axes, profile, _ARROW, COLOUR, "angle of the cam")
+    if profile.driver is not None and len(profile.driver) > 1:
+        falls = np.median(np.sign(np.diff(profile.driver) * np.diff(profile.angle))) < 0.0  # it jumps after its period
+        label = f"rotation with {profile.driver_name}"
+        _arrow(axes, profile, -_ROTATION if falls else _ROTATION, palette.BODIES[2], label)
+
+
+def _arrow(axes: Axes, profile: CamProfile, radius: float, colour: palette.Colour, label: str) -> None:
+    """Draw an arrow about the axle, counter-clockwise; clockwise if the radius, in base circles, is negative."""
+    first, last = np.radians([20.0, 110.0])[:: 1 if radius > 0.0 else -1]
+    route = arc(profile.axle, abs(radius) * _base_radius(profile), first, last)
+    axes.plot(*route.T, color=ink(colour), lw=1.2, label=label)
+    head: dict[str, Any] = {"arrowstyle": "-|>", "color": ink(colour), "lw": 1.2, "shrinkA": 0.0, "shrinkB": 0.0}
     axes.annotate("", route[-1], route[-2], arrowprops=head)
 
 
@@ -168,7 +180,7 @@ def _pressure(axes: Axes, profile: CamProfile, across: FloatArray) -> None:
     for value in (-limit, limit):
         axes.axhline(value, color=ink(palette.RUNS[0]), lw=0.8, ls="--", label="usual limit" if value > 0.0 else "_")
     dress(axes, "")
-    _legend(axes)
+    _legend(axes, "right")
     axes.set_ylabel("pressure angle [deg]", fontsize=SMALL, color=ink(GREY))
 
 

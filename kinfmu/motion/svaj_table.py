@@ -21,8 +21,8 @@ def svaj_columns(run: Run, name: str, *, degrees: bool = False) -> list[Column]:
 
     There is a row for each sample, of side 0. At each break of a law two more rows hold the limits before it in the
     order of the run, of side -1, and after it, of side 1. A sample exactly at a break has the value of the piece on the
-    right of the law, which is before the break where the law's argument falls. Without time on the axis of the run there is no column of it. Numbers that are not
-    known are NaN.
+    right of the law, which is before the break where the law's argument falls. Without time on the axis of the run
+    there is no column of it. Numbers that are not known are NaN.
 
     Args:
         run: The run, as for `motion_of`.

@@ -26,6 +26,8 @@ from kinfmu.scene.cams import CamShape, cam_shapes
 from kinfmu.scene.details import on_face
 from kinfmu.scene.scene import scene
 from kinfmu.scene.shape import Shape, guides_of_cams
+from tests.cams import followers
+from tests.cams.test_profile import geared
 
 QUARTER = 0.5 * math.pi
 RADIUS = 6.0  # of the roller
@@ -156,6 +158,17 @@ def test_the_picture_of_a_cam_names_its_lines_and_shows_the_sense_of_its_angle()
     assert [text.get_text() for text in pressure.get_legend().get_texts()] == ["usual limit"]
     (arrow,) = (line for line in outline.lines if line.get_label() == "angle of the cam")
     assert (np.diff(np.unwrap(np.arctan2(*arrow.get_xydata().T[::-1]))) > 0.0).all()  # counter-clockwise
+
+
+@pytest.mark.parametrize("ratio", [-1.0, 2.0, -0.5])
+def test_the_picture_of_a_geared_cam_shows_the_sense_in_which_its_driver_turns_it(ratio: float) -> None:
+    profile = cam_profile(geared(followers.lifted_roller(8.0), ratio), "lift")
+    arrows = {
+        line.get_label(): np.diff(np.unwrap(np.arctan2(*(line.get_xydata() - profile.axle).T[::-1])))
+        for line in _figure(profile).axes[0].lines
+    }
+    assert (arrows["angle of the cam"] > 0.0).all()  # counter-clockwise
+    assert (arrows["rotation with motor"] * ratio > 0.0).all()
 
 
 @pytest.mark.parametrize("radius", [None, 29.5])
