@@ -68,10 +68,14 @@ def _texts(member: object) -> set[object]:
     return found
 
 
-def unused_points(mechanism: Mechanism) -> str:
-    """Return a line on the points of bodies that nothing of the mechanism names; '' if there are none."""
+def unused_points(mechanism: Mechanism, *, of_joints: bool = False) -> str:
+    """Return a line on the points of bodies that nothing of the mechanism names; '' if there are none.
+
+    of_joints: ends of rods and corners of plates, which only place the mass, do not count as named.
+    """
     used: set[object] = set(mechanism.points.values())
-    used |= {f"{body.name}.{end}" for body in mechanism.bodies for end in body.rod or body.plate or ()}
+    if not of_joints:
+        used |= {f"{body.name}.{end}" for body in mechanism.bodies for end in body.rod or body.plate or ()}
     for member in (*mechanism.joints, *mechanism.drivers, *mechanism.loads, *mechanism.measures):
         used |= _texts(member)
     unused = [name for name in mechanism.body_points if name not in used]
@@ -133,7 +137,7 @@ def _longest(points: Mapping[str, tuple[float, float]], names: Sequence[str]) ->
 
 
 def _still_bodies(mechanism: Mechanism, paths: Sequence[DriverPath]) -> Iterator[str]:
-    """Yield a line for bodies that no driver moves, except those welded to the ground."""
+    """Yield a line for bodies that no driver moves, except those welded to the ground or at rest by a law."""
     size = size_of(mechanism)
     moves: set[str] = set()
     for path in paths:
@@ -146,13 +150,26 @@ def _still_bodies(mechanism: Mechanism, paths: Sequence[DriverPath]) -> Iterator
                 if abs(now[name] - first[name]) > _STILL * (1.0 if name.is_angle else size)
             }
     welded = _welded(mechanism)
-    still = [body.name for body in mechanism.moving_bodies if body.name not in moves and body.name not in welded]
+    resting = _resting(mechanism, moves)
+    still = [body.name for body in mechanism.moving_bodies if body.name not in moves | welded | resting]
     if still:
         one = len(still) == 1
         yield (
             f"{listed(still)} {'does' if one else 'do'} not move with any driver: check the points of "
             f"{'its' if one else 'their'} joints, or weld {'it' if one else 'them'} to the ground (type 'fixed')"
         )
+
+
+def _resting(mechanism: Mechanism, moves: set[str]) -> set[str]:
+    """Return the bodies at rest that a law joins to moving ones, such as a cam's follower, and what these carry."""
+    found, count = set[str](), -1
+    while len(found) > count:
+        count = len(found)
+        for joint in mechanism.joints:
+            bodies = {*joint.bodies()} - {GROUND_NAME}
+            if bodies & (found if getattr(joint, "law", None) is None else found | moves):
+                found |= bodies - moves
+    return found
 
 
 def _welded(mechanism: Mechanism) -> set[str]:

@@ -23,6 +23,7 @@ from kinfmu.units import CoordinateName
 _SAMPLES = 4  # poses of the motion that the joints allow; a row dependent at all of them is dependent
 _IN_SPAN = 1e-7  # part of a gradient outside the span of the others; smaller counts as zero
 _MOVES = 1e-6  # part of a free direction; a coordinate with more counts as moving
+INSTEAD = "; drive, for example, "
 _LARGE = 600  # coordinates; the null space of more takes too long
 
 
@@ -227,7 +228,7 @@ def clearer_problem(
         + (f"{listed(surplus.implied_by)} and the joints determine" if surplus.implied_by else "the joints hold")
         for surplus in advice.surplus
     ]
-    instead = f"; drive, for example, {advice.suggestions[0]}" if advice.suggestions else ""
+    instead = f"{INSTEAD}{advice.suggestions[0]}" if advice.suggestions else ""
     return MobilityError(
         f"{listed(conflicts)}, while {listed(advice.loose_bodies)} can still move{instead}",
         mobility=redundancy.mobility,

@@ -6,7 +6,7 @@ from kinfmu.analysis.assemblies import Assemblies, find_assemblies
 from kinfmu.analysis.cams import cam_findings
 from kinfmu.analysis.design_notes import motion_notes, part_notes, unused_points
 from kinfmu.analysis.driver_path import follow
-from kinfmu.analysis.drivers import DriverAdvice, clearer_problem, driver_advice
+from kinfmu.analysis.drivers import INSTEAD, DriverAdvice, clearer_problem, driver_advice
 from kinfmu.analysis.dyads import find_dyads
 from kinfmu.analysis.file_notes import file_notes, run_notes, start_notes
 from kinfmu.analysis.findings import Findings
@@ -117,7 +117,10 @@ def _after_probable_cause(problem: KinfmuError, system: System, advice: DriverAd
         return problem
     opened = open_joints_text(system, start_from_poses(system).q)
     is_held = advice is not None and any(not surplus.implied_by for surplus in advice.surplus)
-    unused = unused_points(system.mechanism) if opened or is_held else ""
+    unused = unused_points(system.mechanism, of_joints=True) if opened or is_held else ""
     causes = [f"in the start poses of the file {opened}"] if opened else []
     causes += [unused] if unused else []
-    return type(problem)("; ".join([*causes, str(problem)]), **problem.data) if causes else problem
+    if not causes:
+        return problem
+    fault, _, _ = str(problem).partition(INSTEAD)  # another driver would hide the cause
+    return type(problem)("; ".join([*causes, fault]), **problem.data)

@@ -118,7 +118,9 @@ class MotionSequence(Law):
 
     def zeros(self) -> Mapping[str, Value]:
         whole = sum(segment.duration for segment in self.segments)
-        rises = [segment.rise for segment in self.segments if segment.law != DWELL]
+        rises = [
+            segment.rise for segment in self.segments if not (isinstance(segment.rise, float) and segment.rise == 0.0)
+        ]
         found = {"durations in all over a turn, less 1,": whole / TURN - 1.0}
         if rises:
             found["rises in all over their size"] = sum(rises) / sqrt(sum(rise * rise for rise in rises))

@@ -79,6 +79,39 @@ def test_a_body_that_is_welded_to_the_ground_may_stand_still() -> None:
     assert notes(("[joints]", frame)) == ()
 
 
+FOLLOWER = """[bodies.stem]
+points = { P = [0, 0] }
+[bodies.tip]
+points = { P = [0, 0] }
+[joints.guide]
+type = "translational"
+between = ["ground.C", "stem.P"]
+axis = "90 deg"
+[joints.held]
+type = "fixed"
+between = ["stem.P", "tip.P"]
+[joints.lift]
+type = "cam_translating"
+between = ["ground.C", "stem.P"]
+cam = "crank"
+axis = "90 deg"
+law = "sequence"
+repeat = true
+segments = [
+    { law = "dwell", duration = "180 deg" },
+    { law = "cycloidal", duration = "90 deg", rise = 1 },
+    { law = "cycloidal", duration = "90 deg", rise = -1 },
+]
+[drivers.crank]"""
+
+
+@pytest.mark.parametrize("rise", ["1", "0"])
+def test_a_follower_that_its_cam_holds_at_rest_is_no_body_to_be_welded(rise: str) -> None:
+    follower = FOLLOWER.replace("rise = 1", f"rise = {rise}").replace("rise = -1", f"rise = -{rise}")
+    mechanism = changed(("[drivers.crank]", follower))
+    assert not [note for note in kinfmu.check(mechanism).notes if "move" in note]
+
+
 def test_points_that_nothing_uses_are_named() -> None:
     assert notes(("Q = [50, 0] }\nstart = { x = 20", "Q = [50, 0], R = [9, 9] }\nstart = { x = 20")) == (
         "point coupler.R is used by no joint, driver, load, measure or point of interest",

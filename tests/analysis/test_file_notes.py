@@ -228,6 +228,19 @@ def test_an_error_of_mobility_names_first_a_joint_at_a_wrong_point() -> None:
     assert "remove it" not in str(report)
 
 
+def test_an_error_of_mobility_names_the_point_that_no_joint_uses_also_where_it_is_the_end_of_a_rod() -> None:
+    text = SIX_BAR.replace("R = [5, 3] }", 'R = [5, 3] }\nmass = "1 kg"\nrod = ["P", "R"]', 1)
+    assert check(parse(text)).problem is None
+    closed = text.replace('"bar.R", "flap.R"', '"bar.P", "flap.R"').replace(
+        "G = [6, 1], R = [5, 3]", "G = [6, 1], R = [2, 3]"
+    )
+    report = check(parse(closed))
+    assert str(report.problem) == (
+        "point bar.R is used by no joint, driver, load, measure or point of interest; "
+        "[drivers.crank] drives what the joints hold, while bar can still move"
+    )
+
+
 EFFORT = '[measures.motor]\ntype = "peak"\nof = "crank.torque"\n'
 
 
