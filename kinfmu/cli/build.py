@@ -162,7 +162,7 @@ def _page(mechanism: Mechanism, wanted: bool | None) -> str:
     if wanted is False or (wanted is None and find_spec("ziglang") is None):
         return ""
     try:
-        with patience():
+        with patience(hint="; --no-page builds the FMU without it"):
             return page(mechanism)
     except CompilerError as error:
         if wanted:

@@ -50,6 +50,12 @@ def test_the_paths_of_the_architecture_exist() -> None:
         assert (ROOT / path).exists(), path
 
 
+def test_the_architecture_lists_every_script() -> None:
+    scripts = {path.name for path in (ROOT / "scripts").iterdir() if path.is_file() and not path.suffix}
+    assert set(re.findall(r"^\| `scripts/(\w+)` \|", ARCHITECTURE, re.MULTILINE)) == scripts
+    assert "docs/architecture.md#scripts" in README
+
+
 def test_the_gallery_page_lists_every_mechanism_with_its_title() -> None:
     listed = re.findall(r"^\| \[`(\w+)`\]\(\.\./fmus/(\w+)/README\.md\) \| (.+?) \| .+ \|$", GALLERY, re.MULTILINE)
     assert listed == [(name, name, kinfmu.load(name).title) for name in gallery.names()]
