@@ -5,20 +5,23 @@ from __future__ import annotations
 import csv
 import io
 import re
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
 from shlex import quote
+from typing import NamedTuple
 
 import numpy as np
 
-from kinfmu.errors import FmuError, RequestError, listed
+from kinfmu.errors import FmuError, RequestError, listed, suggestion
 from kinfmu.fmu import description, reference
 from kinfmu.fmu.reference import FOLDER, ReferenceResults
 from kinfmu.fmu.simulate import simulate
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, text_in, unpacked
 from kinfmu.mechanism.valid import quoted
 from kinfmu.run import FloatArray
-from kinfmu.units import every_unit, spelled
+from kinfmu.units import Quantity, every_unit, spelled
 
 _SAME_TIME = 1e-6  # of a step: hosts sum up time
 _UNIT = re.compile(r"\s*\[([^]]*)\]\s*$")
@@ -35,15 +38,16 @@ class Verification:
         samples: Number of reference samples.
         missing: Times [s] of reference samples that the results do not have.
         names: Outputs that were compared.
-        left_out: Outputs with reference results that the results do not have.
+        left_out: Outputs to compare that the results do not have.
         name: Output with the largest relative difference.
         time: Its time [s].
         value: The result there.
         wanted: The reference result there.
         difference: The difference, relative.
-        is_a_step_late: True if the results equal those of the sample before, within the tolerance.
+        is_a_step_late: True if the row after each sample equals the reference of that sample, within the tolerance.
         ends: Times [s] of the first and the last row of a host's table; None for an FMU that kinfmu steps itself.
         digits: Digits of the numbers in a host's table, at most; None for an FMU that kinfmu steps itself.
+        unit_notes: Notes on outputs that differ throughout by the factor between two units.
 
     """
 
@@ -60,11 +64,12 @@ class Verification:
     is_a_step_late: bool
     ends: tuple[float, float] | None = None
     digits: int | None = None
+    unit_notes: tuple[str, ...] = ()
 
     @property
     def ok(self) -> bool:
-        """True if every difference is within the tolerance and no sample is missing, except as in is_shorter."""
-        return (not self.missing or self.is_shorter) and self.difference <= self.tolerance
+        """True if all outputs are there within the tolerance, and no sample is missing, except as in is_shorter."""
+        return not self.left_out and (not self.missing or self.is_shorter) and self.difference <= self.tolerance
 
     @property
     def is_shorter(self) -> bool:
@@ -94,18 +99,18 @@ class Verification:
             there = self.samples - len(self.missing)
             lines.append(f"the results agree at the {there} of {self.samples} samples that they have")
         if self.is_a_step_late:
-            lines.append("the results equal the reference of the sample before: this host records outputs a step late")
+            lines.append("the row after each sample equals its reference: this host records outputs a step late")
         elif self.digits is not None and self.tolerance < self.difference <= self._rounding <= _COARSEST:
             lines.append(
                 f"the results have {self.digits} digits, which may be the difference: compare with --tolerance "
                 f"{self._rounding:g}"
             )
-        return "\n".join(lines)
+        return "\n".join([*lines, *self.unit_notes])
 
     @property
     def _rounding(self) -> float:
         """A tolerance for numbers that are rounded to the digits of the table."""
-        return 10.0 ** (1 - (self.digits or 0))
+        return _rounding(self.digits or 0)
 
     def _reason_of_missing(self) -> str:
         """Return what to change where a host's table has no row at some samples; '' if kinfmu made the results."""
@@ -119,7 +124,13 @@ class Verification:
         return "; a host needs rows at the samples of the reference: choose its steps and its stop time by them"
 
 
-def verify(fmu: str | Path, results: str | Path | None = None, *, tolerance: float | None = None) -> Verification:
+def verify(
+    fmu: str | Path,
+    results: str | Path | None = None,
+    *,
+    tolerance: float | None = None,
+    columns: Sequence[str] | None = None,
+) -> Verification:
     """Compare results with the reference results in an FMU of kinfmu.
 
     Args:
@@ -129,13 +140,15 @@ def verify(fmu: str | Path, results: str | Path | None = None, *, tolerance: flo
             than those of the reference are left out. Default: the FMU is stepped with fmpy.
         tolerance: Largest valid difference, relative to the largest number with the same unit. Default: that in the
             FMU, which is 1e-9 but near singular points. A host that writes six digits needs 1e-5.
+        columns: Outputs to compare, such as 'crank.phi' or 'ram.*', with * for any letters. Default: all.
 
     Returns:
-        The verification.
+        The verification. It is not `ok` if the results do not have an output to compare.
 
     Raises:
-        FmuError: The FMU has no reference results, or is not of kinfmu; the results are damaged, or have no output.
-        RequestError: The tolerance is not valid.
+        FmuError: The FMU has no reference results, or is not of kinfmu; the results are damaged, have no output, or
+            have one twice.
+        RequestError: The tolerance is not valid, or a column is no output.
 
     """
     path = Path(fmu)
@@ -160,17 +173,47 @@ def verify(fmu: str | Path, results: str | Path | None = None, *, tolerance: flo
     unknown = [one for one in wanted.names if one not in units]
     if unknown:
         raise FmuError(f"{path}: the reference results in {FOLDER} are damaged: {quoted(unknown[0])} is no variable")
+    length_unit = about.interface.length_unit
+    wanted = _chosen(wanted, columns)
     if results is None:
-        names, values = _stepped(path, wanted)
-        ends = digits = None
+        values = _stepped(path, wanted)
+        table = _Table(wanted.names, values, np.vstack([values[1:], np.full((1, values.shape[1]), np.nan)]))
     else:
-        names, values, ends, digits = _table_of_host(Path(results), wanted, units, about.interface.length_unit)
-    found = _compared(wanted, units, names, values, wanted.tolerance if tolerance is None else tolerance)
-    return replace(found, ends=ends, digits=digits)
+        table = _table_of_host(Path(results), wanted, units, length_unit)
+    return _compared(wanted, units, table, wanted.tolerance if tolerance is None else tolerance, length_unit)
 
 
-def _stepped(path: Path, wanted: ReferenceResults) -> tuple[tuple[str, ...], FloatArray]:
-    """Return outputs and their values (n, k) of the FMU, stepped through fmpy's low-level calls."""
+def _chosen(wanted: ReferenceResults, columns: Sequence[str] | None) -> ReferenceResults:
+    """Return the reference results of some outputs, by names with * for any letters; None: all."""
+    if columns is None:
+        return wanted
+    for one in columns:
+        if not any(fnmatchcase(name, one) for name in wanted.names):
+            raise RequestError(
+                f"columns: the reference results have no output {quoted(one)}{suggestion(one, wanted.names)}; outputs: "
+                f"{listed(wanted.names)}, with * for any letters"
+            )
+    kept = [any(fnmatchcase(name, one) for one in columns) for name in wanted.names]
+    names = tuple(name for name, is_kept in zip(wanted.names, kept, strict=True) if is_kept)
+    return wanted._replace(names=names, values=wanted.values[:, kept])
+
+
+class _Table(NamedTuple):
+    """Results to compare.
+
+    names: outputs (k,); values: (n, k) at the samples of the reference; after: (n, k) one row later; both NaN where
+    there are none; ends: first and last time; digits: of the numbers, at most. The last two are those of a file.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    after: FloatArray
+    ends: tuple[float, float] | None = None
+    digits: int | None = None
+
+
+def _stepped(path: Path, wanted: ReferenceResults) -> FloatArray:
+    """Return the outputs (n, k) of the FMU, stepped through fmpy's low-level calls."""
     t, step = wanted.t, wanted.step
     inputs = None
     if wanted.input_names:
@@ -180,16 +223,11 @@ def _stepped(path: Path, wanted: ReferenceResults) -> tuple[tuple[str, ...], Flo
     rows = np.full((len(t), len(wanted.names)), np.nan)
     count = int(run.good.sum())
     rows[:count] = np.column_stack([run[name][:count] for name in wanted.names])
-    return wanted.names, rows
+    return rows
 
 
-def _table_of_host(
-    path: Path, wanted: ReferenceResults, units: dict[str, str], length_unit: str
-) -> tuple[tuple[str, ...], FloatArray, tuple[float, float] | None, int]:
-    """Return outputs, their values (n, k) at the times of the reference, first and last time, and digits.
-
-    Values are NaN where the table has none.
-    """
+def _table_of_host(path: Path, wanted: ReferenceResults, units: dict[str, str], length_unit: str) -> _Table:
+    """Return the results in a file."""
     try:
         if path.stat().st_size > _LARGEST_TABLE:
             raise FmuError(f"{path}: is too large (largest: {_LARGEST_TABLE} bytes)")
@@ -203,7 +241,7 @@ def _table_of_host(
     times = [k for k, one in enumerate(titles) if one.lower() in ("time", "t")]
     if not times:
         raise FmuError(f"{path}: has no column time; columns: {listed(titles)}")
-    places = {name: k for name in wanted.names if (k := _place(name, titles)) is not None}
+    places = {name: k for name in wanted.names if (k := _place(path, name, titles, header)) is not None}
     if not places:
         raise FmuError(f"{path}: has no output of the FMU, such as {listed(wanted.names[:3])}")
     columns = [times[0], *places.values()]
@@ -213,21 +251,28 @@ def _table_of_host(
         raise FmuError(f"{path}: row {wrong[0] + 1} after the header has the time {table[wrong[0], 0]}")
     for column, (name, place) in enumerate(places.items(), start=1):
         table[:, column] *= _factor(path, header[place], units[name], length_unit)
-    found = np.full((len(wanted.t), len(places)), np.nan)
+    found, after = np.full((2, len(wanted.t), len(places)), np.nan)
+    times_of_host, same = table[:, 0], _SAME_TIME * wanted.step
     for k, time in enumerate(wanted.t.tolist()):
-        near = np.flatnonzero(np.abs(table[:, 0] - time) <= _SAME_TIME * wanted.step)
+        near = np.flatnonzero(np.abs(times_of_host - time) <= same)
         if len(near):
             found[k] = table[near[-1], 1:]  # of rows at one time the last is after events
+            later = times_of_host[times_of_host > time + same]
+            if len(later):
+                after[k] = table[np.flatnonzero(np.abs(times_of_host - later.min()) <= same)[-1], 1:]
     ends = (float(table[:, 0].min()), float(table[:, 0].max())) if len(table) else None
-    return tuple(places), found, ends, max((_digits(row[k]) for row in rows for k in columns[1:]), default=0)
+    digits = max((_digits(row[k]) for row in rows for k in columns[1:]), default=0)
+    return _Table(tuple(places), found, after, ends, digits)
 
 
-def _place(name: str, titles: list[str]) -> int | None:
+def _place(path: Path, name: str, titles: list[str], header: list[str]) -> int | None:
     """Return the place of an output among the titles of columns, by its name alone or behind that of an instance."""
-    if name in titles:
-        return titles.index(name)
-    behind = [k for k, title in enumerate(titles) if title.endswith((f"::{name}", f".{name}", f"/{name}"))]
-    return behind[0] if len(behind) == 1 else None
+    found = [k for k, title in enumerate(titles) if title == name]
+    found = found or [k for k, title in enumerate(titles) if title.endswith((f"::{name}", f".{name}", f"/{name}"))]
+    if len(found) > 1:
+        columns = " and ".join(f"{k + 1}, {quoted(header[k].strip())}" for k in found[:2])
+        raise FmuError(f"{path}: output {name} is in columns {columns}; leave only one of them in the table")
+    return found[0] if found else None
 
 
 def _digits(text: str) -> int:
@@ -260,12 +305,9 @@ def _factor(path: Path, title: str, unit: str, length_unit: str) -> float:
 
 
 def _compared(
-    wanted: ReferenceResults,
-    units: dict[str, str],
-    names: tuple[str, ...],
-    found: FloatArray,
-    tolerance: float,
+    wanted: ReferenceResults, units: dict[str, str], table: _Table, tolerance: float, length_unit: str
 ) -> Verification:
+    names, found = table.names, table.values
     values = wanted.values[:, [wanted.names.index(name) for name in names]]
     sizes = _sizes(wanted, units)
     scale = np.array([sizes[units[name]] or 1.0 for name in names])
@@ -275,7 +317,18 @@ def _compared(
     relative[is_missing] = -1.0
     row, column = (int(one) for one in np.unravel_index(int(np.argmax(relative)), relative.shape))
     difference = float(relative[row, column])
-    late = np.abs(found[1:] - values[:-1]) / scale
+    late = (np.abs(table.after - values) / scale)[~np.isnan(table.after).all(axis=1)]
+    limit = tolerance if table.digits is None else max(tolerance, min(_rounding(table.digits), _COARSEST))
+    rows = ~is_missing
+    notes = _unit_notes(
+        {
+            name: (units[name], found[rows, k] / scale[k], values[rows, k] / scale[k])
+            for k, name in enumerate(names)
+            if relative[:, k].max() > tolerance
+        },
+        every_unit(length_unit),
+        limit,
+    )
     return Verification(
         tolerance=tolerance,
         samples=len(wanted.t),
@@ -287,8 +340,38 @@ def _compared(
         value=float(found[row, column]),
         wanted=float(values[row, column]),
         difference=difference if difference >= 0.0 else float("nan"),
-        is_a_step_late=difference > tolerance and bool((late <= tolerance).all()),
+        is_a_step_late=difference > tolerance and len(late) > 0 and bool((late <= tolerance).all()),
+        ends=table.ends,
+        digits=table.digits,
+        unit_notes=tuple(notes),
     )
+
+
+def _unit_notes(
+    differing: dict[str, tuple[str, FloatArray, FloatArray]], known: dict[str, tuple[Quantity, float]], limit: float
+) -> Iterator[str]:
+    """Yield a note for each other unit in which outputs that differ would agree.
+
+    differing: unit, results and reference results by output, both relative to the size of the numbers with this unit;
+    known: quantity and factor of all units; limit: largest valid difference.
+    """
+    grouped: dict[tuple[str, str], list[str]] = {}
+    for name, (unit, found, values) in differing.items():
+        quantity, factor = known.get(unit, (None, 1.0))
+        for other, (kind, other_factor) in known.items():
+            ratio = factor / other_factor
+            if kind == quantity and ratio != 1.0 and (np.abs(found / ratio - values) <= limit).all():
+                grouped.setdefault((f"{ratio:.6g}", f"{other} in place of {unit}"), []).append(name)
+                break
+    for ratio in dict.fromkeys(one for one, _ in grouped):
+        names = [name for (one, _), found in grouped.items() if one == ratio for name in found]
+        units = [text for one, text in grouped if one == ratio]
+        yield f"units? {listed(names)} are {ratio} of the reference throughout: {listed(units)}"
+
+
+def _rounding(digits: int) -> float:
+    """Return a tolerance for numbers that are rounded to so many digits."""
+    return 10.0 ** (1 - digits)
 
 
 def _sizes(wanted: ReferenceResults, units: dict[str, str]) -> dict[str, float]:

@@ -7,7 +7,6 @@ import re
 import zipfile
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -71,14 +70,89 @@ def test_results_of_hosts_in_their_formats(built: Built, tmp_path: Path) -> None
     place = header.index("rocker.phi")
     degrees = [["Time", "model.root.fourbar.rocker.phi [deg]"]]
     degrees += [[row[0], repr(float(np.degrees(float(row[place]))))] for row in rows]
-    found = kinfmu.verify(fmu, write(tmp_path / "degrees.csv", degrees, ";"))
+    found = kinfmu.verify(fmu, write(tmp_path / "degrees.csv", degrees, ";"), columns=["rocker.phi"])
     assert found.ok, str(found)
     assert found.names == ("rocker.phi",)
-    late = [header, rows[0], *([row[0], *before[1:]] for before, row in pairwise(rows))]
-    found = kinfmu.verify(fmu, write(tmp_path / "late.csv", late))
-    assert found.is_a_step_late
-    assert not found.ok
-    assert "a step late" in str(found)
+
+
+@pytest.mark.parametrize("parts", [1, 2, 3, 30])  # of a step of the reference
+def test_a_host_that_records_a_step_late_is_reported_at_any_step(built: Built, tmp_path: Path, parts: int) -> None:
+    fmu = built("fourbar", "time")
+    header, *rows = rows_of(texts(fmu)["fourbar_ref.csv"])
+    times, stop = [float(row[0]) for row in rows], float(rows[-1][0])
+    t = np.linspace(times[0], stop, 20 * parts + 1)
+    run = kinfmu.solve(kinfmu.load("fourbar"), t)
+    outputs = np.column_stack([run[name] for name in header[1:]])
+    late = np.vstack([outputs[:1], outputs[:-1]])
+    table = [header, *([repr(float(time)), *map(repr, row)] for time, row in zip(t, late.tolist(), strict=True))]
+    found = kinfmu.verify(fmu, write(tmp_path / "late.csv", table))
+    assert (found.is_a_step_late, found.ok) == (True, False)
+    assert "the row after each sample equals its reference: this host records outputs a step late" in str(found)
+    table[5][1] = repr(float(table[5][1]) + 1.0)  # rows between the samples are not compared, unless they follow one
+    table[parts + 2][1] = repr(float(table[parts + 2][1]) + 1.0)
+    found = kinfmu.verify(fmu, write(tmp_path / "wrong.csv", table))
+    assert (found.is_a_step_late, found.ok) == (False, False)
+
+
+def test_outputs_that_are_not_in_the_results_fail_unless_others_are_named(built: Built, tmp_path: Path) -> None:
+    fmu = built("fourbar", "time")
+    table = rows_of(texts(fmu)["fourbar_ref.csv"])
+    places = [k for k, name in enumerate(table[0]) if name == "time" or name.startswith("coupler.")]
+    path = write(tmp_path / "some.csv", [[row[k] for k in places] for row in table])
+
+    def verified(*columns: str) -> tuple[int, str]:
+        done = CliRunner().invoke(main, ["verify", str(fmu), "--results", str(path), *columns])
+        return done.exit_code, done.output
+
+    status, text = verified()
+    assert status == 1
+    assert (
+        f"kinfmu: {path}: 12 of 21 outputs are not in the results; to compare only some, name them: --columns" in text
+    )
+    assert verified(*text.rpartition("name them: ")[2].replace("'", "").split())[0] == 0
+    status, text = verified("--columns", "coupler.*")
+    assert status == 0
+    assert "9 outputs at 21 of 21 samples compared" in text
+    status, text = verified("--columns", "coupler.*,crank.phi")
+    assert (status, "not in the results: crank.phi" in text) == (1, True)
+    status, text = verified("--columns", "copler.x")
+    assert status == 2
+    assert "columns: the reference results have no output 'copler.x'; did you mean 'coupler.x'?" in text
+    assert kinfmu.verify(fmu, columns=["rocker.*"]).names == ("rocker.phi", "rocker.omega", "rocker.alpha")
+
+
+@pytest.mark.parametrize("titles", [("coupler.x", "coupler.x"), ("a.coupler.x", "b.coupler.x [m]")])
+def test_an_output_in_two_columns_is_refused(built: Built, tmp_path: Path, titles: tuple[str, str]) -> None:
+    fmu = built("fourbar", "time")
+    table = [["time", *titles], ["0", "0", "0"]]
+    message = f"output coupler.x is in columns 2, '{titles[0]}' and 3, '{titles[1]}'; leave only one of them"
+    with pytest.raises(FmuError, match=re.escape(message)):
+        kinfmu.verify(fmu, write(tmp_path / "twice.csv", table))
+
+
+@pytest.mark.parametrize("shape", ["{!r}", "{:.6g}"])
+def test_results_in_another_unit_are_reported(built: Built, tmp_path: Path, shape: str) -> None:
+    fmu = built("fourbar", "time")
+    header, *rows = rows_of(texts(fmu)["fourbar_ref.csv"])
+
+    def report(factors: dict[str, float]) -> list[str]:
+        table = [
+            [shape.format(float(one) * factors.get(n, 1.0)) for n, one in zip(header, row, strict=True)] for row in rows
+        ]
+        found = kinfmu.verify(fmu, write(tmp_path / "host.csv", [header, *table]))
+        assert not found.ok
+        return [line for line in str(found).splitlines() if line.startswith("units?")]
+
+    assert report({"coupler.x": 1e3, "coupler.y": 1e3, "coupler.vx": 1e3}) == [
+        "units? coupler.x, coupler.y, coupler.vx are 1000 of the reference throughout: mm in place of m, mm/s in place "
+        "of m/s"
+    ]
+    degrees = 180.0 / np.pi
+    assert report({"crank.phi": degrees, "coupler.x": 1.0 / 0.0254}) == [
+        "units? crank.phi are 57.2958 of the reference throughout: deg in place of rad",
+        "units? coupler.x are 39.3701 of the reference throughout: in in place of m",
+    ]
+    assert report({"coupler.x": 1.5}) == []
 
 
 @pytest.mark.parametrize("shape", ["{:.0f}", "{:.0e}", "{:.1e}", "0"])
