@@ -36,7 +36,11 @@ from kinfmu.errors import KinfmuError
     show_default=True,
     help="native: compiled C; auto: native from some hundred designs on.",
 )
-@click.option("--restart", is_flag=True, help="Begin again, without the parts that an earlier run left.")
+@click.option(
+    "--restart",
+    is_flag=True,
+    help="Begin again: replace the results and the parts that an earlier run or another study left.",
+)
 @click.option("--figure", "picture", type=OutputFile(*FIGURES), help="Draw the results into a .svg, .png or .pdf file.")
 @click.option("--measures", metavar="NAMES", help="Only these measures in the figure, such as stroke,swing.")
 def study(

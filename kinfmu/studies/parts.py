@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -114,13 +114,38 @@ def _is_whole(path: Path) -> bool:
         return False
 
 
+def check_replaceable(target: Path, study: Study, there: Mapping[str, str]) -> None:
+    """Raise a StudyError for a file in the place of the results that is not of this study.
+
+    A study that has parts may replace it: it was begun with restart.
+
+    Args:
+        target: The file of the results.
+        study: The study.
+        there: Metadata of the study whose results the file holds; empty for other files.
+
+    """
+    if not target.is_file() or _has_parts_of(study, target):
+        return
+    what = "is not the results of a study"
+    if "study" in there:
+        own = {"fingerprint": study.fingerprint, **study.definition}
+        what = f"holds the results of another study{_difference(json.loads(there['study']), own)}"
+    raise StudyError(f"{target} {what}; choose another file with -o, or replace it with --restart")
+
+
 def remove_finished(target: Path, study: Study) -> None:
     """Remove the parts of a study whose results are written, if it was killed before it removed them."""
-    folder = folder_of(target)
+    if _has_parts_of(study, target):
+        shutil.rmtree(folder_of(target), ignore_errors=True)
+
+
+def _has_parts_of(study: Study, target: Path) -> bool:
+    """Return True if the folder next to the results is that of this study."""
     with suppress(OSError, ValueError):
-        manifest = json.loads((folder / _MANIFEST).read_bytes())
-        if manifest.get("fingerprint") == study.fingerprint:
-            shutil.rmtree(folder, ignore_errors=True)
+        manifest = json.loads((folder_of(target) / _MANIFEST).read_bytes())
+        return isinstance(manifest, dict) and manifest.get("fingerprint") == study.fingerprint
+    return False
 
 
 def folder_of(target: Path) -> Path:

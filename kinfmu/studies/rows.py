@@ -18,7 +18,7 @@ from kinfmu.mechanism.display_unit import DisplayUnit, display_unit
 from kinfmu.mechanism.valid import quoted
 from kinfmu.run import FloatArray
 from kinfmu.run.tables import table_package
-from kinfmu.studies.definition import DESIGN, REASON, Study
+from kinfmu.studies.definition import DESIGN, REASON
 from kinfmu.studies.nominal import Nominal
 from kinfmu.studies.statistics import Moments, Statistics
 from kinfmu.studies.table import metadata_of
@@ -192,15 +192,12 @@ class StudyRows:
             yield from file.read_row_group(k, columns=columns).to_batches()
 
 
-def is_result_of(path: Path, study: Study) -> bool:
-    """Return True if a file holds the results of a study."""
-    if not path.is_file():
-        return False
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+def study_in(path: Path) -> Mapping[str, str]:
+    """Return the metadata of the study whose results a file holds; empty for another file, or none."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
 
-        about = metadata_of(pq.read_schema(path))
-    except (ImportError, OSError, pa.ArrowInvalid):
-        return False
-    return about.get("fingerprint") == study.fingerprint
+    try:
+        return metadata_of(pq.read_schema(path))
+    except (OSError, ValueError, pa.ArrowException):
+        return {}

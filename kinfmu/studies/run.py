@@ -19,9 +19,9 @@ from kinfmu.readings import Reading
 from kinfmu.studies.chunk import Job, run_chunk
 from kinfmu.studies.definition import SAMPLES, SEED, Study, define
 from kinfmu.studies.nominal import nominal
-from kinfmu.studies.parts import PartsFolder, remove_finished
+from kinfmu.studies.parts import PartsFolder, check_replaceable, remove_finished
 from kinfmu.studies.result import StudyResult
-from kinfmu.studies.rows import is_result_of
+from kinfmu.studies.rows import study_in
 from kinfmu.studies.sampling import METHODS
 from kinfmu.studies.table import join, part_bytes, schema_of
 from kinfmu.studies.workers import results
@@ -71,7 +71,8 @@ def study(
         workers: Processes on this machine; 1: this process. Default: one for each core.
         dask: Address of a Dask scheduler, such as 'tcp://host:8786', whose workers have kinfmu installed; 'local': a
             cluster on this machine. Default: processes.
-        restart: Begin again, without the parts that an earlier run or another study left.
+        restart: Begin again, without the parts that an earlier run or another study left, and replace the file of the
+            results, whatever it holds.
         progress: Called with the number of designs that are done and of all.
         **inputs: Driver values in place of t, such as crank_angle=(n,) [rad] and crank_speed=, as in `kinfmu.solve`.
 
@@ -80,7 +81,8 @@ def study(
 
     Raises:
         RequestError: An argument is invalid.
-        StudyError: The parts on disk belong to another study, workers end unexpectedly, or a file cannot be written.
+        StudyError: The parts or the file on disk belong to another study, workers end unexpectedly, or a file cannot be
+            written.
         KinfmuError: The design as written cannot be planned.
         MissingPackageError: `distributed` is not installed.
 
@@ -117,6 +119,8 @@ def run_study(
     if workers is None:
         workers = cores()
     require_workers(workers)
+    if find_spec("pyarrow") is None:  # else the study would end after its first part
+        raise MissingPackageError("a study needs pyarrow: pip install pyarrow")
     if output is None:
         with temporary_folder() as folder:
             path = folder / f"study{RESULTS}"
@@ -127,7 +131,10 @@ def run_study(
     path = Path(output)
     if suffix_of(path) != RESULTS:
         raise RequestError(f"{path}: results are written as Parquet; the name must end in {RESULTS}")
-    if restart or not is_result_of(path, study):
+    there = study_in(path)
+    if restart or there.get("fingerprint") != study.fingerprint:
+        if not restart:
+            check_replaceable(path, study, there)
         _run(study, path, workers, dask, progress or _quiet, restart=restart)
     else:
         remove_finished(path, study)
@@ -136,8 +143,6 @@ def run_study(
 
 def _run(study: Study, path: Path, workers: int, dask: str | None, progress: Progress, *, restart: bool) -> None:
     """Measure the parts that are missing, and join all parts."""
-    if find_spec("pyarrow") is None:  # else the study would end after its first part
-        raise MissingPackageError("a study needs pyarrow: pip install pyarrow")
     with PartsFolder(path, study, restart=restart) as parts:
         job = Job.of(study)
         schema = schema_of(study, nominal(study, job))

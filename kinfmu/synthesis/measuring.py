@@ -171,6 +171,11 @@ def measuring_of(
         }
         if all(value is None for value in limits.values()):
             raise MechanismError(f"{where} needs 'minimum' or 'maximum', or both")
+        low, high = limits["minimum"], limits["maximum"]
+        if low is not None and high is not None and low > high:
+            raise MechanismError(
+                f"{where} minimum = {quoted(one.minimum)} is above maximum = {quoted(one.maximum)}: no value is valid"
+            )
         if isinstance(one, MarginConstraint) and not 0.0 < (limits["minimum"] or 0.0) < 1.0:
             raise MechanismError(
                 f"{where} minimum = {quoted(one.minimum)} must be between 0 and 1, as 1 / condition is"

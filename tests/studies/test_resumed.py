@@ -177,6 +177,34 @@ def test_parts_of_another_study_are_refused_until_they_are_removed(interrupted: 
     assert len(found) == 170
 
 
+def test_a_file_of_something_else_in_the_place_of_the_results_is_kept(interrupted: Path, alone: bytes) -> None:
+    path = interrupted.with_name("kept.parquet")
+    given = {"measures": "swing", "output": path, "workers": 1}
+
+    def refused(designs: int, reason: str) -> None:
+        before = path.read_bytes()
+        with pytest.raises(StudyError) as error:
+            kinfmu.study(linkage(), RANGES, designs=designs, **given)  # type: ignore[arg-type]
+        assert str(error.value) == f"{path} {reason}; choose another file with -o, or replace it with --restart"
+        assert path.read_bytes() == before
+        assert not path.with_name("kept.parquet.parts").exists()
+
+    path.write_text("my notes")
+    refused(160, "is not the results of a study")
+    pq = pytest.importorskip("pyarrow.parquet")
+    path.write_bytes(alone)
+    pq.write_table(pq.read_table(path).replace_schema_metadata({}), path)
+    refused(160, "is not the results of a study")
+    path.write_bytes(alone)
+    refused(170, "holds the results of another study (samples: 160 there, 170 here)")
+    assert len(kinfmu.study(linkage(), RANGES, designs=160, **given)) == 160  # type: ignore[arg-type]
+    assert path.read_bytes() == alone
+    assert len(kinfmu.study(linkage(), RANGES, designs=170, restart=True, **given)) == 170  # type: ignore[arg-type]
+    shutil.copytree(interrupted.with_name("rows.parquet.parts"), path.with_name("kept.parquet.parts"))
+    kinfmu.study(linkage(), RANGES, designs=160, **given)  # type: ignore[arg-type]  # begun with restart, then ended
+    assert path.read_bytes() == alone
+
+
 def test_two_commands_do_not_run_one_study_at_the_same_time(tmp_path: Path) -> None:
     path = tmp_path / "rows.parquet"
 

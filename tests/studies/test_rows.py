@@ -165,7 +165,7 @@ def test_a_finished_study_is_not_measured_again(tmp_path: Path) -> None:
         linkage(), RANGES, designs=8, output=path, workers=1, progress=lambda *done: calls.extend(done)
     )
     assert (calls, len(again)) == ([], 8)
-    other = kinfmu.study(linkage(), RANGES, designs=9, output=path, workers=1)
+    other = kinfmu.study(linkage(), RANGES, designs=9, output=path, workers=1, restart=True)
     assert len(other) == 9
 
 

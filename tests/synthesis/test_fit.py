@@ -414,6 +414,10 @@ def _poses(**keys: Any) -> dict[str, Any]:
     return {"targets": [PoseTarget(**{"name": "p", "of": "rocker", "poses": [(0, 0, 0)], "length": 1.0, **keys})]}
 
 
+def _swing(minimum: str, maximum: str) -> MeasureConstraint:
+    return MeasureConstraint(name="swing", of=Range("swing", of="rocker.phi"), minimum=minimum, maximum=maximum)
+
+
 def _grashof(*links: str) -> dict[str, Any]:
     return {"constraints": [GrashofConstraint(name="g", links=links)]}
 
@@ -434,6 +438,10 @@ CASES: list[tuple[dict[str, Any], str]] = [
     (_path(step="0 deg"), "step = '0 deg' must not be 0"),
     ({"constraints": [GrashofConstraint(name="g", links=[*LENGTHS][:4], gap=-1)]}, "gap = -1 must be 0 or more"),
     ({"constraints": [MarginConstraint(name="m", minimum=2)]}, "minimum = 2 must be between 0 and 1"),
+    (
+        {"constraints": [_swing("70 deg", "50 deg")]},
+        r"\[constraints.swing\] minimum = '70 deg' is above maximum = '50 deg': no value is valid",
+    ),
     (_path(weight=-1.0), "weights must be 0 or more"),
     (_poses(of="rokker"), "moving body; did you mean 'rocker'"),
     (_poses(length=0), "length = 0 must be positive"),
