@@ -363,10 +363,10 @@ def _unit_notes(
             if kind == quantity and ratio != 1.0 and (np.abs(found / ratio - values) <= limit).all():
                 grouped.setdefault((f"{ratio:.6g}", f"{other} in place of {unit}"), []).append(name)
                 break
-    for ratio in dict.fromkeys(one for one, _ in grouped):
-        names = [name for (one, _), found in grouped.items() if one == ratio for name in found]
-        units = [text for one, text in grouped if one == ratio]
-        yield f"units? {listed(names)} are {ratio} of the reference throughout: {listed(units)}"
+    for shown in dict.fromkeys(one for one, _ in grouped):
+        names = [name for (one, _), found_names in grouped.items() if one == shown for name in found_names]
+        pairs = [pair for one, pair in grouped if one == shown]
+        yield f"units? {listed(names)} are {shown} of the reference throughout: {listed(pairs)}"
 
 
 def _rounding(digits: int) -> float:
