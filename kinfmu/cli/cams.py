@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -11,6 +12,7 @@ from kinfmu.cli.arguments import STANDARD_OUTPUT
 from kinfmu.cli.group import errors_of
 from kinfmu.cli.pages import mechanism_of
 from kinfmu.cli.quantities import driver_value
+from kinfmu.cli.settings import checked_settings
 from kinfmu.errors import RequestError, listed
 from kinfmu.files.whole_file import suffix_of
 from kinfmu.units import Quantity
@@ -19,9 +21,18 @@ FORMATS = (".csv", ".dxf", ".svg", ".png", ".pdf")
 _FINE = 1e-5  # of the largest distance of the profile from the axle
 
 
-def export_cam(given: str, output: Path, joint: str, tolerance: str | None, *, units: bool, degrees: bool) -> None:
+def export_cam(
+    given: str,
+    output: Path,
+    joint: str,
+    tolerance: str | None,
+    settings: Sequence[tuple[str, str]],
+    *,
+    units: bool,
+    degrees: bool,
+) -> None:
     """Write the profile of a cam of a mechanism, or of the mechanism of a record."""
-    valid = {"run", "output", "cam", "tolerance", "units", "degrees"}
+    valid = {"run", "output", "cam", "tolerance", "settings", "units", "degrees"}
     others = [name for name, value in click.get_current_context().params.items() if value and name not in valid]
     if others:
         options = listed(f"--{name}" for name in others).replace("--other", "a second run").replace("across", "x")
@@ -43,7 +54,7 @@ def export_cam(given: str, output: Path, joint: str, tolerance: str | None, *, u
 
         mechanism = mechanism_of(read(Path(given)))
     else:
-        mechanism = gallery.load(given)
+        mechanism = checked_settings(gallery.load(given), settings).mechanism()
     unit = mechanism.length_unit
     within = None if tolerance is None else driver_value("--tolerance", tolerance, Quantity("length"), unit)
     if within is not None and not within > 0.0:

@@ -16,6 +16,7 @@ from kinfmu.cli.cams import export_cam
 from kinfmu.cli.group import errors_of, main
 from kinfmu.cli.pages import PAGES, mechanism_of, write_page
 from kinfmu.cli.quantities import on_axis
+from kinfmu.cli.settings import checked_settings, set_option
 from kinfmu.errors import RequestError, listed
 from kinfmu.files.whole_file import suffix_of
 
@@ -168,6 +169,7 @@ def _on_axis_of(run: Run, text: str) -> float:
     help="Largest distance of the polygon of a cam's .dxf from the curve, such as 0.01mm. Default: 1e-5 of the cam.",
 )
 @click.option("--units", is_flag=True, help="Write units into the first line of a CSV file: coupler.x [m].")
+@set_option
 def export(
     run: str,
     other: Path | None,
@@ -185,6 +187,7 @@ def export(
     cam: str | None,
     tolerance: str | None,
     units: bool,
+    settings: tuple[tuple[str, str], ...],
 ) -> None:
     """Write a run as a table, as plots, as an animation or as a page; or a mechanism as a page.
 
@@ -195,17 +198,22 @@ def export(
     show coordinates, velocities and accelerations against time, or against the driver of a solve --angle. With --x,
     --overlay or --polar, exactly the named columns are curves. OTHER is a second run for the same plot. A .gif or
     .mp4 shows the moving linkage, a .dxf the pose at a value as a CAD drawing. With --cam, a mechanism or a record
-    gives the profile of a cam as .csv, .dxf or a figure.
+    gives the profile of a cam as .csv, .dxf or a figure. --set is for mechanisms: a record has the values of its run.
     """
+    if settings and suffix_of(run) == ".mcap":
+        raise click.UsageError(
+            f"--set {settings[0][0]}: only for mechanisms; {run} has the values of its run: use solve --set or "
+            "simulate --set"
+        )
     if width is not None:
         _check_width(width)
     if cam is not None:
-        export_cam(run, output, cam, tolerance, units=units, degrees=degrees)
+        export_cam(run, output, cam, tolerance, settings, units=units, degrees=degrees)
         return
     if tolerance is not None:
         raise click.UsageError(f"--tolerance {tolerance}: only for the .dxf of a cam, with --cam")
     if suffix_of(output) in PAGES or suffix_of(run) != ".mcap":
-        _export_page(run, output, start, stop)
+        _export_page(run, output, start, stop, settings)
         return
     from kinfmu.log import read
     from kinfmu.log.table import csv_lines
@@ -271,13 +279,15 @@ def _record_command(mechanism: str) -> str:
     return f": kinfmu solve {quote(mechanism)} -o {quote(str(Path(name).with_suffix('.mcap')))}"
 
 
-def _export_page(given: str, output: Path, start: str | None, stop: str | None) -> None:
+def _export_page(
+    given: str, output: Path, start: str | None, stop: str | None, settings: Sequence[tuple[str, str]]
+) -> None:
     """Write the page of a record, from start to stop, or of a mechanism."""
     is_record = suffix_of(given) == ".mcap"
-    valid = {"run", "output", *(("start", "stop") if is_record else ())}
+    valid = {"run", "output", *(("start", "stop") if is_record else ("settings",))}
     others = [name for name, value in click.get_current_context().params.items() if value and name not in valid]
     if others or suffix_of(output) not in PAGES:
-        options = "no other options than --start and --stop" if is_record else "no other options"
+        options = f"no other options than {'--start and --stop' if is_record else '--set'}"
         raise click.UsageError(
             f"{given}: of a mechanism only a page (.html) is written, or with --cam a cam; a page has {options}; a "
             f"table, plot or animation needs a record (.mcap){_record_command(given)}"
@@ -288,7 +298,7 @@ def _export_page(given: str, output: Path, start: str | None, stop: str | None) 
         run = _between(read(Path(given)), start, stop)
         write_page(mechanism_of(run), output, run)
     else:
-        mechanism = gallery.load(given)
+        mechanism = checked_settings(gallery.load(given), settings).mechanism()
         with errors_of(given):
             write_page(mechanism, output)
     click.echo(f"written: {output}")

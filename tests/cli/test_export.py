@@ -33,6 +33,12 @@ def test_a_record_is_exported_as_csv(record: Path, command: Command, tmp_path: P
     assert list(table) == [column.name for column in read(record).columns()]
 
 
+def test_values_of_parameters_are_for_mechanisms_only(record: Path, refuses: Callable[..., str]) -> None:
+    message = refuses("export", record, "-o", "run.csv", "--set", "crank.speed=30rpm")
+    assert message.startswith("--set crank.speed: only for mechanisms; ")
+    assert message.endswith(" has the values of its run: use solve --set or simulate --set")
+
+
 def test_parquet_holds_the_units(record: Path, command: Command, tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     assert command("export", record, "-o", "run.parquet").exit_code == 0
@@ -137,7 +143,7 @@ def test_animations_have_the_width_that_is_asked_for(
     assert "'wide' is not a valid integer" in refuses("export", record, "-o", "run.gif", "--width", "wide")
     message = refuses("export", record, "-o", "run.svg", "--width", "800")
     assert "--width 800: only for animations, .gif, .mp4, not .svg" in message
-    assert "a page has no other options" in refuses("export", "fourbar", "-o", "run.html", "--width", "800")
+    assert "a page has no other options than --set" in refuses("export", "fourbar", "-o", "run.html", "--width", "800")
     tall = tmp_path / "tall.mcap"
     write_mcap(kinfmu.solve(kinfmu.load("engine"), np.linspace(0.0, 0.01, 11)), tall)
     message = fails("export", tall, "-o", "run.gif", "--width", "1900")

@@ -10,6 +10,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from kinfmu.cli import main
+from kinfmu.mechanism.toml_text import text as toml_text
+from tests.cams import followers
 
 
 def export(*arguments: str) -> Result:
@@ -64,6 +66,27 @@ def test_the_angles_of_the_table_of_a_cam_are_in_degrees_on_request(tmp_path: Pa
     np.testing.assert_allclose(degrees[:, angles], np.degrees(radians[:, angles]), atol=1e-11)
     lengths = [k for k in range(len(names)) if k not in angles]
     np.testing.assert_array_equal(degrees[:, lengths], radians[:, lengths])
+
+
+def test_the_profile_of_a_cam_takes_values_of_parameters(tmp_path: Path) -> None:
+    text = toml_text(followers.lifted_roller(8.0)).replace("roller_radius = 8.0", 'roller_radius = "roller"')
+    path = tmp_path / "tappet.toml"
+    path.write_text(f'{text}\n[parameters]\nroller = "8 mm"\n', encoding="utf-8")
+    tables = {}
+    for radius in (8.0, 5.0):
+        result = export(str(path), "--cam", "lift", "-o", "-", "--set", f"roller={radius}mm")
+        assert result.exit_code == 0, result.output
+        header, *lines = result.output.splitlines()
+        columns = np.array([[float(one) for one in line.split(",")] for line in lines]).T
+        table = dict(zip(header.split(","), columns, strict=True))
+        tables[radius] = table
+        np.testing.assert_allclose(
+            np.hypot(table["x"] - table["pitch_x"], table["y"] - table["pitch_y"]), radius, rtol=1e-12
+        )
+    np.testing.assert_allclose(tables[5.0]["pitch_x"], tables[8.0]["pitch_x"], atol=1e-12)
+    result = export(str(path), "--cam", "lift", "-o", "-", "--set", "rollr=5mm")
+    assert result.exit_code == 2
+    assert "--set: there is no parameter 'rollr'; did you mean 'roller'?" in result.output
 
 
 @pytest.mark.parametrize(

@@ -141,6 +141,9 @@ def test_the_page_of_a_run_without_the_values_of_its_drivers_is_refused(
 def test_a_mechanism_is_exported_as_a_page_only(command: Command, refuses: Callable[..., str], tmp_path: Path) -> None:
     assert command("export", "crank_rocker", "-o", "mech.html").stdout == "written: mech.html\n"
     assert data_of(tmp_path / "mech.html")["run"]["to"] == 2.0
+    assert command("export", "crank_rocker", "-o", "fast.html", "--set", "crank.speed=30rpm").exit_code == 0
+    parameters = data_of(tmp_path / "fast.html")["modules"]["written"]["parameters"]
+    assert [one["value"] for one in parameters if one["name"] == "crank.speed"] == pytest.approx([np.pi])
     assert "of a mechanism only a page (.html) is written" in refuses("export", "crank_rocker", "-o", "mech.csv")
     assert "needs a record (.mcap)" in refuses("export", "crank_rocker", "-o", "mech.html", "--stop", "1")
     assert "not in the gallery" in refuses("export", "run", "-o", "mech.html")
