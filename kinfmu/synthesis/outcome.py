@@ -105,6 +105,7 @@ class FitOutcome:
     tried: int
     refused: Mapping[str, int]
     idle: tuple[str, ...] = ()
+    undetermined: tuple[str, ...] = ()
     note: str = ""
 
     @property

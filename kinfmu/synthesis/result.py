@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -24,6 +25,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _NO_EFFECT = 1e-9  # of the largest effect: round-off
+_FREE = 1e-4  # of the largest singular value; differences of measures have an error of 1e-6
+_PART = 1e-3  # of a free direction; an unknown with less is determined
+_AT_BOUND = 1e-6  # of the range
+_MET = 1e-9  # of the root of the sum of squares of a typical design; targets with less are met
+_EQUAL, _SEVERAL = 1e-7, 2  # relative difference of equal sums; more optima than a symmetric mechanism has
 _SAME = 1e-6  # relative difference of sums up to which a mechanism file gives the motion that was fitted
 
 
@@ -42,6 +48,7 @@ class FitResult(FitOutcome, Displayed):
         tried: Number of designs that were solved.
         refused: How often designs could not be assembled or did not reach a sample, by reason.
         idle: Unknowns that have no effect on the targets near the best design.
+        undetermined: Unknowns that can change together so that the errors stay: others fit as well.
         note: What to know about `mechanism`; '' if there is nothing.
 
     """
@@ -100,6 +107,7 @@ def result_of(equations: Equations, optima: Sequence[Optimum], tried: int, refus
         tried=tried,
         refused=dict(refused),
         idle=_idle(problem, jacobian),
+        undetermined=_undetermined(equations, z, fitted, jacobian, optima),
         note=note,
     )
 
@@ -110,6 +118,30 @@ def _idle(problem: FitProblem, jacobian: FloatArray) -> tuple[str, ...]:
     if problem.measuring is not None or not sizes.any():
         return ()
     return tuple(name for name, size in zip(problem.bounds, sizes, strict=True) if size <= _NO_EFFECT * sizes.max())
+
+
+def _undetermined(
+    equations: Equations, z: FloatArray, found: Evaluation, jacobian: FloatArray, optima: Sequence[Optimum]
+) -> tuple[str, ...]:
+    """Return the unknowns in the null space of the Jacobian of targets and active constraints; bounds hold unknowns.
+
+    Where the targets are not met, the Jacobian alone does not tell an isolated optimum from others: there must be
+    several optima of the same sum.
+    """
+    twins = sum(abs(one.total - optima[0].total) <= _EQUAL * optima[0].total for one in optima[1:])
+    if math.sqrt(found.squares) > _MET * equations.scale and twins < _SEVERAL:
+        return ()
+    full = equations.with_measures(z, found, jacobian)
+    rows = full[(np.arange(len(full)) < found.target_count) | (found.residuals > 0.0)]
+    rows = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
+    is_open = (z > _AT_BOUND) & (z < 1.0 - _AT_BOUND) & (np.abs(rows).max(axis=0, initial=0.0) > _NO_EFFECT)
+    if not is_open.any():
+        return ()
+    _, values, directions = np.linalg.svd(rows[:, is_open])
+    rank = int((values > _FREE * values.max(initial=0.0)).sum())
+    moves = np.abs(directions[rank:]).max(axis=0, initial=0.0) > _PART
+    names = [name for name, counts in zip(equations.names, is_open, strict=True) if counts]
+    return tuple(name for name, counts in zip(names, moves, strict=True) if counts)
 
 
 def _errors(problem: FitProblem, found: Evaluation) -> list[TargetErrors]:

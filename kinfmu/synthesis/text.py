@@ -135,8 +135,13 @@ def constraint_notes(result: FitOutcome) -> list[str]:
 
 
 def parameter_notes(result: FitOutcome) -> list[str]:
-    """Return a line for each unknown with no effect on the targets, and for each with bare bounds in another unit."""
+    """Return a line for each unknown with no effect on the targets, and for each with bare bounds in another unit.
+
+    Also one for unknowns that the targets do not determine.
+    """
     problem = result.problem
     lines = [f"{name} has no effect on the targets: any value between its bounds is as good" for name in result.idle]
+    if result.undetermined:
+        lines.append(f"the targets do not determine {listed(result.undetermined)}: others fit as well")
     lines += [problem.mechanism.settable.note_on_bare(name, bounds) for name, bounds in problem.unknowns.items()]
     return [line for line in lines if line]

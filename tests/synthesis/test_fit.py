@@ -502,3 +502,29 @@ def test_law_constants_are_unknowns_over_time() -> None:
 
     assert result.parameters["crank.speed"] == pytest.approx(speed, abs=1e-9)
     assert LENGTHS["crank"] == result.mechanism.parameters["crank"].value
+
+
+def test_unknowns_that_the_targets_leave_free_together_are_noted() -> None:
+    swing = MeasureTarget(name="swing", of=Range("swing", "rocker.phi"), value="40 deg")
+    unknowns = {"crank": (0.5, 1.5), "coupler": (2.0, 5.0)}
+    found = kinfmu.fit(_problem(unknowns=unknowns, targets=[swing]), starts=1)
+    assert found.squares < 1e-18
+    assert found.undetermined == ("crank", "coupler")
+    assert "note: the targets do not determine crank, coupler: others fit as well" in str(found)
+    alone = kinfmu.fit(_problem(unknowns={"crank": (0.5, 1.5)}, targets=[swing]), starts=1)
+    assert alone.squares < 1e-18
+    assert alone.undetermined == ()
+    assert kinfmu.fit(_problem(), starts=1).undetermined == ()
+
+
+def test_lengths_that_a_function_of_angles_leaves_free_are_noted_with_exact_derivatives() -> None:
+    angles = np.radians([80.0, 120.0, 160.0, 220.0, 300.0])
+    run = kinfmu.solve(four_bar(), crank_angle=angles)
+    points = list(zip(angles.tolist(), run["rocker.phi"].tolist(), strict=True))
+    target = FunctionTarget(name="swing", of="rocker.phi", points=points)
+    lengths = {name: (0.7 * LENGTHS[name], 1.5 * LENGTHS[name]) for name in ("ground", "crank", "coupler", "rocker")}
+    whole = kinfmu.fit(_problem(unknowns=lengths, targets=[target]), starts=2)
+    assert whole.squares < 1e-18
+    assert set(whole.undetermined) == {*lengths}
+    del lengths["ground"]
+    assert kinfmu.fit(_problem(unknowns=lengths, targets=[target]), starts=2).undetermined == ()
