@@ -23,11 +23,13 @@ from kinfmu.solver.python.tracks import sample_rates
 class ForceSlave(MechanismSlave):
     """A mechanism with forces as an FMI 2.0 co-simulation slave.
 
-    A subclass defines `stages` (emitted, by part) and `positive` (names of the constants of loads' laws that must be
-    positive).
+    A subclass defines `stages` (emitted, by part), `positive` (names of the constants of loads' laws that must be
+    positive) and, if loads need a direction, `distances` (emitted) of their ends with a message for each in `meeting`.
     """
 
     stages: ClassVar[dict[str, Callable[..., Numbers]]]
+    distances: Callable[..., Numbers]
+    meeting: ClassVar[tuple[str, ...]] = ()
     positive: ClassVar[tuple[str, ...]]
 
     def __init__(self, **kwargs: Any) -> None:
@@ -82,7 +84,7 @@ class ForceSlave(MechanismSlave):
         if stage not in self._forces:
             try:
                 self._forces[stage] = self._forces_at(shown, stage)
-            except (ArithmeticError, ValueError) as error:  # a load without a value, such as a spring of length 0
+            except (ArithmeticError, ValueError) as error:  # a law of a load without a value
                 self.log(f"forces have no value: {error}", Fmi2Status.warning)
                 self._forces[stage] = self._unknown[stage]
         return self._forces[stage]
@@ -97,7 +99,13 @@ class ForceSlave(MechanismSlave):
         if not self._driven_by_time and self._history and (shown.stale or not self._touched):
             time = self._history[-1][0]  # of the sample that is shown
         loads = self._committed_loads if shown.stale else self._loads
-        return self.stages[stage](time, u, ud, udd, pose.z, zd, zdd, slopes, loads, self._parameters)
+        sample = (time, u, ud, udd, pose.z, zd, zdd, slopes, loads, self._parameters)
+        found = self.stages[stage](*sample)
+        if self.meeting and any(map(math.isnan, found)):
+            for message, distance in zip(self.meeting, self.distances(*sample), strict=True):
+                if distance == 0.0:
+                    self.log(message, Fmi2Status.warning)
+        return found
 
     def _get_fmu_state(self) -> dict[str, Any]:
         return super()._get_fmu_state() | {

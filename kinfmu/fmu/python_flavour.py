@@ -29,6 +29,7 @@ from kinfmu.codegen.forces import STAGES
 from kinfmu.codegen.python import emit
 from kinfmu.codegen.python.forces import emit_forces, solves
 from kinfmu.codegen.python.jumps import emit_jumps
+from kinfmu.codegen.python.stage import has_roots
 from kinfmu.errors import FmuError
 from kinfmu.fmu import description
 from kinfmu.fmu.archive import digest, token, zipped
@@ -40,6 +41,7 @@ from kinfmu.fmu.variables import interface
 from kinfmu.mechanism import toml_text
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import ForceSteps
+from kinfmu.plan.meeting import distance_steps, meeting_messages
 
 CAPABILITIES = {
     "needsExecutionTool": True,  # Python, in the process of the host
@@ -125,9 +127,17 @@ def archive(
     variables = interface(plan, drive, forces=forces, starts=starts, reach=reach)
     variables = variables.displayed_in(documents.display_length if documents else None)
     in_si = units_in_si(plan) if owned else ()
-    contents = _contents(plan, variables, version, in_si)
+    distances = distance_steps(plan)
+    meets = bool(forces and distances.results)
+    contents = _contents(plan, variables, version, in_si, meets=meets)
     stages = dict(forces) | ({"inertia": owned.inertia} if owned else {})
     contents |= {f"kinfmu/solver/{stage}.py": emit_forces(plan, steps).encode() for stage, steps in stages.items()}
+    if meets:
+        stages["distances"] = distances
+        text = f"{emit_forces(plan, distances)}\n\nMEETING = {meeting_messages(plan, distances)!r}\n"
+        contents["kinfmu/solver/distances.py"] = text.encode()
+    if any(map(has_roots, (*stages.values(), *([owned.laws.steps] if owned else [])))):
+        contents["kinfmu/solver/roots.py"] = files("kinfmu.codegen.python").joinpath("roots.py").read_bytes()
     if any(map(solves, stages.values())):
         contents["kinfmu/solver/solutions.py"] = files("kinfmu.codegen.python").joinpath("solutions.py").read_bytes()
     if owned:
@@ -139,11 +149,13 @@ def archive(
     added = (*(WITH_FORCES if stages else ()), *(WITH_EFFORTS if owned else ()))
     contents |= {f"kinfmu/fmu/{name}": files("kinfmu.fmu").joinpath(name).read_bytes() for name in added}
     metadata = documents.metadata if documents else {}
-    named = _named(dict(sorted(contents.items())), variables, version, digest(contents), in_si, metadata)
+    named = _named(dict(sorted(contents.items())), variables, version, digest(contents), in_si, metadata, meets=meets)
     return zipped(named | (documents.files(variables) if documents else {}))
 
 
-def _contents(plan: SolvePlan, variables: Interface, version: str, in_si: Sequence[float]) -> dict[str, bytes]:
+def _contents(
+    plan: SolvePlan, variables: Interface, version: str, in_si: Sequence[float], *, meets: bool
+) -> dict[str, bytes]:
     """Return every file by path in the FMU, still under the names `kinfmu` and `pythonfmu` and without a token."""
     import pythonfmu
 
@@ -156,7 +168,7 @@ def _contents(plan: SolvePlan, variables: Interface, version: str, in_si: Sequen
         "kinfmu/fmu/__init__.py": b'"""The slave."""\n',
         "kinfmu/pythonfmu/__init__.py": b'"""The base class of pythonfmu."""\n',
         "kinfmu/solver/model.py": emit(plan).encode(),
-        "kinfmu_slave.py": _entry(variables, "", in_si).encode(),
+        "kinfmu_slave.py": _entry(variables, "", in_si, meets=meets).encode(),
     }
     contents |= {f"kinfmu/fmu/{name}": fmu.joinpath(name).read_bytes() for name in RUN_TIME}
     contents |= {f"kinfmu/solver/{f.name}": f.read_bytes() for f in solver.iterdir() if f.name.endswith(".py")}
@@ -199,7 +211,7 @@ def _description(
     return description.write(about, {"CoSimulation": CAPABILITIES})
 
 
-def _entry(variables: Interface, token: str, in_si: Sequence[float], package: str = "kinfmu") -> str:
+def _entry(variables: Interface, token: str, in_si: Sequence[float], package: str = "kinfmu", *, meets: bool) -> str:
     parts = []
     for part in variables.parts:
         starts = tuple(variable.start for variable in part.variables) if part.name in PARTS_WITH_START else ()
@@ -217,6 +229,9 @@ def _entry(variables: Interface, token: str, in_si: Sequence[float], package: st
         attributes += ["inertia = staticmethod(inertia.forces)", "jumps = staticmethod(jumps.jumps)"]
         attributes += ["law_counts = laws.COUNTS", "laws = staticmethod(laws.forces)"]
         attributes.append(f"in_si = {tuple(in_si)!r}")
+    if meets:
+        modules.append("distances")
+        attributes += ["meeting = distances.MEETING", "distances = staticmethod(distances.forces)"]
     base, module = ("ForceSlave", "force_slave") if stages else ("MechanismSlave", "slave")
     if in_si:
         base, module = "TorqueSlave", "torque_slave"
@@ -239,6 +254,8 @@ def _named(
     digits: str,
     in_si: Sequence[float],
     metadata: Mapping[str, str],
+    *,
+    meets: bool,
 ) -> dict[str, bytes]:
     """Return the files under their final names; check that modules import only each other and the standard library."""
     package = f"kinfmu_{variables.name}_{digits[:12]}"
@@ -251,7 +268,7 @@ def _named(
         elif path != "modelDescription.xml":
             named[path] = data
     del named["kinfmu_slave.py"]
-    named[f"resources/{package}_slave.py"] = _entry(variables, guid, in_si, package).encode()
+    named[f"resources/{package}_slave.py"] = _entry(variables, guid, in_si, package, meets=meets).encode()
     named["resources/slavemodule.txt"] = f"{package}_slave".encode()
     _check_imports(named, package)
     return named

@@ -41,6 +41,10 @@ class BetweenPoints(Load):
 
     between: tuple[str, str]
 
+    @property
+    def needs_direction(self) -> bool:
+        return True
+
     def bodies(self) -> tuple[str, ...]:
         return tuple(map(body_of, self.between))
 
@@ -85,6 +89,10 @@ class Spring(BetweenPoints):
             isinstance(value, float | int) and value == 0.0 and not hasattr(value, "expression")
             for value in (self.free_length, self.preload)
         )
+
+    @property
+    def needs_direction(self) -> bool:
+        return not self.is_proportional
 
     def with_unit(self, length_unit: str) -> Spring:
         return replace(self, metre=METRES[length_unit])
@@ -195,6 +203,10 @@ class ForceBetween(Following):
     between: Points
     law: Annotated[Law, "the force f [N]"]
     over: Over = None
+
+    @property
+    def needs_direction(self) -> bool:
+        return True
 
     def acts_on(self) -> tuple[str, ...]:
         return tuple(map(body_of, self.between))

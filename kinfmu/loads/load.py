@@ -32,6 +32,11 @@ class Load(ABC):
     name: str
 
     @property
+    def needs_direction(self) -> bool:
+        """True if it acts along the line between two points: it has no value where they are in the same place."""
+        return False
+
+    @property
     def depends_on_origin(self) -> bool:
         """True if it depends on the place of the mechanism in the world."""
         return False

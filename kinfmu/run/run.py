@@ -146,7 +146,7 @@ class Run(Tabular, Displayed):
     mechanism_source: Lazy[Mechanism | str] = Lazy("")
     model_description: str = ""
     info: Lazy[Mapping[str, str]] = Lazy()
-    events: tuple[Event, ...] = ()
+    events: Lazy[tuple[Event, ...]] = Lazy(())
     absent: frozenset[str] = frozenset()
     axis: Lazy[str] = Lazy(TIME)
 

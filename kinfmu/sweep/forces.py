@@ -15,6 +15,7 @@ from kinfmu.errors import RequestError
 from kinfmu.mechanism.force_names import shaking_names
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.forces import force_names, force_steps, loaded_coordinates
+from kinfmu.plan.meeting import distance_steps, meeting_messages
 from kinfmu.plan.origin import localized
 from kinfmu.plan.reactions import reaction_names_of, reaction_steps
 from kinfmu.plan.shaking import shaking_steps
@@ -31,7 +32,7 @@ from kinfmu.sweep.engine import Driven
 from kinfmu.sweep.stages import native_results, native_stage, stage_results
 
 LEAST_SPEED = 1e-100  # [rad/s, ...] of a driver; products with smaller ones lose digits
-_STAGES = 5  # forces by each kind of coefficients, reactions, those on the ground alone
+_STAGES = 6  # forces by each kind of coefficients, reactions, those on the ground alone, distances of ends
 Given = dict[str, FloatArray | float]
 
 
@@ -123,6 +124,19 @@ class ForceModel:
         """Return shaking force and moment at all samples, (n, 3); NaN where the run has no numbers."""
         return self._without_gaps(self._evaluated(self._shaking_stage, run, slice(None), len(run.poses)), run)
 
+    def meetings(self, run: LoadedRun) -> list[tuple[int, str]]:
+        """Return the first sample at which a load has no direction, and the message, for each such load."""
+        stage, messages = self._distances
+        if not messages:
+            return []
+        distances = self._evaluated(stage, run, slice(None), len(run.poses))
+        found = []
+        for message, own in zip(messages, distances.T, strict=True):
+            samples = np.flatnonzero((own == 0.0) & (run.poses.status <= Status.BRIDGED))
+            if len(samples):
+                found.append((int(samples[0]), message))
+        return found
+
     def _without_gaps(self, results: FloatArray, run: LoadedRun) -> FloatArray:
         """Return results (n, ...), NaN at the samples that have no numbers."""
         if run.has_gaps:
@@ -157,6 +171,12 @@ class ForceModel:
     @cached_property
     def _shaking_stage(self) -> CompiledStage:
         return load_stage(shaking_steps(self.poses.plan))
+
+    @cached_property
+    def _distances(self) -> tuple[CompiledStage, tuple[str, ...]]:
+        """The distances between the ends of loads that need a direction, and a message for each."""
+        steps = distance_steps(self.poses.plan)
+        return load_stage(steps), meeting_messages(self.poses.plan, steps)
 
     @cached_property
     def _shaking_count(self) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -193,6 +193,10 @@ class Model:
                 moved, has_gaps = (poses.inputs[:, ::3], poses.inputs[:, 1::3], poses.inputs[:, 2::3]), True
             return LoadedRun(poses, moved, has_gaps, setting, applied, None if inputs else times)
 
+        def events(found: Iterable[tuple[int, str]], level: str) -> tuple[Event, ...]:
+            return tuple(Event(float(k if inputs else times[k]), level, message) for k, message in found)
+
+        failures = events(result.failures, "error")
         run = Run.of_fields(
             t=(lambda: np.arange(count, dtype=float)) if inputs else times,
             outputs=self.outputs,
@@ -218,7 +222,9 @@ class Model:
             length_unit=plan.mechanism.length_unit,
             mechanism_source=self.arguments.mechanism_with(setting),
             info=lambda: self.arguments.info(setting, engine.name),
-            events=tuple(Event(float(k if inputs else times[k]), "error", message) for k, message in result.failures),
+            events=(lambda: (*failures, *events(self._force_model.meetings(loaded()), "warning")))
+            if any(load.needs_direction for load in plan.mechanism.loads)
+            else failures,
             axis=(lambda: axis_for(given[0], self._input_names[::3])) if inputs else TIME,
         )
         itself = weakref.ref(run)  # a run that refers to itself would keep its tables until they are collected

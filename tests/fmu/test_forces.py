@@ -22,7 +22,7 @@ from kinfmu.fmu.unpacked import text_in, unpacked
 from kinfmu.mechanism import toml_file
 from tests.fmu.host import DISCARD, OK, Host, answer
 from tests.gallery_members import mostly_long
-from tests.sweep.test_forces import loaded
+from tests.sweep.test_forces import MEETING, MET, loaded, met
 from tests.sweep.test_redundant_reactions import LOCOMOTIVE, coupled
 
 FLAVOURS = [("python", 2), ("native", 2), ("native", 3)]
@@ -429,3 +429,25 @@ def test_potential_energy_counts_from_the_origin_of_the_world(tmp_path: Path) ->
     for flavour in ("python", "native"):
         fmu = kinfmu.build(mechanism, tmp_path / f"{flavour}.fmu", flavour=flavour)
         assert_forces_equal(kinfmu.simulate(fmu, step=0.25), run)
+
+
+@of_each_flavour
+def test_ends_that_meet_are_reported_in_the_log(flavour: str, fmi: int, tmp_path: Path) -> None:
+    fmu = kinfmu.build(met(MEETING[0]), tmp_path / "met.fmu", flavour=flavour, fmi=fmi)
+    run = kinfmu.simulate(fmu, stop=1.0, step=0.05)
+    nothing = np.arange(21) == 10
+    np.testing.assert_array_equal(np.isnan(run["crank.torque"]), nothing)
+    np.testing.assert_array_equal(np.isnan(run["S.force_x"]), nothing)
+    assert np.isfinite(run["potential_energy"]).all()
+    assert np.isfinite(run["shaking_force_x"]).all()
+    assert (run.status == 0).all()
+    text = "forces have no value: the ends of spring 'return' are in the same place, so that it has no direction"
+    assert {(event.level, event.text) for event in run.events} == {("warning", text)}
+
+
+@of_each_flavour
+def test_the_ends_of_a_spring_without_free_length_may_meet(flavour: str, fmi: int, tmp_path: Path) -> None:
+    fmu = kinfmu.build(toml_file.parse(MET), tmp_path / "met.fmu", flavour=flavour, fmi=fmi)
+    run = kinfmu.simulate(fmu, stop=1.0, step=0.05)
+    assert run["crank.torque"][10] == pytest.approx(-0.5 * 9.81 * 0.04, rel=1e-9)
+    assert not run.events

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import gc
 import weakref
 from dataclasses import replace
@@ -304,6 +305,21 @@ joints.guide = { type = "translational", between = ["ground.O", "slide.S"] }
 drivers.crank = { type = "angle", of = "crank", law = "constant_speed", speed = "60 rpm" }
 loads.return = { type = "spring", between = ["ground.Z", "slide.S"], stiffness = "1 N/mm", free_length = 0 }
 """  # after half a second the slide is on Z
+MEETING = [
+    'type = "spring", stiffness = "1 N/mm", free_length = "10 mm"',
+    'type = "spring", stiffness = "1 N/mm", free_length = 0, preload = "5 N"',
+    'type = "spring", stiffness = "1 N/mm", free_length = "rest"',
+    'type = "gas_spring", extended_length = 99, stroke = 99, extended_force = 3, compressed_force = 4',
+    'type = "damper", damping = 3',
+    'type = "force_between", law = "constant", level = 3',
+]
+
+
+def met(load: str) -> Mechanism:
+    """The slider-crank with another load, whose ends meet after half a second."""
+    first, _, _ = MET.partition("loads.return")
+    start = "parameters = { rest = 0 }\n" if '"rest"' in load else ""
+    return toml_file.parse(f'{start}{first}loads.return = {{ between = ["ground.Z", "slide.S"], {load} }}')
 
 
 @pytest.mark.parametrize("engine", ["python", "native"])
@@ -320,3 +336,31 @@ def test_a_spring_without_free_length_acts_where_its_ends_meet(engine: str, coun
     assert np.isfinite(run.reactions).all()
     near = model.solve(t=[0.5 - 1e-6, 0.5 + 1e-6])  # 6e-6 rad away
     assert near["crank.torque"].mean() == pytest.approx(run["crank.torque"][count // 2], abs=1e-10)
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("count", [3, 41])
+@pytest.mark.parametrize("load", MEETING)
+def test_a_load_whose_ends_meet_has_no_direction_which_a_warning_says(load: str, count: int, engine: str) -> None:
+    """What does not depend on it keeps its value: energies and the shaking force."""
+    mechanism = met(load)
+    run = kinfmu.compile(mechanism, engine=engine).solve(np.linspace(0.4, 0.6, count))
+    nothing = np.arange(count) == count // 2
+    np.testing.assert_array_equal(np.isnan(run["crank.torque"]), nothing)
+    np.testing.assert_array_equal(np.isnan(run["S.force_x"]), nothing)
+    for name in ("potential_energy", "kinetic_energy", "crank.reduced_inertia", "shaking_force_x"):
+        assert np.isfinite(run[name]).all(), name
+    kind = load.partition('"')[2].partition('"')[0].replace("_", " ")
+    text = f"forces have no value: the ends of {kind} 'return' are in the same place, so that it has no direction"
+    assert [(event.level, event.text) for event in run.events] == [("warning", text)]
+    assert run.events[0].t == pytest.approx(0.5, abs=1e-12)
+    assert not kinfmu.solve(mechanism, [0.4, 0.6], engine=engine).events
+    chosen = kinfmu.compile(mechanism, ["crank.phi"], engine=engine).solve([0.5])
+    assert [event.text for event in chosen.events] == [text]
+
+
+def test_events_of_meeting_ends_follow_parts_and_copies() -> None:
+    run = kinfmu.solve(met(MEETING[0]), [0.4, 0.5, 0.6])
+    assert len(copy.copy(run).events) == 1
+    assert len(run.replaced(axis="time").events) == 1
+    assert run.part(slice(0, 2)).events == ()

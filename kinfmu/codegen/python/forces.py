@@ -14,7 +14,7 @@ from typing import Any
 
 from kinfmu.codegen.forces import ARGUMENTS, places_of_symbols
 from kinfmu.codegen.python.block_code import indented, matrix, tupled
-from kinfmu.codegen.python.stage import given_symbols, stage_curves, stage_lines
+from kinfmu.codegen.python.stage import given_symbols, has_roots, stage_curves, stage_lines
 from kinfmu.codegen.writer import identifier
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import ForceSteps
@@ -31,8 +31,9 @@ def emit_forces(plan: SolvePlan, steps: ForceSteps) -> str:
         [
             f'"""Forces of {plan.mechanism.name}: generated from its mechanism, not to be edited."""',
             "",
-            "from math import atan2, cos, floor, sin, sqrt",
+            "from math import atan2, cos, floor, sin",
             *(["", "from .curve import curve"] if curves else []),
+            *(["", "from .roots import sqrt"] if has_roots(steps) else []),
             *(["", "from .solutions import solutions"] if solves(steps) else []),
             "",
             f"FORCES = {tuple(map(str, steps.names))!r}",

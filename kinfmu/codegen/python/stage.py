@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from kinfmu.codegen.python.block_code import indented, matrix, tupled, unpacking
+from kinfmu.codegen.python.roots import sqrt
 from kinfmu.codegen.python.solutions import solutions
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node, reachable, symbols
@@ -85,6 +86,11 @@ def given_symbols(steps: Stage) -> tuple[str, ...]:
     """Return the names of the symbols that no step gives."""
     made = {name for step in steps.steps for name in _names(step)}
     return tuple(symbol.name for symbol in symbols(_roots(steps)) if symbol.name not in made)
+
+
+def has_roots(steps: Stage) -> bool:
+    """Return True for a stage with square roots."""
+    return any(node.op == "sqrt" for node in reachable(_roots(steps)))
 
 
 def stage_curves(steps: Stage) -> dict[CurveData, str]:
@@ -194,7 +200,7 @@ def _curve_of_arrays(data: CurveData, order: int, x: Any) -> Any:
 _OF_NUMBERS: dict[str, Any] = {
     "sin": math.sin,
     "cos": math.cos,
-    "sqrt": math.sqrt,
+    "sqrt": sqrt,
     "floor": floor,
     "atan2": math.atan2,
     "curve": curve_value,

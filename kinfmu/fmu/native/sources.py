@@ -25,6 +25,7 @@ from kinfmu.fmu.owned_motion import units_in_si
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.led_laws import LedLaws
+from kinfmu.plan.meeting import distance_steps, meeting_messages
 from kinfmu.plan.trace import parameter_symbol
 
 RUNTIME = Path(__file__).with_name("runtime")
@@ -107,6 +108,11 @@ def sources(
         if not any(map(solves, forces.values())):
             del instance["solutions.c"]
         instance |= {f"{stage}.c": emit_forces(plan, steps, stage) for stage, steps in forces.items()}
+        distances = distance_steps(plan)
+        if forces and distances.results:
+            messages = [string(message) for message in meeting_messages(plan, distances)]
+            lines = [emit_forces(plan, distances, "distances"), *array("char *const kf_meeting", messages), ""]
+            instance["distances.c"] = "\n".join(lines)
     tables = {"interface.h": _header(plan, variables, version, token), "interface.c": _tables(variables)}
     tables |= {"step.c": _step(version, owns=owns), "events.c": _events(plan, owns=owns)}
     files = emit(plan) | compiler.sources(compiler.SOLVER) | instance | tables
@@ -183,6 +189,8 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
     loads = len(variables.part("loads"))
     forces += [f"#define KF_LOADS {loads} /* efforts of external loads, then constants of the laws of loads */"]
     forces += [f"#define KF_LOAD_INPUTS {len(variables.inputs('loads'))}"]
+    meeting = len(distance_steps(plan).results) if sum(counts.values()) else 0
+    forces += [f"#define KF_MEETING {meeting} /* loads between points that may meet */"] if total else []
     forces += ["#define KF_PART_INPUTS KF_PART_STATES"] if owns else []
     forces = [*forces, ""] if total else []
     bits, not_real = ("unsigned", 1 << 31) if forces else ("unsigned short", 1 << 15)

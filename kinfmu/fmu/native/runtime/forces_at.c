@@ -100,6 +100,36 @@ void kf_read_forces(kf_state *s, unsigned parts)
     kf_forces_at(&s->solver, kf_shown(s), t, drive, efforts, parts, s->real);
 }
 
+/* Warn of loads whose ends are in the same place: they have no direction, so that forces in `parts` have no value. */
+void kf_warn_of_meeting(kf_instance *instance, unsigned parts)
+{
+#if KF_MEETING
+    kf_state *const s = &instance->now;
+    double distances[KF_MEETING];
+    const double *efforts;
+    const double t = shown_at(s, &efforts);
+    bool is_known = true;
+    int part, k;
+    for (part = KF_PART_FORCES; part <= KF_PART_SHAKING; ++part) {
+        for (k = kf_part_first[part]; (parts >> part & 1u) && k < kf_part_first[part + 1]; ++k) {
+            is_known = is_known && !isnan(s->real[k]);
+        }
+    }
+    if (is_known) {
+        return;
+    }
+    kf_distances(t, s->u, s->ud, s->udd, kf_shown(s)->found.x, NULL, NULL, NULL, efforts,
+                 s->solver.model.parameters, distances);
+    for (k = 0; k < KF_MEETING; ++k) {
+        if (distances[k] == 0.0) {
+            kf_answered(instance, KF_WARN, "%s", kf_meeting[k]);
+        }
+    }
+#else
+    (void)instance, (void)parts;
+#endif
+}
+
 /* Forces of another pose, at the time and the loads of the one shown. */
 void kf_forces_of_trial(kf_state *s, const kf_solver *solver, kf_pose *pose, const double *const drive[3],
                         unsigned parts, double *row)

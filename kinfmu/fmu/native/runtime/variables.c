@@ -112,6 +112,7 @@ kf_answer kf_read(kf_instance *instance, unsigned parts)
 #if KF_FORCES
             if (missing & KF_FORCE_PARTS) {
                 kf_read_forces(s, missing);
+                kf_warn_of_meeting(instance, missing);
             }
 #endif
             if (missing & KF_BIT(KF_PART_WATCH)) {
