@@ -1,4 +1,4 @@
-"""dxf(): the pose of a run at one sample as a DXF drawing, for CAD."""
+"""dxf(): one pose of a run as a DXF drawing, for CAD."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ import numpy as np
 
 from kinfmu.draw.animation import placed_run
 from kinfmu.draw.painting import placed
+from kinfmu.draw.pose_at import pose_at
 from kinfmu.draw.writing import write_bytes
 from kinfmu.errors import FigureError, MissingPackageError
 from kinfmu.files.whole_file import suffix_of
 from kinfmu.measures.placement import body_of
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import Run
-from kinfmu.run.axis import axis_of
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.shapes import shapes
 
@@ -32,7 +32,7 @@ POINT_STYLE = 34  # $PDMODE: a cross in a circle
 
 
 def dxf(run: Run, path: str | Path, at: float | None = None) -> None:
-    """Write the pose of `run` at one sample into a .dxf file, in the mechanism's unit of length.
+    """Write one pose of `run` into a .dxf file, in the mechanism's unit of length.
 
     Each body has a layer of its name and colour, with its lines and circles and its points as POINT. Profile and pitch
     curve of a cam are closed polylines on the layer of the cam, one corner a degree; `kinfmu.draw.cam` draws them
@@ -42,12 +42,12 @@ def dxf(run: Run, path: str | Path, at: float | None = None) -> None:
     Args:
         run: The run.
         path: The .dxf file.
-        at: Value on the axis of the run, in the unit of `axis_of`: the nearest sample with numbers is drawn. Default:
-            the first sample with numbers.
+        at: Value on the axis of the run, in the unit of `axis_of`. Between two samples the pose is solved. Default: the
+            first sample with numbers.
 
     Raises:
-        FigureError: The run has no mechanism, not all its coordinates, or no sample with numbers; or the file cannot be
-            written.
+        FigureError: The run has no mechanism, not all its coordinates, or no sample with numbers; `at` is outside the
+            run, in a gap, or between samples from which its pose cannot be solved; or the file cannot be written.
         MissingPackageError: ezdxf is not installed.
 
     """
@@ -61,9 +61,9 @@ def dxf(run: Run, path: str | Path, at: float | None = None) -> None:
         ezdxf: Any = import_module("ezdxf")
     except ImportError:
         raise MissingPackageError(f"{path}: a DXF file needs ezdxf: pip install 'kinfmu[dxf]'") from None
-    row = good[0] if at is None else good[np.argmin(np.abs(axis_of(run).values[good] - at))]
     mechanism, poses = placed_run(run, path)
-    shown = Instant(mechanism, {body: pose[row : row + 1] for body, pose in poses.items()}, {})
+    drawn = {body: pose[good[:1]] for body, pose in poses.items()} if at is None else pose_at(run, mechanism, at, path)
+    shown = Instant(mechanism, drawn, {})
     with without_date(ezdxf):
         text = _drawing(ezdxf, shown, mechanism.length_unit)
     write_bytes(path, text.encode())

@@ -90,6 +90,8 @@ def overlay(
         raise FigureError(
             f"x names {len(xs)} columns for {len(chosen)} curves; name one for all curves, or one for each of them"
         )
+    if how.get("polar") and not xs:
+        xs = _driver_angle(first)
     shown = Overlay(tuple(runs), names, chosen, tuple(xs), **how)
     for run in runs:
         if not len(run) or not chosen:
@@ -117,6 +119,12 @@ def overlay(
             f"least {most - MOST_CURVES} of them, by a minus in front of its name as in -{fullest[-1]}"
         )
     return shown
+
+
+def _driver_angle(run: Run) -> Sequence[str]:
+    """Return the column of the only driver of an angle, for a polar plot of a run over another axis; else none."""
+    angles = [name for name in run.input_names[::3] if name.quantity.kind == "angle" and name not in run.absent]
+    return angles if len(angles) == 1 and run.axis not in run.input_names else ()
 
 
 def _check_angle(run: Run, across: Abscissa) -> None:

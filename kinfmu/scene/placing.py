@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -88,6 +88,32 @@ def recomputed(run: Run, mechanism: Mechanism) -> Mapping[str, FloatArray] | Non
         if not np.all(np.abs(columns[name] - run[name][good]) <= _AGREEMENT * size):  # False for NaN
             return None
     return {name: _spread(column, good, len(run)) for name, column in columns.items()}
+
+
+def poses_after(run: Run, mechanism: Mechanism, row: int, u: Sequence[float]) -> dict[str, FloatArray] | None:
+    """Return poses (1, 3) by body at driver values u (d,), solved along the run up to `row`, and on from there.
+
+    None if the run does not hold its driver values, u cannot be reached, or the pose solved at `row` is not the run's.
+    """
+    from kinfmu.sweep import solve
+
+    values = run.input_names[::3]
+    if not values or run.absent.intersection(values):
+        return None
+    rows = np.append(np.flatnonzero(run.good[:row]), row)
+    inputs: dict[str, Any] = {name: np.append(run.inputs[rows, 3 * k], u[k]) for k, name in enumerate(values)}
+    try:
+        plan = _plan_of_all(_as_run(run, mechanism))
+        found = solve(plan, **inputs)
+    except KinfmuError:
+        return None
+    for name in (*run.names, *run.fixed):
+        size = 1.0 if name.is_angle else plan.size
+        if name not in run.absent and not abs(found[name][-2] - run[name][row]) <= _AGREEMENT * size:
+            return None
+    if not found.good[-1]:
+        return None
+    return {body: pose[-1:] for body, pose in poses_of(found, mechanism)[0].items()}
 
 
 def _as_run(run: Run, mechanism: Mechanism) -> Mechanism:

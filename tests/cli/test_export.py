@@ -243,6 +243,9 @@ def test_displacement_velocity_acceleration_and_jerk_are_a_table(command: Comman
 def test_a_pose_is_drawn_for_cad(record: Path, command: Command, refuses: Callable[..., str]) -> None:
     pytest.importorskip("ezdxf")
     assert command("export", record, "-o", "run.dxf", "--at", "45").stdout == "written: run.dxf\n"
+    outside = command("export", record, "-o", "none.dxf", "--at", "4500")
+    assert (outside.exit_code, outside.stderr.count("\n")) == (1, 1)
+    assert "none.dxf: at t = 4500 s is outside the run, t = 0 to " in outside.stderr
     message = refuses("export", record, "-o", "run.csv", "--at", "45")
     assert message == "--at 45: only for .dxf, not .csv"
     assert "'noon' is not a number" in refuses("export", record, "-o", "run.dxf", "--at", "noon")

@@ -16,6 +16,7 @@ import kinfmu
 from kinfmu.draw import animate, animation, dxf
 from kinfmu.draw.video import encoder, mp4
 from kinfmu.errors import FigureError, MissingPackageError
+from kinfmu.run.axis import axis_of
 from tests.log.runs import fourbar
 
 
@@ -36,16 +37,65 @@ def test_a_pose_is_drawn_in_layers_with_its_true_dimensions(tmp_path: Path) -> N
     (law,) = [joint.law for joint in mechanism.joints if joint.name == "pitch"]
     angle = np.radians(np.arange(360.0))
     radii = np.array([law.at(one) for one in angle])
-    turned = angle + np.radians(100.0)
+    turned = angle + np.radians(100.2)
     np.testing.assert_allclose(corners, radii[:, None] * np.column_stack([np.cos(turned), np.sin(turned)]), atol=1e-9)
     assert pitch.closed
     points = {tuple(np.round([*one.dxf.location.vec2], 9)) for one in space.query("POINT") if one.dxf.layer == "lever"}
-    assert points == {(90.0, 0.0), tuple(np.round([run["roller.x"][100], run["roller.y"][100]], 9))}
+    there = kinfmu.solve(mechanism, cam_angle=np.radians([0.0, 100.0, 100.2]))
+    assert points == {(90.0, 0.0), tuple(np.round([there["roller.x"][2], there["roller.y"][2]], 9))}
     (roller,) = space.query("CIRCLE")
     assert roller.dxf.radius == 12.0
     np.testing.assert_allclose(np.hypot(*(inside - corners).T), 12.0, rtol=1e-12)
     gaps = np.hypot(*(inside - np.array([*roller.dxf.center.vec2])).T) - 12.0
     assert abs(gaps.min()) < 4e-3  # the profile has a corner at each degree
+
+
+def crank_angle_drawn(path: Path) -> float:
+    """Return the angle [deg] of the crank of a four-bar in a drawing, from the points of the crank."""
+    ezdxf = pytest.importorskip("ezdxf")
+    points = ezdxf.readfile(path).modelspace().query("POINT")
+    ends = sorted(
+        (np.array([*one.dxf.location.vec2]) for one in points if one.dxf.layer == "crank"), key=np.linalg.norm
+    )
+    return float(np.degrees(np.arctan2(*(ends[-1] - ends[0])[::-1])) % 360.0)
+
+
+@pytest.mark.parametrize("kind", ["driver", "backwards", "law", "inputs"])
+def test_a_pose_between_samples_is_solved(kind: str, tmp_path: Path) -> None:
+    mechanism, t = kinfmu.load("crank_rocker"), np.linspace(0.0, 1.0, 21)
+    if kind in ("driver", "backwards"):
+        angles = np.radians(np.linspace(0.0, 360.0, 37))
+        run, at, wanted = kinfmu.solve(mechanism, crank_angle=angles[:: 1 if kind == "driver" else -1]), 15.0, 15.0
+    elif kind == "law":
+        run, at = kinfmu.solve(mechanism, t), 0.513
+        wanted = np.degrees(float(mechanism.drivers[0].law.at(at))) % 360.0
+    else:
+        u = 0.3 + t**4
+        run = kinfmu.solve(mechanism, crank_angle=u, crank_speed=4.0 * t**3, crank_acceleration=12.0 * t**2)
+        run, at = run.replaced(t=t, axis="time"), 0.525
+        wanted = np.degrees(0.3 + at**4)
+    dxf(run, tmp_path / "a.dxf", at=at)
+    assert crank_angle_drawn(tmp_path / "a.dxf") == pytest.approx(wanted, abs=1e-5 if kind == "inputs" else 1e-9)
+    dxf(run, tmp_path / "b.dxf", at=float(axis_of(run).values[7]))
+    wanted = np.degrees(run["crank.phi"][7]) % 360.0
+    assert crank_angle_drawn(tmp_path / "b.dxf") == pytest.approx(wanted, abs=1e-9)
+
+
+def test_a_pose_that_the_run_does_not_have_is_refused(tmp_path: Path) -> None:
+    pytest.importorskip("ezdxf")
+    run = kinfmu.solve(kinfmu.load("crank_rocker"), crank_angle=np.radians(np.linspace(0.0, 360.0, 37)))
+    for at in (400.0, -50.0):
+        with pytest.raises(
+            FigureError, match=rf"a\.dxf: at crank = {at:g} deg is outside the run, crank = 0 to 360 deg$"
+        ):
+            dxf(run, tmp_path / "a.dxf", at=at)
+    with pytest.raises(FigureError, match=r"at sample = 1\.5 is between two samples, .* cannot be solved .*: 1 and 2$"):
+        dxf(run.replaced(axis="sample", t=np.arange(37.0)), tmp_path / "a.dxf", at=1.5)
+    status = np.array(run.status)
+    status[3] = 3
+    with pytest.raises(FigureError, match=r"a\.dxf: the run has no numbers at crank = 25 deg$"):
+        dxf(run.replaced(status=status), tmp_path / "a.dxf", at=25.0)
+    assert not (tmp_path / "a.dxf").exists()
 
 
 def with_loads(name: str) -> tuple[kinfmu.Mechanism, kinfmu.Mechanism]:

@@ -111,10 +111,16 @@ def test_a_polar_plot_has_the_driver_as_its_angle(run: Run) -> None:
     curve = curve * np.exp(1j * np.tile(run["crank.phi"], 2))
     numbers = (axes.get_yticks() - axes.get_rmin()) * np.exp(1j * np.radians(axes.get_rlabel_position()))
     assert np.abs(numbers[:, None] - curve).min() > 0.1  # of a radius of about 3
+    (by_default,) = sheet([run], ["A.y", "coupler.x"], [], polar=True).axes
+    np.testing.assert_allclose(by_default.lines[0].get_xydata(), axes.lines[0].get_xydata(), atol=1e-12)
+
+
+def test_a_polar_plot_without_a_single_driver_of_an_angle_needs_an_angle() -> None:
+    run = kinfmu.solve(kinfmu.load("five_bar"))
     with pytest.raises(
-        FigureError, match=r"^a polar plot needs an angle, not t \[s\]; name one by x \(--x\), such as crank\.phi$"
+        FigureError, match=r"^a polar plot needs an angle, not t \[s\]; name one by x \(--x\), such as "
     ):
-        sheet([run], ["A.y"], [], polar=True)
+        sheet([run], ["left_arm.phi"], [], polar=True)
 
 
 def test_a_sheet_with_too_many_curves_names_what_to_leave_out(run: Run) -> None:
