@@ -25,6 +25,7 @@ from kinfmu.solver.python import Pose
 
 TOO_LONG = 50.0  # medians of all links; a link that long is probably in another unit
 TOO_SHORT = 1e-3  # of the shortest neighbour; a link that short is probably in another unit
+NEAR_PIVOTS = 1e-2  # of the shortest body there; pivots so close are probably in another unit
 _LEAST_LINKS = 4  # fewer have no usual length
 _STILL = 1e-9  # [rad, sizes]; a body that moves less does not move
 _SAME = 1e-9  # of the size; points closer than this coincide
@@ -116,6 +117,30 @@ def _short_links(mechanism: Mechanism) -> Iterator[str]:
             yield (
                 f"{body} is {length:.4g} {unit} long between its joints, its neighbours at least {min(others):.4g} "
                 f"{unit}: are its points in another unit?"
+            )
+
+
+def near_pivots(mechanism: Mechanism) -> Iterator[str]:
+    """Yield a line for each two joints on the ground that are much closer than the bodies there are long.
+
+    Small offsets are sound, so this is for mechanisms that do not close.
+    """
+    points, unit = mechanism.body_points, mechanism.length_unit
+    at: dict[str, set[str]] = {}  # bodies by point of the ground
+    held: dict[str, list[str]] = {}
+    for joint in mechanism.joints:
+        between = [point for point in getattr(joint, "between", ()) if point in points]
+        for point in between:
+            held.setdefault(body_of(point), []).append(point)
+            if body_of(point) == GROUND_NAME:
+                at.setdefault(point, set()).update(body_of(other) for other in between if other != point)
+    for first, second in combinations(at, 2):
+        lengths = [_longest(points, held[body]) for body in at[first] | at[second]]
+        apart, shortest = math.dist(points[first], points[second]), min(filter(None, lengths), default=0.0)
+        if 0.0 < apart <= NEAR_PIVOTS * shortest:
+            yield (
+                f"{first} and {second} are {apart:.4g} {unit} apart, the bodies there at least {shortest:.4g} {unit} "
+                "long: are their points in another unit?"
             )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kinfmu.analysis.assemblies import Assemblies, find_assemblies
 from kinfmu.analysis.cams import cam_findings
-from kinfmu.analysis.design_notes import motion_notes, part_notes, unused_points
+from kinfmu.analysis.design_notes import motion_notes, near_pivots, part_notes, unused_points
 from kinfmu.analysis.driver_path import follow
 from kinfmu.analysis.drivers import INSTEAD, DriverAdvice, clearer_problem, driver_advice
 from kinfmu.analysis.dyads import find_dyads
@@ -85,6 +85,7 @@ def check(mechanism: Mechanism, *, written: Mechanism | None = None) -> Report:
     try:
         plan = plan_from(mechanism, system, origin, redundancy)
     except KinfmuError as problem:
+        notes += near_pivots(mechanism) if isinstance(problem, AssemblyError) else ()
         advice = driver_advice(system, redundancy)
         loops = find_named_loops(mechanism, redundancy, ())
         problem = _after_probable_cause(clearer_problem(problem, system, redundancy, advice), system, advice)

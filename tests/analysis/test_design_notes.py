@@ -112,6 +112,22 @@ def test_a_follower_that_its_cam_holds_at_rest_is_no_body_to_be_welded(rise: str
     assert not [note for note in kinfmu.check(mechanism).notes if "move" in note]
 
 
+def test_pivots_in_another_unit_are_named_where_the_mechanism_does_not_close() -> None:
+    report = kinfmu.check(
+        changed(
+            ("C = [40, 0] }", "C = [0.04, 0] }"), ("Q = [50, 0] }\nstart = { x = 40", "Q = [90, 0] }\nstart = { x = 40")
+        )
+    )
+    assert "does not close" in str(report.problem)
+    assert report.notes == (
+        "ground.O and ground.C are 0.04 mm apart, the bodies there at least 20 mm long: are their points in another "
+        "unit?",
+    )
+    sound = kinfmu.check(changed(("C = [40, 0] }", "C = [0.04, 0] }")))
+    assert sound.problem is None
+    assert not [note for note in sound.notes if "another unit" in note]
+
+
 def test_points_that_nothing_uses_are_named() -> None:
     assert notes(("Q = [50, 0] }\nstart = { x = 20", "Q = [50, 0], R = [9, 9] }\nstart = { x = 20")) == (
         "point coupler.R is used by no joint, driver, load, measure or point of interest",
