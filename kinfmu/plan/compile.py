@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from kinfmu.drivers import Driver
 from kinfmu.equations.graph import Node, symbols
@@ -98,7 +98,7 @@ def plan_from(
     rates, row = TimeDerivatives(tracer, known), RowTracer(system, tracer)
     motions, coordinate_count, fixed = _outputs(mechanism, origin, tracer, rates, known)
     if outputs is not None:
-        motions, coordinate_count = _chosen(motions, coordinate_count, outputs)
+        motions, coordinate_count = _chosen(motions, coordinate_count, outputs, fixed)
     at_anchor: dict[str, float] = dict(zip(system.coordinates, map(float, anchor.q), strict=True))
     at_anchor |= {parameter_symbol(parameter.name): parameter.value for parameter in settable}
     blocks = _needed(
@@ -166,13 +166,18 @@ def _outputs(
 
 
 def _chosen(
-    motions: Sequence[MotionNodes[CoordinateName]], coordinate_count: int, outputs: Sequence[str]
+    motions: Sequence[MotionNodes[CoordinateName]],
+    coordinate_count: int,
+    outputs: Sequence[str],
+    fixed: Collection[CoordinateName],
 ) -> tuple[list[MotionNodes[CoordinateName]], int]:
     """Return the motions of the outputs requested, and how many of these are coordinates."""
     known = [motion.name for motion in motions]
     if isinstance(outputs, str):
         raise RequestError(f"outputs: '{outputs}' must be a list of names, such as ['{known[0]}']")
     for name in outputs:
+        if name in fixed:
+            raise RequestError(f"outputs: '{name}' is not one: the joints hold it constant; outputs: {listed(known)}")
         if name not in known:
             raise RequestError(f"outputs: '{name}' is not one{suggestion(name, known)}; outputs: {listed(known)}")
     chosen = [(k, motion) for k, motion in enumerate(motions) if motion.name in outputs]

@@ -10,7 +10,7 @@ import numpy as np
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.run.axis import TIME
 from kinfmu.run.run import FloatArray, IntArray, Run
-from kinfmu.units import CoordinateName, ForceName, SignalName
+from kinfmu.units import CoordinateName, ForceName, SignalName, unit_of
 
 ALWAYS = ("time", "solver.status")  # without them a sample has no meaning
 DRAWN = "drawn"
@@ -56,6 +56,10 @@ def kept_columns(run: Run, names: Sequence[str]) -> frozenset[str]:
 
     """
     groups, columns = _groups(run), list(run.column_units())
+    for name, value in run.fixed.items():
+        if {name, f"-{name}"} & {*names}:
+            unit = unit_of(name.quantity(), run.length_unit)
+            raise RequestError(f"channel '{name}' is not a column: the joints hold it at {value + 0.0:.9g} {unit}")
     kept = _kept(names, lambda name: _chosen(name, groups, columns))
     minus = (name[1:] for name in names if name.startswith("-"))
     left_out = {column for name in minus for column in _chosen(name, groups, columns)} - kept

@@ -122,6 +122,17 @@ def test_a_column_that_is_not_there_is_reported(record: Path, refuses: Callable[
     assert message.startswith(expected)
 
 
+def test_a_coordinate_that_joints_hold_is_no_column(command: Command, refuses: Callable[..., str]) -> None:
+    """The piston slides along x; plots draw its y as a line, over which other columns may be plotted."""
+    held = "channel 'piston.y' is not a column: the joints hold it at 0 mm"
+    assert command("solve", "slider_crank", "-o", "run.mcap").exit_code == 0
+    assert refuses("export", "run.mcap", "-o", "run.csv", "--columns", "piston.y") == held
+    assert command("export", "run.mcap", "-o", "run.svg", "--columns", "piston.x", "--x", "piston.y").exit_code == 0
+    assert refuses("simulate", "slider_crank", "--channels", "q,-piston.y") == held
+    message = refuses("solve", "slider_crank", "-o", "run.csv", "--outputs", "piston.y")
+    assert "outputs: 'piston.y' is not one: the joints hold it constant; outputs: crank.phi" in message
+
+
 def test_animations_have_the_width_that_is_asked_for(
     record: Path,
     command: Command,
