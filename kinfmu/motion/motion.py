@@ -28,6 +28,7 @@ from kinfmu.motion.going_round import goes_round
 from kinfmu.motion.history import FEWEST, Extreme, History
 from kinfmu.motion.margins import lowest
 from kinfmu.motion.needed import Cosine, PathCoordinate, QuantityRead, cosine_between, is_angle, value_of
+from kinfmu.motion.poles import first_pole
 from kinfmu.motion.quantity_names import QuantityNames
 from kinfmu.motion.quintic import FloatArray, IntArray
 from kinfmu.motion.sampled import sampled_history
@@ -38,8 +39,6 @@ from kinfmu.units import CoordinateName, Quantity
 
 SHAPES: dict[str, type[Line] | type[Circle]] = {"line": Line, "circle": Circle}
 Vector = tuple[Taylor, Taylor]
-_SLOW = 1e-6  # of the largest speed; of two quantities that turn together both are
-_RESTING = 1e-12  # of the largest speed, at a sample
 _STILL = 1e-9  # [rad, sizes]; of rates: of their largest value; a quantity that changes by less does not move
 _TURNED = 1.0  # [rad]; the ends of a motion that goes round differ by nothing or by whole turns
 
@@ -318,23 +317,9 @@ class Motion:
         return ~np.isnan(self._pole(of, to)), f"{_name(to)} turns back, where the ratio has no bound"
 
     def _pole(self, of: str | PoseQuantity, to: str | None) -> FloatArray:
-        """Return (...) the first place where a ratio of speeds has no bound, NaN for designs without one.
-
-        There the other quantity turns back while the first one moves.
-        """
-        over, under = map(self._cut, self._speeds(of, to))
-        over, under = (
-            History.of(one, one.taylor + 0.0 * other.taylor) for one, other in ((over, under), (under, over))
-        )  # both with an axis of designs if one has it
-        design, x = under.crossings(np.zeros(under.value.shape[:-1]))
-        speeds = np.abs(under.value.reshape(-1, len(under.x)))
-        resting = np.nonzero(speeds <= _RESTING * speeds.max(axis=1, keepdims=True))
-        design, x = np.append(design, resting[0]), np.append(x, under.x[resting[1]])
-        own = over.of_designs(design)
-        moves = np.abs(own.at(x[:, None])[0][:, 0]) > _SLOW * np.abs(own.value).max(axis=1)
-        first = np.full(len(speeds), np.inf)
-        np.minimum.at(first, design[moves], x[moves])
-        return np.where(np.isfinite(first), first, np.nan).reshape(over.value.shape[:-1])
+        """Return (...) the first place where a ratio of speeds has no bound, NaN for designs without one."""
+        over, under = self._speeds(of, to)
+        return first_pole(self._cut(over), self._cut(under))
 
     def _speeds(self, of: str | PoseQuantity, to: str | None) -> tuple[History, History]:
         """Return the speeds of a quantity and of another, as in `speed_ratio`, without regard to the window."""
