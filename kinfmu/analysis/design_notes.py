@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
-from functools import partial
 from itertools import combinations, pairwise
 from statistics import median_low
 from typing import NamedTuple
@@ -21,7 +20,6 @@ from kinfmu.measures import PoseQuantity
 from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
-from kinfmu.solver.python import Pose
 
 TOO_LONG = 50.0  # medians of all links; a link that long is probably in another unit
 TOO_SHORT = 1e-3  # of the shortest neighbour; a link that short is probably in another unit
@@ -219,12 +217,14 @@ def _toggles(mechanism: Mechanism, path: DriverPath, loops: Sequence[NamedLoop])
     if path.kind == "angle" and high - low >= math.tau * (1.0 - 1e-9):
         return
     edge = _EDGE * (high - low)
+    coordinates = [*map(path.coordinates, path.poses)]
     for named in loops:
         for toggle in _toggles_of(named.loop):
-            sine = partial(_sine, path, toggle)
-            for before, after in pairwise(path.poses):
-                if sine(before) * sine(after) < 0.0:
-                    at = _within(path, path.zero(sine, before, after).u[0], low)
+            sines = [_sine(toggle, q) for q in coordinates]
+            for (before, after), (one, other) in zip(pairwise(path.poses), pairwise(sines), strict=True):
+                if one * other < 0.0:
+                    zero = path.zero(lambda pose: _sine(toggle, path.coordinates(pose)), before, after)  # noqa: B023
+                    at = _within(path, zero.u[0], low)
                     if low + edge < at < high - edge:
                         value = value_text(at, mechanism.length_unit, path.kind)
                         yield f"the run crosses a toggle position: {toggle.happens} at {path.name} = {value}"
@@ -259,9 +259,8 @@ def _within(path: DriverPath, u: float, low: float) -> float:
     return low + (u - low) % period
 
 
-def _sine(path: DriverPath, toggle: _Toggle, pose: Pose) -> float:
+def _sine(toggle: _Toggle, q: Mapping[str, float]) -> float:
     """Return the sine of the angle between the two links, or between the rod and the normal of its slide."""
-    q = path.coordinates(pose)
     (ax, ay), (bx, by), *third = (place.world(q) for place in toggle.places)
     cx, cy = third[0] if third else (bx + math.cos(toggle.across), by + math.sin(toggle.across))
     return ((bx - ax) * (cy - by) - (by - ay) * (cx - bx)) / (

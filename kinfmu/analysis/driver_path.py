@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -23,9 +24,13 @@ SIZES = 3.0  # reach of a driver of a length, in both directions
 _LARGE = 150  # coordinates; a larger mechanism is followed for one turn only
 _NEAR_LIMIT = 1e-6  # [rad, sizes]; distance from a limit of the poses from which its own is extrapolated
 _REPEATS = 1e-6  # [rad, sizes]; poses closer than this are equal
-_HALVINGS = 60
+_SAME = 1e-15  # of a driver value; places closer than this are equal
 _MANY = 200  # poses among which no two extremes of a quantity are neighbours
 _NEAR_END = 16  # poses between the last one and a limit, where coordinates change with the root of the distance
+
+
+class _PathEndsError(Exception):
+    """A pose cannot be reached."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,23 +85,24 @@ class DriverPath:
         return tuple(pose for pose in (*poses, *last) if pose.good)
 
     def zero(self, value: Callable[[Pose], float], low: Pose, high: Pose) -> Pose:
-        """Return the pose between two where a value changes its sign, by bisection."""
-        at_low = value(low)
-        if at_low == 0.0:
-            return low
-        for _ in range(_HALVINGS):
-            u = 0.5 * (low.u[0] + high.u[0])
-            middle = self.solver.solve(low, (u,))
-            if not middle.good or u in (low.u[0], high.u[0]):
-                break
-            at_middle = value(middle)
-            if at_middle == 0.0:
-                return middle
-            if (at_middle < 0.0) == (at_low < 0.0):
-                low = middle
-            else:
-                high = middle
-        return low
+        """Return the pose between two where a value changes its sign; one where the path ends before it."""
+        from scipy.optimize import brentq
+
+        found, ends = low, {low.u[0]: low, high.u[0]: high}
+
+        def at(u: float) -> float:
+            nonlocal found
+            pose = ends.get(u) or self.solver.solve(low, (u,))
+            if not pose.good:
+                raise _PathEndsError
+            found = pose
+            return value(pose)
+
+        with suppress(_PathEndsError):
+            u = brentq(at, low.u[0], high.u[0], xtol=_SAME, rtol=_SAME)
+            if u != found.u[0]:
+                at(u)
+        return found
 
     def at_limit(self, limit: Limit) -> dict[str, float]:
         """Return all coordinates by name at one of the limits.
