@@ -17,6 +17,7 @@ from kinfmu.codegen.c import compiler, emit
 from kinfmu.codegen.c.forces import SIGNATURE, emit_forces
 from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
 from kinfmu.codegen.forces import load_inputs
+from kinfmu.codegen.python.forces import solves
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import reaction_names_of, shaking_names
@@ -114,11 +115,13 @@ def page_sources(plan: SolvePlan, points: Sequence[str], labels: Mapping[str, st
     files = emit(plan, labels) | compiler.sources([*compiler.SOLVER, *FOLLOWER])
     files |= {"instance.h": _header(plan, points), "points.h": _points(plan, points)}
     files["interface.c"] = _INTERFACE.read_text("utf-8")
-    lines = ["/* The whole module as one unit. Files included here are not compiled separately. */"]
-    lines += [f'#include "{name}"' for name in sorted(files) if name.endswith(".c")]
     names = force_names(plan.mechanism)
     stages = {"forces": force_steps(plan, names, coefficients="given")} if names else {}
     stages |= _reaction_stages(plan)
+    if any(map(solves, stages.values())):
+        files |= compiler.sources(["solutions.c"])
+    lines = ["/* The whole module as one unit. Files included here are not compiled separately. */"]
+    lines += [f'#include "{name}"' for name in sorted(files) if name.endswith(".c")]
     files |= {f"{stage}.c": emit_forces(plan, steps, stage, are_loads_open=False) for stage, steps in stages.items()}
     return files | {"page.c": "\n".join(lines) + "\n"}
 

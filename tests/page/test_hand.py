@@ -99,7 +99,7 @@ def test_banner_names_the_joint_and_goes_with_what_it_was_about(chromium: Browse
         for after in ("undo", "value", "reset"):
             page.drag("ground.C", [(x + 60 * k, y) for k in range(1, 15)])
             banner = page.tab.text_content("#banner")
-            assert banner.startswith("Stops here. Joint C does not close: gap ")
+            assert banner.startswith("Stops here: joint C does not close: gap ")
             if after == "value":
                 field = page.tab.get_by_label("rocker.Q x mm", exact=True)
                 field.fill("51")

@@ -12,6 +12,7 @@ import pytest
 import kinfmu
 from kinfmu import Status
 from kinfmu.errors import KinfmuError
+from kinfmu.mechanism.toml_file import parse
 from kinfmu.page.module import page_module
 from tests.page.engines import (
     StepByStep,
@@ -31,6 +32,24 @@ MEMBERS = {  # with what their poses are
     "excavator": {Status.OK},  # three cylinders
     "triple_rocker": {Status.OK, Status.OUTSIDE},
 }
+THREE_BARS = parse("""
+name = "three_bars"
+bodies.ground.points = { O = [0, 0] }
+bodies.base = { points = { O = [0, 0], A = [0, 0], B = [2, 0], C = [1, 0] }, mass = 1 }
+bodies.crank = { points = { A = [0, 0], P = [1, 0] }, start = { phi = 1 }, mass = 1 }
+bodies.rocker = { points = { B = [0, 0], P = [1, 0] }, start = { phi = 1 }, mass = 1, inertia = 0.1 }
+bodies.third = { points = { C = [0, 0], P = [1, 0] }, start = { phi = 1 }, mass = 1, inertia = 0.1 }
+bodies.bar = { points = { P = [0, 0], Q = [2, 0], R = [1, 0] }, start = { phi = 0 }, mass = 1, inertia = 0.1 }
+joints.O = { type = "revolute", between = ["ground.O", "base.O"] }
+joints.A = { type = "revolute", between = ["base.A", "crank.A"] }
+joints.B = { type = "revolute", between = ["base.B", "rocker.B"] }
+joints.C = { type = "revolute", between = ["base.C", "third.C"] }
+joints.P = { type = "revolute", between = ["crank.P", "bar.P"] }
+joints.Q = { type = "revolute", between = ["rocker.P", "bar.Q"] }
+joints.R = { type = "revolute", between = ["third.P", "bar.R"] }
+drivers.crank = { type = "angle", of = "crank", law = "constant_speed" }
+drivers.base = { type = "angle", of = "base", law = "constant_speed" }
+""")
 LOADED = "excavator_loaded"  # masses, several drivers
 LEG = kinfmu.load("jansen_leg")
 OTHER_LEG = {"m": 14.0, "k": 62.5, "crank.speed": 3.0}
@@ -91,8 +110,10 @@ def swept(native: Callable[[str], StepByStep], tmp_path_factory: pytest.TempPath
         ["reactions", TIMES[-1]],
     ]
     jobs.append((loaded, calls))
+    bars = page_module(THREE_BARS)
+    jobs.append((bars, [["at", [1.0, 0.3], [1.0, 1.0], [0.0, 0.0]], ["reactions", 0.0], ["forces", 0.0]]))
     found = answers(tmp_path_factory.mktemp("page"), jobs)
-    return {"runs": {**runs, LOADED: run}, **dict(zip([*MEMBERS, "refused", "bound", LOADED], found, strict=True))}
+    return {"runs": {**runs, LOADED: run}, **dict(zip([*MEMBERS, "refused", "bound", LOADED, "three_bars"], found, strict=True))}
 
 
 def test_forces_are_those_of_a_run(swept: dict[str, Any]) -> None:
@@ -110,6 +131,16 @@ def test_reactions_and_shaking_force_are_those_of_a_run(swept: dict[str, Any]) -
     assert names == run.reaction_names
     assert names[-3:] == ("shaking_force_x", "shaking_force_y", "shaking_moment")
     assert np.abs(reactions - run.reactions[-1]).max() < 1e-12 * np.abs(run.reactions).max()
+
+
+def test_reactions_that_need_a_system_of_three_unknowns(swept: dict[str, Any]) -> None:
+    inputs = {"crank_angle": [1.0], "base_angle": [0.3], "crank_speed": 1.0, "base_speed": 1.0}
+    run, (status, reactions, forces) = kinfmu.solve(THREE_BARS, **inputs), swept["three_bars"]
+    known = np.isfinite(run.reactions[0])  # redundant rows share a load
+    assert status == Status.OK
+    assert page_module(THREE_BARS).reactions == tuple(np.array(run.reaction_names)[known])
+    assert np.abs(reactions - run.reactions[0, known]).max() < 1e-12 * np.abs(run.reactions[0, known]).max()
+    assert np.abs(forces - run.forces[0]).max() < 1e-12 * np.abs(run.forces[0]).max()
 
 
 @pytest.mark.parametrize("name", MEMBERS)

@@ -222,7 +222,7 @@ def test_lengths_that_do_not_close_keep_the_last_pose_in_grey(chromium: Browser)
         field.press("Enter")
         page.settle()
         banner = page.tab.text_content("#banner")
-        assert re.match(r"Does not close\. Joint knee does not close: gap [\d.]+ mm\. The last good", banner)
+        assert re.match(r"Does not close: joint knee does not close: gap [\d.]+ mm\. The last good", banner)
         assert page.get("k.extra().isGhost")
         assert page.get("Array.from(k.linkage.pose.q)") == pose
         field.fill("15")
@@ -238,7 +238,7 @@ def test_a_crank_at_its_limit_names_joint_and_gap(chromium: Browser) -> None:
         limit = max(one["at"] for one in page.get("k.linkage.limits"))
         page.move(limit + 0.2)
         banner = page.tab.text_content("#banner")
-        assert re.match(r"Stops here\. .* cannot close; there, joint \w+ does not close: gap [\d.]+ mm\.$", banner)
+        assert re.match(r"Stops here: .* cannot close; there, joint \w+ does not close: gap [\d.]+ mm\.$", banner)
         assert page.get("k.linkage.u[0]") == pytest.approx(limit, abs=1e-3)
         assert page.errors == []
 
@@ -349,7 +349,7 @@ def test_masses_and_gravity_have_the_limits_and_the_effects_of_the_file(chromium
             page.get(f"k.refresh(() => {{ k.design.set({{'bodies.rocker.{key}': -1}}); k.reshape(); }})")
             page.settle()
             text = page.tab.inner_text("#banner")
-            assert text.startswith(f"Not valid. [bodies.rocker] {key} = -1 must be 0 or more.")
+            assert text.startswith(f"Not valid: [bodies.rocker] {key} = -1 must be 0 or more.")
             assert page.get("Array.from(k.linkage.pose.forces)") == before
             page.get(f"k.refresh(() => {{ k.design.set({{'bodies.rocker.{key}': 0.5}}); k.reshape(); }})")
             page.settle()
@@ -518,3 +518,11 @@ def test_keyboard_alone_moves_plays_and_changes_values(chromium: Browser) -> Non
         page.settle()
         assert page.get("k.design.values.get('bodies.crank.points.P.x')") == 20
         assert page.errors == []
+
+
+def test_a_pose_that_is_too_far_is_refused_by_that_reason_alone(chromium: Browser) -> None:
+    with chromium.open(text_of("crank_rocker")) as page:
+        assert page.get("k.linkage.goTo([1.2e6])") is False
+        text = page.get("k.linkage.failure")
+        assert text.startswith("crank = ")
+        assert text.endswith("steps on one path")

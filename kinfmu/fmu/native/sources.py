@@ -102,11 +102,11 @@ def sources(
             instance["laws.c"] = emit_forces(plan, laws.steps, "laws")
         instance["dormand_prince.h"] = dormand_prince(pair.C, pair.A, b=pair.B, e3=pair.E3, e5=pair.E5)
     if not (forces or owns):
-        del instance["forces_at.c"], instance["solutions.c"]
+        del instance["forces_at.c"]
         instance = {name: _OF_FORCES.sub("", text) for name, text in instance.items()}
     else:
-        if not any(map(solves, forces.values())):
-            del instance["solutions.c"]
+        if any(map(solves, forces.values())):
+            instance |= compiler.sources(["solutions.c"])
         instance |= {f"{stage}.c": emit_forces(plan, steps, stage) for stage, steps in forces.items()}
         distances = distance_steps(plan)
         if forces and distances.results:

@@ -103,8 +103,8 @@ export class Linkage {
     goTo(u, rates = null) {
         if (this.#follow(u, rates)) return true;
         const message = this.shown.message || "This pose is unreachable.";
-        const { text } = this.shown.gap(this.shown.parameters.slice(), Float64Array.from(u));
-        this.failure = text ? `${message}; there, ${text}` : message;
+        const { text, hasGap } = this.shown.gap(this.shown.parameters.slice(), Float64Array.from(u));
+        this.failure = hasGap ? `${message}; there, ${text}` : message;
         return false;
     }
 

@@ -13,7 +13,7 @@ import { keyboard } from "./keyboard.js";
 import { Linkage } from "./linkage.js";
 import { ofJoints } from "./messages.js";
 import { Motion } from "./motion.js";
-import { sentence } from "./numbers.js";
+import { withStop } from "./numbers.js";
 import { filesPanel, Plots, showPanel } from "./panels.js";
 import { CanvasPen } from "./pen.js";
 import { Transport } from "./transport.js";
@@ -128,9 +128,9 @@ class Page {
         $("undo").disabled = !design.past.length;
         $("redo").disabled = !design.future.length;
         $("reset").disabled = !design.changes().length;
-        const head = design.isInvalid ? "Not valid. " : design.isOtherBranch ? "Another branch. " : "Does not close. ";
-        if (!design.isOk) this.#banner(head, `${sentence(this.inWords(design.failure))} The last good pose is shown in grey.`);
-        else this.#banner("Stops here. ", motion.blocked && sentence(this.inWords(motion.blocked)));
+        const head = design.isInvalid ? "Not valid: " : design.isOtherBranch ? "Another branch: " : "Does not close: ";
+        if (!design.isOk) this.#banner(head, `${withStop(this.inWords(design.failure))} The last good pose is shown in grey.`);
+        else this.#banner("Stops here: ", motion.blocked && withStop(this.inWords(motion.blocked)));
     }
 
     // Return why something does not close, with joints and drivers in place of rows.

@@ -30,7 +30,7 @@ export function grouped(members, key) {
     return found;
 }
 
-// Return a text as a sentence: its first letter large, a full stop at its end.
-export function sentence(text) {
-    return `${text.slice(0, 1).toUpperCase()}${text.slice(1).replace(/[.]$/, "")}.`;
+// Return a text with a full stop at its end; names at its begin keep their letters.
+export function withStop(text) {
+    return `${text.replace(/[.]$/, "")}.`;
 }

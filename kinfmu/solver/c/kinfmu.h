@@ -131,6 +131,8 @@ bool kf_lu(int k, const double *matrix, double *factors, double *determinant);
 void kf_lu_solve(int k, const double *factors, const double *right, double *x);
 bool kf_qr(int m, int k, const double *matrix, double *factors, double *determinant);
 void kf_qr_solve(int m, int k, const double *factors, const double *right, double *x);
+/* solutions.c, of stages of forces. */
+void kf_solutions(int m, int k, int columns, const double *a, const double *b, double *factors, double *x);
 double kf_row_part(int k, const double *matrix, const double *usual);
 double kf_column_part(int m, int k, const double *matrix, const double *usual);
 double kf_unclosed(int m, int k, const double *matrix, const double *right, double damping);

@@ -85,6 +85,30 @@ def test_directional_derivative_with_respect_to_an_input_is_the_finite_differenc
     np.testing.assert_allclose(host.slopes(outputs, [moved], [-2.5]), -2.5 * exact, rtol=1e-9, atol=1e-11)
 
 
+@pytest.mark.parametrize("steps", [[0.1], [0.1, 0.1], [0.1, 0.1, 0.1], [0.1, 0.05, 0.2]])
+@pytest.mark.parametrize("moves", [False, True])
+def test_directional_derivatives_after_a_step_are_the_differences_of_setting_an_input(
+    start: Start, steps: list[float], moves: bool
+) -> None:
+    host = start("crank_rocker")
+    (angle,) = host.get("crank_angle")
+    host.set({"crank_angle": angle})
+    outputs = [v.name for part in ("values", "rates", "accelerations") for v in host.about.interface.part(part)]
+    time = 0.0
+    for k, step in enumerate(steps):
+        if moves:
+            angle += 0.03 * (k + 1)
+            host.set({"crank_angle": angle})
+        host.step(time, step)
+        time += step
+    shown = host.get(*outputs)
+    exact = np.array(host.slopes(outputs, ["crank_angle"], [1.0]))
+    assert host.get(*outputs) == shown
+    found = _differences(host, outputs, {"crank_angle": angle}, {"crank_angle": 1.0}, 2e-3)
+    assert np.abs(found).max() > 1.0
+    np.testing.assert_allclose(exact, found, rtol=0, atol=2e-10 * np.abs(found).max())
+
+
 def test_directional_derivatives_of_the_parallelogram_are_those_of_its_formulas(start: Start) -> None:
     host = start()
     u, v, a = 0.6, 1.3, -0.4

@@ -405,6 +405,7 @@ kf_answer kf_directional(kf_instance *instance, const unsigned *unknowns, size_t
 {
     kf_state *const s = &instance->now;
     unsigned parts = 0;
+    bool is_held = false;
     double time_seed = 0.0;
     kf_answer answer;
     size_t k;
@@ -430,8 +431,19 @@ kf_answer kf_directional(kf_instance *instance, const unsigned *unknowns, size_t
     if (!KF_GOOD(kf_ask(instance))) {
         return kf_answered(instance, KF_DISCARD, "at t = %g s: %s", s->time, s->message);
     }
+#if !KF_TORQUE
+    /* The derivative is that of setting an input now, even if the pose shown still is that of the last commit. */
+    is_held = !s->driven_by_time && !s->model_exchange && s->samples && !s->touched && !s->ended;
+    if (is_held) {
+        s->touched = true;
+        s->drive_known = false;
+    }
+#endif
     kf_find_drive(s);
     answer = along(instance, time_seed, parts);
+    if (is_held) {
+        s->touched = s->drive_known = false;
+    }
     for (k = 0; answer == KF_DONE && k < unknown_count; ++k) {
         sensitivity[k] = instance->slope[KF_PLACE(unknowns[k])];
     }

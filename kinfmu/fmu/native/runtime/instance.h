@@ -207,7 +207,6 @@ typedef void kf_stage(double time, const double *u, const double *ud, const doub
 kf_stage kf_forces, kf_reactions, kf_shaking, kf_distances;
 extern const char *const kf_meeting[]; /* generated: messages where a distance is 0 */
 void kf_warn_of_meeting(kf_instance *instance, unsigned parts);
-void kf_solutions(int m, int k, int columns, const double *a, const double *b, double *factors, double *x);
 void kf_forces_at(const kf_solver *solver, kf_pose *pose, double t, const double *const drive[3], const double *efforts,
                   unsigned parts, double *row);
 void kf_read_forces(kf_state *state, unsigned parts);

@@ -1,5 +1,5 @@
 /* Linear systems of force stages; see kinfmu/codegen/python/solutions.py. */
-#include "instance.h"
+#include "kinfmu.h"
 
 #include <math.h>
 #include <string.h>
