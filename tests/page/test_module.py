@@ -113,7 +113,10 @@ def swept(native: Callable[[str], StepByStep], tmp_path_factory: pytest.TempPath
     bars = page_module(THREE_BARS)
     jobs.append((bars, [["at", [1.0, 0.3], [1.0, 1.0], [0.0, 0.0]], ["reactions", 0.0], ["forces", 0.0]]))
     found = answers(tmp_path_factory.mktemp("page"), jobs)
-    return {"runs": {**runs, LOADED: run}, **dict(zip([*MEMBERS, "refused", "bound", LOADED, "three_bars"], found, strict=True))}
+    return {
+        "runs": {**runs, LOADED: run},
+        **dict(zip([*MEMBERS, "refused", "bound", LOADED, "three_bars"], found, strict=True)),
+    }
 
 
 def test_forces_are_those_of_a_run(swept: dict[str, Any]) -> None:

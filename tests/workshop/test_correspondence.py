@@ -7,7 +7,7 @@ from pathlib import Path
 CHECKOUT = Path(__file__).parents[2]
 SOLVER = CHECKOUT / "kinfmu" / "solver"
 ONLY_PYTHON = {"status", "law_breaks"}
-ONLY_C = {"position", "follower", "sweep", "designs"}
+ONLY_C = {"position", "follower", "sweep", "designs", "solutions"}
 
 
 def test_files_of_both_solvers_correspond_by_name() -> None:
