@@ -123,7 +123,7 @@ def test_a_length_that_leads_to_another_branch_is_taken_over_before_the_change_p
         shown.get(f"k.setValue('{name}', 0.98 * k.design.values.get('{name}'))")
         shown.settle()
         banner = shown.tab.inner_text("#banner")
-        assert banner.startswith("Another branch. ")
+        assert banner.startswith("Another branch: ")
         assert "beyond crank = 180°" in banner
         assert shown.get("Array.from(k.linkage.pose.q)") == kept
         shown.move(before)
