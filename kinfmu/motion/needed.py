@@ -13,7 +13,6 @@ from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.checks import coordinate_orders
 from kinfmu.mechanism.members import COORDINATES
 from kinfmu.readings import LowestMargin, PressureAngle, Reading, TransmissionAngle
-from kinfmu.readings.transfer import TransmissionSide
 from kinfmu.units import CoordinateName
 
 
@@ -66,7 +65,7 @@ def needed(mechanism: Mechanism, readings: Iterable[Reading]) -> Needed:
 
 def _quantities(mechanism: Mechanism, known: dict[str, CoordinateName], reading: Reading) -> list[QuantityRead]:
     """Return the quantities that a measure reads; of a pressure angle the coordinates of its bodies."""
-    if isinstance(reading, TransmissionAngle | TransmissionSide):
+    if isinstance(reading, TransmissionAngle):
         return [Cosine(reading.coupler, reading.output)]
     if isinstance(reading, PressureAngle):
         points = [reading.follower] if reading.pivot is None else [reading.follower, reading.pivot]

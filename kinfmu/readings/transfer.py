@@ -36,21 +36,12 @@ class TransmissionAngle(Reading):
 
 
 @dataclass(frozen=True)
-class TransmissionSide(Reading):
+class TransmissionSide(TransmissionAngle):
     """Largest deviation of the transmission angle from 90 degrees to one side: below 90 degrees, signed.
 
     With the points of `coupler` in reverse order it is the deviation above 90 degrees. The larger of both is that of
     `TransmissionAngle`, but each has derivatives where they are equal. It is no type of mechanism files.
     """
-
-    type: ClassVar[str] = TransmissionAngle.type
-    counted_from: ClassVar[str] = TransmissionAngle.counted_from
-
-    name: str
-    coupler: Annotated[PointPair, "two points of the coupler's line"]
-    output: Annotated[PointPair, "two points of the output's line"]
-    begin: Begin = None
-    end: End = None
 
     def read(self, motion: Motion) -> Finding:
         worst = motion.line_cosine(self.coupler, self.output).maximum()
