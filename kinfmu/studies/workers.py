@@ -97,12 +97,25 @@ def _cluster(address: str, workers: int) -> Iterator[tuple[Executor, int]]:
             yield client.get_executor(pure=False), max(1, sum(client.ncores().values()))
     except ModuleNotFoundError as error:
         raise StudyError(f"the workers of the Dask cluster need kinfmu {VERSION} ({error}): install it there") from None
-    except CancelledError:
+    except distributed.KilledWorker as error:
+        raise StudyError(f"Dask workers ended several times at the same part: {error}") from None
+    except (CancelledError, TypeError, ValueError) as error:
+        if not (isinstance(error, CancelledError) or _is_from_executor(error)):
+            raise
         raise StudyError(
             "the Dask cluster was lost; the same command goes on with the parts that are missing"
         ) from None
-    except distributed.KilledWorker as error:
-        raise StudyError(f"Dask workers ended several times at the same part: {error}") from None
     finally:
         if cluster is not None:
             cluster.close()
+
+
+def _is_from_executor(error: Exception) -> bool:
+    """Return whether an error is one of Dask's executor itself: it expects the error of a task where there is none.
+
+    This happens where the connection is lost between two looks of the executor at a task.
+    """
+    traceback = error.__traceback__
+    while traceback is not None and traceback.tb_next is not None:
+        traceback = traceback.tb_next
+    return traceback is not None and traceback.tb_frame.f_globals.get("__name__") == "distributed.cfexecutor"

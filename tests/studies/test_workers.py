@@ -133,6 +133,27 @@ def test_a_cluster_gives_the_same_bytes_and_if_it_is_lost_the_parts_are_kept(row
 
 @needs_dask
 @quiet
+@pytest.mark.parametrize("lost", [("error", None, None, "more"), None])
+def test_a_cluster_that_is_lost_between_two_looks_is_named(
+    lost: tuple[object, ...] | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import distributed
+
+    async def result(_self: object, *, raiseit: bool) -> object:
+        assert not raiseit
+        return lost
+
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, silence_logs=50
+    ) as cluster:
+        monkeypatch.setattr(distributed.Future, "_result", result)
+        monkeypatch.setattr(distributed.Future, "status", "lost")
+        with pytest.raises(StudyError, match="the Dask cluster was lost; the same command goes on"):
+            study(tmp_path, dask=cluster.scheduler_address)
+
+
+@needs_dask
+@quiet
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense"])
 def test_a_scheduler_that_does_not_answer_is_named(
     address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
