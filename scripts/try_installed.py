@@ -22,7 +22,7 @@ CALLS = (
     ("build", "mine.toml", "--flavour", "python", "-o", "mine.fmu"),
     ("simulate", "mine.fmu"),
     ("export", "logs/mine.mcap", "-o", "mine.csv"),
-    ("export", "logs/mine.mcap", "-o", "mine.parquet"),
+    ("export", "logs/mine.mcap", "-o", "mine.npz"),
 )
 SAVE = ("review", "logs/mine.mcap", "--save", "saved.rrd")
 

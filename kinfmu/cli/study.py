@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
 
@@ -19,8 +20,9 @@ from kinfmu.errors import KinfmuError
 @click.option(
     "-o",
     "output",
-    type=OutputFile(".parquet"),
-    help="The results. Default: the name of FILE with .parquet, in the current folder.",
+    type=OutputFile(".parquet", ".csv"),
+    help="The results, .parquet or .csv. Default: the name of FILE in the current folder, with .parquet if pyarrow is "
+    "installed, else with .csv.",
 )
 @click.option("--workers", type=click.IntRange(1), help="Processes on this machine. Default: one for each core.")
 @click.option(
@@ -66,7 +68,7 @@ def study(
     defined = read_study(file, engine=engine)
     for text in defined.notes:
         note(text)
-    target = output or Path(f"{file.stem}.parquet")
+    target = output or Path(f"{file.stem}{'.parquet' if find_spec('pyarrow') else '.csv'}")
     designs = _Designs()
     try:
         with Progress(f"kinfmu study {quote(str(file))}", least=1) as show:

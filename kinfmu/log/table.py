@@ -98,7 +98,7 @@ def _write_parquet(run: Run, path: Path, columns: Sequence[Column]) -> None:
     try:
         import pyarrow.parquet as pq
     except ImportError:
-        raise MissingPackageError(f"{path}: writing Parquet needs pyarrow: pip install pyarrow") from None
+        raise MissingPackageError(f"{path}: writing Parquet needs pyarrow: pip install 'kinfmu[parquet]'") from None
 
     info = {f"info.{key}": value for key, value in run.info.items()}
     about = description(run) | ending(run) | {"mechanism": run.mechanism_text} | info

@@ -34,7 +34,10 @@ from kinfmu.sweep.model import WORTH_COMPILING
 
 SAMPLES = 1000  # of sampled parameters, by default
 SEED = 0
-OWN_COLUMNS = DESIGN, STATUS, REASON = "design", "solver.status", "reason"
+DESIGN = "design"
+STATUS = "solver.status"
+REASON = "reason"
+OWN_COLUMNS = (DESIGN, STATUS, REASON)
 MOST_OF_A_HYPERCUBE = 50_000_000  # numbers; a gigabyte while they are drawn
 _SAMPLES_AT_ONCE = {"native": 1_500_000, "python": 200_000}  # of a part: 0.2 to 2 s
 _MOST, _FEWEST = 4096, 32  # designs of a part

@@ -16,7 +16,7 @@ from kinfmu.studies.definition import Study
 
 SUFFIX = ".parts"
 _MANIFEST = "study.json"
-_END = b"PAR1"  # of a Parquet file
+_END, _END_SIZE = b"PK\5\6", 22  # record at the end of a .npz file
 
 
 class PartsFolder:
@@ -87,7 +87,7 @@ class PartsFolder:
 
     def path(self, first: int) -> Path:
         """Return the file of the part that begins with a design."""
-        return self.folder / f"part-{first:010}.parquet"
+        return self.folder / f"part-{first:010}.npz"
 
     def missing(self) -> list[int]:
         """Return the first designs of the parts that are still to be done."""
@@ -105,11 +105,11 @@ class PartsFolder:
 
 
 def _is_whole(path: Path) -> bool:
-    """Return True for a part that is there, up to the mark at its end."""
+    """Return True for a part that is there, up to the record at its end."""
     try:
         with path.open("rb") as file:
-            file.seek(-len(_END), os.SEEK_END)
-            return file.read() == _END
+            file.seek(-_END_SIZE, os.SEEK_END)
+            return file.read().startswith(_END)
     except OSError:
         return False
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from importlib.util import find_spec
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from numpy.typing import ArrayLike
 
 from kinfmu import VERSION
-from kinfmu.errors import MechanismError, MissingPackageError, RequestError, StudyError
+from kinfmu.errors import MechanismError, RequestError, StudyError, listed
 from kinfmu.files.temporary_folder import temporary_folder
 from kinfmu.files.whole_file import replacement, suffix_of
 from kinfmu.mechanism import Mechanism
@@ -19,14 +18,27 @@ from kinfmu.readings import Reading
 from kinfmu.studies.chunk import Job, run_chunk
 from kinfmu.studies.definition import SAMPLES, SEED, Study, define
 from kinfmu.studies.nominal import nominal
-from kinfmu.studies.parts import PartsFolder, check_replaceable, remove_finished
+from kinfmu.studies.parts import PartsFolder, check_replaceable, remove_finished, write_synced
 from kinfmu.studies.result import StudyResult
 from kinfmu.studies.rows import study_in
 from kinfmu.studies.sampling import METHODS
-from kinfmu.studies.table import join, part_bytes, schema_of
+from kinfmu.studies.table import (
+    CSV,
+    FORMATS,
+    PARQUET,
+    Layout,
+    MemoryTable,
+    Rows,
+    beside,
+    joined,
+    part_bytes,
+    require_parquet,
+    stacked,
+    write_csv,
+    write_parquet,
+)
 from kinfmu.studies.workers import results
 
-RESULTS = ".parquet"
 Progress = Callable[[int, int], None]
 
 
@@ -67,7 +79,7 @@ def study(
         t: (n,) times [s] for the laws of the file. Default, without inputs: one cycle of a single driver that turns all
             the way round, at each design's own speed if that varies, else the run of the file.
         engine: 'python', 'native' (generated C) or 'auto', which is native from some hundred designs on.
-        output: The Parquet file of the results. Default: none is kept.
+        output: The file of the results, .parquet, or .csv with a file FILE.json next to it. Default: none is kept.
         workers: Processes on this machine; 1: this process. Default: one for each core.
         dask: Address of a Dask scheduler, such as 'tcp://host:8786', whose workers have kinfmu installed; 'local': a
             cluster on this machine. Default: processes.
@@ -84,7 +96,7 @@ def study(
         StudyError: The parts or the file on disk belong to another study, workers end unexpectedly, or a file cannot be
             written.
         KinfmuError: The design as written cannot be planned.
-        MissingPackageError: `distributed` is not installed.
+        MissingPackageError: `distributed`, or for Parquet `pyarrow`, is not installed.
 
     """
     try:
@@ -119,50 +131,63 @@ def run_study(
     if workers is None:
         workers = cores()
     require_workers(workers)
-    if find_spec("pyarrow") is None:  # else the study would end after its first part
-        raise MissingPackageError("a study needs pyarrow: pip install pyarrow")
+    show = progress or _quiet
     if output is None:
-        with temporary_folder() as folder:
-            path = folder / f"study{RESULTS}"
-            _run(study, path, workers, dask, progress or _quiet, restart=False)
-            return StudyResult.of_bytes(path.read_bytes())
+        with temporary_folder() as folder, PartsFolder(folder / "study", study) as parts:
+            layout, rows = _measured(study, parts, workers, dask, show)
+            table = stacked(rows)
+        return StudyResult(MemoryTable(layout, lambda: table))
     if not isinstance(output, str | Path):
-        raise RequestError(f"output = {output!r} must be the path of a file, {RESULTS}")
+        raise RequestError(f"output = {output!r} must be the path of a file, {listed(FORMATS)}")
     path = Path(output)
-    if suffix_of(path) != RESULTS:
-        raise RequestError(f"{path}: results are written as Parquet; the name must end in {RESULTS}")
+    if suffix_of(path) not in FORMATS:
+        raise RequestError(f"{path}: the name of the results must end in {listed(FORMATS)}")
+    if suffix_of(path) == PARQUET:  # else the study would end after its last part
+        require_parquet(f"{path}: writing Parquet")
     there = study_in(path)
     if restart or there.get("fingerprint") != study.fingerprint:
         if not restart:
             check_replaceable(path, study, there)
-        _run(study, path, workers, dask, progress or _quiet, restart=restart)
+        _run(study, path, workers, dask, show, restart=restart)
     else:
         remove_finished(path, study)
     return StudyResult.read(path)
 
 
 def _run(study: Study, path: Path, workers: int, dask: str | None, progress: Progress, *, restart: bool) -> None:
-    """Measure the parts that are missing, and join all parts."""
+    """Measure the parts that are missing, and join all parts in a file."""
     with PartsFolder(path, study, restart=restart) as parts:
-        job = Job.of(study)
-        schema = schema_of(study, nominal(study, job))
-        missing = parts.missing()
-        size = study.part_size
-        done = sum(min(size, len(study) - first) for first in set(study.parts) - set(missing))
-        progress(done, len(study))
-        packed = job.packed()
-        for first, columns in results(
-            run_chunk, lambda first: (packed, VERSION, study.part(first)), missing, workers, dask
-        ):
-            parts.write(first, part_bytes(schema, first, columns))
-            done += min(size, len(study) - first)
-            progress(done, len(study))
+        layout, rows = _measured(study, parts, workers, dask, progress)
         try:
             with replacement(path) as temporary:
-                join(schema, ((k, min(size, len(study) - k), parts.path(k)) for k in study.parts), temporary)
+                if suffix_of(path) == CSV:
+                    write_csv(rows, layout, temporary)
+                    write_synced(beside(path), layout.as_json().encode())
+                else:
+                    write_parquet(rows, layout, temporary)
         except OSError as error:
             raise StudyError(f"{path}: cannot be written ({error.strerror or error})") from None
         parts.remove()
+
+
+def _measured(
+    study: Study, parts: PartsFolder, workers: int, dask: str | None, progress: Progress
+) -> tuple[Layout, Iterator[Rows]]:
+    """Measure the parts that are missing; return the layout of the table, and the rows of all parts."""
+    job = Job.of(study)
+    layout = Layout.of(study, nominal(study, job))
+    missing = parts.missing()
+    size = study.part_size
+    done = sum(min(size, len(study) - first) for first in set(study.parts) - set(missing))
+    progress(done, len(study))
+    packed = job.packed()
+    for first, columns in results(
+        run_chunk, lambda first: (packed, VERSION, study.part(first)), missing, workers, dask
+    ):
+        parts.write(first, part_bytes(layout.rows(first, columns)))
+        done += min(size, len(study) - first)
+        progress(done, len(study))
+    return layout, joined(layout, ((k, min(size, len(study) - k), parts.path(k)) for k in study.parts))
 
 
 def _quiet(_done: int, _count: int) -> None:

@@ -40,7 +40,7 @@ def test_it_prints_a_summary_and_writes_table_and_figure(tmp_path: Path, monkeyp
     [
         (["study.tml"], "its name must end in .toml"),
         (["stud.toml"], "there is no such file; did you mean 'study.toml'?"),
-        (["study.toml", "-o", "a.csv"], "its name must end in .parquet"),
+        (["study.toml", "-o", "a.npz"], "its name must end in one of .parquet, .csv"),
         (["study.toml", "--workers", "0"], "0 is not in the range x>=1"),
         (["study.toml", "--workers", "2", "--dask", "tcp://a:1"], "--workers is for this machine"),
     ],

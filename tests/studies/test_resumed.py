@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import kinfmu
@@ -98,9 +100,9 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 def test_parts_that_are_whole_are_kept_and_damaged_ones_measured_again(interrupted: Path) -> None:
     folder = interrupted.with_name("rows.parquet.parts")
-    (folder / ".part-0000000064.12345678.parquet").write_bytes(b"half")
+    (folder / ".part-0000000064.12345678.npz").write_bytes(b"half")
     begins: list[int] = []
-    (folder / "part-0000000032.parquet").write_bytes(b"damaged")
+    (folder / "part-0000000032.npz").write_bytes(b"damaged")
     found = kinfmu.study(
         linkage(),
         RANGES,
@@ -136,21 +138,18 @@ def test_a_part_with_other_content_is_never_joined(damage: str, interrupted: Pat
         second.write_bytes(_without_a_column(second))
     else:
         content = bytearray(second.read_bytes())
-        content[content.index(b"\x28\xb5\x2f\xfd") + 12] ^= 1  # of the first page, after the mark of its compression
+        content[content.index(b"\x93NUMPY") + 140] ^= 1  # of the first column, after its header
         second.write_bytes(content)
-    with pytest.raises(StudyError, match=r"part-0000000032\.parquet: cannot be read .* the same command measures it"):
+    with pytest.raises(StudyError, match=r"part-0000000032\.npz: cannot be read .* the same command measures it"):
         kinfmu.study(linkage(), RANGES, **given)  # type: ignore[arg-type]
     kinfmu.study(linkage(), RANGES, **given)  # type: ignore[arg-type]
     assert interrupted.read_bytes() == alone
 
 
 def _without_a_column(path: Path) -> bytes:
-    import io
-
-    import pyarrow.parquet as pq
-
     file = io.BytesIO()
-    pq.write_table(pq.read_table(path, partitioning=None).drop_columns("swing"), file)
+    with np.load(path) as part:
+        np.savez(file, allow_pickle=False, **{name: part[name] for name in part if name != "swing"})
     return file.getvalue()
 
 

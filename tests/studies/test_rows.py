@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from scipy.stats import kstest, qmc
 
 import kinfmu
-from kinfmu.errors import StudyError
+from kinfmu.errors import MissingPackageError, StudyError
 from kinfmu.mechanism import toml_file
 from kinfmu.readings import Minimum, Range
 from kinfmu.studies import StudyResult
@@ -139,10 +140,11 @@ def test_other_law_constants_vary_over_the_run_of_the_file() -> None:
         assert found["fastest"][k] == pytest.approx(kinfmu.measure(run)["fastest"].value, rel=1e-9)
 
 
-def test_the_file_says_what_it_was_made_from(tmp_path: Path) -> None:
-    path = tmp_path / "rows.parquet"
+@pytest.mark.parametrize("suffix", [".parquet", ".csv"])
+def test_the_file_says_what_it_was_made_from(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"rows{suffix}"
     found = kinfmu.study(linkage(), RANGES, designs=8, seed=4, output=path, workers=1)
-    assert [one.name for one in tmp_path.iterdir()] == ["rows.parquet"]
+    assert sorted(one.name for one in tmp_path.iterdir()) == [path.name, "rows.csv.json"][: 1 + (suffix == ".csv")]
     again = StudyResult.read(path)
     assert again.definition == found.definition
     assert (again.definition["seed"], again.definition["designs"]) == (4, 8)
@@ -157,8 +159,9 @@ def test_the_file_says_what_it_was_made_from(tmp_path: Path) -> None:
         again["swin"]
 
 
-def test_a_finished_study_is_not_measured_again(tmp_path: Path) -> None:
-    path = tmp_path / "rows.parquet"
+@pytest.mark.parametrize("suffix", [".parquet", ".csv"])
+def test_a_finished_study_is_not_measured_again(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"rows{suffix}"
     kinfmu.study(linkage(), RANGES, designs=8, output=path, workers=1)
     calls: list[int] = []
     again = kinfmu.study(
@@ -183,7 +186,7 @@ def test_it_shows_itself_in_notebooks() -> None:
 
 
 def test_another_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(StudyError, match="path = 5 must be the path of a Parquet file"):
+    with pytest.raises(StudyError, match=r"path = 5 must be the path of a \.parquet or \.csv file"):
         StudyResult.read(5)  # type: ignore[arg-type]
     other = tmp_path / "run.parquet"
     kinfmu.log.write_table(kinfmu.solve(linkage(), crank_angle=[0.0, 0.1]), other)
@@ -192,3 +195,36 @@ def test_another_file_is_refused(tmp_path: Path) -> None:
     other.write_bytes(b"PAR1")
     with pytest.raises(StudyError, match="cannot be read"):
         StudyResult.read(other)
+    table = tmp_path / "rows.csv"
+    with pytest.raises(StudyError, match=r"rows\.csv: cannot be read \(No such file"):
+        StudyResult.read(table)
+    kinfmu.study(linkage(), RANGES, designs=4, output=table, workers=1)
+    table.write_text("design\n0\n")
+    with pytest.raises(StudyError, match=r"rows\.csv: cannot be read \(its columns are others"):
+        StudyResult.read(table)["swing"]
+    table.with_name("rows.csv.json").write_text("[]")
+    with pytest.raises(StudyError, match=r"rows\.csv: not the results of a study: rows\.csv\.json is not about it"):
+        StudyResult.read(table)
+
+
+def test_rows_are_the_same_in_every_format_and_without_pyarrow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given = {"crank": {"values": [20, 200]}, "base": {"from": 40, "to": 50, "count": 2}}  # 200: does not close
+    found = kinfmu.study(linkage(), given, workers=1)
+    files = [kinfmu.study(linkage(), given, output=tmp_path / name, workers=1) for name in ("a.parquet", "a.csv")]
+    for other in files:
+        assert other.units == found.units
+        assert (other.failures, other.first_failure) == (found.failures, found.first_failure)
+        assert other.statistics == found.statistics
+        assert other.to_arrow().schema.equals(found.to_arrow().schema, check_metadata=True)
+        for name, column in found.columns():
+            assert other[name].dtype == column.dtype
+            np.testing.assert_array_equal(other[name], column)
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    again = kinfmu.study(linkage(), given, output=tmp_path / "b.csv", workers=1)
+    assert (tmp_path / "b.csv").read_bytes() == (tmp_path / "a.csv").read_bytes()
+    assert again.to_pandas().shape == (4, len(found.units))
+    for refused in (lambda: kinfmu.study(linkage(), given, output=tmp_path / "b.parquet", workers=1), again.to_arrow):
+        with pytest.raises(MissingPackageError, match="pyarrow"):
+            refused()
+    with pytest.raises(MissingPackageError, match=r"reading Parquet needs pyarrow: pip install 'kinfmu\[parquet\]'"):
+        StudyResult.read(tmp_path / "a.parquet")

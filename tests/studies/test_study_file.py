@@ -163,8 +163,8 @@ def test_arguments_of_a_call_are_refused_likewise() -> None:
         kinfmu.study(linkage(), ranges, designs=0)
     with pytest.raises(RequestError, match="workers = 0 must be a positive whole number"):
         kinfmu.study(linkage(), ranges, workers=0)
-    with pytest.raises(RequestError, match=r"rows.csv: results are written as Parquet; the name must end in .parquet"):
-        kinfmu.study(linkage(), ranges, output="rows.csv")
+    with pytest.raises(RequestError, match=r"rows\.npz: the name of the results must end in \.parquet, \.csv"):
+        kinfmu.study(linkage(), ranges, output="rows.npz")
     with pytest.raises(RequestError, match="give times or inputs, not both: t and crank_angle"):
         kinfmu.study(linkage(), ranges, t=[0.0, 1.0], crank_angle=[0.0, 1.0])
     with pytest.raises(RequestError, match="engine 'fast' is not known"):
@@ -195,7 +195,7 @@ def test_arguments_of_a_call_are_refused_likewise() -> None:
             {"measures": [5]},
             "measures: 5 is neither a measure such as kinfmu.read",
         ),
-        ({"crank": {"values": [20]}}, {"output": 5}, "output = 5 must be the path of a file, .parquet"),
+        ({"crank": {"values": [20]}}, {"output": 5}, "output = 5 must be the path of a file, .parquet, .csv"),
     ],
 )
 def test_so_is_one_in_a_call(parameters: dict[Any, Any], arguments: dict[str, Any], message: str) -> None:
