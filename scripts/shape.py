@@ -11,6 +11,7 @@ from __future__ import annotations
 import ast
 import re
 import subprocess
+import sys
 from collections.abc import Iterable, Mapping
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path, PurePosixPath
@@ -18,6 +19,8 @@ from pathlib import Path, PurePosixPath
 ROOT = Path(__file__).parents[1]
 ENDINGS = {".py", ".c", ".h", ".js", ".css", ".html"}
 SHORT = 60  # lines of a file below which it is counted as short
+AS_LARGE_AS_PACKAGES = {"kinfmu/notebook.py"}
+PITCH, STOREY, BOX = 110, 64, (90, 30)  # of the picture: distances of packages and floors, size of a package
 NEITHER = {"docs", "examples"}  # folders of the checkout that are neither product nor tests
 
 Graph = dict[str, set[str]]
@@ -120,13 +123,61 @@ def floors(graph: Graph) -> dict[str, int]:
     return heights
 
 
-def main() -> None:
-    """Print the counts, a line each, and the packages from the top floor down."""
+def needed(graph: Graph) -> set[tuple[str, str]]:
+    """Return the arrows that no way through other packages replaces."""
+    reached: Graph = {}
+    for name in TopologicalSorter(graph).static_order():
+        reached[name] = set().union(*({other} | reached[other] for other in graph.get(name, ())))
+    return {
+        (name, other)
+        for name, imported in graph.items()
+        for other in imported
+        if not any(other in reached[third] for third in imported - {other})
+    }
+
+
+def picture(graph: Graph, heights: Mapping[str, int]) -> str:
+    """Return the packages as SVG, a row for each floor, with the arrows that no other way replaces."""
+    rows = [sorted(name for name in graph if heights[name] == floor) for floor in range(max(heights.values()), 0, -1)]
+    width = PITCH * max(map(len, rows))
+    middle = {
+        name: ((k + 0.5) * width / len(row), (j + 0.5) * STOREY)
+        for j, row in enumerate(rows)
+        for k, name in enumerate(row)
+    }
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {STOREY * len(rows)}" font-family="sans-serif" '
+        f'font-size="13" text-anchor="middle" fill="none" stroke="#667">',
+        '<marker id="head" markerWidth="8" markerHeight="6" refX="8" refY="3" orient="auto" stroke="none">'
+        '<path d="M0 0 8 3 0 6z" fill="#667"/></marker>',
+    ]
+    for name, other in sorted(needed(graph)):
+        (x, y), (to_x, to_y) = middle[name], middle[other]
+        y, to_y = y + BOX[1] / 2, to_y - BOX[1] / 2
+        bend = (to_y - y) / 2
+        parts.append(
+            f'<path d="M{x:.0f} {y:.0f}C{x:.0f} {y + bend:.0f} {to_x:.0f} {to_y - bend:.0f} {to_x:.0f} {to_y:.0f}" '
+            f'marker-end="url(#head)"/>'
+        )
+    for name, (x, y) in middle.items():
+        box = f'x="{x - BOX[0] / 2:.0f}" y="{y - BOX[1] / 2:.0f}" width="{BOX[0]}" height="{BOX[1]}" rx="4"'
+        parts.append(f'<rect {box} fill="#eef3fa"/>')
+        label = name.rpartition("/")[2].removesuffix(".py")
+        parts.append(f'<text x="{x:.0f}" y="{y + 5:.0f}" fill="#223" stroke="none">{label}</text>')
+    return "\n".join([*parts, "</svg>\n"])
+
+
+def main(target: str = "") -> None:
+    """Print the counts, a line each, and the packages from the top floor down; or draw the packages into a file."""
     files = tracked()
     python = imports_of_python(files)
     packages = places(python)
     heights = floors(packages)
-    counted = {name for name in packages if not name.endswith(".py")}
+    counted = {name for name in packages if not name.endswith(".py") or name in AS_LARGE_AS_PACKAGES}
+    if target:
+        inner = {name: packages[name] & counted for name in counted}
+        (ROOT / target).write_text(picture(inner, floors(inner)), "utf-8")
+        return
     lines = {path: (ROOT / path).read_bytes().count(b"\n") for path in files}
     product = {path: n for path, n in lines.items() if path.parts[0] not in {*NEITHER, "tests", "benchmarks"}}
     own = [path for path in product if path.suffix == ".py" and path.parts[0] == "kinfmu"]
@@ -147,4 +198,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:])
