@@ -26,9 +26,9 @@ from kinfmu.studies.table import (
     CSV,
     FORMATS,
     PARQUET,
-    Layout,
     MemoryTable,
     Rows,
+    TableLayout,
     beside,
     joined,
     part_bytes,
@@ -172,10 +172,10 @@ def _run(study: Study, path: Path, workers: int, dask: str | None, progress: Pro
 
 def _measured(
     study: Study, parts: PartsFolder, workers: int, dask: str | None, progress: Progress
-) -> tuple[Layout, Iterator[Rows]]:
+) -> tuple[TableLayout, Iterator[Rows]]:
     """Measure the parts that are missing; return the layout of the table, and the rows of all parts."""
     job = Job.of(study)
-    layout = Layout.of(study, nominal(study, job))
+    layout = TableLayout.of(study, nominal(study, job))
     missing = parts.missing()
     size = study.part_size
     done = sum(min(size, len(study) - first) for first in set(study.parts) - set(missing))

@@ -52,14 +52,14 @@ class Field:
 
 
 @dataclass(frozen=True)
-class Layout:
+class TableLayout:
     """The columns of a study's table, and what it was made from."""
 
     fields: tuple[Field, ...]
     about: Mapping[str, str]
 
     @classmethod
-    def of(cls, study: Study, nominal: Nominal) -> Layout:
+    def of(cls, study: Study, nominal: Nominal) -> TableLayout:
         """Return the layout of the table of a study."""
         fields = [Field(DESIGN, "1")]
         fields += [Field(one.name, one.unit, "parameter", one.display_unit) for one in study.sampling.variations]
@@ -89,7 +89,7 @@ class Layout:
         return json.dumps({"fields": [asdict(field) for field in self.fields], "about": dict(self.about)}, indent=1)
 
     @classmethod
-    def from_json(cls, text: str) -> Layout:
+    def from_json(cls, text: str) -> TableLayout:
         """Return the layout in a text; ValueError, KeyError or TypeError for any other."""
         found = json.loads(text)
         return cls(tuple(Field(**field) for field in found["fields"]), dict(found["about"]))
@@ -108,7 +108,7 @@ class Layout:
         return pa.schema(fields, metadata={_PREFIX + key: text for key, text in self.about.items()})
 
     @classmethod
-    def from_schema(cls, schema: Any) -> Layout:
+    def from_schema(cls, schema: Any) -> TableLayout:
         """Return the layout in a pyarrow.Schema, without `about` for the schema of another table."""
         fields = []
         for field in schema:
@@ -121,7 +121,7 @@ class Layout:
 class Table(Protocol):
     """The rows of a study, read column by column."""
 
-    layout: Layout
+    layout: TableLayout
 
     def __len__(self) -> int:
         """Return the number of designs."""
@@ -139,7 +139,7 @@ class Table(Protocol):
 class MemoryTable:
     """The rows of a study in memory, made when they are first asked for."""
 
-    def __init__(self, layout: Layout, rows: Callable[[], Rows]) -> None:
+    def __init__(self, layout: TableLayout, rows: Callable[[], Rows]) -> None:
         self.layout = layout
         self._make_rows = rows
 
@@ -168,7 +168,7 @@ class ParquetTable:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self.layout = Layout.from_schema(self._file().schema_arrow)
+        self.layout = TableLayout.from_schema(self._file().schema_arrow)
 
     def _file(self) -> Any:
         """Return the pyarrow.parquet.ParquetFile."""
@@ -220,7 +220,7 @@ def table_in(path: Path) -> Table:
         return ParquetTable(path)
     try:
         with path.open("rb"):
-            layout = Layout.from_json(beside(path).read_text("utf-8"))
+            layout = TableLayout.from_json(beside(path).read_text("utf-8"))
     except OSError as error:
         raise StudyError(f"{error.filename}: cannot be read ({error.strerror})") from None
     except (ValueError, KeyError, TypeError):
@@ -233,7 +233,7 @@ def beside(path: Path) -> Path:
     return path.with_name(f"{path.name}.json")
 
 
-def _read_csv(path: Path, layout: Layout) -> Rows:
+def _read_csv(path: Path, layout: TableLayout) -> Rows:
     names = [field.name for field in layout.fields]
     try:
         with path.open(encoding="utf-8", newline="") as file:
@@ -256,7 +256,7 @@ def part_bytes(rows: Rows) -> bytes:
     return file.getvalue()
 
 
-def joined(layout: Layout, parts: Iterable[tuple[int, int, Path]]) -> Iterator[Rows]:
+def joined(layout: TableLayout, parts: Iterable[tuple[int, int, Path]]) -> Iterator[Rows]:
     """Yield the rows of parts, one after another.
 
     Args:
@@ -287,7 +287,7 @@ def stacked(parts: Iterable[Rows]) -> Rows:
     return {name: np.concatenate([rows[name] for rows in tables]) for name in tables[0]}
 
 
-def write_csv(parts: Iterable[Rows], layout: Layout, target: Path) -> None:
+def write_csv(parts: Iterable[Rows], layout: TableLayout, target: Path) -> None:
     """Write rows as lines; nan where a design lacks a measure."""
     with target.open("w", encoding="utf-8", newline="") as file:
         lines = csv.writer(file, lineterminator="\n")
@@ -296,7 +296,7 @@ def write_csv(parts: Iterable[Rows], layout: Layout, target: Path) -> None:
             lines.writerows(zip(*(column.tolist() for column in rows.values()), strict=True))
 
 
-def write_parquet(parts: Iterable[Rows], layout: Layout, target: Path) -> None:
+def write_parquet(parts: Iterable[Rows], layout: TableLayout, target: Path) -> None:
     """Write rows as a Parquet file, part after part; equal parts give equal bytes."""
     import pyarrow.parquet as pq
 
