@@ -2,8 +2,8 @@
 
 A package stands one floor above the highest package that it imports; an arrow is a pair of packages of which one
 imports the other; a circle is a set of files, or of packages, that import each other. Imports inside functions count
-too. A file of C imports the headers that it includes; a header and the file of its name are one. Modules next to the
-packages have floors, but are no packages and no ends of arrows.
+too. A file of C imports the headers that it includes. Modules next to the packages have floors, but are no packages
+and no ends of arrows.
 """
 
 from __future__ import annotations
@@ -58,16 +58,24 @@ def _imported(module: str, path: str, homes: Mapping[str, str]) -> set[str]:
 
 
 def includes_of_c(files: Iterable[PurePosixPath]) -> Graph:
-    """Return for each file of C (a header and its source are one) the files of C whose headers it includes."""
+    """Return for each file of C in the package the headers there that it includes."""
+    own = [path for path in files if path.suffix in {".c", ".h"} and path.parts[0] == "kinfmu"]
+    known = {path.name: str(path) for path in own}
     graph: Graph = {}
-    known = {path.name: str(path.with_suffix("")) for path in files if path.suffix == ".h"}
-    for path in files:
-        if path.suffix in {".c", ".h"} and path.parts[0] == "kinfmu":
-            text = (ROOT / path).read_text("utf-8")
-            name = str(path.with_suffix(""))
-            included = {PurePosixPath(other).name for other in re.findall(r'^#include "(.+)"', text, re.MULTILINE)}
-            graph.setdefault(name, set()).update({known[other] for other in included & known.keys()} - {name})
+    for path in own:
+        text = (ROOT / path).read_text("utf-8")
+        included = {PurePosixPath(other).name for other in re.findall(r'^#include "(.+)"', text, re.MULTILINE)}
+        graph[str(path)] = {known[other] for other in included & known.keys()}
     return graph
+
+
+def folders(graph: Graph) -> Graph:
+    """Return the graph of the folders of files."""
+    merged: Graph = {}
+    for path, imported in graph.items():
+        here = str(PurePosixPath(path).parent)
+        merged.setdefault(here, set()).update({str(PurePosixPath(other).parent) for other in imported} - {here})
+    return merged
 
 
 def place(path: str, depth: int = 2) -> str:
@@ -188,7 +196,9 @@ def main(target: str = "") -> None:
     print(f"files           {len(own)}, of which {short} have less than {SHORT} lines")
     print(f"product         {sum(product.values())} lines")
     print(f"tests           {sum(n for path, n in lines.items() if path.parts[0] == 'tests')} lines")
-    for name, graph in (("packages", packages), ("files of Python", python), ("files of C", includes_of_c(files))):
+    c = includes_of_c(files)
+    graphs = {"packages": packages, "files of Python": python, "files of C": c, "folders of C": folders(c)}
+    for name, graph in graphs.items():
         found = circles(graph)
         print(f"circles of {name}: {len(found)}")
         for members in found:
