@@ -29,7 +29,7 @@ from kinfmu.studies.table import (
     MemoryTable,
     Rows,
     TableLayout,
-    beside,
+    about_file,
     joined,
     part_bytes,
     require_parquet,
@@ -162,7 +162,7 @@ def _run(study: Study, path: Path, workers: int, dask: str | None, progress: Pro
             with replacement(path) as temporary:
                 if suffix_of(path) == CSV:
                     write_csv(rows, layout, temporary)
-                    write_synced(beside(path), layout.as_json().encode())
+                    write_synced(about_file(path), layout.as_json().encode())
                 else:
                     write_parquet(rows, layout, temporary)
         except OSError as error:

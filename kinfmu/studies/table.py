@@ -220,15 +220,15 @@ def table_in(path: Path) -> Table:
         return ParquetTable(path)
     try:
         with path.open("rb"):
-            layout = TableLayout.from_json(beside(path).read_text("utf-8"))
+            layout = TableLayout.from_json(about_file(path).read_text("utf-8"))
     except OSError as error:
         raise StudyError(f"{error.filename}: cannot be read ({error.strerror})") from None
     except (ValueError, KeyError, TypeError):
-        raise StudyError(f"{path}: not the results of a study: {beside(path).name} is not about it") from None
+        raise StudyError(f"{path}: not the results of a study: {about_file(path).name} is not about it") from None
     return MemoryTable(layout, lambda: _read_csv(path, layout))
 
 
-def beside(path: Path) -> Path:
+def about_file(path: Path) -> Path:
     """Return the file that says of what study a .csv file is."""
     return path.with_name(f"{path.name}.json")
 
