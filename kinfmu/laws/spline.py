@@ -15,6 +15,7 @@ from kinfmu.solver.python.curve import CurveData, Piece
 
 NOT_A_KNOT, NATURAL, PERIODIC = ENDS = ("not_a_knot", "natural", "periodic")
 FEWEST = {NOT_A_KNOT: 4, NATURAL: 3, PERIODIC: 4}
+STEPS_OF_A_PIECE = 2.0  # that it is seen in at least: a cubic bends in one direction, or in two
 EDGE = 1e-12  # of the table's width; times k h that miss the last point by rounding still belong to the table
 SAME = 1e-9  # of the largest value; by how much the ends of a periodic table may differ
 _X, _U = LawQuantity("argument"), LawQuantity("led")
@@ -69,6 +70,19 @@ class Spline(Law):
             first, last = self.points[0][0], self.points[-1][0]
             x = split_periods(x, first, last, -first)[1]
         return curve(x, self.data)
+
+    def fewest_steps(self, x: Value, **constants: Value) -> Value:  # noqa: ARG002  it has none
+        knots = [point[0] for point in self.points]
+        pieces: list[Piece] = [
+            (a, (STEPS_OF_A_PIECE / (b - a), STEPS_OF_A_PIECE * k), 0.0, 0.0, 0.0)
+            for k, (a, b) in enumerate(pairwise(knots))
+        ]
+        most = STEPS_OF_A_PIECE * len(pieces)
+        if self.ends == PERIODIC:
+            times, x = split_periods(x, knots[0], knots[-1], -knots[0])
+            return times * most + curve(x, (tuple(knots[1:-1]), tuple(pieces)))
+        before, after = (0.0, (0.0,), 0.0, 0.0, 0.0), (0.0, (most,), 0.0, 0.0, 0.0)
+        return curve(x, (tuple(knots), (before, *pieces, after)))
 
     def breaks(self, order: int, /, **constants: Value) -> Jumps:  # noqa: ARG002  it has none
         if self.ends != PERIODIC:

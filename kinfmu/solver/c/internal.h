@@ -113,7 +113,7 @@ typedef struct {
     int block;
     bool crosses; /* another branch crosses there and no bridge holds: the motion does not turn back */
 } kf_limit;
-enum { KF_NO_BLOCK = -1, KF_TOO_FAR = -2 };
+enum { KF_NO_BLOCK = -1, KF_TOO_FAR = -2, KF_NEGATIVE = -3 };
 void kf_limit_beyond(kf_solver *solver, const kf_pose *before, kf_pose *pose, const double *direction, kf_limit *limit);
 bool kf_is_beyond(const double *target, const double *limit, const double *direction, double s);
 void kf_append_limit(char *message, const kf_limit *limit, const double *target, int driver);
@@ -164,6 +164,10 @@ KF_RARE kf_pose *kf_advance(kf_solver *solver, kf_pose *start, int map, const do
 /* trusted_step.c */
 bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u,
                      kf_pose *trial);
+#if KF_LAWS
+bool kf_passes_unseen(const kf_model *model, const kf_found *pose, const double *x1, const double *x2,
+                      const kf_found *trial, double s);
+#endif
 bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const double *direction, double s);
 kf_pose *kf_follow_path(kf_solver *solver, kf_pose *start, double u);
 

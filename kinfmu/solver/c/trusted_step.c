@@ -1,6 +1,7 @@
 /* Trusted steps: predict, correct, and accept only what stays on the branch. See kinfmu/solver/python/trusted_step.py. */
 #include "internal.h"
 
+#define MOST_OFF 0.5        /* [rad, sizes] of what a law gives outright from its prediction; farther off lie whole turns */
 #define UNDOUBTED 1e-5      /* [rad, sizes]; a prediction that was corrected by less did not land by accident */
 #define SMOOTH 0.5          /* largest jump of the tangent in a step, as a part of it: a larger one is another branch */
 #define MOST_FOLLOWED 10000 /* steps between a pose and a node; a few, as a rule */
@@ -27,6 +28,56 @@ static bool turns_over(const kf_model *model, const kf_pose *pose, const kf_pose
     }
     return false;
 }
+
+#if KF_LAWS
+/* Return whether a step passes over a part of a law that it has not seen, or over a length below 0.
+ *
+ * What it monitors moves along the step as predicted, and by what the prediction is `off` to either side. Arguments may
+ * turn back within the step. A coordinate that a law gives outright may not be off by so much that another one, predicted
+ * from it, may be a whole turn off.
+ */
+bool kf_passes_unseen(const kf_model *model, const kf_found *pose, const double *x1, const double *x2,
+                      const kf_found *trial, double s)
+{
+    double here[KF_LAWS], rates[KF_LAWS], bends[KF_LAWS], there[KF_LAWS], lows[KF_LAWS], highs[KF_LAWS];
+    double before[KF_ROOM(KF_LAW_ARGUMENTS)], after[KF_ROOM(KF_LAW_ARGUMENTS)];
+    int k;
+    kf_law_positions(model, pose, here);
+    kf_law_rates(model, pose, x1, rates);
+    kf_law_accelerations(model, pose, x1, x2, bends);
+    kf_law_positions(model, trial, there);
+    for (k = 0; k < KF_LAWS; ++k) {
+        const double rate = s * rates[k], bend = s * s * bends[k], predicted = here[k] + rate + 0.5 * bend;
+        double off = there[k] - predicted;
+        if (k < KF_LAW_ARGUMENTS && kf_law_turns[k] > 0.0) {
+            off -= kf_law_turns[k] * floor(off / kf_law_turns[k] + 0.5);
+        }
+        if (!(fabs(off) <= MOST_OFF * kf_law_units[k])) {
+            return true;
+        }
+        lows[k] = fmin(here[k], predicted);
+        highs[k] = fmax(here[k], predicted);
+        if (rate * (rate + bend) < 0.0) {
+            const double turning = here[k] - 0.5 * rate * rate / bend;
+            lows[k] = fmin(lows[k], turning);
+            highs[k] = fmax(highs[k], turning);
+        }
+        lows[k] -= fabs(off);
+        highs[k] += fabs(off);
+        if (k >= KF_LAW_ARGUMENTS && k < KF_LAW_ARGUMENTS + KF_LAW_LENGTHS && lows[k] < 0.0) {
+            return true;
+        }
+    }
+    kf_law_steps(model, lows, before);
+    kf_law_steps(model, highs, after);
+    for (k = 0; k < KF_LAW_ARGUMENTS; ++k) {
+        if (fabs(after[k] - before[k]) > 1.0) {
+            return true;
+        }
+    }
+    return false;
+}
+#endif
 
 /* Take one step of predict and correct; return false if it cannot be trusted to stay on the branch. */
 inline bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u,
@@ -59,6 +110,11 @@ inline bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *dire
             return false;
         }
     }
+#if KF_LAWS
+    if (kf_passes_unseen(model, &pose->found, x1, x2, &trial->found, s)) {
+        return false;
+    }
+#endif
     if (KF_TALL && turns_over(model, pose, trial)) {
         return false;
     }
