@@ -15,7 +15,7 @@ from kinfmu.solver.python.curve import CurveData, Piece
 
 NOT_A_KNOT, NATURAL, PERIODIC = ENDS = ("not_a_knot", "natural", "periodic")
 FEWEST = {NOT_A_KNOT: 4, NATURAL: 3, PERIODIC: 4}
-STEPS_OF_A_PIECE = 2.0  # that it is seen in at least: a cubic bends in one direction, or in two
+STEPS = 2.0  # over a width in which a cubic bends by a sixth of the table's range; a point out of line is seen in 12
 EDGE = 1e-12  # of the table's width; times k h that miss the last point by rounding still belong to the table
 SAME = 1e-9  # of the largest value; by how much the ends of a periodic table may differ
 _X, _U = LawQuantity("argument"), LawQuantity("led")
@@ -71,18 +71,30 @@ class Spline(Law):
             x = split_periods(x, first, last, -first)[1]
         return curve(x, self.data)
 
+    @cached_property
+    def _steps(self) -> CurveData:
+        """`fewest_steps` in the table, from 0: over a width w a piece bends by d w^3, a part of the table's range.
+
+        So dense tables of smooth curves are not seen point by point, but one point out of line is.
+        """
+        values = [u for _, u in self.points]
+        extent = max(values) - min(values) or 1.0
+        inner = self.data[1] if self.ends == PERIODIC else self.data[1][1:-1]
+        knots = [x for x, _ in self.points]
+        total, pieces = 0.0, list[Piece]()
+        for (_, (d, *_), *_), (begin, end) in zip(inner, pairwise(knots), strict=True):
+            density = STEPS * (6.0 * abs(d) / extent) ** (1.0 / 3.0)
+            pieces.append((begin, (density, total), 0.0, 0.0, 0.0))
+            total += density * (end - begin)
+        before, after = (0.0, (0.0,), 0.0, 0.0, 0.0), (0.0, (total,), 0.0, 0.0, 0.0)
+        return tuple(knots), (before, *pieces, after)
+
     def fewest_steps(self, x: Value, **constants: Value) -> Value:  # noqa: ARG002  it has none
-        knots = [point[0] for point in self.points]
-        pieces: list[Piece] = [
-            (a, (STEPS_OF_A_PIECE / (b - a), STEPS_OF_A_PIECE * k), 0.0, 0.0, 0.0)
-            for k, (a, b) in enumerate(pairwise(knots))
-        ]
-        most = STEPS_OF_A_PIECE * len(pieces)
-        if self.ends == PERIODIC:
-            times, x = split_periods(x, knots[0], knots[-1], -knots[0])
-            return times * most + curve(x, (tuple(knots[1:-1]), tuple(pieces)))
-        before, after = (0.0, (0.0,), 0.0, 0.0, 0.0), (0.0, (most,), 0.0, 0.0, 0.0)
-        return curve(x, (tuple(knots), (before, *pieces, after)))
+        if self.ends != PERIODIC:
+            return curve(x, self._steps)
+        first, last = self.points[0][0], self.points[-1][0]
+        times, x = split_periods(x, first, last, -first)
+        return times * self._steps[1][-1][1][0] + curve(x, self._steps)
 
     def breaks(self, order: int, /, **constants: Value) -> Jumps:  # noqa: ARG002  it has none
         if self.ends != PERIODIC:

@@ -20,6 +20,7 @@
 #define KF_SHORTEST_STEP 5e-9 /* of the longest; where steps get shorter, a limit is near: its place is extrapolated */
 #define KF_GIVE_UP 5e-15      /* of the longest; nothing lies between such steps */
 #define KF_BENT 1.0           /* [rad, sizes]; a prediction whose quadratic term is larger may land whole turns away */
+#define KF_MOST_OFF 0.5       /* [rad, sizes] of what a law gives outright from its prediction; farther off lie whole turns */
 #define KF_UNDECIDED 1e-6    /* determinant below which a path ends: lengths within 1e-12 of a change point give such a determinant */
 #define KF_STEEP 100.0       /* slope of an unknown; right before a dead centre it is more: see pose.py */
 

@@ -1,7 +1,6 @@
 /* Trusted steps: predict, correct, and accept only what stays on the branch. See kinfmu/solver/python/trusted_step.py. */
 #include "internal.h"
 
-#define MOST_OFF 0.5        /* [rad, sizes] of what a law gives outright from its prediction; farther off lie whole turns */
 #define UNDOUBTED 1e-5      /* [rad, sizes]; a prediction that was corrected by less did not land by accident */
 #define SMOOTH 0.5          /* largest jump of the tangent in a step, as a part of it: a larger one is another branch */
 #define MOST_FOLLOWED 10000 /* steps between a pose and a node; a few, as a rule */
@@ -52,7 +51,7 @@ bool kf_passes_unseen(const kf_model *model, const kf_found *pose, const double 
         if (k < KF_LAW_ARGUMENTS && kf_law_turns[k] > 0.0) {
             off -= kf_law_turns[k] * floor(off / kf_law_turns[k] + 0.5);
         }
-        if (!(fabs(off) <= MOST_OFF * kf_law_units[k])) {
+        if (!(fabs(off) <= KF_MOST_OFF * kf_law_units[k])) {
             return true;
         }
         lows[k] = fmin(here[k], predicted);
