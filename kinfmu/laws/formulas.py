@@ -7,7 +7,19 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 from kinfmu.errors import MechanismError
-from kinfmu.laws.law import NEARLY, RISE_STEPS, TURN, Constant, ConstantPath, Frequency, Law, LawQuantity, Led, LedRate, Phase
+from kinfmu.laws.law import (
+    NEARLY,
+    RISE_STEPS,
+    TURN,
+    Constant,
+    ConstantPath,
+    Frequency,
+    Law,
+    LawQuantity,
+    Led,
+    LedRate,
+    Phase,
+)
 from kinfmu.measures.arithmetic import Value, sine_of_line
 
 HIGHEST_DEGREE = 20  # the value of a polynomial of a higher degree is mostly rounding error

@@ -10,7 +10,7 @@ from kinfmu.codegen.python.block_code import indented, tupled, unpacking
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node
 from kinfmu.plan import Block, SolvePlan
-from kinfmu.plan.path_laws import PathLaws, argument_symbol
+from kinfmu.plan.path_laws import argument_symbol
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.solver.python.curve import CurveData
 
@@ -70,20 +70,11 @@ def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str
         f"TALL = {tuple(k for k, b in enumerate(solved) if len(b.residuals) > len(b.unknowns))!r}",
         *([f"ROWS = {rows!r}"] if plan.parameters else []),
         f"DISTANCES = {distances!r}  # drivers of distances; block, row and scale of each",
-        f"LAWS = {len(plan.path_laws.units)!r}  # motions that steps of a path monitor, because of laws over the pose",
-        *_law_constants(plan.path_laws),
+        f"LAW_UNITS = {plan.path_laws.units!r}  # of motions that steps monitor, first arguments of laws, then lengths",
+        f"LAW_TURNS = {plan.path_laws.turns!r}  # of the arguments: 0 if they do not jump back",
+        f"LAW_LENGTHS = {plan.path_laws.lengths!r}",
         *(f"{name} = {data!r}" for data, name in curves.items()),
         "",
-    ]
-
-
-def _law_constants(laws: PathLaws) -> list[str]:
-    if not laws.units:
-        return []
-    return [
-        f"LAW_TURNS = {laws.turns!r}  # of the arguments, which come first: 0 if they do not jump back",
-        f"LAW_LENGTHS = {laws.lengths!r}  # which come next",
-        f"LAW_UNITS = {laws.units!r}",
     ]
 
 

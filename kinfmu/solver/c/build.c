@@ -93,8 +93,7 @@ static bool cross(kf_solver *solver, kf_span *span, kf_pose *before, double side
             }
         }
 #if KF_LAWS
-        kf_tangent(&solver->model, before);
-        if (kf_passes_unseen(&solver->model, &before->found, before->x1, before->x2, &pose->found, u - KF_HERE(solver, before))) {
+        if (kf_passes_unseen_between(solver, before, pose)) {
             return false;
         }
 #endif

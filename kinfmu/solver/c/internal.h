@@ -166,8 +166,7 @@ KF_RARE kf_pose *kf_advance(kf_solver *solver, kf_pose *start, int map, const do
 bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u,
                      kf_pose *trial);
 #if KF_LAWS
-bool kf_passes_unseen(const kf_model *model, const kf_found *pose, const double *x1, const double *x2,
-                      const kf_found *trial, double s);
+bool kf_passes_unseen_between(kf_solver *solver, kf_pose *pose, const kf_pose *trial);
 #endif
 bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const double *direction, double s);
 kf_pose *kf_follow_path(kf_solver *solver, kf_pose *start, double u);

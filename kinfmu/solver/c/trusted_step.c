@@ -35,8 +35,8 @@ static bool turns_over(const kf_model *model, const kf_pose *pose, const kf_pose
  * turn back within the step. A coordinate that a law gives outright may not be off by so much that another one, predicted
  * from it, may be a whole turn off.
  */
-bool kf_passes_unseen(const kf_model *model, const kf_found *pose, const double *x1, const double *x2,
-                      const kf_found *trial, double s)
+static bool passes_unseen(const kf_model *model, const kf_found *pose, const double *x1, const double *x2,
+                          const kf_found *trial, double s)
 {
     double here[KF_LAWS], rates[KF_LAWS], bends[KF_LAWS], there[KF_LAWS], lows[KF_LAWS], highs[KF_LAWS];
     double before[KF_ROOM(KF_LAW_ARGUMENTS)], after[KF_ROOM(KF_LAW_ARGUMENTS)];
@@ -76,6 +76,14 @@ bool kf_passes_unseen(const kf_model *model, const kf_found *pose, const double 
     }
     return false;
 }
+
+/* Return the same of the step between two poses along a single driver. */
+bool kf_passes_unseen_between(kf_solver *solver, kf_pose *pose, const kf_pose *trial)
+{
+    kf_tangent(&solver->model, pose);
+    return passes_unseen(&solver->model, &pose->found, pose->x1, pose->x2, &trial->found,
+                         KF_HERE(solver, trial) - KF_HERE(solver, pose));
+}
 #endif
 
 /* Take one step of predict and correct; return false if it cannot be trusted to stay on the branch. */
@@ -110,7 +118,7 @@ inline bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *dire
         }
     }
 #if KF_LAWS
-    if (kf_passes_unseen(model, &pose->found, x1, x2, &trial->found, s)) {
+    if (passes_unseen(model, &pose->found, x1, x2, &trial->found, s)) {
         return false;
     }
 #endif

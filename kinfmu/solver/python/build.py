@@ -101,7 +101,7 @@ def _crossed(model: Model, centre: float, half: float, side: float, near: list[P
             return None
         if distance > 1.0 and any(a * b <= 0.0 for a, b in zip(pose.determinants, poses[-1].determinants, strict=True)):
             return None  # there is another zero next to the one to be bridged
-        if model.LAWS and passes_unseen(model, poses[-1], pose, UNIT_SPEED, u[0] - poses[-1].u[0]):
+        if model.LAW_UNITS and passes_unseen(model, poses[-1], pose, UNIT_SPEED, u[0] - poses[-1].u[0]):
             return None
         places.append(distance)
         poses.append(pose)

@@ -83,7 +83,7 @@ def reach(module: Any, values: Vector, tolerance: float = TOLERANCE) -> Reached:
         except (ArithmeticError, ValueError) as error:  # diverged, or a root of something negative
             block = error.args[0] if len(error.args) == 2 else block
         else:
-            if _is_trusted(pose, trial) and not (model.LAWS and _leads_far(model, ahead, pose, trial)):
+            if _is_trusted(pose, trial) and not (model.LAW_UNITS and _leads_far(model, ahead, pose, trial)):
                 if there == 1.0:
                     pose, model = trial, ahead
                     break

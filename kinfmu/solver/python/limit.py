@@ -29,7 +29,7 @@ def limit_beyond(model: Model, before: Pose, pose: Pose, direction: Vector) -> L
     Near a dead centre the tangent grows without bound, and determinant^2 falls linearly along the path: the secant rule
     on the last two poses gives its zero. Where branches cross the determinant itself falls linearly.
     """
-    for k in range(len(model.LAW_TURNS), len(model.LAW_TURNS) + model.LAW_LENGTHS) if model.LAWS else ():
+    for k in range(len(model.LAW_TURNS), len(model.LAW_TURNS) + model.LAW_LENGTHS):
         near, far = (model.law_positions(at.values)[k] for at in (pose, before))
         if near < VANISHING * model.SIZE:
             return Limit(_extrapolated(before, pose, near, far), NEGATIVE)

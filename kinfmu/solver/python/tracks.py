@@ -63,9 +63,8 @@ class TrackModel:
         )
         self.ANCHOR = u[own], self.of(z)
         self.WATCHES = ()
-        self.LAWS = model.LAWS
-        if model.LAWS:
-            self.LAW_TURNS, self.LAW_LENGTHS, self.LAW_UNITS = model.LAW_TURNS, model.LAW_LENGTHS, model.LAW_UNITS
+        self.LAW_UNITS, self.LAW_TURNS, self.LAW_LENGTHS = model.LAW_UNITS, model.LAW_TURNS, model.LAW_LENGTHS
+        if model.LAW_UNITS:
             self.law_positions, self.law_steps = model.law_positions, model.law_steps
         ends = [0]
         for k in self.blocks:

@@ -35,7 +35,7 @@ def trusted_step(model: Model, pose: Pose, direction: Vector, s: float, u: Vecto
     for before, after in zip(pose.determinants, trial.determinants):  # noqa: B905  one item per block
         if after < FALL * before if before > 0.0 else after > FALL * before:
             return None
-    if model.LAWS and passes_unseen(model, pose, trial, direction, s):
+    if model.LAW_UNITS and passes_unseen(model, pose, trial, direction, s):
         return None
     if model.TALL and _turns_over(model, pose, trial):
         return None
@@ -56,7 +56,7 @@ def passes_unseen(model: Model, pose: Pose, trial: Pose, direction: Vector, s: f
     zd, zdd = directed(model, pose, direction)
     motion = model.law_motion(pose.values, direction, (0.0,) * len(direction), zd, zdd)
     there = model.law_positions(trial.values)
-    count, arguments = model.LAWS, len(model.LAW_TURNS)
+    count, arguments = len(there), len(model.LAW_TURNS)
     lows, highs = [], []
     for k, (end, unit) in enumerate(zip(there, model.LAW_UNITS)):  # noqa: B905  one item per motion
         here, rate, bend = motion[k], s * motion[count + k], s * s * motion[2 * count + k]
@@ -72,10 +72,10 @@ def passes_unseen(model: Model, pose: Pose, trial: Pose, direction: Vector, s: f
             low, high = min(low, turning), max(high, turning)
         lows.append(low - abs(off))
         highs.append(high + abs(off))
-    if any([low < 0.0 for low in lows[arguments : arguments + model.LAW_LENGTHS]]):
+    if min(lows[arguments : arguments + model.LAW_LENGTHS], default=0.0) < 0.0:
         return True
-    steps = zip(model.law_steps(lows[:arguments]), model.law_steps(highs[:arguments]))  # noqa: B905
-    return any([abs(b - a) > 1.0 for a, b in steps])
+    before, after = model.law_steps(lows[:arguments]), model.law_steps(highs[:arguments])
+    return any(abs(b - a) > 1.0 for a, b in zip(before, after))  # noqa: B905  one item per argument
 
 
 def _turns_over(model: Model, pose: Pose, trial: Pose) -> bool:
