@@ -153,10 +153,8 @@ class SolvePlan:
         lines += [f"output {m.name} {[number[n] for n in m[1:]]}" for m in motions]
         lines += [f"watch {name} {number[node]}" for name, node in self.watches]
         lines += [f"fixed {name} {number[node]}" for name, node in self.fixed_nodes.items()]
-        lines += [
-            f"path {self.path_laws.units} {[number[n] for n in order]}" for order in self.path_laws.motions if order
-        ]
-        lines += [f"steps {number[node]}" for node in self.path_laws.steps]
+        for nodes in (*self.path_laws.motions, self.path_laws.steps) if self.path_laws.units else ():
+            lines.append(f"laws on paths {self.path_laws.units} {[number[node] for node in nodes]}")
         lines += [f"condition {name} {number[node]} {required}" for name, node, required in self.conditions]
         lines += [f"{self.law_constants} {self.parameters} {self.drivers} {self.coordinate_count}"]
         return "\n".join(lines)
