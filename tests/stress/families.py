@@ -731,7 +731,8 @@ def cylinders(rng: Draw) -> Sketch:
 def led_by_laws(rng: Draw) -> Sketch:
     """A four-bar whose crank follows rises and dwells over the angle of a cam, or of a rocker that swings."""
     other = fourbar(grashof(rng, rng.choice(KINDS)), "crank", _side(rng))
-    law, is_swinging = DrawnLaw(rng), rng.random() < 0.5
+    is_swinging = rng.random() < 0.5
+    law = DrawnLaw(rng, 1e-5 if is_swinging else 2e-7)  # the angle of a rocker is rounded
     first = fourbar(grashof(rng, "crank-rocker"), "crank", _side(rng)) if is_swinging else None
     leader, reach = "rocker" if is_swinging else "cam", (0.0, TURN)
     places = np.linspace(*reach, 2000)
@@ -764,11 +765,11 @@ def led_by_laws(rng: Draw) -> Sketch:
             moving[f"{body}2"] = Pose(pose.at + moved, pose.phi)
         return moving
 
-    def joints(frame: Frame) -> tuple[Joint, ...]:
-        return (Coupling("law", AngleBetween(leader), AngleBetween("crank2"), law.law(frame.angle)),)
+    def joints(_: Frame) -> tuple[Joint, ...]:
+        return (Coupling("law", AngleBetween(leader), AngleBetween("crank2"), law.law),)
 
     driven = "cam" if first is None else "crank"
-    return Sketch(points, poses, _turns(driven), joints, marks=tuple(marks), period=0, reach=reach)
+    return Sketch(points, poses, _turns(driven), joints, marks=tuple(marks), period=0, reach=reach, is_level=True)
 
 
 def _turning(function: Callable[[Array], Array], places: Array) -> list[float]:

@@ -13,15 +13,15 @@ from kinfmu import MotionSequence, Segment
 from tests.power_series import mp
 from tests.stress.jets import Array, Jet, Numbers, Value
 
-SHORTEST, LONGEST = 2e-7, 1.0  # [rad] of rises: from 1e-6 of a step on
+LONGEST = 1.0  # [rad] of rises
 EIGHTHS = 8  # of a rise, at which an oracle looks closely
 SHAPES = ("cycloidal", "3-4-5", "dwell")
 
 
 class DrawnLaw:
-    """A sequence that may repeat: single rises, or bumps that go up and back."""
+    """A sequence that may repeat: single rises, or bumps that go up and back; shortest: of them [rad]."""
 
-    def __init__(self, rng: Random) -> None:
+    def __init__(self, rng: Random, shortest: float) -> None:
         self.repeat = rng.random() < 0.5
         self.start = round(rng.uniform(-3.0, 3.0), 3)
         self.begin = 0.0
@@ -29,7 +29,7 @@ class DrawnLaw:
         for _ in range(rng.randint(1, 3)):
             self.segments.append(Segment("dwell", 0.0))
             rise = round(rng.uniform(-1.0, 1.0) * rng.choice((0.1, 1.0, 2.0, math.tau)), 3)
-            shape, duration = rng.choice(SHAPES[:2]), _duration(rng)
+            shape, duration = rng.choice(SHAPES[:2]), _duration(rng, shortest)
             self.segments.append(Segment(shape, duration, rise))
             if rng.random() < 0.6:
                 self.segments.append(Segment(rng.choice(SHAPES[:2]), duration, -rise))
@@ -52,9 +52,10 @@ class DrawnLaw:
                     self.marks += [at + segment.duration * k / EIGHTHS for k in range(EIGHTHS + 1)]
                 at += segment.duration
 
-    def law(self, angle: float) -> MotionSequence:
-        """The law in a frame at an angle [rad], which its argument and its value count from."""
-        return MotionSequence(tuple(self.segments), self.start + angle, self.begin + angle, self.repeat)
+    @property
+    def law(self) -> MotionSequence:
+        """The law that kinfmu is given."""
+        return MotionSequence(tuple(self.segments), self.start, self.begin, self.repeat)
 
     def value(self, numbers: Numbers, x: Jet) -> Jet:
         """The law's value, with the derivatives of a jet."""
@@ -75,8 +76,8 @@ class DrawnLaw:
         return value
 
 
-def _duration(rng: Random) -> float:
-    return float(10.0 ** rng.uniform(math.log10(SHORTEST), math.log10(LONGEST)))
+def _duration(rng: Random, shortest: float) -> float:
+    return float(10.0 ** rng.uniform(math.log10(shortest), math.log10(LONGEST)))
 
 
 def _floor(x: Any) -> Any:
