@@ -732,7 +732,7 @@ def led_by_laws(rng: Draw) -> Sketch:
     """A four-bar whose crank follows rises and dwells over the angle of a cam, or of a rocker that swings."""
     other = fourbar(grashof(rng, rng.choice(KINDS)), "crank", _side(rng))
     is_swinging = rng.random() < 0.5
-    law = DrawnLaw(rng, 1e-5 if is_swinging else 2e-7)  # the angle of a rocker is rounded
+    law = DrawnLaw(rng, 1e-4 if is_swinging else 2e-7)  # the angle of a rocker is rounded
     first = fourbar(grashof(rng, "crank-rocker"), "crank", _side(rng)) if is_swinging else None
     leader, reach = "rocker" if is_swinging else "cam", (0.0, TURN)
     places = np.linspace(*reach, 2000)

@@ -43,7 +43,9 @@ class DrawnLaw:
             for segment in self.segments
         ]
         whole = sum(segment.duration for segment in self.segments)
-        times = range(-math.ceil((high - low) / whole) - 1, math.ceil((high - low) / whole) + 2) if self.repeat else (0,)
+        times = (
+            range(-math.ceil((high - low) / whole) - 1, math.ceil((high - low) / whole) + 2) if self.repeat else (0,)
+        )
         self.marks = []
         for n in times:
             at = self.begin + n * whole
