@@ -57,7 +57,7 @@ class Path:
         self.length = self.longest
         self.shortest = (
             GIVE_UP if model.LAW_TURNS else SHORTEST_STEP
-        ) * self.longest  # rises may be as short as a limit is near
+        ) * self.longest  # rises are short, too
         self.most_steps = 0 if abs(self.distance) > MOST_STEPS * self.longest else MOST_STEPS
         self.iterations = 0
         self.limit: Limit | None = None
