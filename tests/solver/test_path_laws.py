@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -339,3 +340,14 @@ begin = 1.5
     assert run.status.tolist() == [0] * 5
     assert follower == pytest.approx(follower[0] + math.tau * np.floor(u / math.tau), abs=1e-9)
     assert run["hand.phi"] == pytest.approx(np.where(wheel - follower > 1.502, 10.0, 0.0), abs=1e-9)
+
+
+@pytest.mark.parametrize(("flavour", "fmi"), [("python", 2), ("native", 2), ("native", 3)])
+def test_fmus_step_over_no_rise(flavour: str, fmi: int, tmp_path: Path) -> None:
+    """Communication points are in the dwells before and after a rise of a turn."""
+    width = 1e-4
+    law = sequence(("dwell", math.tau - width, 0.0), ("cycloidal", width, math.tau))
+    built = kinfmu.build(linkage(law), tmp_path / "led.fmu", flavour=flavour, fmi=fmi)  # type: ignore[arg-type]
+    run = kinfmu.simulate(built, start=0.0, stop=12.4, step=6.2, parameters={"crank.speed": 1.02})
+    assert run.status.tolist() == [0, 0, 0]
+    assert run["follower.phi"] == pytest.approx(run["follower.phi"][0] + math.tau * np.arange(3), abs=1e-9)
