@@ -20,7 +20,7 @@ from kinfmu.laws.law import (
     LedRate,
     Phase,
 )
-from kinfmu.measures.arithmetic import Value, sine_of_line
+from kinfmu.measures.arithmetic import Value, sine_of_line, sqrt
 
 HIGHEST_DEGREE = 20  # the value of a polynomial of a higher degree is mostly rounding error
 
@@ -123,6 +123,9 @@ class Harmonic(Law):
 
     def fewest_steps(self, x: Value, **constants: Value) -> Value:
         return 2.0 * RISE_STEPS / TURN * constants["frequency"] * x
+
+    def most_steps(self, **constants: Value) -> Value:
+        return 2.0 * RISE_STEPS / TURN * sqrt(constants["frequency"] * constants["frequency"])
 
     @property
     def period(self) -> float:

@@ -112,6 +112,10 @@ class Law(ABC):
         """
         return 0.0
 
+    def most_steps(self, **constants: Value) -> Value:  # noqa: ARG002
+        """Return a bound of the slope of `fewest_steps`; within its inverse, x passes over nothing."""
+        return 0.0
+
     def own_breaks(self, order: int = 2) -> Jumps:
         """Return the arguments at which f or a derivative up to an order jumps, with the law's own constants."""
         return self.breaks(order, **{name: constant.value for name, constant in self.constants().items()})

@@ -35,6 +35,9 @@ class Rise(Law):
     def fewest_steps(self, x: Value, **constants: Value) -> Value:
         return RISE_STEPS * curve((x - constants["begin"]) / constants["duration"], RAMP)
 
+    def most_steps(self, **constants: Value) -> Value:
+        return RISE_STEPS / constants["duration"]
+
     def breaks(self, order: int, /, **constants: Value) -> Jumps:
         begin, duration = constants["begin"], constants["duration"]
         return Jumps(tuple(begin + duration * x for x in jumping_breaks(self.shape, order)))

@@ -86,6 +86,10 @@ class MotionSequence(Law):
         steps = {name: RISE_STEPS for name in constants if name.startswith("rise_")}
         return self._summed(x, constants | steps | {"start": 0.0}, dict.fromkeys(_SHAPES, RAMP))
 
+    def most_steps(self, **constants: Value) -> Value:
+        rising = [k for k, segment in enumerate(self.segments, start=1) if segment.law != DWELL]
+        return sum((RISE_STEPS / constants[f"duration_{k}"] for k in rising), start=0.0)
+
     def _summed(self, x: Value, constants: Mapping[str, Value], shapes: Mapping[str, CurveData]) -> Value:
         """Return start + sum_k rise_k N_k with these normalized curves."""
         numbered = list(enumerate(self.segments, start=1))

@@ -96,6 +96,9 @@ class Spline(Law):
         times, x = split_periods(x, first, last, -first)
         return times * self._steps[1][-1][1][0] + curve(x, self._steps)
 
+    def most_steps(self, **constants: Value) -> Value:  # noqa: ARG002  it has none
+        return max(slope for _, (slope, *_), *_ in self._steps[1])
+
     def breaks(self, order: int, /, **constants: Value) -> Jumps:  # noqa: ARG002  it has none
         if self.ends != PERIODIC:
             return Jumps(jumping_breaks(self.data, order))

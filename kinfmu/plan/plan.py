@@ -134,7 +134,7 @@ class SolvePlan:
         """Every node that the plan is made of, arguments first."""
         roots = [node for block in self.blocks for node in nodes_of(block)]
         roots += [node for motion in (*self.laws, *self.outputs_motion) for node in motion[1:]]
-        roots += [node for nodes in (*self.path_laws.motions, self.path_laws.steps) for node in nodes]
+        roots += [node for nodes in self.path_laws.nodes for node in nodes]
         roots += [*self.fixed_nodes.values(), *(node for _, node in self.watches)]
         return tuple(reachable([*roots, *(condition.node for condition in self.conditions)]))
 
@@ -153,7 +153,7 @@ class SolvePlan:
         lines += [f"output {m.name} {[number[n] for n in m[1:]]}" for m in motions]
         lines += [f"watch {name} {number[node]}" for name, node in self.watches]
         lines += [f"fixed {name} {number[node]}" for name, node in self.fixed_nodes.items()]
-        for nodes in (*self.path_laws.motions, self.path_laws.steps) if self.path_laws.units else ():
+        for nodes in self.path_laws.nodes if self.path_laws.units else ():
             lines.append(f"laws on paths {self.path_laws.units} {[number[node] for node in nodes]}")
         lines += [f"condition {name} {number[node]} {required}" for name, node, required in self.conditions]
         lines += [f"{self.law_constants} {self.parameters} {self.drivers} {self.coordinate_count}"]

@@ -214,6 +214,7 @@ def _laws(parts: Parts) -> list[str]:
         ("positions", f"{pose}, double *positions", laws.motions[0]),
         ("rates", f"{pose}, const double *x1, double *rates", laws.motions[1]),
         ("accelerations", f"{pose}, const double *x1, const double *x2, double *accelerations", laws.motions[2]),
+        ("slopes", "const kf_model *model, double *slopes", laws.slopes),
         ("steps", "const kf_model *model, const double *arguments, double *steps", laws.steps),
     )
     lines = []

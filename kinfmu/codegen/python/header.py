@@ -79,19 +79,21 @@ def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str
 
 
 def law_steps(plan: SolvePlan, names: Names, prolog: Sequence[Node]) -> list[str]:
-    """Return the function of the fewest steps through laws."""
-    writer = Writer(names, (), prolog)
-    steps = plan.path_laws.steps
-    body = writer.statements(steps)
-    return [
-        "",
-        "def law_steps(arguments):",
-        '    """The fewest steps in which a path goes through each law up to its argument."""',
-        *unpacking([identifier(argument_symbol(k)) for k in range(len(steps))], "arguments"),
-        *indented(body),
-        f"    return {tupled(writer.expression(node) for node in steps)}",
-        "",
-    ]
+    """Return the functions of the fewest steps through laws, and of the bounds of their slopes."""
+    laws = plan.path_laws
+    arguments = unpacking([identifier(argument_symbol(k)) for k in range(len(laws.steps))], "arguments")
+    functions = (
+        ("law_steps(arguments)", "The fewest steps of a path through each law up to its argument.", laws.steps),
+        ("law_slopes()", "Bounds of the slopes of `law_steps`.", laws.slopes),
+    )
+    lines = []
+    for head, about, nodes in functions:
+        writer = Writer(names, (), prolog)
+        body = writer.statements(nodes)
+        returned = f"    return {tupled(writer.expression(node) for node in nodes)}"
+        lines += ["", f"def {head}:", f'    """{about}"""', *(arguments if nodes is laws.steps else ())]
+        lines += [*indented(body), returned, ""]
+    return lines
 
 
 def places(solved: Sequence[Block]) -> list[tuple[int, int]]:

@@ -126,6 +126,7 @@ void kf_law_rates(const kf_model *model, const kf_found *found, const double *x1
 void kf_law_accelerations(const kf_model *model, const kf_found *found, const double *x1, const double *x2,
                           double *accelerations);
 void kf_law_steps(const kf_model *model, const double *arguments, double *steps); /* the fewest up to each argument */
+void kf_law_slopes(const kf_model *model, double *slopes); /* bounds of their slopes */
 #endif
 void kf_fixed(const kf_model *model, double *fixed);
 void kf_jacobian(const kf_model *model, const kf_found *found, int block, double *jacobian); /* row after row */

@@ -67,6 +67,12 @@ static bool passes_unseen(const kf_model *model, const kf_found *pose, const dou
             return true;
         }
     }
+    kf_law_slopes(model, before);
+    for (k = 0; k < KF_LAW_ARGUMENTS && before[k] * (highs[k] - lows[k]) <= 1.0; ++k) {
+    }
+    if (k == KF_LAW_ARGUMENTS) { /* as a rule */
+        return false;
+    }
     kf_law_steps(model, lows, before);
     kf_law_steps(model, highs, after);
     for (k = 0; k < KF_LAW_ARGUMENTS; ++k) {

@@ -55,9 +55,7 @@ class Path:
             self.direction, self.distance = straight_path(model, start.u, target)
             self.longest = LONGEST_STEP
         self.length = self.longest
-        self.shortest = (
-            GIVE_UP if model.LAW_TURNS else SHORTEST_STEP
-        ) * self.longest  # rises are short, too
+        self.shortest = (GIVE_UP if model.LAW_TURNS else SHORTEST_STEP) * self.longest  # rises are short, too
         self.most_steps = 0 if abs(self.distance) > MOST_STEPS * self.longest else MOST_STEPS
         self.iterations = 0
         self.limit: Limit | None = None

@@ -55,25 +55,31 @@ def passes_unseen(model: Model, pose: Pose, trial: Pose, direction: Vector, s: f
     """
     zd, zdd = directed(model, pose, direction)
     motion = model.law_motion(pose.values, direction, (0.0,) * len(direction), zd, zdd)
-    there = model.law_positions(trial.values)
-    count, arguments = len(there), len(model.LAW_TURNS)
+    there, turns = model.law_positions(trial.values), model.LAW_TURNS
+    count, arguments = len(there), len(turns)
     lows, highs = [], []
     for k, (end, unit) in enumerate(zip(there, model.LAW_UNITS)):  # noqa: B905  one item per motion
         here, rate, bend = motion[k], s * motion[count + k], s * s * motion[2 * count + k]
         predicted = here + rate + 0.5 * bend
-        off = end - predicted
-        if k < arguments and model.LAW_TURNS[k]:
-            off -= model.LAW_TURNS[k] * floor(off / model.LAW_TURNS[k] + 0.5)
-        if not abs(off) <= MOST_OFF * unit:
+        off = abs(end - predicted)
+        if k < arguments and off > 1.0 and turns[k]:
+            off = abs(off - turns[k] * floor(off / turns[k] + 0.5))
+        if not off <= MOST_OFF * unit:
             return True
-        low, high = (here, predicted) if here < predicted else (predicted, here)
-        if rate * (rate + bend) < 0.0:
-            turning = here - 0.5 * rate * rate / bend
-            low, high = min(low, turning), max(high, turning)
-        lows.append(low - abs(off))
-        highs.append(high + abs(off))
-    if min(lows[arguments : arguments + model.LAW_LENGTHS], default=0.0) < 0.0:
-        return True
+        if k < arguments + model.LAW_LENGTHS:
+            low, high = (here, predicted) if here < predicted else (predicted, here)
+            if rate * (rate + bend) < 0.0:
+                turning = here - 0.5 * rate * rate / bend
+                low, high = min(low, turning), max(high, turning)
+            if k >= arguments and low < off:
+                return True
+            lows.append(low - off)
+            highs.append(high + off)
+    for low, high, slope in zip(lows, highs, model.law_slopes()):  # noqa: B905  lengths have none
+        if slope * (high - low) > 1.0:
+            break
+    else:  # as a rule
+        return False
     before, after = model.law_steps(lows[:arguments]), model.law_steps(highs[:arguments])
     return any(abs(b - a) > 1.0 for a, b in zip(before, after))  # noqa: B905  one item per argument
 
