@@ -15,7 +15,7 @@ from kinfmu.plan import localized
 from kinfmu.plan.origin import relative_to
 from kinfmu.solver.python import Pose
 from kinfmu.solver.python.bridge import Bridge
-from kinfmu.solver.python.limit import NO_BLOCK, Limit
+from kinfmu.solver.python.limit import NEGATIVE, NO_BLOCK, Limit
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def _position(path: DriverPath, limit: Limit | None) -> LimitPosition | None:
 
 def _kind(limit: Limit) -> str:
     """Return the kind of a limit, as in LimitPosition."""
-    if limit.block == NO_BLOCK:
+    if limit.block in (NO_BLOCK, NEGATIVE):
         return "end"
     return "change point" if limit.crosses else "dead centre"
 

@@ -7,8 +7,20 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 from kinfmu.errors import MechanismError
-from kinfmu.laws.law import NEARLY, TURN, Constant, ConstantPath, Frequency, Law, LawQuantity, Led, LedRate, Phase
-from kinfmu.measures.arithmetic import Value, sine_of_line
+from kinfmu.laws.law import (
+    NEARLY,
+    RISE_STEPS,
+    TURN,
+    Constant,
+    ConstantPath,
+    Frequency,
+    Law,
+    LawQuantity,
+    Led,
+    LedRate,
+    Phase,
+)
+from kinfmu.measures.arithmetic import Value, sine_of_line, sqrt
 
 HIGHEST_DEGREE = 20  # the value of a polynomial of a higher degree is mostly rounding error
 
@@ -108,6 +120,12 @@ class Harmonic(Law):
 
     def target(self, x: Value, **constants: Value) -> Value:
         return constants["start"] + constants["amplitude"] * sine_of_line(constants["frequency"], x, constants["phase"])
+
+    def fewest_steps(self, x: Value, **constants: Value) -> Value:
+        return 2.0 * RISE_STEPS / TURN * constants["frequency"] * x
+
+    def most_steps(self, **constants: Value) -> Value:
+        return 2.0 * RISE_STEPS / TURN * sqrt(constants["frequency"] * constants["frequency"])
 
     @property
     def period(self) -> float:

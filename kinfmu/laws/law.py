@@ -15,6 +15,7 @@ from kinfmu.measures.arithmetic import Value
 from kinfmu.solver.python.curve import CurveData, curve
 from kinfmu.units import Quantity
 
+RISE_STEPS = 8.0  # that a rise is seen in at least: the modified trapezoid has 8 parts
 SAME = 1e-9  # of the largest value at the breaks and midway between them; smaller differences are rounding
 
 
@@ -103,6 +104,17 @@ class Law(ABC):
     def breaks(self, order: int, /, **constants: Value) -> Jumps:  # noqa: ARG002  smooth laws have none
         """Return the arguments at which f or a derivative of it up to an order jumps, as `jumps` does."""
         return Jumps()
+
+    def fewest_steps(self, x: Value, **constants: Value) -> Value:  # noqa: ARG002  it is smooth, as poses are
+        """Return the number of steps that a path takes at least through the law up to x, in plain arithmetic.
+
+        In one step of a path it changes by one at most, so that no part of the law stays unseen: see `RISE_STEPS`.
+        """
+        return 0.0
+
+    def most_steps(self, **constants: Value) -> Value:  # noqa: ARG002
+        """Return a bound of the slope of `fewest_steps`; within its inverse, x passes over nothing."""
+        return 0.0
 
     def own_breaks(self, order: int = 2) -> Jumps:
         """Return the arguments at which f or a derivative up to an order jumps, with the law's own constants."""

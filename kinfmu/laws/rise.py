@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-from kinfmu.laws.law import Argument, Duration, Jumps, Law, Led, jumping_breaks
+from kinfmu.laws.law import RISE_STEPS, Argument, Duration, Jumps, Law, Led, jumping_breaks
 from kinfmu.measures.arithmetic import Value, curve
 from kinfmu.solver.python.curve import CurveData, Piece
 
@@ -32,6 +32,12 @@ class Rise(Law):
         part = (x - constants["begin"]) / constants["duration"]
         return constants["start"] + constants["rise"] * curve(part, self.shape)
 
+    def fewest_steps(self, x: Value, **constants: Value) -> Value:
+        return RISE_STEPS * curve((x - constants["begin"]) / constants["duration"], RAMP)
+
+    def most_steps(self, **constants: Value) -> Value:
+        return RISE_STEPS / constants["duration"]
+
     def breaks(self, order: int, /, **constants: Value) -> Jumps:
         begin, duration = constants["begin"], constants["duration"]
         return Jumps(tuple(begin + duration * x for x in jumping_breaks(self.shape, order)))
@@ -40,6 +46,9 @@ class Rise(Law):
 def polynomial(origin: float, *coefficients: float) -> Piece:
     """Return a piece that is a polynomial of s = x - origin, highest power first."""
     return origin, coefficients, 0.0, 0.0, 0.0
+
+
+RAMP: CurveData = ((0.0, 1.0), (polynomial(0.0, 0.0), polynomial(0.0, 1.0, 0.0), polynomial(1.0, 1.0)))
 
 
 def normalized(half: Sequence[tuple[float, Piece]]) -> CurveData:

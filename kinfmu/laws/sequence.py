@@ -8,9 +8,22 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.laws.law import NEARLY, TURN, Argument, Constant, ConstantPath, Jumps, Law, LawQuantity, Led, jumping_breaks
-from kinfmu.laws.rise import RISES
+from kinfmu.laws.law import (
+    NEARLY,
+    RISE_STEPS,
+    TURN,
+    Argument,
+    Constant,
+    ConstantPath,
+    Jumps,
+    Law,
+    LawQuantity,
+    Led,
+    jumping_breaks,
+)
+from kinfmu.laws.rise import RAMP, RISES
 from kinfmu.measures.arithmetic import Value, curve, split_periods, sqrt
+from kinfmu.solver.python.curve import CurveData
 
 DWELL = "dwell"
 _SHAPES = {rise.type: rise.shape for rise in RISES}
@@ -67,6 +80,18 @@ class MotionSequence(Law):
         return replace(self, segments=segments, **own)
 
     def target(self, x: Value, **constants: Value) -> Value:
+        return self._summed(x, constants, _SHAPES)
+
+    def fewest_steps(self, x: Value, **constants: Value) -> Value:
+        steps = {name: RISE_STEPS for name in constants if name.startswith("rise_")}
+        return self._summed(x, constants | steps | {"start": 0.0}, dict.fromkeys(_SHAPES, RAMP))
+
+    def most_steps(self, **constants: Value) -> Value:
+        rising = [k for k, segment in enumerate(self.segments, start=1) if segment.law != DWELL]
+        return sum((RISE_STEPS / constants[f"duration_{k}"] for k in rising), start=0.0)
+
+    def _summed(self, x: Value, constants: Mapping[str, Value], shapes: Mapping[str, CurveData]) -> Value:
+        """Return start + sum_k rise_k N_k with these normalized curves."""
         numbered = list(enumerate(self.segments, start=1))
         rises = {k: constants[f"rise_{k}"] for k, segment in numbered if segment.law != DWELL}
         durations = {k: constants[f"duration_{k}"] for k, _ in numbered}
@@ -78,7 +103,7 @@ class MotionSequence(Law):
         begin = 0.0
         for k, segment in numbered:
             if k in rises:
-                value = value + rises[k] * curve((since - begin) / durations[k], _SHAPES[segment.law])
+                value = value + rises[k] * curve((since - begin) / durations[k], shapes[segment.law])
             begin = begin + durations[k]
         return value
 

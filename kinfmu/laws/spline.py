@@ -15,6 +15,7 @@ from kinfmu.solver.python.curve import CurveData, Piece
 
 NOT_A_KNOT, NATURAL, PERIODIC = ENDS = ("not_a_knot", "natural", "periodic")
 FEWEST = {NOT_A_KNOT: 4, NATURAL: 3, PERIODIC: 4}
+STEPS = 2.0  # over a width in which a cubic bends by a sixth of the table's range; a point out of line is seen in 12
 EDGE = 1e-12  # of the table's width; times k h that miss the last point by rounding still belong to the table
 SAME = 1e-9  # of the largest value; by how much the ends of a periodic table may differ
 _X, _U = LawQuantity("argument"), LawQuantity("led")
@@ -69,6 +70,34 @@ class Spline(Law):
             first, last = self.points[0][0], self.points[-1][0]
             x = split_periods(x, first, last, -first)[1]
         return curve(x, self.data)
+
+    @cached_property
+    def _steps(self) -> CurveData:
+        """`fewest_steps` in the table, from 0: over a width w a piece bends by d w^3, a part of the table's range.
+
+        So dense tables of smooth curves are not seen point by point, but one point out of line is.
+        """
+        values = [u for _, u in self.points]
+        extent = max(values) - min(values) or 1.0
+        inner = self.data[1] if self.ends == PERIODIC else self.data[1][1:-1]
+        knots = [x for x, _ in self.points]
+        total, pieces = 0.0, list[Piece]()
+        for (_, (d, *_), *_), (begin, end) in zip(inner, pairwise(knots), strict=True):
+            density = STEPS * (6.0 * abs(d) / extent) ** (1.0 / 3.0)
+            pieces.append((begin, (density, total), 0.0, 0.0, 0.0))
+            total += density * (end - begin)
+        before, after = (0.0, (0.0,), 0.0, 0.0, 0.0), (0.0, (total,), 0.0, 0.0, 0.0)
+        return tuple(knots), (before, *pieces, after)
+
+    def fewest_steps(self, x: Value, **constants: Value) -> Value:  # noqa: ARG002  it has none
+        if self.ends != PERIODIC:
+            return curve(x, self._steps)
+        first, last = self.points[0][0], self.points[-1][0]
+        times, x = split_periods(x, first, last, -first)
+        return times * self._steps[1][-1][1][0] + curve(x, self._steps)
+
+    def most_steps(self, **constants: Value) -> Value:  # noqa: ARG002  it has none
+        return max(slope for _, (slope, *_), *_ in self._steps[1])
 
     def breaks(self, order: int, /, **constants: Value) -> Jumps:  # noqa: ARG002  it has none
         if self.ends != PERIODIC:

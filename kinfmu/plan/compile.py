@@ -21,6 +21,7 @@ from kinfmu.plan.conditions import (
     refuse_undefined_loads,
 )
 from kinfmu.plan.origin import localized
+from kinfmu.plan.path_laws import find_path_laws
 from kinfmu.plan.plan import DriverInfo, MotionNodes, PlanParameter, SolvePlan, nodes_of, position_count
 from kinfmu.plan.structure import RowTracer, find_structure
 from kinfmu.plan.trace import Tracer, is_parameter, parameter_symbol
@@ -128,6 +129,7 @@ def plan_from(
         known_by={name: system.rows[index].name for name, index in structure.fixed_by.items()},
         load_sharing=tuple((one.row.name, *(row.name for row in one.implied_by)) for one in redundancy.redundant),
         watches=tuple(watches),
+        path_laws=find_path_laws(tracer, rates, known, blocks, system.size),
         conditions=find_conditions(mechanism, tracer),
         anchor=anchor,
     )

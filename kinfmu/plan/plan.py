@@ -12,6 +12,7 @@ from kinfmu.equations.graph import Node, evaluate, reachable, symbols
 from kinfmu.mechanism import LawConstant, Mechanism, Point
 from kinfmu.plan.block import Block
 from kinfmu.plan.conditions import PlanCondition
+from kinfmu.plan.path_laws import PathLaws
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.units import CoordinateName, InputName, Quantity
 
@@ -68,6 +69,7 @@ class SolvePlan:
             those that imply it. Their reactions are undetermined.
         watches: Redundant rows, relative to the size, whose residuals are monitored.
         conditions: Conditions that parameters set at run time must keep.
+        path_laws: What steps of a path monitor of the laws over quantities of the pose.
         anchor: An assembled, regular pose.
 
     """
@@ -89,6 +91,7 @@ class SolvePlan:
     load_sharing: tuple[tuple[str, ...], ...]
     watches: tuple[tuple[str, Node], ...]
     conditions: tuple[PlanCondition, ...]
+    path_laws: PathLaws
     anchor: Assembled
 
     @cached_property
@@ -131,6 +134,7 @@ class SolvePlan:
         """Every node that the plan is made of, arguments first."""
         roots = [node for block in self.blocks for node in nodes_of(block)]
         roots += [node for motion in (*self.laws, *self.outputs_motion) for node in motion[1:]]
+        roots += [node for nodes in self.path_laws.nodes for node in nodes]
         roots += [*self.fixed_nodes.values(), *(node for _, node in self.watches)]
         return tuple(reachable([*roots, *(condition.node for condition in self.conditions)]))
 
@@ -149,6 +153,8 @@ class SolvePlan:
         lines += [f"output {m.name} {[number[n] for n in m[1:]]}" for m in motions]
         lines += [f"watch {name} {number[node]}" for name, node in self.watches]
         lines += [f"fixed {name} {number[node]}" for name, node in self.fixed_nodes.items()]
+        for nodes in self.path_laws.nodes if self.path_laws.units else ():
+            lines.append(f"laws on paths {self.path_laws.units} {[number[node] for node in nodes]}")
         lines += [f"condition {name} {number[node]} {required}" for name, node, required in self.conditions]
         lines += [f"{self.law_constants} {self.parameters} {self.drivers} {self.coordinate_count}"]
         return "\n".join(lines)

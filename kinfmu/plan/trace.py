@@ -53,19 +53,20 @@ class Tracer:
 
     def joint(self, joint: Joint, known: Mapping[str, Node]) -> tuple[Node, ...]:
         """Return the rows of a joint, with `known` in place of the symbols of some coordinates."""
-        return tuple(self.graph.lift(row) for row in joint.residual(self._placement(joint.bodies(), known)))
+        return tuple(self.graph.lift(row) for row in joint.residual(self.placement(joint.bodies(), known)))
 
     def driver(self, driver: Driver, known: Mapping[str, Node]) -> Node:
         """Return the row of a driver, with `known` in place of the symbols of some coordinates."""
-        placement = self._placement(driver.bodies(), known)
+        placement = self.placement(driver.bodies(), known)
         return self.graph.lift(driver.residual(placement, self.targets[driver.name]))
 
     def point(self, name: str, known: Mapping[str, Node]) -> tuple[Node, Node]:
         """Return the world coordinates of a point 'body.point'."""
-        x, y = self._placement((body_of(name),), known).point(name)
+        x, y = self.placement((body_of(name),), known).point(name)
         return self.graph.lift(x), self.graph.lift(y)
 
-    def _placement(self, bodies: tuple[str, ...], known: Mapping[str, Node]) -> Placement:
+    def placement(self, bodies: tuple[str, ...], known: Mapping[str, Node]) -> Placement:
+        """Return the poses of bodies, with `known` in place of the symbols of some coordinates."""
         poses = {}
         for body in bodies:
             if body == GROUND_NAME:

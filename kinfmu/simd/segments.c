@@ -16,8 +16,70 @@
 
 #if KF_HAS_LANES
 
+#if KF_LAWS
+#define MOST_STEPS 64   /* through laws in a segment: with more, its samples are solved alone */
+#define UNEXAMINED 2.0  /* steps through a law between poses at which a segment was examined */
+#define APART 0.1       /* [rad, sizes] of a segment from such a pose; farther off lie other branches and whole turns */
+
+static void law_steps(const kf_model *model, const kf_pose *pose, double *steps)
+{
+    double positions[KF_LAWS];
+    kf_law_positions(model, &pose->found, positions);
+    kf_law_steps(model, positions, steps);
+}
+
+/* Return the most steps of a path through a law between two poses. */
+static double steps_between(const double *a, const double *b)
+{
+    double most = 0.0;
+    int k;
+    for (k = 0; k < KF_LAW_ARGUMENTS; ++k) {
+        most = fmax(most, fabs(b[k] - a[k]));
+    }
+    return most;
+}
+
+/* Return whether a segment was not too coarse for the laws: compare it with poses at as many places as laws have steps.
+ *
+ * steps: of a path through the laws at the end of the segment, from where the follower goes back; through: in the segment.
+ */
+static bool sees_laws(const kf_segments *segments, kf_follower *follower, const kf_segment *segment, double end,
+                      const double *steps, double through)
+{
+    const int count = through <= MOST_STEPS ? (int)ceil(through) : 0;
+    double before[KF_ROOM(KF_LAW_ARGUMENTS)], here[KF_ROOM(KF_LAW_ARGUMENTS)];
+    int i, j, k;
+    memcpy(before, steps, sizeof before);
+    for (i = 1; through > UNEXAMINED && i <= count; ++i) {
+        const double u = end + 2.0 * (segment->centre - end) * i / count, x = (u - segment->centre) * 2.0 / segments->width;
+        const kf_pose *const pose = kf_followed(follower, &u);
+        if (!KF_GOOD(pose->status)) {
+            return false;
+        }
+        law_steps(&follower->solver.model, pose, here);
+        if (!(steps_between(before, here) <= UNEXAMINED)) {
+            return false;
+        }
+        memcpy(before, here, sizeof before);
+        for (k = 0; k < KF_UNKNOWNS; ++k) {
+            double value = 0.0;
+            for (j = KF_TERMS - 2; j >= 0; --j) {
+                value = (value + segment->c[j][k]) * x;
+            }
+            if (!(fabs(segment->base[k] + value - pose->found.x[k]) <= APART * kf_unknown_scales[k])) {
+                return false;
+            }
+        }
+    }
+    return through <= MOST_STEPS;
+}
+#endif
+
 typedef struct {
     bool is_good;
+#if KF_LAWS
+    double steps[KF_ROOM(KF_LAW_ARGUMENTS)];
+#endif
     double z[KF_ROOM(KF_UNKNOWNS)], zd[KF_ROOM(KF_UNKNOWNS)], zdd[KF_ROOM(KF_UNKNOWNS)];
 } kf_node;
 
@@ -86,6 +148,9 @@ static bool take_node(kf_segments *segments, kf_follower *follower, int64_t numb
     }
     collect(segments, &follower->solver, pose);
     node->is_good = pose->status == KF_OK && pose->found.margin >= SURE;
+#if KF_LAWS
+    law_steps(&follower->solver.model, pose, node->steps);
+#endif
     if (node->is_good) {
         kf_tangent(&follower->solver.model, pose);
         memcpy(node->z, pose->found.x, sizeof node->z);
@@ -156,6 +221,11 @@ static bool lay(kf_segments *segments, kf_follower *follower, int64_t last, kf_n
         }
         join(&nodes[side > 0 ? 1 : 3], &nodes[2], &nodes[side > 0 ? 3 : 1], node_place(segments, 2 * number + side),
              0.5 * segments->width, segment);
+#if KF_LAWS
+        segment->is_plain = segment->is_plain
+            && sees_laws(segments, follower, segment, node_place(segments, 2 * number + 2 * side), nodes[3].steps,
+                         steps_between(nodes[1].steps, nodes[2].steps) + steps_between(nodes[2].steps, nodes[3].steps));
+#endif
     }
     return true;
 }

@@ -153,7 +153,7 @@ def interval(drawn: Drawn) -> Interval:
     scale = 1.0 if is_angle else float(drawn.frame.scale)
     if is_angle and not sketch.period:
         ends = sketch.reach[0] + drawn.frame.angle, sketch.reach[1] + drawn.frame.angle
-        marks = []
+        marks = list(sketch.marks)
     elif is_angle:
         period = TURN * sketch.period
         ends = start - period, start + period

@@ -70,6 +70,7 @@ class Sketch:
     marks: tuple[float, ...] = ()
     period: int = 2
     reach: tuple[float, float] = (0.0, TURN)
+    is_level: bool = False  # its angles count from the world's axis: it is not turned
 
 
 class Exactly(NamedTuple):

@@ -11,8 +11,10 @@ from random import Random
 import numpy as np
 
 from kinfmu import (
+    AngleBetween,
     AngleDriver,
     ConstantSpeed,
+    Coupling,
     Distance,
     DistanceDriver,
     Gear,
@@ -22,9 +24,10 @@ from kinfmu import (
 )
 from kinfmu.drivers import Driver
 from kinfmu.joints import Joint
-from tests.stress.drawn import Frame, Pose, Sketch, framed, standing, world
+from tests.stress.drawn import TURN, Frame, Pose, Sketch, framed, standing, world
 from tests.stress.inverse import driven_at
-from tests.stress.jets import Exact, Jet, Numbers, Vector, turned
+from tests.stress.jets import LONG, Array, Exact, Jet, Numbers, Value, Vector, turned
+from tests.stress.laws import DrawnLaw
 from tests.stress.loops import Closing, between, in_slot, on_arm, on_level, on_slide
 
 ENDS = (0.0, math.pi)  # of an arm: stretched toward its pivot and away from it
@@ -725,6 +728,80 @@ def cylinders(rng: Draw) -> Sketch:
     return Sketch(points, poses, drivers, kinds=kinds, reach=(0.1, 4.0))
 
 
+def led_by_laws(rng: Draw) -> Sketch:
+    """A four-bar whose crank follows rises and dwells over the angle of a cam, or of a rocker that swings."""
+    other = fourbar(grashof(rng, rng.choice(KINDS)), "crank", _side(rng))
+    is_swinging = rng.random() < 0.5
+    law = DrawnLaw(rng, 1e-4 if is_swinging else 2e-7)  # the angle of a rocker is rounded
+    first = fourbar(grashof(rng, "crank-rocker"), "crank", _side(rng)) if is_swinging else None
+    leader, reach = "rocker" if is_swinging else "cam", (0.0, TURN)
+    places = np.linspace(*reach, 2000)
+
+    def led(numbers: Numbers, u: Jet, closing: Closing) -> dict[str, Pose]:
+        return {leader: Pose(Vector(0, 0), u)} if first is None else first.poses(numbers, [u], closing)
+
+    def argument(u: Array) -> Array:
+        return np.asarray(led(LONG, Value(LONG, LONG.array(u)), Closing())[leader].phi.d0)
+
+    angles = argument(places)
+    if np.abs(np.diff(angles)).max() > 1.0:
+        raise RedrawError  # an angle that jumps by a turn
+    law.placed(rng, float(angles.min()), float(angles.max()))
+    marks = [*_turning(argument, places), *_crossing(argument, places, law.marks)]
+    points = {} if first is None else {body: dict(given) for body, given in first.points.items()}
+    points = points or {"ground": {"K": ORIGIN}, "cam": {"K": ORIGIN}}
+    aside = drawn_length(rng, 3.0, 6.0), drawn_length(rng, -2.0, 2.0)
+    for body, given in other.points.items():
+        if body == "ground":
+            points[body] |= {f"{name}2": (x + aside[0], y + aside[1]) for name, (x, y) in given.items()}
+        else:
+            points[f"{body}2"] = {f"{name}2": point for name, point in given.items()}
+
+    def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
+        moving = led(numbers, u[0], closing)
+        followed = law.value(numbers, moving[leader].phi)
+        moved = standing(numbers, *aside, u[0])
+        for body, pose in other.poses(numbers, [followed], closing).items():
+            moving[f"{body}2"] = Pose(pose.at + moved, pose.phi)
+        return moving
+
+    def joints(_: Frame) -> tuple[Joint, ...]:
+        return (Coupling("law", AngleBetween(leader), AngleBetween("crank2"), law.law),)
+
+    driven = "cam" if first is None else "crank"
+    return Sketch(points, poses, _turns(driven), joints, marks=tuple(marks), period=0, reach=reach, is_level=True)
+
+
+def _turning(function: Callable[[Array], Array], places: Array) -> list[float]:
+    """Where a function over rising places turns back."""
+    found = []
+    values = function(places)
+    for k in range(1, len(places) - 1):
+        if (values[k] - values[k - 1]) * (values[k + 1] - values[k]) < 0.0:
+            low, high, sign = places[k - 1], places[k + 1], np.sign(values[k] - values[k - 1])
+            for _ in range(60):
+                near = np.linspace(low, high, 9)
+                best = int(np.argmax(sign * function(near)))
+                low, high = near[max(best - 1, 0)], near[min(best + 1, 8)]
+            found.append(float(0.5 * (low + high)))
+    return found
+
+
+def _crossing(function: Callable[[Array], Array], places: Array, levels: Sequence[float]) -> list[float]:
+    """Where a function over rising places passes levels."""
+    found = []
+    values = function(places)
+    for level in levels:
+        for k in np.flatnonzero((values[:-1] - level) * (values[1:] - level) <= 0.0):
+            low, high, rises = places[k], places[k + 1], values[k + 1] > values[k]
+            for _ in range(55):
+                middle = 0.5 * (low + high)
+                is_past = (function(np.array([middle]))[0] > level) == rises
+                low, high = (low, middle) if is_past else (middle, high)
+            found.append(float(low))
+    return found
+
+
 STARTS_ANYWHERE = "starts anywhere"
 
 
@@ -770,4 +847,5 @@ FAMILIES: dict[str, tuple[Callable[[Draw], Sketch], int]] = {  # and how often o
     "cylinders": (cylinders, 4),
     STARTS_ANYWHERE: (starts_anywhere, 5),
     "machines with a robot": (machines_with_a_robot, 4),
+    "led by laws": (led_by_laws, 4),
 }

@@ -334,6 +334,7 @@ def _drawn(rng: Draw, family: str) -> Drawn:
     sketch = FAMILIES[family][0](rng)
     scale = Fraction(10) ** (rng.randint(-6, 6) if rng.random() < 0.25 else 0)
     direction = rng.choice(DIRECTIONS) if rng.random() < 0.5 else DIRECTIONS[0]
+    direction = DIRECTIONS[0] if sketch.is_level else direction
     at = (Fraction(0), Fraction(0))
     if chance < FAR_SHARE:  # as decimal numbers, which kinfmu takes them for
         scale, direction = Fraction(1), DIRECTIONS[0]

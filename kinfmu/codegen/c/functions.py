@@ -17,6 +17,7 @@ from kinfmu.codegen.lists import LISTS, Lists
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.path_laws import argument_symbol
 from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.python.continuation import NO_NUMBER
 from kinfmu.solver.python.curve import CurveData
@@ -137,7 +138,8 @@ _ALONE = (((0, ""),), ((1, "v"),), ((2, "(v * v)"), (1, "a")))  # sums of deriva
 
 def readers(parts: Parts) -> list[str]:
     """Return all of them."""
-    return [*(line for order in range(3) for line in _outputs(parts, order)), *_watches(parts), *_fixed(parts)]
+    found = [*(line for order in range(3) for line in _outputs(parts, order)), *_watches(parts), *_fixed(parts)]
+    return [*found, *(_laws(parts) if parts.plan.path_laws.units else ())]
 
 
 def _outputs(parts: Parts, order: int) -> list[str]:
@@ -205,6 +207,25 @@ def _fixed(parts: Parts) -> list[str]:
     return function("void kf_fixed(const kf_model *model, double *fixed)", lines, ("model", "fixed"))
 
 
+def _laws(parts: Parts) -> list[str]:
+    """Return the functions of what steps of a path monitor of laws."""
+    laws, pose = parts.plan.path_laws, "const kf_model *model, const kf_found *found"
+    functions = (
+        ("positions", f"{pose}, double *positions", laws.motions[0]),
+        ("rates", f"{pose}, const double *x1, double *rates", laws.motions[1]),
+        ("accelerations", f"{pose}, const double *x1, const double *x2, double *accelerations", laws.motions[2]),
+        ("slopes", "const kf_model *model, double *slopes", laws.slopes),
+        ("steps", "const kf_model *model, const double *arguments, double *steps", laws.steps),
+    )
+    lines = []
+    for name, given, nodes in functions:
+        texts, statements = _expressions(parts, nodes)
+        statements += [f"{name}[{k}] = {texts[node]};" for k, node in enumerate(nodes)]
+        arguments = [one.split("*")[1] for one in given.split(", ")]
+        lines += function(f"void kf_law_{name}({given})", statements, arguments)
+    return lines
+
+
 def _expressions(parts: Parts, targets: Sequence[Node]) -> tuple[dict[Node, str], list[str]]:
     """Return each target as an expression, and the statements that come before."""
     writer = Writer(parts.names, [*parts.derived, *parts.stage_cache.nodes])
@@ -216,6 +237,7 @@ def _expressions(parts: Parts, targets: Sequence[Node]) -> tuple[dict[Node, str]
 def _loads(parts: Parts, used: Iterable[Node]) -> list[str]:
     """Return assignments of what the statements read from the model, its pose and the lists."""
     listed = {name: f"{_LISTS[order]}[{k}]" for order in range(3) for name, k in parts.places(order).items()}
+    listed |= {argument_symbol(k): f"arguments[{k}]" for k in range(len(parts.plan.path_laws.turns))}
     lines = []
     for node in used:
         if node in parts.derived:

@@ -65,6 +65,9 @@ def _sizes(parts: Parts) -> str:
         "DERIVED": len(parts.derived),
         "CONSTANTS": len(plan.law_constants),
         "DISTANCES": len(distance_rows(plan, solved)),
+        "LAWS": len(plan.path_laws.units),
+        "LAW_ARGUMENTS": len(plan.path_laws.turns),
+        "LAW_LENGTHS": plan.path_laws.lengths,
         "TALL": int(any(len(block.residuals) > len(block.unknowns) for block in solved)),
         "LARGEST_BLOCK": max((len(block.residuals) * len(block.unknowns) for block in solved), default=0),
     }
@@ -103,6 +106,8 @@ def tables(plan: SolvePlan, solved: Sequence[Block], labels: Mapping[str, str]) 
         *array("int kf_distance_blocks", [row.block for row in distances]),
         *array("int kf_distance_rows", [row.row for row in distances]),
         *array("double kf_distance_scales", [row.scale for row in distances]),
+        *(array("double kf_law_turns", plan.path_laws.turns) if plan.path_laws.units else []),
+        *(array("double kf_law_units", plan.path_laws.units) if plan.path_laws.units else []),
         *array("double kf_parameters_written", [parameter.value for parameter in plan.parameters]),
         *array("double kf_constants_written", [constant.value for constant in plan.law_constants]),
         "",

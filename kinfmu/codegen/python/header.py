@@ -10,6 +10,7 @@ from kinfmu.codegen.python.block_code import indented, tupled, unpacking
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node
 from kinfmu.plan import Block, SolvePlan
+from kinfmu.plan.path_laws import argument_symbol
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.solver.python.curve import CurveData
 
@@ -69,9 +70,30 @@ def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str
         f"TALL = {tuple(k for k, b in enumerate(solved) if len(b.residuals) > len(b.unknowns))!r}",
         *([f"ROWS = {rows!r}"] if plan.parameters else []),
         f"DISTANCES = {distances!r}  # drivers of distances; block, row and scale of each",
+        f"LAW_UNITS = {plan.path_laws.units!r}  # of motions that steps monitor, first arguments of laws, then lengths",
+        f"LAW_TURNS = {plan.path_laws.turns!r}  # of the arguments: 0 if they do not jump back",
+        f"LAW_LENGTHS = {plan.path_laws.lengths!r}",
         *(f"{name} = {data!r}" for data, name in curves.items()),
         "",
     ]
+
+
+def law_steps(plan: SolvePlan, names: Names, prolog: Sequence[Node]) -> list[str]:
+    """Return the functions of the fewest steps through laws, and of the bounds of their slopes."""
+    laws = plan.path_laws
+    arguments = unpacking([identifier(argument_symbol(k)) for k in range(len(laws.steps))], "arguments")
+    functions = (
+        ("law_steps(arguments)", "The fewest steps of a path through each law up to its argument.", laws.steps),
+        ("law_slopes()", "Bounds of the slopes of `law_steps`.", laws.slopes),
+    )
+    lines = []
+    for head, about, nodes in functions:
+        writer = Writer(names, (), prolog)
+        body = writer.statements(nodes)
+        returned = f"    return {tupled(writer.expression(node) for node in nodes)}"
+        lines += ["", f"def {head}:", f'    """{about}"""', *(arguments if nodes is laws.steps else ())]
+        lines += [*indented(body), returned, ""]
+    return lines
 
 
 def places(solved: Sequence[Block]) -> list[tuple[int, int]]:

@@ -12,7 +12,7 @@ from kinfmu.codegen.kinds import UnitRun
 from kinfmu.codegen.lists import LISTS, Lists
 from kinfmu.codegen.newton import ROUND_OFF
 from kinfmu.codegen.python.block_code import indented, tupled
-from kinfmu.codegen.python.header import bound, curve_names, differences, drive, header
+from kinfmu.codegen.python.header import bound, curve_names, differences, drive, header, law_steps
 from kinfmu.codegen.python.loops import Loops
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node
@@ -46,6 +46,7 @@ class _Looped(Lists):
             *self._stage("rates", "Rates of the outputs.", (1,)),
             *self._stage("accelerations", "Accelerations of the outputs.", (2,)),
             *self._stage("motion", "Positions, rates and accelerations of the outputs in one row.", (0, 1, 2)),
+            *(self._laws() if self.plan.path_laws.units else ()),
             *self._watches(),
             *self._appended("jacobians", "Jacobian of each block.", "jacobian"),
             *self._appended("residuals", "Residuals of each block, relative to the size.", "residual"),
@@ -282,6 +283,32 @@ class _Looped(Lists):
             "def motion_row(x, x1, x2):",
             f"    {about}",
             *self._row(orders),
+        ]
+
+    def _laws(self) -> list[str]:
+        """Return the functions of what steps of a path monitor of laws."""
+        motions = self.plan.path_laws.motions
+        here, lines = self._expressions(motions[0])
+        moving, all_lines = self._expressions([node for nodes in motions for node in nodes])
+        rates = ("(1.0,)", "(0.0,)") if self.has_one_driver else ("ud", "udd")
+        return [
+            "",
+            "def law_motion(values, ud, udd, first, second):",
+            '    """Motions that steps monitor, with rates and accelerations."""',
+            "    x = values[0]",
+            f"    x1 = carried(values, {rates[0]}, first)",
+            f"    x2 = carried_twice(values, {rates[1]}, x1, second)",
+            *all_lines,
+            f"    return {tupled(moving)}",
+            "",
+            "",
+            "def law_positions(values):",
+            '    """Positions that steps monitor."""',
+            "    x = values[0]",
+            *lines,
+            f"    return {tupled(here)}",
+            "",
+            *law_steps(self.plan, self.names, list(self.derived)),
         ]
 
     def _watches(self) -> list[str]:

@@ -17,7 +17,7 @@ from kinfmu.codegen.python.block_code import (
     unpacking,
 )
 from kinfmu.codegen.python.definitions import Definitions, UnitSpeed
-from kinfmu.codegen.python.header import bound, curve_names, differences, drive, header, places
+from kinfmu.codegen.python.header import bound, curve_names, differences, drive, header, law_steps, places
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node, reachable, symbols
 from kinfmu.plan import Block, SolvePlan
@@ -66,6 +66,7 @@ class _Straight:
             self._stage("rates", "Rates of the outputs.", (1,)),
             self._stage("accelerations", "Accelerations of the outputs.", (2,)),
             self._stage("motion", "Positions, rates and accelerations of the outputs in one row.", (0, 1, 2)),
+            *self._laws(),
             self._watches(),
             self._jacobians(),
             self._residuals(),
@@ -75,6 +76,8 @@ class _Straight:
         functions = [*drive(self.plan, self.curves), *position, *differences(self.plan)]
         for lines in later:
             functions += [unpacked if line is _VALUES else line for line in lines]
+        if self.plan.path_laws.units:
+            functions += law_steps(self.plan, self.names, self.prolog)
         if self.plan.parameters:
             functions = bound(self.plan, self.names, self.prolog, functions)
         return "\n".join([*header(self.plan, self.curves), *functions]) + "\n"
@@ -243,9 +246,23 @@ class _Straight:
                 lines += solution
         return lines
 
-    def _stage(self, name: str, docstring: str, orders: Sequence[int]) -> list[str]:
-        """Return a function that returns all outputs at some orders of derivative, one after another."""
-        targets: list[Node] = [motion[1:][order] for order in orders for motion in self.plan.outputs_motion]
+    def _laws(self) -> list[list[str]]:
+        """Return the functions of what steps of a path monitor of laws, if there are some."""
+        motions = self.plan.path_laws.motions
+        return [
+            self._stage("law_motion", "Motions that steps monitor, with rates and accelerations.", (0, 1, 2), motions),
+            self._stage("law_positions", "Positions that steps monitor.", (0,), motions),
+        ][: 2 * bool(motions[0])]
+
+    def _stage(
+        self, name: str, docstring: str, orders: Sequence[int], motions: Sequence[Sequence[Node]] = ()
+    ) -> list[str]:
+        """Return a function that returns motions at some orders of derivative, one after another.
+
+        motions: positions, rates and accelerations; default: of all outputs.
+        """
+        motions = motions or [[motion[1:][order] for motion in self.plan.outputs_motion] for order in range(3)]
+        targets = [node for order in orders for node in motions[order]]
         highest = max(orders)
         arguments = [["values"], ["values", "ud", "first"], ["values", "ud", "udd", "first", "second"]][highest]
         lines = ["", f"def {name}({', '.join(arguments)}):", f'    """{docstring}"""', _VALUES]

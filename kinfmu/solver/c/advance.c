@@ -66,7 +66,7 @@ inline void kf_path_accept(kf_path *path, kf_pose *trial, double s, double margi
 bool kf_path_shorten(kf_path *path, double s)
 {
     path->length = 0.5 * fabs(s);
-    return path->length < KF_SHORTEST_STEP * path->longest;
+    return path->length < (KF_LAW_ARGUMENTS ? KF_GIVE_UP : KF_SHORTEST_STEP) * path->longest; /* rises may be short, too */
 }
 
 void kf_path_limit(kf_path *path, double s)

@@ -265,9 +265,15 @@ int kf_moved(kf_solver *solver, int number, kf_pose *pose, double u)
     }
     kf_make_bridge(other, solver, bridge->span, turns);
     for (k = 0; turns != 0.0 && k < KF_NODES; ++k) {
-        if (!at_node(solver, other, k, &solver->scratch.follow[0])) {
+        kf_pose *const follow = solver->scratch.follow;
+        if (!at_node(solver, other, k, &follow[k % 2])) {
             return -1;
         }
+#if KF_LAWS
+        if (k > 0 && kf_passes_unseen_between(solver, &follow[(k - 1) % 2], &follow[k % 2])) {
+            return -1;
+        }
+#endif
     }
     return kf_bridge_closes(solver, other, &solver->scratch.follow[0].found) ? made : -1;
 }

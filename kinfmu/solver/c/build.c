@@ -62,13 +62,14 @@ static bool is_tall(int block)
     return kf_block_rows[block] > kf_block_ends[block] - kf_first_of(block);
 }
 
-/* Find poses at 1, 2, 4 half widths on the far side, each extrapolated from the last ones and corrected. */
-static bool cross(kf_solver *solver, kf_span *span, double side, int block)
+/* Find poses at 1, 2, 4 half widths on the far side, each extrapolated from the last ones and corrected. before: the last
+ * pose on the near side.
+ */
+static bool cross(kf_solver *solver, kf_span *span, kf_pose *before, double side, int block)
 {
     static const double places[KF_NODES] = {-4.0, -2.0, -1.0, 1.0, 2.0, 4.0}; /* in the direction of the crossing */
     static const int order[KF_NODES] = {0, 1, 2, 3, 4, 5};
     double(*const determinants)[KF_ROOM(KF_BLOCKS)] = solver->scratch.determinants; /* before the zero, after, last */
-    kf_pose *const pose = &solver->scratch.follow[0];
     double *const last = determinants[2];
 #if KF_TRACKS
     double buffer[KF_DRIVERS];
@@ -77,6 +78,7 @@ static bool cross(kf_solver *solver, kf_span *span, double side, int block)
     for (node = 3; node < KF_NODES; ++node) {
         const int first = node == 5 ? 1 : 0, count = node - first;
         const double u = span->centre + side * places[node] * span->half;
+        kf_pose *const pose = &solver->scratch.follow[before == &solver->scratch.follow[0]];
         double weights[KF_MOST_NODES][3];
         kf_weights(count, places + first, places[node], weights);
         kf_combined(span, side * span->half, count, order + first, (const double(*)[3])weights, solver->scratch.z);
@@ -90,11 +92,17 @@ static bool cross(kf_solver *solver, kf_span *span, double side, int block)
                 return false; /* there is another zero next to the one to be bridged */
             }
         }
+#if KF_LAWS
+        if (kf_passes_unseen_between(solver, before, pose)) {
+            return false;
+        }
+#endif
         memcpy(last, pose->found.determinants, KF_BLOCKS * sizeof(double));
         if (node == 3) {
             memcpy(determinants[1], last, KF_BLOCKS * sizeof(double));
         }
         kf_span_node(span, node, pose, &solver->model);
+        before = pose;
     }
     return determinants[0][block] * determinants[1][block] < 0.0 || is_tall(block); /* else it touches zero without crossing it */
 }
@@ -116,7 +124,7 @@ static bool span_over(kf_solver *solver, kf_span *span, kf_pose *pose, int block
         distance *= 0.5;
     }
     memcpy(solver->scratch.determinants[0], pose->found.determinants, KF_BLOCKS * sizeof(double));
-    if (!cross(solver, span, side, block)) {
+    if (!cross(solver, span, pose, side, block)) {
         return false;
     }
     kf_span_hold(span, solver->scratch.determinants[0], solver->scratch.determinants[1]);

@@ -28,6 +28,25 @@ static bool is_trusted(const kf_found *found, const kf_found *trial)
     return true;
 }
 
+#if KF_LAWS
+/* Return whether what laws give outright moves by so much that what follows from it may be a whole turn off. */
+static bool leads_far(const kf_model *model, const kf_model *ahead, const kf_pose *pose, const kf_pose *trial)
+{
+    double here[KF_LAWS], there[KF_LAWS];
+    int k;
+    kf_law_positions(model, &pose->found, here);
+    kf_law_positions(ahead, &trial->found, there);
+    for (k = KF_LAW_ARGUMENTS + KF_LAW_LENGTHS; k < KF_LAWS; ++k) {
+        if (!(fabs(there[k] - here[k]) <= KF_MOST_OFF * kf_law_units[k])) {
+            return true;
+        }
+    }
+    return false;
+}
+#else
+#define leads_far(model, ahead, pose, trial) false
+#endif
+
 /* "parameters coupler = 9": those that differ from the mechanism's. */
 static void append_parameters(char *message, const double *parameters)
 {
@@ -191,7 +210,7 @@ bool kf_continued(kf_solver *solver, const double *from, const double *to, const
         if (kf_bind(ahead, p, why, sizeof why)) {
             const int failed =
                 kf_position(ahead, u, pose->found.x, slope, kf_at_rest, there - s, NULL, &trial->found);
-            if (failed < 0 && is_trusted(&pose->found, &trial->found)) {
+            if (failed < 0 && is_trusted(&pose->found, &trial->found) && !leads_far(&solver->model, ahead, pose, trial)) {
                 for (k = 0; k < KF_UNKNOWNS; ++k) {
                     slope[k] = (trial->found.x[k] - pose->found.x[k]) / (there - s);
                 }

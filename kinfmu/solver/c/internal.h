@@ -20,6 +20,7 @@
 #define KF_SHORTEST_STEP 5e-9 /* of the longest; where steps get shorter, a limit is near: its place is extrapolated */
 #define KF_GIVE_UP 5e-15      /* of the longest; nothing lies between such steps */
 #define KF_BENT 1.0           /* [rad, sizes]; a prediction whose quadratic term is larger may land whole turns away */
+#define KF_MOST_OFF 0.5       /* [rad, sizes] of what a law gives outright from its prediction; farther off lie whole turns */
 #define KF_UNDECIDED 1e-6    /* determinant below which a path ends: lengths within 1e-12 of a change point give such a determinant */
 #define KF_STEEP 100.0       /* slope of an unknown; right before a dead centre it is more: see pose.py */
 
@@ -113,7 +114,7 @@ typedef struct {
     int block;
     bool crosses; /* another branch crosses there and no bridge holds: the motion does not turn back */
 } kf_limit;
-enum { KF_NO_BLOCK = -1, KF_TOO_FAR = -2 };
+enum { KF_NO_BLOCK = -1, KF_TOO_FAR = -2, KF_NEGATIVE = -3 };
 void kf_limit_beyond(kf_solver *solver, const kf_pose *before, kf_pose *pose, const double *direction, kf_limit *limit);
 bool kf_is_beyond(const double *target, const double *limit, const double *direction, double s);
 void kf_append_limit(char *message, const kf_limit *limit, const double *target, int driver);
@@ -164,6 +165,9 @@ KF_RARE kf_pose *kf_advance(kf_solver *solver, kf_pose *start, int map, const do
 /* trusted_step.c */
 bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u,
                      kf_pose *trial);
+#if KF_LAWS
+bool kf_passes_unseen_between(kf_solver *solver, kf_pose *pose, const kf_pose *trial);
+#endif
 bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const double *direction, double s);
 kf_pose *kf_follow_path(kf_solver *solver, kf_pose *start, double u);
 

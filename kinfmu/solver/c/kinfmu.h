@@ -83,6 +83,10 @@ extern const int kf_distance_drivers[KF_ROOM(KF_DISTANCES)]; /* those that drive
 extern const int kf_distance_blocks[KF_ROOM(KF_DISTANCES)];  /* where their rows are */
 extern const int kf_distance_rows[KF_ROOM(KF_DISTANCES)];
 extern const double kf_distance_scales[KF_ROOM(KF_DISTANCES)]; /* of these rows */
+#if KF_LAWS /* motions that steps monitor: arguments of laws, lengths, coordinates that laws give; see trusted_step.py */
+extern const double kf_law_turns[KF_ROOM(KF_LAW_ARGUMENTS)]; /* 0 if the argument does not jump back */
+extern const double kf_law_units[KF_LAWS];
+#endif
 extern const double kf_parameters_written[KF_ROOM(KF_PARAMETERS)];
 extern const double kf_constants_written[KF_ROOM(KF_CONSTANTS)]; /* of the laws */
 
@@ -116,6 +120,14 @@ void kf_output_rates(const kf_model *model, const kf_found *found, const double 
 void kf_output_accelerations(const kf_model *model, const kf_found *found, const double *x1, const double *x2,
                              double v, double a, double *accelerations);
 void kf_watches(const kf_model *model, const kf_found *found, double *watches);
+#if KF_LAWS
+void kf_law_positions(const kf_model *model, const kf_found *found, double *positions);
+void kf_law_rates(const kf_model *model, const kf_found *found, const double *x1, double *rates);
+void kf_law_accelerations(const kf_model *model, const kf_found *found, const double *x1, const double *x2,
+                          double *accelerations);
+void kf_law_steps(const kf_model *model, const double *arguments, double *steps); /* the fewest up to each argument */
+void kf_law_slopes(const kf_model *model, double *slopes); /* bounds of their slopes */
+#endif
 void kf_fixed(const kf_model *model, double *fixed);
 void kf_jacobian(const kf_model *model, const kf_found *found, int block, double *jacobian); /* row after row */
 void kf_residuals(const kf_model *model, const kf_found *found, int block, double *residuals); /* relative to the size */

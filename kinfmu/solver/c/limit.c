@@ -1,6 +1,17 @@
 /* Limits: driver values where a path ends, and why. See kinfmu/solver/python/limit.py. */
 #include "internal.h"
 
+#define VANISHING 1e-6 /* [sizes] of a length that a law gives: where steps end there, it would be negative beyond */
+
+/* Move the limit past the last pose, to where a number vanishes that is `far` at the pose before and `near` at the last. */
+static void extrapolate(const kf_pose *before, const kf_pose *pose, double near, double far, kf_limit *limit)
+{
+    int k;
+    for (k = 0; far > near && k < KF_DRIVERS; ++k) {
+        limit->u[k] += (KF_POSE_U(pose)[k] - KF_POSE_U(before)[k]) * (near / (far - near));
+    }
+}
+
 /* Return where the path ends, just beyond a pose that steps cannot leave.
  *
  * Near a dead centre the tangent grows without bound, and determinant^2 falls linearly along the path: the secant rule
@@ -9,9 +20,24 @@
 void kf_limit_beyond(kf_solver *solver, const kf_pose *before, kf_pose *pose, const double *direction, kf_limit *limit)
 {
     const double *const determinants = pose->found.determinants;
-    double near, far, beyond = 0.0, steepest = 0.0;
+    double near, far, steepest = 0.0;
     int k;
+#if KF_LAWS
+    double lengths[KF_LAWS], longer[KF_LAWS];
+    kf_law_positions(&solver->model, &pose->found, lengths);
+    kf_law_positions(&solver->model, &before->found, longer);
+#endif
     memcpy(limit->u, KF_POSE_U(pose), sizeof limit->u);
+    limit->crosses = false;
+#if KF_LAWS
+    for (k = KF_LAW_ARGUMENTS; k < KF_LAW_ARGUMENTS + KF_LAW_LENGTHS; ++k) {
+        if (lengths[k] < VANISHING * kf_size) {
+            extrapolate(before, pose, lengths[k], longer[k], limit);
+            limit->block = KF_NEGATIVE;
+            return;
+        }
+    }
+#endif
     limit->block = KF_BLOCKS > 0 ? 0 : KF_NO_BLOCK;
     if (KF_BLOCKS == 0) {
         return;
@@ -34,12 +60,7 @@ void kf_limit_beyond(kf_solver *solver, const kf_pose *before, kf_pose *pose, co
         near *= near;
         far *= far;
     }
-    if (far > near) {
-        beyond = near / (far - near);
-        for (k = 0; k < KF_DRIVERS; ++k) {
-            limit->u[k] += (KF_POSE_U(pose)[k] - KF_POSE_U(before)[k]) * beyond;
-        }
-    }
+    extrapolate(before, pose, near, far, limit);
 }
 
 /* Return whether the target lies past the limit in the direction of s. */
@@ -71,6 +92,10 @@ void kf_append_limit(char *message, const kf_limit *limit, const double *target,
         kf_append_place(message, target, kf_differs(target, limit->u, KF_ROUGHLY) ? KF_ROUGHLY : KF_LOCATED, driver);
         kf_append(message, " cannot be reached: the limit is ");
         kf_append_place(message, limit->u, KF_LOCATED, driver);
+    }
+    if (limit->block == KF_NEGATIVE) {
+        kf_append(message, "; beyond it a distance would be negative");
+        return;
     }
     kf_append(message, limit->crosses ? ", where branches of " : "; beyond it ");
     kf_append(message, limit->block == KF_NO_BLOCK ? "the joints" : limit->crosses ? "" : "the loop of ");

@@ -28,6 +28,70 @@ static bool turns_over(const kf_model *model, const kf_pose *pose, const kf_pose
     return false;
 }
 
+#if KF_LAWS
+/* Return whether a step passes over a part of a law that it has not seen, or over a length below 0.
+ *
+ * What it monitors moves along the step as predicted, and by what the prediction is `off` to either side. Arguments may
+ * turn back within the step. A coordinate that a law gives outright may not be off by so much that another one, predicted
+ * from it, may be a whole turn off.
+ */
+static bool passes_unseen(const kf_model *model, const kf_found *pose, const double *x1, const double *x2,
+                          const kf_found *trial, double s)
+{
+    double here[KF_LAWS], rates[KF_LAWS], bends[KF_LAWS], there[KF_LAWS], lows[KF_LAWS], highs[KF_LAWS];
+    double before[KF_ROOM(KF_LAW_ARGUMENTS)], after[KF_ROOM(KF_LAW_ARGUMENTS)];
+    int k;
+    kf_law_positions(model, pose, here);
+    kf_law_rates(model, pose, x1, rates);
+    kf_law_accelerations(model, pose, x1, x2, bends);
+    kf_law_positions(model, trial, there);
+    for (k = 0; k < KF_LAWS; ++k) {
+        const double rate = s * rates[k], bend = s * s * bends[k], predicted = here[k] + rate + 0.5 * bend;
+        double off = there[k] - predicted;
+        if (k < KF_LAW_ARGUMENTS && kf_law_turns[k] > 0.0) {
+            off -= kf_law_turns[k] * floor(off / kf_law_turns[k] + 0.5);
+        }
+        if (!(fabs(off) <= KF_MOST_OFF * kf_law_units[k])) {
+            return true;
+        }
+        lows[k] = fmin(here[k], predicted);
+        highs[k] = fmax(here[k], predicted);
+        if (rate * (rate + bend) < 0.0) {
+            const double turning = here[k] - 0.5 * rate * rate / bend;
+            lows[k] = fmin(lows[k], turning);
+            highs[k] = fmax(highs[k], turning);
+        }
+        lows[k] -= fabs(off);
+        highs[k] += fabs(off);
+        if (k >= KF_LAW_ARGUMENTS && k < KF_LAW_ARGUMENTS + KF_LAW_LENGTHS && lows[k] < 0.0) {
+            return true;
+        }
+    }
+    kf_law_slopes(model, before);
+    for (k = 0; k < KF_LAW_ARGUMENTS && before[k] * (highs[k] - lows[k]) <= 1.0; ++k) {
+    }
+    if (k == KF_LAW_ARGUMENTS) { /* as a rule */
+        return false;
+    }
+    kf_law_steps(model, lows, before);
+    kf_law_steps(model, highs, after);
+    for (k = 0; k < KF_LAW_ARGUMENTS; ++k) {
+        if (fabs(after[k] - before[k]) > 1.0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Return the same of the step between two poses along a single driver. */
+bool kf_passes_unseen_between(kf_solver *solver, kf_pose *pose, const kf_pose *trial)
+{
+    kf_tangent(&solver->model, pose);
+    return passes_unseen(&solver->model, &pose->found, pose->x1, pose->x2, &trial->found,
+                         KF_HERE(solver, trial) - KF_HERE(solver, pose));
+}
+#endif
+
 /* Take one step of predict and correct; return false if it cannot be trusted to stay on the branch. */
 inline bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u,
                      kf_pose *trial)
@@ -59,6 +123,11 @@ inline bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *dire
             return false;
         }
     }
+#if KF_LAWS
+    if (passes_unseen(model, &pose->found, x1, x2, &trial->found, s)) {
+        return false;
+    }
+#endif
     if (KF_TALL && turns_over(model, pose, trial)) {
         return false;
     }

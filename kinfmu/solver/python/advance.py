@@ -40,6 +40,7 @@ class Path:
         "most_steps",
         "pose",
         "regular",
+        "shortest",
         "target",
     )
 
@@ -54,6 +55,7 @@ class Path:
             self.direction, self.distance = straight_path(model, start.u, target)
             self.longest = LONGEST_STEP
         self.length = self.longest
+        self.shortest = (GIVE_UP if model.LAW_TURNS else SHORTEST_STEP) * self.longest  # rises are short, too
         self.most_steps = 0 if abs(self.distance) > MOST_STEPS * self.longest else MOST_STEPS
         self.iterations = 0
         self.limit: Limit | None = None
@@ -83,7 +85,7 @@ class Path:
     def shorten(self, s: float, limit_here: Callable[[], Limit]) -> None:
         """Go on with shorter steps; end at the limit if no step is left or if the target lies beyond it."""
         self.length = 0.5 * abs(s)
-        if self.length < SHORTEST_STEP * self.longest:
+        if self.length < self.shortest:
             self.limit = self.limit or limit_here()
             if self.length < GIVE_UP * self.longest or is_beyond(self.target, self.limit.u, self.direction, s):
                 self.end = self.limit

@@ -8,6 +8,7 @@ pose closes proves that it is a pose of the mechanism: where lengths miss a chan
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import sqrt
 from typing import Any
 
@@ -15,7 +16,7 @@ from .linear import unclosed
 from .pose import AT_REST, EPS, UNIT_SPEED, Found, Model, Pose, Vector, evaluated
 from .span import Span, restored_span
 from .status import Status
-from .trusted_step import follow_path
+from .trusted_step import follow_path, passes_unseen
 
 CLOSED = 1e-12  # residual relative to the size up to which an interpolated pose counts as closed
 AGREED = 1e-9  # [rad, sizes]; largest difference of two widths, and of a pose and a node whole turns away
@@ -201,4 +202,8 @@ def moved(model: Model, bridge: Bridge, pose: Pose, u: float) -> Bridge | None:
         there = Bridge(span, turns, tuple(raised))
     except (ArithmeticError, ValueError):
         return None
+    if model.LAW_UNITS and any(
+        passes_unseen(model, a, b, UNIT_SPEED, b.u[0] - a.u[0]) for a, b in pairwise(there.nodes)
+    ):
+        return None  # the laws do not repeat
     return there if there.closes() else None

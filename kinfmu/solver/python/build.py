@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from .bridge import AGREED, Bridge
 from .hermite import weights
-from .pose import Model, Pose, evaluated
+from .pose import UNIT_SPEED, Model, Pose, evaluated
 from .span import Span, combined
-from .trusted_step import follow_path
+from .trusted_step import follow_path, passes_unseen
 
 HALF_WIDTH = 0.05  # [rad, sizes]; twice as wide loses four digits on the antiparallelogram
 NARROWEST = 1e-3  # [rad, sizes]; nodes closer than this have lost the digits that a bridge would gain
@@ -101,6 +101,8 @@ def _crossed(model: Model, centre: float, half: float, side: float, near: list[P
             return None
         if distance > 1.0 and any(a * b <= 0.0 for a, b in zip(pose.determinants, poses[-1].determinants, strict=True)):
             return None  # there is another zero next to the one to be bridged
+        if model.LAW_UNITS and passes_unseen(model, poses[-1], pose, UNIT_SPEED, u[0] - poses[-1].u[0]):
+            return None
         places.append(distance)
         poses.append(pose)
     return poses[3:]

@@ -16,7 +16,7 @@ from .linear import factor, lu_solve
 from .pose import Model, Pose, Vector, evaluated, failed, position
 from .solver import TOLERANCE, Solver
 from .status import Status
-from .trusted_step import FALL, TRUST
+from .trusted_step import FALL, MOST_OFF, TRUST
 
 _SHORTEST = 1e-7  # step in s; where steps get shorter the path ends
 _MOST_STEPS = 10_000
@@ -83,7 +83,7 @@ def reach(module: Any, values: Vector, tolerance: float = TOLERANCE) -> Reached:
         except (ArithmeticError, ValueError) as error:  # diverged, or a root of something negative
             block = error.args[0] if len(error.args) == 2 else block
         else:
-            if _is_trusted(pose, trial):
+            if _is_trusted(pose, trial) and not (model.LAW_UNITS and _leads_far(model, ahead, pose, trial)):
                 if there == 1.0:
                     pose, model = trial, ahead
                     break
@@ -117,6 +117,13 @@ def _is_trusted(pose: Pose, trial: Pose) -> bool:
         return False
     pairs = zip(pose.determinants, trial.determinants, strict=True)
     return all(after >= FALL * before if before > 0.0 else after <= FALL * before for before, after in pairs)
+
+
+def _leads_far(model: Model, ahead: Model, pose: Pose, trial: Pose) -> bool:
+    """Return whether what laws give outright moves by so much that what follows from it may be a whole turn off."""
+    first = len(model.LAW_TURNS) + model.LAW_LENGTHS
+    here, there = model.law_positions(pose.values)[first:], ahead.law_positions(trial.values)[first:]
+    return not all(abs(b - a) <= MOST_OFF * c for a, b, c in zip(here, there, model.LAW_UNITS[first:], strict=True))
 
 
 def _changed(module: Any, values: Vector) -> str:

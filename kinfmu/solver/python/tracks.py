@@ -63,6 +63,10 @@ class TrackModel:
         )
         self.ANCHOR = u[own], self.of(z)
         self.WATCHES = ()
+        self.LAW_UNITS, self.LAW_TURNS, self.LAW_LENGTHS = model.LAW_UNITS, model.LAW_TURNS, model.LAW_LENGTHS
+        if model.LAW_UNITS:
+            self.law_positions = model.law_positions
+            self.law_steps, self.law_slopes = model.law_steps, model.law_slopes
         ends = [0]
         for k in self.blocks:
             low, high = model.BLOCKS[k]
@@ -144,6 +148,11 @@ class TrackModel:
         first, whole = self.put(zd, self._slopes), self.put(given or (0.0,) * len(self.places), still)
         mask = self._outside | self.mask(held)
         return self.of(self._model.acceleration(values, self._driven(ud), self._driven(udd), first, whole, mask))
+
+    def law_motion(self, values: Any, ud: Vector, udd: Vector, zd: Vector, zdd: Vector) -> Vector:
+        """Return the same as a model's `law_motion`."""
+        first, second = self.put(zd, self._slopes), self.put(zdd, (0.0,) * len(self._z))
+        return tuple(self._model.law_motion(values, self._driven(ud), self._driven(udd), first, second))
 
     def _driven(self, rate: Vector) -> Vector:
         return (*self._rest[: self.driver], rate[0], *self._rest[self.driver + 1 :]) if len(rate) == 1 else rate

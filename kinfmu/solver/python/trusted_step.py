@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import floor, inf
 
 from .linear import orientation
 from .pose import POLISHED, UNDECIDED, UNIT_SPEED, Model, Pose, Vector, directed, polished
@@ -11,6 +11,7 @@ LONGEST_STEP = 0.2  # [rad, sizes]; longer predictions may land on another branc
 TRUST = 10.0  # a correction of the prediction must be this much smaller than the determinants: so far off lie branches
 FALL = 0.3  # a step may not bring a determinant below this part of what it was
 BENT = 1.0  # [rad, sizes]; a prediction whose quadratic term is larger may land whole turns away by accident
+MOST_OFF = 0.5  # [rad, sizes] of what a law gives outright from its prediction; farther off lie whole turns
 UNDOUBTED = 1e-5  # [rad, sizes]; a prediction that was corrected by less did not land by accident
 SMOOTH = 0.5  # largest jump of the tangent in a step, as a part of the tangent: a larger one is another branch
 _MOST_FOLLOWED = 10_000  # steps between a pose and a node; a few, as a rule
@@ -34,6 +35,8 @@ def trusted_step(model: Model, pose: Pose, direction: Vector, s: float, u: Vecto
     for before, after in zip(pose.determinants, trial.determinants):  # noqa: B905  one item per block
         if after < FALL * before if before > 0.0 else after > FALL * before:
             return None
+    if model.LAW_UNITS and passes_unseen(model, pose, trial, direction, s):
+        return None
     if model.TALL and _turns_over(model, pose, trial):
         return None
     if trial.moved > UNDOUBTED:
@@ -41,6 +44,44 @@ def trusted_step(model: Model, pose: Pose, direction: Vector, s: float, u: Vecto
             if abs(second) * s * s > 2.0 * BENT * scale:
                 return None
     return trial
+
+
+def passes_unseen(model: Model, pose: Pose, trial: Pose, direction: Vector, s: float) -> bool:
+    """Return whether a step passes over a part of a law that it has not seen, or over a length below 0.
+
+    What it monitors moves along the step as predicted, and by what the prediction is `off` to either side. Arguments
+    may turn back within the step. A coordinate that a law gives outright may not be off by so much that another one,
+    predicted from it, may be a whole turn off.
+    """
+    zd, zdd = directed(model, pose, direction)
+    motion = model.law_motion(pose.values, direction, (0.0,) * len(direction), zd, zdd)
+    there, turns = model.law_positions(trial.values), model.LAW_TURNS
+    count, arguments = len(there), len(turns)
+    lows, highs = [], []
+    for k, (end, unit) in enumerate(zip(there, model.LAW_UNITS)):  # noqa: B905  one item per motion
+        here, rate, bend = motion[k], s * motion[count + k], s * s * motion[2 * count + k]
+        predicted = here + rate + 0.5 * bend
+        off = abs(end - predicted)
+        if k < arguments and off > 1.0 and turns[k]:
+            off = abs(off - turns[k] * floor(off / turns[k] + 0.5))
+        if not off <= MOST_OFF * unit:
+            return True
+        if k < arguments + model.LAW_LENGTHS:
+            low, high = (here, predicted) if here < predicted else (predicted, here)
+            if rate * (rate + bend) < 0.0:
+                turning = here - 0.5 * rate * rate / bend
+                low, high = min(low, turning), max(high, turning)
+            if k >= arguments and low < off:
+                return True
+            lows.append(low - off)
+            highs.append(high + off)
+    for low, high, slope in zip(lows, highs, model.law_slopes()):  # noqa: B905  lengths have none
+        if slope * (high - low) > 1.0:
+            break
+    else:  # as a rule
+        return False
+    before, after = model.law_steps(lows[:arguments]), model.law_steps(highs[:arguments])
+    return any(abs(b - a) > 1.0 for a, b in zip(before, after))  # noqa: B905  one item per argument
 
 
 def _turns_over(model: Model, pose: Pose, trial: Pose) -> bool:
