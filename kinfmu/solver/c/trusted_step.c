@@ -77,8 +77,8 @@ inline bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *dire
  * Near a crossing the branches lie as close as corrections are small, and one of them keeps the determinant's sign;
  * their tangents stay apart. Towards a dead centre the tangent grows, but in a step by at most SMOOTH of itself. Where
  * the unknowns rest the tangent is rounding noise: at a distance x from a crossing both branches have a determinant
- * |D| ~ x and lie |D| apart, so in a step s across it the tangents differ by (|D| + |D'|) / s. Where a pose is so close
- * to either that doubles cannot tell the branches apart, no step is accepted.
+ * |D| ~ x and lie |D| apart, so in a step s across it their tangents differ by (|D| + |D'|) / s. Where a pose is so
+ * close to either that doubles cannot tell the branches apart, no step is accepted.
  */
 bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const double *direction, double s)
 {
