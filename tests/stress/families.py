@@ -67,6 +67,12 @@ def _turns(body: str) -> Callable[[Frame, Sequence[float]], tuple[Driver, ...]]:
     return lambda _, start: (AngleDriver("drive", body, ConstantSpeed(start[0], 1.0)),)
 
 
+def _turn_each(*bodies: str) -> Callable[[Frame, Sequence[float]], tuple[Driver, ...]]:
+    return lambda _, start: tuple(
+        AngleDriver(f"drive_{body}", body, ConstantSpeed(value, 1.0)) for body, value in zip(bodies, start, strict=True)
+    )
+
+
 # ---------------------------------------------------------------------------------------------------- four-bars
 
 
@@ -529,22 +535,32 @@ def translating_tables(rng: Draw) -> Sketch:
             if not is_body
         )
 
-    def drivers(_: Frame, start: Sequence[float]) -> tuple[Driver, ...]:
-        driven = ("crank0", {"table": "crank1"}.get(tops, tops))[: len(start)]
-        pairs = zip(driven, start, strict=True)
-        return tuple(AngleDriver(f"drive_{body}", body, ConstantSpeed(value, 1.0)) for body, value in pairs)
-
-    return Sketch(points, poses, drivers, joints, kinds=("angle",) * (2 if tops else 1), marks=ENDS)
+    bodies = ("crank0", *{"": (), "table": ("crank1",), "arm": ("arm",)}[tops])
+    return Sketch(points, poses, _turn_each(*bodies), joints, kinds=("angle",) * len(bodies), marks=ENDS)
 
 
 def resting_slides(rng: Draw) -> Sketch:
-    """A crank and a rod of its length, a distance, to a block on a line through the pivot, on which the block rests."""
-    a = drawn_length(rng, 0.3, 2.0)
+    """A crank and a rod of its length, a distance, to a block on a line through the pivot, on which the block rests.
+
+    Some have an arm next to them with a driver of its own.
+    """
+    a, with_arm = drawn_length(rng, 0.3, 2.0), rng.random() < 0.4
+    points: dict[str, dict[str, tuple[Exact, Exact]]] = {
+        "ground": {"O": ORIGIN, "way": ORIGIN},
+        "crank": {"O": ORIGIN, "P": (a, 0)},
+        "block": {"S": ORIGIN},
+    }
+    if with_arm:
+        points["ground"]["W"] = _place(rng, 2.0)
+        points["arm"] = {"W": ORIGIN}
 
     def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
         closing.sines.append(u[0].sin_cos()[1].d0)
         zero = u[0] * numbers.number(0)
-        return {"crank": Pose(Vector(0, 0), u[0]), "block": Pose(Vector(zero, zero), zero)}
+        moving = {"crank": Pose(Vector(0, 0), u[0]), "block": Pose(Vector(zero, zero), zero)}
+        if with_arm:
+            moving["arm"] = Pose(standing(numbers, *points["ground"]["W"], u[1]), u[1])
+        return moving
 
     def joints(frame: Frame) -> tuple[Joint, ...]:
         return (
@@ -552,8 +568,9 @@ def resting_slides(rng: Draw) -> Sketch:
             Distance("rod", ("crank.P", "block.S"), frame.length(a)),
         )
 
-    points = {"ground": {"O": ORIGIN, "way": ORIGIN}, "crank": {"O": ORIGIN, "P": (a, 0)}, "block": {"S": ORIGIN}}
-    return Sketch(points, poses, _turns("crank"), joints, marks=(-0.5 * math.pi, 0.5 * math.pi))
+    bodies = ("crank", "arm") if with_arm else ("crank",)
+    marks, kinds = (-0.5 * math.pi, 0.5 * math.pi), ("angle",) * len(bodies)
+    return Sketch(points, poses, _turn_each(*bodies), joints, kinds=kinds, marks=marks)
 
 
 def coupled_wheels(rng: Draw) -> Sketch:
@@ -621,12 +638,8 @@ def _wheels(rng: Draw, part: Fraction = Fraction(0)) -> Sketch:
             if not bar[-1]
         )
 
-    def drivers(_: Frame, start: Sequence[float]) -> tuple[Driver, ...]:
-        bodies = ("wheel0", "arm") if with_arm else ("wheel0",)
-        pairs = zip(bodies, start, strict=True)
-        return tuple(AngleDriver(f"drive_{body}", body, ConstantSpeed(value, 1.0)) for body, value in pairs)
-
-    return Sketch(points, poses, drivers, joints, kinds=("angle", "angle") if with_arm else ("angle",), gap=gap)
+    bodies = ("wheel0", "arm") if with_arm else ("wheel0",)
+    return Sketch(points, poses, _turn_each(*bodies), joints, kinds=("angle",) * len(bodies), gap=gap)
 
 
 # ------------------------------------------------------------------------------------- cylinders, several drivers
