@@ -222,7 +222,7 @@ def test_a_crossing_that_depends_on_one_driver_is_bridged_for_all_values_of_the_
 
 
 def lever(offset: float, turn: float, start: float = 1.0, unit: float = 1.0, *, has_shoe: bool = False) -> Mechanism:
-    """A lever about (0, 0) whose slot, `offset` beside the pivot, moves a block on y = unit, all turned by `turn`.
+    """A lever about (0, 0) whose slot, `offset` off the pivot, moves a block on y = unit, all turned by `turn`.
 
     The block is at x = (cos phi - offset) / sin phi, which has poles at every half turn of the lever.
     """

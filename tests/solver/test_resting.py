@@ -137,8 +137,8 @@ def test_a_table_moved_by_its_weight_keeps_its_energy(pins: Sequence[tuple[float
     assert np.abs(run["crank_speed"]) == pytest.approx(speed, abs=1e-6)
 
 
-def test_branches_that_cross_are_told_apart_however_slowly_they_move() -> None:
-    """At a change point of a parallelogram the crossed branch leaves: steps across it never land there."""
+def test_steps_across_a_change_point_never_land_on_the_branch_that_crosses() -> None:
+    """At a change point of a parallelogram the crossed one leaves, on which the plate turns."""
     solver = Solver(load_model(compile_plan(table(PINS[:1]), ["plate.phi"])))
     rng = np.random.default_rng(3)
     for _ in range(400):
