@@ -106,8 +106,8 @@ class Findings:
         start: driver values by name at the start of the run; assembled: those of the assembled pose.
         singular: driver, value, kind ('change point' or 'limit'), block.
         ranges: driver, kind ('angle' or 'length'), low, high, turns (after which the mechanism repeats), reach (values
-        evaluated), stopped, limits: value, kind ('dead centre', 'change point' or 'end'), bodies (that can move there
-        while the driver is fixed), coordinates.
+        evaluated), stopped, limits: value, kind ('dead centre', 'change point', 'pole' or 'end'), bodies (that can move
+        there while the driver is fixed), coordinates.
         loops: kind ('four-bar' or 'slider-crank'), links, lengths (by link; 'ground' too), offset (slider-cranks),
         class, shape, sums, transmission: driver, coupler, output, smallest, at_smallest, largest, at_largest, verdict.
         dyads (pairs of links in none of the loops that have a transmission angle): links (of a guided link, it and its

@@ -15,14 +15,14 @@ from kinfmu.plan import localized
 from kinfmu.plan.origin import relative_to
 from kinfmu.solver.python import Pose
 from kinfmu.solver.python.bridge import Bridge
-from kinfmu.solver.python.limit import NEGATIVE, NO_BLOCK, Limit
+from kinfmu.solver.python.limit import NEGATIVE, NO_BLOCK, NO_POLE, Limit
 
 
 @dataclass(frozen=True)
 class SingularPoint:
     """A driver value where a block's determinant vanishes.
 
-    kind: 'change point' (branches cross, the motion goes on) or 'limit' (a dead centre: the motion turns back).
+    kind: 'change point' (branches cross, the motion goes on) or 'limit' (of any other kind: see LimitPosition).
     block: its number, from 1, among the blocks of the plan in which the driver moves alone; 0 if no block is singular.
     """
 
@@ -37,8 +37,8 @@ class LimitPosition:
     """The mechanism at a limit of a driver.
 
     value: of the driver [rad or length]; kind: 'dead centre' (the motion turns back), 'change point' (branches cross
-    and no run can cross it) or 'end' (a distance of 0); coordinates: all of them by name, in the world; bodies: those
-    that can move there while the drivers are fixed.
+    and no run can cross it), 'pole' (a body runs to infinity) or 'end' (a distance of 0); coordinates: all of them by
+    name, in the world, of the last pose before a pole; bodies: those that can move there while the drivers are fixed.
     """
 
     value: float
@@ -136,14 +136,16 @@ def driver_range(path: DriverPath) -> DriverRange:
 def _position(path: DriverPath, limit: Limit | None) -> LimitPosition | None:
     if limit is None:
         return None
-    coordinates = path.at_limit(limit)
-    return LimitPosition(limit.u[0], _kind(limit), coordinates, parting(path, coordinates))
+    coordinates, kind = path.at_limit(limit), _kind(limit)
+    return LimitPosition(limit.u[0], kind, coordinates, () if kind == "pole" else parting(path, coordinates))
 
 
 def _kind(limit: Limit) -> str:
     """Return the kind of a limit, as in LimitPosition."""
     if limit.block in (NO_BLOCK, NEGATIVE):
         return "end"
+    if limit.pole != NO_POLE:
+        return "pole"
     return "change point" if limit.crosses else "dead centre"
 
 

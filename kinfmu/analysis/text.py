@@ -25,6 +25,7 @@ _MOST_LOOPS = 8  # in the text; JSON has all
 _END = {
     "dead centre": "a dead centre",
     "change point": "where branches cross and the motion cannot continue",
+    "pole": "where a slide runs to infinity",
     "end": "where the distance is 0",
 }
 _SAME = 1e-9  # [rad or length]; values closer than this are equal

@@ -13,6 +13,7 @@ from kinfmu.plan import Block
 
 ROUND_OFF = 4e-16  # residual relative to the size below which more steps gain nothing at regular poses
 SETTLED = 1e-13  # residual from which Newton may stop when it no longer falls fourfold
+SETTLED_TALL = 1e-10  # the same of more rows than unknowns: lengths that are consistent to 1e-11 keep them open
 ITERATIONS = 12
 
 Rows = Sequence[Sequence[str]]
@@ -21,6 +22,11 @@ Rows = Sequence[Sequence[str]]
 def is_small(block: Block) -> bool:
     """Return True for a square block of one or two unknowns, whose solves are unrolled."""
     return len(block.unknowns) <= 2 and len(block.residuals) == len(block.unknowns)
+
+
+def settled_square(block: Block) -> float:
+    """Return the squared residual from which Newton may stop when it no longer falls fourfold."""
+    return float((SETTLED_TALL if len(block.residuals) > len(block.unknowns) else SETTLED) ** 2)
 
 
 def determinant(jacobian: Rows) -> str:

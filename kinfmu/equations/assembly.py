@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinfmu.equations.blocks import Ordered, ordered_blocks
-from kinfmu.equations.closing import CLOSED, branches, close, dependent_rows, followed, margin, reaches
+from kinfmu.equations.closing import CLOSED, branches, close, closed_up_to, dependent_rows, followed, margin, reaches
 from kinfmu.equations.part import Part
 from kinfmu.equations.reach import cannot_close
 from kinfmu.equations.start_poses import StartValues, distance_from_start, law_targets, start_from_poses, with_angles
@@ -117,7 +117,7 @@ def _assembled(system: System, start: StartValues) -> Assembled | None:
             f"block from its start pose, but {trouble}"
         )
     q, gap = close(system, start.q, u)
-    if gap > CLOSED:
+    if gap > closed_up_to(system):
         found = _assembled_nearby(system, start) if gap < _NEARLY else None
         return found if found or order.blocks else assemble_from_random_starts(system, start, None, order)
     found = _without_spare_rows(system, q, u) or Assembled(q, u, margin(system, q))
@@ -162,7 +162,7 @@ def _assembled_nearby(system: System, start: StartValues) -> Assembled | None:
         for side in (1.0, -1.0):
             u = start.u + side * OFFSET * reaches(system)
             q, gap = close(system, start.q + spread, u)
-            near = Assembled(q, u, margin(system, q) if gap <= CLOSED else 0.0)
+            near = Assembled(q, u, margin(system, q) if gap <= closed_up_to(system) else 0.0)
             if near.margin > SINGULAR and np.array_equal(followed(system, q, u, start.u)[1], start.u):
                 nearby.append((distance_from_start(system, start, near.q), near))
     return min(nearby, key=lambda pose: pose[0])[1] if nearby else None
@@ -237,7 +237,7 @@ def assemble_from_random_starts(
             found, _ = _assembled_in_order(system, u, rough, order)
         else:
             q, gap = close(system, rough, u)
-            found = Assembled(q, u, margin(system, q)) if gap <= CLOSED else None
+            found = Assembled(q, u, margin(system, q)) if gap <= closed_up_to(system) else None
         if found is None or found.margin <= comfortable(system):
             continue
         poses = [found] if nearest is None else [nearest, found]

@@ -11,6 +11,7 @@ from kinfmu.equations.part import Part
 from kinfmu.equations.system import FloatArray, System
 
 CLOSED = 1e-12  # residual relative to the mechanism's size at which a pose counts as closed
+CONSISTENT = 1e-11  # gap up to which a dependent row counts as consistent, of the link that it is about
 _DEPENDENT = 1e-6  # part of a row outside the span of others that counts as zero; so does a weight in a combination
 _APART = 1e-6  # [rad, sizes]; poses further apart are different branches
 _ITERATIONS = 200
@@ -73,6 +74,11 @@ def close(part: System | Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray
         else:
             damping *= 8.0
     return best, float(np.abs(residual).max(initial=0.0))
+
+
+def closed_up_to(system: System) -> float:
+    """Return the residual up to which all rows of a system are closed: redundant rows have a gap in every pose."""
+    return CONSISTENT if len(system.rows) > len(system.coordinates) else CLOSED
 
 
 def _straight(part: Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray | None]:
@@ -178,7 +184,7 @@ def followed(
         corrected, allowed = np.inf, _CORRECTION
         if np.abs((predicted - q) / scales).max() <= _LONGEST * _STEEPEST:
             trial, gap = close(whole, predicted, ahead)
-            if gap <= CLOSED:
+            if gap <= closed_up_to(system):
                 corrected = float(np.abs((trial - predicted) / scales).max())
                 there = margin(system, trial) if trust else there
                 allowed = min(allowed, here / trust, there / trust) if trust else allowed
@@ -235,7 +241,7 @@ def branches(system: System, singular: FloatArray, u: FloatArray) -> list[FloatA
         pose, gap = close(system, start, u)
         away = float(np.abs((pose - singular) / system.column_scales).max())
         new = all(np.abs((pose - other) / system.column_scales).max() > _APART for _, other in found)
-        if gap <= CLOSED and away < 1.0 and new:
+        if gap <= closed_up_to(system) and away < 1.0 and new:
             found.append((away, pose))
     return [pose for _, pose in sorted(found, key=lambda item: item[0])]
 

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinfmu.equations.assembly import AssembledStart, comfortable, find_assembly
-from kinfmu.equations.closing import dependent_rows, motion_samples
+from kinfmu.equations.closing import CONSISTENT, dependent_rows, motion_samples
 from kinfmu.equations.part import Part
 from kinfmu.equations.system import FloatArray, Row, System, length_of
 from kinfmu.joints import Distance, Revolute
 
-CONSISTENT = 1e-11  # gap up to which a dependent row counts as consistent, of the link that it is about
 _ROUNDING = 2e-14  # the least tolerance, of the mechanism's size: what rounding leaves open of a row that holds
 _IN_SPAN = 1e-7  # part of a gradient outside the span of the others that counts as zero
 _SAMPLES = 6

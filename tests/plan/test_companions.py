@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 import kinfmu
 from kinfmu import Mechanism
+from kinfmu.errors import InconsistentError
 from kinfmu.plan import SolvePlan, compile_plan
 from tests.mechanisms import reference_fourbar, wheels
 from tests.open_lengths import with_open_lengths
@@ -72,6 +74,37 @@ def test_coupled_wheels_turn_by_equal_angles(
             assert run[name] == pytest.approx(angles if turns else 0.0 * angles, abs=1e-14)
             assert run[f"{body}.omega"] == pytest.approx(2.0 if turns else 0.0, abs=1e-13)
             assert run[f"{body}.alpha"] == pytest.approx(-3.0 if turns else 0.0, abs=1e-12)
+
+
+def mismatched(longer: float) -> Mechanism:
+    """Two wheels, the second rod of which is longer than the first."""
+    plain = wheels(LOCOMOTIVE)
+    rod = next(body for body in plain.bodies if body.name == "rodB")
+    changed = replace(rod, points={"PB": (0.0, 0.0), "QB": (2.0 + longer, 0.0)})
+    return replace(plain, bodies=tuple(changed if body is rod else body for body in plain.bodies))
+
+
+@pytest.mark.parametrize("longer", [1e-13, -3e-13, 1e-12, -2e-12, 4e-12])
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_a_mismatch_that_counts_as_consistent_moves_coupled_wheels_by_as_little(engine: str, longer: float) -> None:
+    """A rod turns its wheel by its mismatch over the pin's distance, 0.5, from the line of centres; within 45 deg."""
+    run = kinfmu.solve(mismatched(longer), engine=engine, crank_angle=np.concatenate([ANGLES, AT_ENDS]))
+    assert (run.status == 0).all()
+    assert np.abs(run["wheel1.phi"] - run["wheel0.phi"]).max() <= 2.0 * math.sqrt(2.0) * abs(longer) + 1e-14
+    assert run["wheel1.omega"] == pytest.approx(1.0, abs=10.0 * abs(longer) + 1e-13)
+
+
+@pytest.mark.parametrize(("flavour", "fmi"), [("python", 2), ("native", 2), ("native", 3)])
+def test_fmus_of_coupled_wheels_with_a_mismatch_turn(tmp_path: Path, flavour: str, fmi: int) -> None:
+    fmu = kinfmu.build(mismatched(2e-12), tmp_path / "wheels.fmu", flavour=flavour, fmi=fmi)
+    run = kinfmu.simulate(fmu, stop=6.5, step=0.05)
+    assert (run.status == 0).all()
+    assert run["wheel1.phi"] == pytest.approx(run["wheel0.phi"], abs=1e-11)
+
+
+def test_a_larger_mismatch_is_refused_with_its_gap() -> None:
+    with pytest.raises(InconsistentError, match=r"does not close: gap .*e-1[01] m in every pose"):
+        compile_plan(mismatched(1e-10))
 
 
 @pytest.mark.long

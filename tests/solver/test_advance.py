@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 import random
 import re
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu import AngleDriver, Body, ConstantSpeed, Distance, Mechanism, PointOnLine, Revolute, Translational
 from kinfmu.codegen.python import load_model
+from kinfmu.joints import Joint
 from kinfmu.plan import compile_plan
 from kinfmu.solver.python import Pose, Solver, Status
+from kinfmu.solver.python.trusted_step import trusted_step
 from tests import oracle
 from tests.mechanisms import slider_crank, tight_jaw, with_arm
 from tests.solver.change_points import fourbar
@@ -211,3 +216,118 @@ def test_a_crossing_that_depends_on_one_driver_is_bridged_for_all_values_of_the_
             for order, table in enumerate((run.values, run.rates, run.accelerations)):
                 gap = np.abs(table[:, run.outputs.index(name)] - columns[order].astype(float))
                 assert (gap[run.good] <= np.maximum(run.error[run.good, order], 1e-11)).all()
+
+
+# ---------------------------------------------------------------------------------------------------------- poles
+
+
+def lever(offset: float, turn: float, start: float = 1.0, unit: float = 1.0, *, has_shoe: bool = False) -> Mechanism:
+    """A lever about (0, 0) whose slot, `offset` off the pivot, moves a block on y = unit, all turned by `turn`.
+
+    The block is at x = (cos phi - offset) / sin phi, which has poles at every half turn of the lever.
+    """
+
+    def world(x: float, y: float) -> tuple[float, float]:
+        at = cmath.rect(1.0, turn) * complex(x, y) * unit
+        return at.real, at.imag
+
+    at = world((math.cos(start) - offset) / math.sin(start), 1.0)
+    bodies = [
+        Body("ground", {"O": (0, 0), "way": world(0, 1)}),
+        Body("lever", {"O": (0, 0), "slot": (0, offset * unit)}, (0, 0, start + turn)),
+        Body("block", {"S": (0, 0)}, (*at, turn)),
+    ]
+    joints: list[Joint] = [
+        Revolute("O", ("ground.O", "lever.O")),
+        Translational("way", ("ground.way", "block.S"), turn, turn),
+    ]
+    if has_shoe:
+        bodies.append(Body("shoe", {"S": (0, 0)}, (*at, start + turn)))
+        joints += [Revolute("S", ("block.S", "shoe.S")), Translational("slot", ("lever.slot", "shoe.S"))]
+    else:
+        joints.append(PointOnLine("slot", ("lever.slot", "block.S")))
+    return Mechanism("lever", bodies, joints, [AngleDriver("drive", "lever", ConstantSpeed(start + turn, 1.0))])
+
+
+LEVERS = [
+    (offset, turn, unit, has_shoe)
+    for offset in (0.0, 0.3, -0.9)
+    for turn in (0.0, 0.7, math.pi / 2)
+    for unit, has_shoe in ((1.0, False), (1e-3, True))
+]
+
+
+@pytest.mark.parametrize("target", [math.pi, math.pi + 1e-9, 9.0, -1.5])
+@pytest.mark.parametrize(("offset", "turn", "unit", "has_shoe"), LEVERS)
+def test_beyond_a_pole_a_path_ends_early_with_the_pole_and_what_runs_to_infinity(
+    monkeypatch: pytest.MonkeyPatch, offset: float, turn: float, unit: float, has_shoe: bool, target: float
+) -> None:
+    solver = Solver(load_model(compile_plan(lever(offset, turn, 1.0, unit, has_shoe=has_shoe))))
+    steps = 0
+
+    def counted(*arguments: Any) -> Pose | None:
+        nonlocal steps
+        steps += 1
+        return trusted_step(*arguments)
+
+    monkeypatch.setattr("kinfmu.solver.python.advance.trusted_step", counted)
+    pose = solver.solve(solver.anchor, (target + turn,))
+    assert pose.status == Status.OUTSIDE
+    assert steps < 1000
+    assert pose.message.endswith(" runs to infinity")
+    pole = turn + (math.pi if target > 1.0 else 0.0)
+    located = float(re.findall(r"drive = (\S+) rad", pose.message)[-1])
+    assert located == pytest.approx(pole, abs=2e-9 if abs(target + turn - pole) < 1e-8 else 1e-10)
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize(("offset", "turn", "unit", "has_shoe"), LEVERS[::3])
+def test_toward_a_pole_samples_up_to_10_000_sizes_away_are_right(
+    engine: str, offset: float, turn: float, unit: float, has_shoe: bool
+) -> None:
+    before = math.pi - np.geomspace(2.0, 1e-4, 30)
+    angles = np.concatenate([before, [math.pi, 3.5, 5.0], before[::-1]])
+    run = kinfmu.solve(lever(offset, turn, 1.0, unit, has_shoe=has_shoe), engine=engine, drive_angle=turn + angles)
+    good = np.array([*[True] * 30, *[False] * 3, *[True] * 30])
+    np.testing.assert_array_equal(run.good, good)
+    exact = unit * (np.cos(angles) - offset)[good] / np.sin(angles)[good]
+    along = np.cos(turn) * run["block.x"] + np.sin(turn) * run["block.y"]
+    np.testing.assert_allclose(along[good], exact, rtol=1e-11)
+    assert all(event.text.endswith(" runs to infinity") for event in run.events if "cannot be reached" in event.text)
+    assert any("runs to infinity" in event.text for event in run.events)
+
+
+def test_check_calls_a_pole_no_dead_centre() -> None:
+    report = kinfmu.check(lever(0.3, 0.0))
+    assert [(limit.value, limit.kind, limit.bodies) for limit in report.ranges[0].limits] == [
+        (pytest.approx(0.0, abs=1e-10), "pole", ()),
+        (pytest.approx(math.pi, abs=1e-10), "pole", ()),
+    ]
+    assert "dead centre" not in str(report)
+    assert "pi (180 deg), where a slide runs to infinity" in str(report)
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_a_dead_centre_of_a_slide_is_no_pole(engine: str) -> None:
+    """Before it the block is as fast as before a pole: x = 1.5 cos phi + sqrt(1 - (1.5 sin phi)^2)."""
+    mechanism = Mechanism(
+        "short_rod",
+        [
+            Body("ground", {"O": (0, 0), "way": (0, 0)}),
+            Body("crank", {"O": (0, 0), "P": (1.5, 0)}, (0, 0, 0.2)),
+            Body("block", {"S": (0, 0)}, (2.4, 0, 0)),
+        ],
+        [
+            Revolute("O", ("ground.O", "crank.O")),
+            Translational("slide", ("ground.way", "block.S"), 0.0, 0.0),
+            Distance("rod", ("crank.P", "block.S"), 1.0),
+        ],
+        [AngleDriver("crank", "crank", ConstantSpeed(0.2, 1.0))],
+    )
+    limit = math.asin(2.0 / 3.0)
+    run = kinfmu.solve(mechanism, engine=engine, crank_angle=[*(limit - 10.0 ** -np.arange(1.0, 9.0)), limit + 1e-4])
+    assert run.good.tolist() == [True] * 8 + [False]
+    (text,) = [event.text for event in run.events if "cannot be reached" in event.text]
+    assert text.endswith(
+        "the limit is crank = 0.7297276562 rad (41.8103149 deg); beyond it the loop of block.x cannot close"
+    )

@@ -12,7 +12,7 @@ import pytest
 import kinfmu
 from kinfmu.codegen.python import load_model
 from kinfmu.plan import compile_plan
-from kinfmu.solver.python.limit import Limit, limit_message
+from kinfmu.solver.python.limit import NO_POLE, Limit, limit_message
 from kinfmu.solver.python.message import LOCATED, place
 from tests.solver.c.native import Native
 
@@ -67,7 +67,12 @@ def test_a_value_out_of_reach_is_shown_with_digits_that_differ_from_the_limit(
 class NativeLimit(ctypes.Structure):
     """kf_limit of a mechanism with one driver."""
 
-    _fields_ = (("u", ctypes.c_double * 1), ("block", ctypes.c_int), ("crosses", ctypes.c_bool))
+    _fields_ = (
+        ("u", ctypes.c_double * 1),
+        ("block", ctypes.c_int),
+        ("crosses", ctypes.c_bool),
+        ("pole", ctypes.c_int),
+    )
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +82,7 @@ def native() -> Native:
 
 def native_message(native: Native, limit: float, asked: float) -> str:
     text = ctypes.create_string_buffer(480)
-    found = NativeLimit((ctypes.c_double * 1)(limit), 0, False)
+    found = NativeLimit((ctypes.c_double * 1)(limit), 0, False, NO_POLE)
     native.c.probe_limit(text, ctypes.byref(found), (ctypes.c_double * 1)(asked))
     return text.value.decode()
 

@@ -59,7 +59,8 @@ class Sketch:
     Bodies that share a name of a point share a pin. poses: (numbers, driver values, closing) -> pose of each moving
     body. kinds: of the drivers, 'angle' or 'length'. joints: other than the pins, drivers: at start values, both in a
     frame. marks: driver values where loops may be singular, of a turn if it is an angle. period: of the closed form,
-    in turns, 0 if it does not go round; reach: values to draw the start from.
+    in turns, 0 if it does not go round; reach: values to draw the start from; gap: by how much a length contradicts
+    the closed form.
     """
 
     points: Mapping[str, Mapping[str, tuple[Exact, Exact]]]
@@ -71,6 +72,7 @@ class Sketch:
     period: int = 2
     reach: tuple[float, float] = (0.0, TURN)
     is_level: bool = False  # its angles count from the world's axis: it is not turned
+    gap: Exact = 0
 
 
 class Exactly(NamedTuple):

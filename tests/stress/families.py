@@ -70,6 +70,12 @@ def _turns(body: str) -> Callable[[Frame, Sequence[float]], tuple[Driver, ...]]:
     return lambda _, start: (AngleDriver("drive", body, ConstantSpeed(start[0], 1.0)),)
 
 
+def _turn_each(*bodies: str) -> Callable[[Frame, Sequence[float]], tuple[Driver, ...]]:
+    return lambda _, start: tuple(
+        AngleDriver(f"drive_{body}", body, ConstantSpeed(value, 1.0)) for body, value in zip(bodies, start, strict=True)
+    )
+
+
 # ---------------------------------------------------------------------------------------------------- four-bars
 
 
@@ -474,12 +480,117 @@ def redundant_parallelograms(rng: Draw) -> Sketch:
     return Sketch(points, poses, _turns("crank"), joints, marks=ENDS)
 
 
+def translating_tables(rng: Draw) -> Sketch:
+    """A table on parallel legs, one of them a driven crank, the others bars or distances: its angle rests.
+
+    With all pins in line it has change points; away from the line a leg carries the table where the others are in line.
+    Some carry a second table on a crank with a driver of its own, or a driven arm.
+    """
+    points: dict[str, dict[str, tuple[Exact, Exact]]] = {"ground": {}}
+    legs: list[tuple[str, str, Fraction, tuple[Fraction, Fraction], bool]] = []
+    tops = rng.choice(("", "", "table", "arm"))
+    stages = [(drawn_length(rng, 0.2, 1.0), rng.random() < 0.3), (drawn_length(rng, 0.2, 1.0), False)]
+    for k, (a, is_in_line) in enumerate(stages if tops == "table" else stages[:1]):
+        below = f"table{k - 1}" if k else "ground"
+        pins = [(drawn_length(rng, 0.3, 2.0), Fraction(0)), _place(rng, 2.0)]
+        if is_in_line:
+            pins = pins[:1] if rng.random() < 0.5 else [pins[0], (-pins[0][0] / 2, Fraction(0))]
+        elif abs(pins[1][1]) < max(Fraction(1, 5), abs(pins[1][0]) / 4):
+            raise RedrawError  # nearly in line
+        points[below][f"O{k}"], points[f"crank{k}"] = ORIGIN, {f"O{k}": ORIGIN, f"P{k}": (a, 0)}
+        points[f"table{k}"] = {f"P{k}": ORIGIN}
+        for name, pin in zip("BC", pins, strict=False):
+            is_body = rng.random() < 0.4
+            legs.append((f"{name}{k}", below, a, pin, is_body))
+            points[below][f"{name}{k}"] = points[f"table{k}"][f"{name.lower()}{k}"] = pin
+            if is_body:
+                points[f"leg{name}{k}"] = {f"{name}{k}": ORIGIN, f"{name.lower()}{k}": (a, 0)}
+    if tops == "arm":
+        points["table0"]["S"] = (drawn_length(rng, 0.3, 1.0), Fraction(0))
+        points["arm"] = {"S": ORIGIN}
+
+    def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
+        at, zero = {"ground": standing(numbers, 0, 0, u[0])}, u[0] * numbers.number(0)
+        moving = {}
+        for k in range(len(u) if tops != "arm" else 1):
+            below, a = f"table{k - 1}" if k else "ground", stages[k][0]
+            moving[f"crank{k}"] = Pose(at[below], u[k])
+            at[f"table{k}"] = at[below] + turned(u[k], numbers.number(a))
+            moving[f"table{k}"] = Pose(at[f"table{k}"], zero)
+            sines = []
+            for name, under, _, pin, is_body in legs:
+                if under != below:
+                    continue
+                far = abs(complex(*map(float, pin)))
+                sines.append(np.abs(turned(u[k], *(numbers.number(part) for part in (pin[0], -pin[1]))).y.d0) / far)
+                if is_body:
+                    moving[f"leg{name}"] = Pose(at[below] + standing(numbers, *pin, u[0]), u[k])
+            closing.sines.append(np.maximum.reduce(sines))
+        if tops == "arm":
+            moving["arm"] = Pose(world(numbers, moving["table0"], points["table0"]["S"]), u[1])
+        return moving
+
+    def joints(frame: Frame) -> tuple[Joint, ...]:
+        ends = [(name, (f"{below}.{name}", f"table{name[1]}.{name[0].lower()}{name[1]}")) for name, below, *_ in legs]
+        return tuple(
+            Distance(f"leg{name}", pair, frame.length(a))
+            for (name, pair), (_, _, a, _, is_body) in zip(ends, legs, strict=True)
+            if not is_body
+        )
+
+    bodies = ("crank0", *{"": (), "table": ("crank1",), "arm": ("arm",)}[tops])
+    return Sketch(points, poses, _turn_each(*bodies), joints, kinds=("angle",) * len(bodies), marks=ENDS)
+
+
+def resting_slides(rng: Draw) -> Sketch:
+    """A crank and a rod of its length, a distance, to a block on a line through the pivot, on which the block rests.
+
+    Some have an arm next to them with a driver of its own.
+    """
+    a, with_arm = drawn_length(rng, 0.3, 2.0), rng.random() < 0.4
+    points: dict[str, dict[str, tuple[Exact, Exact]]] = {
+        "ground": {"O": ORIGIN, "way": ORIGIN},
+        "crank": {"O": ORIGIN, "P": (a, 0)},
+        "block": {"S": ORIGIN},
+    }
+    if with_arm:
+        points["ground"]["W"] = _place(rng, 2.0)
+        points["arm"] = {"W": ORIGIN}
+
+    def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
+        closing.sines.append(u[0].sin_cos()[1].d0)
+        zero = u[0] * numbers.number(0)
+        moving = {"crank": Pose(Vector(0, 0), u[0]), "block": Pose(Vector(zero, zero), zero)}
+        if with_arm:
+            moving["arm"] = Pose(standing(numbers, *points["ground"]["W"], u[1]), u[1])
+        return moving
+
+    def joints(frame: Frame) -> tuple[Joint, ...]:
+        return (
+            Translational("slide", ("ground.way", "block.S"), frame.angle, frame.angle),
+            Distance("rod", ("crank.P", "block.S"), frame.length(a)),
+        )
+
+    bodies = ("crank", "arm") if with_arm else ("crank",)
+    marks, kinds = (-0.5 * math.pi, 0.5 * math.pi), ("angle",) * len(bodies)
+    return Sketch(points, poses, _turn_each(*bodies), joints, kinds=kinds, marks=marks)
+
+
 def coupled_wheels(rng: Draw) -> Sketch:
     """Equal wheels in a row, each coupled to the next by two rods whose pins are not in line with the wheel's centre.
 
     One rod of a pair is redundant, and carries the wheels where the other is in its dead centre: regular everywhere.
     Rods are bodies or distances; some have an arm next to them with a driver of its own.
     """
+    return _wheels(rng)
+
+
+def mismatched_wheels(rng: Draw) -> Sketch:
+    """Coupled wheels of which one rod is longer or shorter by as little as counts as consistent."""
+    return _wheels(rng, _side(rng) * Fraction(rng.randint(1, 3), 10 ** rng.randint(12, 14)))
+
+
+def _wheels(rng: Draw, part: Fraction = Fraction(0)) -> Sketch:
     pitch, pairs, with_arm = drawn_length(rng, 0.5, 2.0), rng.randrange(1, 4), rng.random() < 0.3
     points: dict[str, dict[str, tuple[Exact, Exact]]] = {"ground": {}}
     bars: list[tuple[int, str, tuple[Fraction, Fraction], bool]] = []  # (wheel, name, pin, whether it is a body)
@@ -502,6 +613,9 @@ def coupled_wheels(rng: Draw) -> Sketch:
                 points[f"wheel{wheel}"][f"{letter}{name}{k}"] = pin
             if bars[-1][-1]:
                 points[f"rod{name}{k}"] = {f"P{name}{k}": ORIGIN, f"Q{name}{k}": (pitch, 0)}
+    gap, loose = part * pitch, [bar for bar in bars if not bar[-1]][-1:]
+    if gap and not loose:
+        raise RedrawError
     if with_arm:
         points["ground"]["S"] = (0, drawn_length(rng, 1.0, 2.0))
         points["arm"] = {"S": ORIGIN}
@@ -521,17 +635,14 @@ def coupled_wheels(rng: Draw) -> Sketch:
 
     def joints(frame: Frame) -> tuple[Joint, ...]:
         return tuple(
-            Distance(name, (f"wheel{wheel}.P{name}", f"wheel{wheel + 1}.Q{name}"), frame.length(pitch))
-            for wheel, name, _, is_body in bars
-            if not is_body
+            Distance(bar[1], (f"wheel{bar[0]}.P{bar[1]}", f"wheel{bar[0] + 1}.Q{bar[1]}"), frame.length(length))
+            for bar in bars
+            for length in ([pitch + gap] if bar in loose else [pitch])
+            if not bar[-1]
         )
 
-    def drivers(_: Frame, start: Sequence[float]) -> tuple[Driver, ...]:
-        bodies = ("wheel0", "arm") if with_arm else ("wheel0",)
-        pairs = zip(bodies, start, strict=True)
-        return tuple(AngleDriver(f"drive_{body}", body, ConstantSpeed(value, 1.0)) for body, value in pairs)
-
-    return Sketch(points, poses, drivers, joints, kinds=("angle", "angle") if with_arm else ("angle",))
+    bodies = ("wheel0", "arm") if with_arm else ("wheel0",)
+    return Sketch(points, poses, _turn_each(*bodies), joints, kinds=("angle",) * len(bodies), gap=gap)
 
 
 # ------------------------------------------------------------------------------------- cylinders, several drivers
@@ -848,4 +959,7 @@ FAMILIES: dict[str, tuple[Callable[[Draw], Sketch], int]] = {  # and how often o
     STARTS_ANYWHERE: (starts_anywhere, 5),
     "machines with a robot": (machines_with_a_robot, 4),
     "led by laws": (led_by_laws, 4),
+    "translating tables": (translating_tables, 4),
+    "resting slides": (resting_slides, 1),
+    "mismatched wheels": (mismatched_wheels, 2),
 }

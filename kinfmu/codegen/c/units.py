@@ -18,7 +18,6 @@ from kinfmu.codegen.kinds import Kind, UnitRun, positions
 from kinfmu.codegen.lists import LISTS
 from kinfmu.codegen.newton import (
     ITERATIONS,
-    SETTLED,
     before_newton,
     determinant,
     is_small,
@@ -26,6 +25,7 @@ from kinfmu.codegen.newton import (
     opposite_solution,
     outright,
     residual_lines,
+    settled_square,
     solution,
     square,
 )
@@ -192,7 +192,7 @@ class Units:
             f"for (iteration = 0; iteration < {ITERATIONS}; ++iteration) {{",
             *indented(inside),
             "    if (error <= newton->enough || held",
-            f"        || (16.0 * error > last && error <= {SETTLED**2!r} * ({angles}))) {{",
+            f"        || (16.0 * error > last && error <= {settled_square(block)!r} * ({angles}))) {{",
             "        break;",
             "    }",
             "    last = error;",

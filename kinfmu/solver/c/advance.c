@@ -1,6 +1,8 @@
 /* Advance: from a good pose to other driver values, along one continuous branch. See kinfmu/solver/python/advance.py. */
 #include "internal.h"
 
+#define STRIDE 0.02 /* of the longest step; where steps become as short, an unknown may run to infinity */
+
 inline void kf_path_init(kf_path *path, kf_pose *start, const double *target, int driver, kf_pose *places)
 {
     path->places = places;
@@ -81,9 +83,7 @@ inline kf_pose *kf_path_terminate(kf_path *path, kf_limit *limit)
     kf_pose *const end = path->end;
     const kf_pose *const regular = path->regular;
     if (!path->is_ended) {
-        memcpy(path->limit.u, KF_POSE_U(path->pose), sizeof path->limit.u);
-        path->limit.block = KF_TOO_FAR;
-        path->limit.crosses = false;
+        kf_limit_at(&path->limit, KF_POSE_U(path->pose), KF_TOO_FAR);
     }
     if (end == NULL) {
         *limit = path->limit;
@@ -137,9 +137,7 @@ static bool cross_bridge(kf_solver *solver, const kf_pose *start, kf_path *path)
             place->map = map;
             path->end = place;
         } else { /* a block not interpolated ends there */
-            memcpy(path->limit.u, KF_POSE_U(pose), sizeof path->limit.u);
-            path->limit.block = KF_NO_BLOCK;
-            path->limit.crosses = false;
+            kf_limit_at(&path->limit, KF_POSE_U(pose), KF_NO_BLOCK);
         }
         return true;
     }
@@ -177,6 +175,9 @@ static void step(kf_solver *solver, const kf_pose *start, kf_path *path)
                 }
             }
             kf_path_accept(path, trial, s, trial->found.margin);
+            if (!path->is_ended && path->length < STRIDE * path->longest) {
+                path->is_ended = kf_pole_before(solver, pose, trial, path->direction, path->distance, &path->limit);
+            }
             return;
         }
     }

@@ -113,8 +113,13 @@ typedef struct {
     double u[KF_DRIVERS];
     int block;
     bool crosses; /* another branch crosses there and no bridge holds: the motion does not turn back */
+    int pole;     /* the unknown that runs to infinity there, or KF_NO_POLE */
 } kf_limit;
-enum { KF_NO_BLOCK = -1, KF_TOO_FAR = -2, KF_NEGATIVE = -3 };
+enum { KF_NO_BLOCK = -1, KF_TOO_FAR = -2, KF_NEGATIVE = -3, KF_NO_POLE = -1 };
+/* Make a limit at driver values. */
+void kf_limit_at(kf_limit *limit, const double *u, int block);
+bool kf_pole_before(kf_solver *solver, kf_pose *before, kf_pose *pose, const double *direction, double distance,
+                    kf_limit *limit);
 void kf_limit_beyond(kf_solver *solver, const kf_pose *before, kf_pose *pose, const double *direction, kf_limit *limit);
 bool kf_is_beyond(const double *target, const double *limit, const double *direction, double s);
 void kf_append_limit(char *message, const kf_limit *limit, const double *target, int driver);

@@ -1,7 +1,11 @@
 /* Limits: driver values where a path ends, and why. See kinfmu/solver/python/limit.py. */
 #include "internal.h"
 
-#define VANISHING 1e-6 /* [sizes] of a length that a law gives: where steps end there, it would be negative beyond */
+#define VANISHING 1e-6        /* [sizes] of a length that a law gives: where steps end there, it would be negative beyond */
+#define FAR_AWAY 100.0        /* [sizes]; what runs to infinity is at least as far away */
+#define AT_POLE 0.999         /* of the distance to a pole; beyond it an unknown is a thousand times as far away */
+#define STEEPEST_SLOPE (-0.8) /* of z'/z'' over the driver: -1 / (p + 1) toward a pole of order p, */
+#define LEAST_SLOPE (-0.2)    /* -2 toward a dead centre */
 
 /* Move the limit past the last pose, to where a number vanishes that is `far` at the pose before and `near` at the last. */
 static void extrapolate(const kf_pose *before, const kf_pose *pose, double near, double far, kf_limit *limit)
@@ -10,6 +14,14 @@ static void extrapolate(const kf_pose *before, const kf_pose *pose, double near,
     for (k = 0; far > near && k < KF_DRIVERS; ++k) {
         limit->u[k] += (KF_POSE_U(pose)[k] - KF_POSE_U(before)[k]) * (near / (far - near));
     }
+}
+
+void kf_limit_at(kf_limit *limit, const double *u, int block)
+{
+    memcpy(limit->u, u, sizeof limit->u);
+    limit->block = block;
+    limit->crosses = false;
+    limit->pole = KF_NO_POLE;
 }
 
 /* Return where the path ends, just beyond a pose that steps cannot leave.
@@ -27,8 +39,7 @@ void kf_limit_beyond(kf_solver *solver, const kf_pose *before, kf_pose *pose, co
     kf_law_positions(&solver->model, &pose->found, lengths);
     kf_law_positions(&solver->model, &before->found, longer);
 #endif
-    memcpy(limit->u, KF_POSE_U(pose), sizeof limit->u);
-    limit->crosses = false;
+    kf_limit_at(limit, KF_POSE_U(pose), KF_BLOCKS > 0 ? 0 : KF_NO_BLOCK);
 #if KF_LAWS
     for (k = KF_LAW_ARGUMENTS; k < KF_LAW_ARGUMENTS + KF_LAW_LENGTHS; ++k) {
         if (lengths[k] < VANISHING * kf_size) {
@@ -38,7 +49,6 @@ void kf_limit_beyond(kf_solver *solver, const kf_pose *before, kf_pose *pose, co
         }
     }
 #endif
-    limit->block = KF_BLOCKS > 0 ? 0 : KF_NO_BLOCK;
     if (KF_BLOCKS == 0) {
         return;
     }
@@ -61,6 +71,64 @@ void kf_limit_beyond(kf_solver *solver, const kf_pose *before, kf_pose *pose, co
         far *= far;
     }
     extrapolate(before, pose, near, far, limit);
+}
+
+/* Find first and second derivative of the unknowns at a pose on a path. */
+static void derivatives_along(kf_solver *solver, kf_pose *pose, const double *direction)
+{
+    if (KF_IS_ONE(solver)) {
+        kf_tangent(&solver->model, pose);
+    } else {
+        KF_VELOCITY(&solver->model, &pose->found, direction, NULL, NULL, pose->x1);
+        KF_ACCELERATION(&solver->model, &pose->found, kf_at_rest, pose->x1, NULL, NULL, pose->x2);
+    }
+}
+
+/* Find the pole that lies ahead of a pose within a distance along the path; return false if there is none.
+ *
+ * At the distance x from a pole of order p an unknown length grows like 1 / x^p, as that of a slide whose pin's path
+ * becomes parallel to it. There f = z'/z'' = x / (p + 1) (1 + k x^2), and two poses give f and its slope, so x without
+ * k. Steps become as short as x^(5/3), and do not pass it.
+ */
+bool kf_pole_before(kf_solver *solver, kf_pose *before, kf_pose *pose, const double *direction, double distance,
+                    kf_limit *limit)
+{
+    const double unit = KF_IS_ONE(solver) ? kf_reach[KF_ALONG(solver)] : 1.0;
+    double between = 0.0, square = 0.0;
+    int block, d, k = 0;
+    for (d = 0; d < KF_DRIVERS; ++d) {
+        between += (KF_POSE_U(pose)[d] - KF_POSE_U(before)[d]) * direction[d];
+        square += direction[d] * direction[d];
+    }
+    between /= square;
+    derivatives_along(solver, before, direction);
+    derivatives_along(solver, pose, direction);
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        for (; k < kf_block_ends[block]; ++k) {
+            const double scale = kf_unknown_scales[k], first = pose->x1[k], second = pose->x2[k];
+            double there, here, slope, order, ahead;
+            if (kf_is_outside(&solver->model, block) || kf_unknown_is_angle[k] || before->x2[k] * between == 0.0
+                || !(fabs(first) * unit > KF_STEEP * scale && second != 0.0
+                     && first * first > FAR_AWAY * scale * fabs(second))) {
+                continue;
+            }
+            there = before->x1[k] / before->x2[k];
+            here = first / second;
+            slope = (here - there) / between;
+            order = 0.5 * rint(-2.0 / slope) - 1.0;
+            ahead = 1.5 * (there + here) / (2.0 / (order + 1.0) - slope) - 0.5 * between;
+            if (STEEPEST_SLOPE < slope && slope < LEAST_SLOPE && 0.0 < AT_POLE * ahead / distance
+                && AT_POLE * ahead / distance <= 1.0) {
+                kf_limit_at(limit, KF_POSE_U(pose), block);
+                limit->pole = k;
+                for (d = 0; d < KF_DRIVERS; ++d) {
+                    limit->u[d] += ahead * direction[d];
+                }
+                return true;
+            }
+        }
+    }
+    return false;
 }
 
 /* Return whether the target lies past the limit in the direction of s. */
@@ -95,6 +163,10 @@ void kf_append_limit(char *message, const kf_limit *limit, const double *target,
     }
     if (limit->block == KF_NEGATIVE) {
         kf_append(message, "; beyond it a distance would be negative");
+        return;
+    }
+    if (limit->pole != KF_NO_POLE) {
+        kf_append(message, ", where %s runs to infinity", kf_unknown_names[limit->pole]);
         return;
     }
     kf_append(message, limit->crosses ? ", where branches of " : "; beyond it ");

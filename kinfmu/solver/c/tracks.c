@@ -183,9 +183,7 @@ kf_status kf_assembled(kf_solver *solver, kf_pose *start, const double *u, const
     pose->status = status;
     if (!kf_evaluated_as_given(&solver->model, u, z, &pose->found)) {
         kf_limit limit;
-        memcpy(limit.u, KF_POSE_U(start), sizeof limit.u);
-        limit.block = KF_NO_BLOCK;
-        limit.crosses = false;
+        kf_limit_at(&limit, KF_POSE_U(start), KF_NO_BLOCK);
         solver->message[0] = '\0';
         kf_append_limit(solver->message, &limit, target, -1);
         return kf_failed(pose, KF_OUTSIDE);

@@ -3,6 +3,7 @@
 
 #define UNDOUBTED 1e-5      /* [rad, sizes]; a prediction that was corrected by less did not land by accident */
 #define SMOOTH 0.5          /* largest jump of the tangent in a step, as a part of it: a larger one is another branch */
+#define APART 1e-3          /* least distance of a crossing branch over the determinant, in radians and sizes */
 #define MOST_FOLLOWED 10000 /* steps between a pose and a node; a few, as a rule */
 #define ROUGHEST 5e-4       /* of the longest step; a path that needs shorter ones is not followed */
 
@@ -144,7 +145,9 @@ inline bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *dire
  *
  * Near a crossing the branches lie as close as corrections are small, and one of them keeps the determinant's sign;
  * their tangents stay apart. Towards a dead centre the tangent grows, but in a step by at most SMOOTH of itself. Where
- * a pose is so close to either that doubles cannot tell the branches apart, no step is accepted.
+ * the unknowns rest the tangent is rounding noise: at a distance x from a crossing both branches have a determinant
+ * |D| ~ x and lie |D| apart, so in a step s across it their tangents differ by (|D| + |D'|) / s. Where a pose is so
+ * close to either that doubles cannot tell the branches apart, no step is accepted.
  */
 bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const double *direction, double s)
 {
@@ -171,7 +174,7 @@ bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const dou
             }
         }
     }
-    return jump <= SMOOTH * largest;
+    return jump <= SMOOTH * fmax(largest, APART * (pose->found.margin + trial->found.margin) / fabs(s));
 }
 
 /* Return the pose at a value of the only driver, followed by trusted steps without bridges, or NULL. It lasts until the

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from .bridge import Bridge
-from .limit import MOST_STEPS, NO_BLOCK, TOO_FAR, Limit, is_beyond, limit_beyond
+from .limit import MOST_STEPS, NO_BLOCK, TOO_FAR, Limit, is_beyond, limit_beyond, pole_before
 from .pose import UNIT_SPEED, Model, Pose, Vector, with_map
 from .singularity_map import SingularityMap
 from .span import REGULAR
@@ -16,6 +16,7 @@ from .trusted_step import LONGEST_STEP, keeps_branch, straight_path, trusted_ste
 SHORTEST_STEP = 5e-9  # of the longest; where shorter ones are needed, a limit is near and is extrapolated
 NEAR_SINGULAR = 0.0125  # determinant below which qdd keeps less than nine digits
 CLOSE = 0.1  # determinant below which another branch may be as near as a correction is long
+STRIDE = 0.02  # of the longest; where steps become as short, an unknown may run to infinity
 GIVE_UP = 5e-15  # of the longest; shorter steps are lost in rounding
 
 
@@ -178,6 +179,8 @@ def _step(model: Model, path: Path) -> None:
                     path.pose = with_map(pose, singularities)
                     return
             path.accept(trial, s, trial.margin)
+            if path.end is None and path.length < STRIDE * path.longest:
+                path.end = pole_before(model, pose, trial, direction, path.distance)
             return
     path.shorten(s, lambda: limit_beyond(model, path.before, pose, direction))
 

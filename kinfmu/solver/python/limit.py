@@ -10,17 +10,23 @@ from .pose import STEEP, Model, Pose, Vector, directed
 MOST_STEPS = 1_000_000  # of a path: seconds, and more than any intended motion
 NO_BLOCK, TOO_FAR, NEGATIVE = -1, -2, -3  # in place of a block: no determinant vanishes; too many steps; see VANISHING
 VANISHING = 1e-6  # [sizes] of a length that a law gives: where steps end there, it would be negative beyond
+NO_POLE = -1  # in place of an unknown that runs to infinity
+FAR_AWAY = 100.0  # [sizes]; what runs to infinity is at least as far away
+AT_POLE = 0.999  # of the distance to a pole; beyond it an unknown is more than a thousand times as far away
+POLE_SLOPES = -0.8, -0.2  # of z'/z'' over the driver: -1 / (p + 1) toward a pole of order p, -2 toward a dead centre
 
 
 class Limit(NamedTuple):
     """Driver values where a path ends, and the block whose determinant vanishes there (or NO_BLOCK, TOO_FAR, NEGATIVE).
 
-    crosses: another branch crosses there and no bridge holds, so that the motion does not turn back.
+    crosses: another branch crosses there and no bridge holds, so that the motion does not turn back; pole: the unknown
+    that runs to infinity there, or NO_POLE.
     """
 
     u: Vector
     block: int
     crosses: bool = False
+    pole: int = NO_POLE
 
 
 def limit_beyond(model: Model, before: Pose, pose: Pose, direction: Vector) -> Limit:
@@ -53,6 +59,34 @@ def _extrapolated(before: Pose, pose: Pose, near: float, far: float) -> Vector:
     return tuple(b + (b - a) * beyond for a, b in zip(before.u, pose.u, strict=True))
 
 
+def pole_before(model: Model, before: Pose, pose: Pose, direction: Vector, distance: float) -> Limit | None:
+    """Return the pole that lies ahead of a pose within a distance along the path, or None.
+
+    At the distance x from a pole of order p an unknown length grows like 1 / x^p, as that of a slide whose pin's path
+    becomes parallel to it. There f = z'/z'' = x / (p + 1) (1 + k x^2), and two poses give f and its slope, so x without
+    k. Steps become as short as x^(5/3), and do not pass it.
+    """
+    square = sum([d * d for d in direction])
+    between = sum([(b - a) * d for a, b, d in zip(before.u, pose.u, direction)]) / square  # noqa: B905  one per driver
+    unit = model.REACH[0] if len(direction) == 1 else 1.0
+    (old, older), (new, newer) = directed(model, before, direction), directed(model, pose, direction)
+    for k, scale in enumerate(model.UNKNOWN_SCALES):
+        is_far = abs(new[k]) * unit > STEEP * scale and new[k] * new[k] > FAR_AWAY * scale * abs(newer[k]) > 0.0
+        if model.UNKNOWN_IS_ANGLE[k] or not is_far or older[k] * between == 0.0:
+            continue
+        there, here = old[k] / older[k], new[k] / newer[k]
+        slope = (here - there) / between
+        if not POLE_SLOPES[0] < slope < POLE_SLOPES[1]:
+            continue
+        order = 0.5 * round(-2.0 / slope) - 1.0
+        ahead = 1.5 * (there + here) / (2.0 / (order + 1.0) - slope) - 0.5 * between
+        if 0.0 < AT_POLE * ahead / distance <= 1.0:
+            block = next(number for number, (_, end) in enumerate(model.BLOCKS) if k < end)
+            u = tuple([a + ahead * d for a, d in zip(pose.u, direction)])  # noqa: B905  one item per driver
+            return Limit(u, block, pole=k)
+    return None
+
+
 def is_beyond(target: Vector, limit: Vector, direction: Vector, s: float) -> bool:
     """Return whether the target lies past the limit in the direction of `s`."""
     return sum((a - b) * d * s for a, b, d in zip(target, limit, direction, strict=True)) > 0.0
@@ -69,6 +103,8 @@ def limit_message(model: Model, limit: Limit, target: Vector) -> str:
     why = f", where branches of {names} cross" if limit.crosses else f"; beyond it {loop} cannot close"
     if limit.block == NEGATIVE:
         why = "; beyond it a distance would be negative"
+    elif limit.pole != NO_POLE:
+        why = f", where {model.UNKNOWNS[limit.pole]} runs to infinity"
     if limit.crosses and len(target) > 1:
         why += "; the crossing depends on several drivers, so no bridge is built"
     if not differs(model, target, limit.u, LOCATED):

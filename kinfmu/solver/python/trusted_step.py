@@ -14,6 +14,7 @@ BENT = 1.0  # [rad, sizes]; a prediction whose quadratic term is larger may land
 MOST_OFF = 0.5  # [rad, sizes] of what a law gives outright from its prediction; farther off lie whole turns
 UNDOUBTED = 1e-5  # [rad, sizes]; a prediction that was corrected by less did not land by accident
 SMOOTH = 0.5  # largest jump of the tangent in a step, as a part of the tangent: a larger one is another branch
+APART = 1e-3  # least distance of a crossing branch over the determinant, in radians and sizes; in most blocks about 1
 _MOST_FOLLOWED = 10_000  # steps between a pose and a node; a few, as a rule
 _ROUGHEST = 5e-4  # of the longest step; a path that needs shorter ones is not followed
 
@@ -98,7 +99,9 @@ def keeps_branch(model: Model, pose: Pose, trial: Pose, direction: Vector, s: fl
 
     Near a crossing the branches lie as close as corrections are small, and one of them keeps the determinant's sign;
     their tangents stay apart. Towards a dead centre the tangent grows, but in a step by at most SMOOTH of itself. Where
-    a pose is so close to either that doubles cannot tell the branches apart, no step is accepted.
+    the unknowns rest the tangent is rounding noise: at a distance x from a crossing both branches have a determinant
+    |D| ~ x and lie |D| apart, so in a step s across it their tangents differ by (|D| + |D'|) / s. Where a pose is so
+    close to either that doubles cannot tell the branches apart, no step is accepted.
     """
     if pose.margin < UNDECIDED and trial.margin > pose.margin:
         return False
@@ -107,7 +110,7 @@ def keeps_branch(model: Model, pose: Pose, trial: Pose, direction: Vector, s: fl
     scales = model.UNKNOWN_SCALES
     largest = max([abs(b) / c for b, c in zip(there, scales)])  # noqa: B905  one item per unknown
     jump = max([abs(b - (a + s * aa)) / c for a, aa, b, c in zip(zd, zdd, there, scales)])  # noqa: B905
-    return bool(jump <= SMOOTH * largest)
+    return bool(jump <= SMOOTH * max(largest, APART * (pose.margin + trial.margin) / abs(s)))
 
 
 def follow_path(model: Model, start: Pose, u: float) -> Pose | None:
