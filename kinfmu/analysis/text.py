@@ -283,11 +283,19 @@ def _forces(report: Findings) -> Iterator[ReportLine]:
     yield ReportLine("forces", f"over {loading.over}{missing}")
     if loading.reason:
         yield ReportLine("", f"no values, because {loading.reason}")
+    if loading.gravity is not None:
+        yield ReportLine("", f"gravity: ({loading.gravity[0]:.6g}, {loading.gravity[1]:.6g}) m/s2")
     for effort in loading.efforts:
         yield ReportLine("", f"{effort.name}: peak {_peak_text(effort)}, rms {effort.rms:.6g} {effort.unit}")
     for inertia in loading.inertias:
         ends = f"{inertia.smallest:.6g} to {inertia.largest:.6g} {inertia.unit}"
         yield ReportLine("", f"{inertia.name}: {ends}")
+    for of_effort, of_quantity in zip(loading.loads[::2], loading.loads[1::2], strict=True):
+        name, _, noun = of_effort.name.rpartition(".")
+        ends = f"{noun} {of_effort.smallest:.6g} to {of_effort.largest:.6g} {of_effort.unit}"
+        noun = of_quantity.name.rpartition(".")[2]
+        unit = of_quantity.unit
+        yield ReportLine("", f"{name}: {ends}, {noun} {of_quantity.smallest:.6g} to {of_quantity.largest:.6g} {unit}")
     if loading.reaction is not None:
         yield ReportLine("", f"largest reaction: {loading.reaction.name} {_peak_text(loading.reaction)}")
     for peak in loading.shaking:

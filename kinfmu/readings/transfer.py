@@ -56,6 +56,7 @@ class PressureAngle(Reading):
     """
 
     type: ClassVar[str] = "pressure_angle"
+    compares_rates: ClassVar[bool] = True
 
     name: str
     cam: Annotated[BodyName, "the cam"]
@@ -83,6 +84,7 @@ class VelocityRatio(Reading):
     """
 
     type: ClassVar[str] = "velocity_ratio"
+    compares_rates: ClassVar[bool] = True
 
     name: str
     of: Measured
@@ -106,6 +108,7 @@ class MechanicalAdvantage(Reading):
     """
 
     type: ClassVar[str] = "mechanical_advantage"
+    compares_rates: ClassVar[bool] = True
 
     name: str
     of: Measured
