@@ -120,9 +120,11 @@ class Findings:
         largest_reaction (of a joint; null if none is determined) and shaking (force and moment): name, value (the peak
         with its sign), unit, driver, at (driver value), at_unit, rms; reduced_inertias and loads (effort and length or
         angle of springs and dampers): name, smallest, largest, unit; undetermined: reactions, and rows that share their
-        load; lift_offs (contacts of cams that would have to pull): joint, force (column), sense (1 if positive values
-        press), unit, driver, at_unit, parts (begin, end), extent ('turn' if it pulls at every angle of the driver,
-        'motion' if in the whole motion, else 'part'), largest_tension (of a lever the moment; value, at);
+        load; left_tables (loads beyond the tables of their laws): load, table and reached (first and last argument),
+        unit, kept (first and last effort), effort_unit; lift_offs (contacts of cams that would have to pull): joint,
+        force (column), sense (1 if positive values press), unit, driver, at_unit, parts (begin, end), extent ('turn' if
+        it pulls at every angle of the driver, 'motion' if in the whole motion, else 'part'), largest_tension (of a
+        lever the moment; value, at);
         reason (why there are no numbers), samples_without_numbers.
         cams, only of mechanisms with cams: joint, element ('roller', 'knife edge', 'flat face', 'unknown'), driver (in
         whose values `at`, begin and end are), reason (why there are no values), cam, follower, swings (true or false),

@@ -7,7 +7,7 @@ measures use place them, to 1e-9 where forces are smooth. Where samples have no 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -20,14 +20,17 @@ from kinfmu.analysis.measuring import motion_of_check, name_of_run
 from kinfmu.analysis.singular import DriverRange
 from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.joints.cam import Cam
+from kinfmu.laws import Spline
+from kinfmu.loads.following import Following
 from kinfmu.mechanism import Mechanism
 from kinfmu.motion.motion import Motion, break_places, force_of
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import effort_noun
 from kinfmu.plan.undetermined import shared_reactions, unknown_contacts, why_unknown
 from kinfmu.run import FloatArray, Run
+from kinfmu.run.axis import TIME
 from kinfmu.sweep import solve
-from kinfmu.units import METRES, ForceName, unit_of
+from kinfmu.units import METRES, ForceName, Quantity, unit_of
 
 EQUAL = 1e-9  # relative: of two sizes that differ by less, the first is reported
 
@@ -69,6 +72,22 @@ class UnknownContact:
 
 
 @dataclass(frozen=True)
+class LeftTable:
+    """A load whose argument leaves the table of its law, which keeps its first and last value there.
+
+    load: its name; table, reached: first and last argument, of the table and of the motion; kept: the first and the
+    last effort of the table; unit, effort_unit: of these.
+    """
+
+    load: str
+    table: tuple[float, float]
+    reached: tuple[float, float]
+    unit: str
+    kept: tuple[float, float]
+    effort_unit: str
+
+
+@dataclass(frozen=True)
 class Loading:
     """Forces over a motion.
 
@@ -76,7 +95,8 @@ class Loading:
     springs and dampers, of each its effort, then its length or angle; reaction: the joint that transmits the largest
     determined force; shaking: force and moment on the ground; undetermined: reactions that share a load, with the rows
     that share it; reason: why there are no numbers, '' if there are; missing: samples without numbers;
-    lift_offs: contacts of cams that would have to pull; unknown_contacts: contacts of cams without a known direction.
+    left_tables: loads beyond their tables; lift_offs: contacts of cams that would have to pull; unknown_contacts:
+    contacts of cams without a known direction.
     """
 
     over: str
@@ -89,6 +109,7 @@ class Loading:
     undetermined: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = ()
     reason: str = ""
     missing: int = 0
+    left_tables: tuple[LeftTable, ...] = ()
     lift_offs: tuple[LiftOff, ...] = ()
     unknown_contacts: tuple[UnknownContact, ...] = ()
 
@@ -104,6 +125,7 @@ class Loading:
             "shaking": [asdict(peak) for peak in self.shaking],
             "undetermined": [{"reactions": list(names), "rows": list(rows)} for names, rows in self.undetermined],
             "unknown_contacts": [asdict(one) | {"reactions": list(one.reactions)} for one in self.unknown_contacts],
+            "left_tables": [asdict(one) for one in self.left_tables],
             "lift_offs": [one.as_json() for one in self.lift_offs],
             "reason": self.reason or None,
             "samples_without_numbers": self.missing,
@@ -155,7 +177,18 @@ def _over_motion(mechanism: Mechanism, ranges: Sequence[DriverRange], cams: Sequ
         metre = METRES[mechanism.length_unit]
         gravity = None if mechanism.gravity is None else (mechanism.gravity.x * metre, mechanism.gravity.y * metre)
         reaction, lifts = forces.largest_reaction(), forces.lift_offs(cams)
-        return Loading(over, gravity, efforts, inertias, of_loads, reaction, shaking, missing=missing, lift_offs=lifts)
+        return Loading(
+            over,
+            gravity,
+            efforts,
+            inertias,
+            of_loads,
+            reaction,
+            shaking,
+            missing=missing,
+            left_tables=tuple(forces.left_tables(mechanism)),
+            lift_offs=lifts,
+        )
     except KinfmuError as reason:
         return Loading("no motion", reason=str(reason))
 
@@ -207,6 +240,26 @@ class _Forces:
             ForceRange(name, low + 0.0, high + 0.0, unit_of(name.quantity, unit))
             for name, ((low, _), (high, _)) in found
         )
+
+    def left_tables(self, mechanism: Mechanism) -> Iterator[LeftTable]:
+        """Yield the loads whose arguments leave their tables."""
+        for load in mechanism.loads:
+            if not isinstance(load, Following) or not isinstance(load.law, Spline) or load.law.repeats:
+                continue
+            if load.over is None and self._run.axis == TIME:
+                low, high = float(self._run.t[0]), float(self._run.t[-1])
+            elif load.over is not None and self._motion is not None:
+                low, high = (float(extreme.value) for extreme in self._motion.history(load.over).extremes())
+            else:
+                continue
+            (first, below), (last, above) = load.law.points[0], load.law.points[-1]
+            low, high = (
+                end if abs(end - own) > EQUAL * (last - first) else own for end, own in ((low, first), (high, last))
+            )
+            if low < first or high > last:
+                effort, argument = (unit_of(Quantity(kind), mechanism.length_unit) for kind in load.law_kinds)
+                kept = float(below), float(above)
+                yield LeftTable(load.name, (float(first), float(last)), (low, high), argument, kept, effort)
 
     def largest_reaction(self) -> ForcePeak | None:
         """Return the largest force that a joint transmits; None if there is none that is determined."""
