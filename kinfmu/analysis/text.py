@@ -324,7 +324,8 @@ def _left_table_text(one: LeftTable) -> str:
     (first, last), (low, high) = one.table, one.reached
     kept = [f"{one.kept[0]:.6g} {one.effort_unit} before it"] if low < first else []
     kept += [f"{one.kept[1]:.6g} {one.effort_unit} after it"] if high > last else []
-    return f"{one.load}: its table goes {extent(one.table)}, the motion {extent(one.reached)}; it keeps {' and '.join(kept)}"
+    both = f"its table goes {extent(one.table)}, the motion {extent(one.reached)}"
+    return f"{one.load}: {both}; it keeps {' and '.join(kept)}"
 
 
 def contact_text(contact: UnknownContact) -> str:
