@@ -19,6 +19,7 @@ from kinfmu.mechanism.settings import LawConstant
 from kinfmu.motion.crowding import is_crowded
 from kinfmu.motion.design_points import dependent_numbers, points_of_designs
 from kinfmu.motion.driven_samples import driven_samples
+from kinfmu.motion.geometry import moves_evenly
 from kinfmu.motion.history import FEWEST
 from kinfmu.motion.measure import (
     MeasuredValue,
@@ -387,7 +388,7 @@ class BatchReading:
         elif driven[0].ndim == 3:
             return names
         drive = self.motion.drive
-        varies = drive is not None and not drive.is_linear
+        varies = drive is not None and not moves_evenly(drive)
         forces = measured_forces(self._model.mechanism)
         return self._dependent | {
             one.name

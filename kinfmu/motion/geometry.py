@@ -14,6 +14,7 @@ import numpy as np
 
 from kinfmu.errors import RequestError
 from kinfmu.mechanism.checks import coordinate_orders
+from kinfmu.motion.history import History
 from kinfmu.motion.motion import Motion
 from kinfmu.readings import Reading
 from kinfmu.run import Run
@@ -21,6 +22,11 @@ from kinfmu.sweep import solve
 
 _SAMPLES = 360  # in a turn, and in every range
 _AT_REST = 1e-12  # of the value of the driver; one that changes by less does not move
+
+
+def moves_evenly(drive: History) -> bool:
+    """Return True for a driver with one speed that is not 0, at which the motion is its geometry."""
+    return drive.is_linear and bool(drive.rate[0])
 
 
 def geometry_of(run: Run, motion: Motion, reading: Reading, solved: Callable[..., Run] | None = None) -> Motion:
@@ -37,9 +43,11 @@ def geometry_of(run: Run, motion: Motion, reading: Reading, solved: Callable[...
 
     """
     drive, orders = motion.drive, coordinate_orders(motion.mechanism)
+    if not reading.compares_rates or drive is None or moves_evenly(drive) or not run.good.all():
+        return motion
     names = [getattr(reading, "of", None), getattr(reading, "to", None)]
     is_rate = any(name in orders and orders[name][1] for name in names if isinstance(name, str))
-    if not reading.compares_rates or is_rate or drive is None or drive.is_linear or not run.good.all():
+    if is_rate:
         return motion
     low, high = (float(extreme.value) for extreme in drive.extremes())
     if high - low <= _AT_REST * max(abs(low), abs(high)):
