@@ -78,7 +78,7 @@ def _lengths(place: NumberPath, value: float, lengths: dict[NumberPath, float], 
     low, high = min(others), max(others)
     for factor, word in ((_SLIP, "a thousandth of"), (1.0 / _SLIP, "a thousand times")):
         is_apart = size * least < low if factor > 1.0 else size > high * least
-        meant = [one for one in METRES if math.isclose(METRES[one], METRES[unit] * factor)]
+        meant = [one for one in ("m", "mm") if math.isclose(METRES[one], METRES[unit] * factor)]
         if is_apart and low / _NEAR <= size * factor <= high * _NEAR and meant:
             yield (
                 f"{path_text(place)}: {value:.12g} is {value:.12g} {unit}, about {word} the other lengths ({low:.6g} "

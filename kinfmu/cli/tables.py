@@ -49,7 +49,8 @@ def csv_form(
     given = {"--separator": separator, "--decimal": decimal}
     asked = [f"{option} '{value}'" for option, value in given.items() if value] + ["--units"] * units
     if suffix not in tables and asked:
-        raise click.UsageError(f"{listed(asked)}: only for tables, {listed(tables)}, not {suffix}")
+        valid = tables[0] if len(tables) == 1 else f"tables, {listed(tables)}"
+        raise click.UsageError(f"{listed(asked)}: only for {valid}, not {suffix}")
     if suffix != CSV and (separator or decimal):
         raise click.UsageError(f"{listed(asked)}: only for {CSV}, not {suffix}")
     found = {"separator": SEPARATORS[separator or ","], "decimal": decimal or "."}
