@@ -49,7 +49,7 @@ def unit_notes(mechanism: Mechanism) -> Iterator[str]:
             understood = f"{value:.12g} {unit_of(quantity, unit)}"
             yield (
                 f"{path_text(place)} = {value:.12g} is {understood}, although the unit of length is {unit}: write "
-                f"'{value:.12g} {meant}' if that is meant, else '{understood}'"
+                f"'{value:.12g} {meant}' if intended, else '{understood}'"
             )
     yield from dict.fromkeys(
         text for place, (value, _) in bare.items() if place in lengths for text in _lengths(place, value, lengths, unit)
@@ -82,5 +82,5 @@ def _lengths(place: NumberPath, value: float, lengths: dict[NumberPath, float], 
         if is_apart and low / _NEAR <= size * factor <= high * _NEAR and meant:
             yield (
                 f"{path_text(place)}: {value:.12g} is {value:.12g} {unit}, about {word} the other lengths ({low:.6g} "
-                f"to {high:.6g} {unit}); write '{value:.12g} {meant[0]}' if that is meant"
+                f"to {high:.6g} {unit}); write '{value:.12g} {meant[0]}' if intended"
             )

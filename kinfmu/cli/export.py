@@ -213,8 +213,8 @@ def export(
     if width is not None:
         _check_width(width)
     if cam is not None:
-        form = {"units": units, "separator": separator, "decimal": decimal}
-        export_cam(run, output, cam, tolerance, settings, degrees=degrees, **form)
+        given: dict[str, Any] = {"units": units, "separator": separator, "decimal": decimal}
+        export_cam(run, output, cam, tolerance, settings, degrees=degrees, **given)
         return
     if tolerance is not None:
         raise click.UsageError(f"--tolerance {tolerance}: only for the .dxf of a cam, with --cam")
@@ -235,11 +235,11 @@ def export(
     }
     if suffix not in TABLES:
         plot_only |= {"--svaj": svaj, "--degrees": degrees}
-    given = [name for name, value in plot_only.items() if value]
-    if given and suffix not in PLOTS:
-        also = "".join(f"; {name} also for tables" for name in given if name in ("--svaj", "--degrees"))
-        raise click.UsageError(f"{listed(given)}: only for plots, {listed(PLOTS)}, not {suffix}{also}")
-    excluded = [name for name in given if name not in ("--svaj", "--degrees")] + ["--columns"] * (columns is not None)
+    asked = [name for name, value in plot_only.items() if value]
+    if asked and suffix not in PLOTS:
+        also = "".join(f"; {name} also for tables" for name in asked if name in ("--svaj", "--degrees"))
+        raise click.UsageError(f"{listed(asked)}: only for plots, {listed(PLOTS)}, not {suffix}{also}")
+    excluded = [name for name in asked if name not in ("--svaj", "--degrees")] + ["--columns"] * (columns is not None)
     if svaj and excluded:
         raise click.UsageError(f"--svaj excludes {listed(excluded)}")
     if at is not None and suffix != DRAWING:

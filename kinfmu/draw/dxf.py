@@ -80,11 +80,12 @@ def _drawing(ezdxf: Any, shown: Instant, length_unit: str) -> str:
     drawn = [shape for shape in placed(shown, shapes(shown)) if shape.kind in _DRAWN]
     extent = float(np.ptp(np.concatenate([shape.points for shape in drawn]), axis=0).max()) if drawn else 0.0
     lines: dict[str, Lines] = {}
-    circles = set()
+    circles: set[tuple[str, float, float, float]] = set()
     for shape in sorted(drawn, key=lambda shape: not shape.is_closed):  # lines along a rim are parts of the rim
         layer = shape.frame if drawing.layers.has_entry(shape.frame) else GROUND_NAME
         if shape.radius:
-            circles.add((layer, *map(float, shape.points[0]), float(shape.radius)))
+            (x, y), radius = map(float, shape.points[0]), float(shape.radius)
+            circles.add((layer, x, y, radius))
             continue
         for points, is_closed in lines.setdefault(layer, Lines(extent)).new(shape.points, is_closed=shape.is_closed):
             space.add_lwpolyline(points.tolist(), close=is_closed, dxfattribs={"layer": layer})

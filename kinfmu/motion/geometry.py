@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -46,16 +47,13 @@ def geometry_of(run: Run, motion: Motion, reading: Reading, solved: Callable[...
     if not reading.compares_rates or drive is None or moves_evenly(drive) or not run.good.all():
         return motion
     names = [getattr(reading, "of", None), getattr(reading, "to", None)]
-    is_rate = any(name in orders and orders[name][1] for name in names if isinstance(name, str))
-    if is_rate:
-        return motion
+    if any(name in orders and orders[name][1] for name in names if isinstance(name, str)):
+        return motion  # the rate of a rate
     low, high = (float(extreme.value) for extreme in drive.extremes())
     if high - low <= _AT_REST * max(abs(low), abs(high)):
         raise RequestError(f"{motion.driver} does not move")
     angle, speed, _ = next(one.inputs() for one in motion.mechanism.drivers if one.name == motion.driver)
     turns = (high - low) / math.tau if angle.quantity.kind == "angle" else 1.0
     values = np.linspace(low, high, _SAMPLES * math.ceil(max(turns, 1.0)) + 1)
-    if solved is None:
-        mechanism = replace(motion.mechanism, coordinates="all")
-        return Motion.of_run(solve(mechanism, **{angle: values, speed: 1.0}), with_margin=False)
+    solved = solved or partial(solve, replace(motion.mechanism, coordinates="all"))
     return Motion.of_run(solved(**{angle: values, speed: 1.0}), with_margin=False)

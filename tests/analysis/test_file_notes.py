@@ -397,7 +397,7 @@ def test_a_bare_number_of_another_unit_is_noted_with_what_is_understood_and_prob
         ("mm", {"FREE": '"0.08 mm"'}),
     ],
 )
-def test_numbers_that_can_be_meant_are_not_noted(unit: str, given: dict[str, str]) -> None:
+def test_numbers_in_a_probable_unit_are_not_noted(unit: str, given: dict[str, str]) -> None:
     assert _in_unit(unit, **given) == []
 
 
@@ -407,6 +407,6 @@ def test_a_length_of_a_thousandth_of_all_others_is_noted(length: str, noted: boo
     notes = [*unit_notes(mechanism)]
     assert bool(notes) is noted
     if noted:
-        others = "the other lengths (100 to 400 mm); write '0.35 m' if that is meant"
+        others = "the other lengths (100 to 400 mm); write '0.35 m' if intended"
         assert notes == [f"[bodies.coupler] points.Q: 0.35 is 0.35 mm, about a thousandth of {others}"]
         assert notes[0] in check(mechanism).notes

@@ -535,7 +535,7 @@ def test_lengths_that_a_function_of_angles_leaves_free_are_noted_with_exact_deri
     assert kinfmu.fit(_problem(unknowns=lengths, targets=[target]), starts=2).undetermined == ()
 
 
-AT = np.radians(np.arange(67.0, 427.0, 20.0))  # beside the change point at 180 deg
+AT = np.radians(np.arange(67.0, 427.0, 20.0))  # none at the change point, 180 deg
 
 
 def _at_a_change_point() -> kinfmu.FitProblem:
@@ -582,7 +582,7 @@ def test_another_optimum_is_chosen_where_a_file_does_not_give_the_fitted_motion(
 @pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize("side", [-1.0, 0.0, 2.0])
 def test_the_nearest_point_of_a_path_is_converged_close_to_a_dead_centre(side: float, engine: str) -> None:
-    """Points beside the path, at a given distance along its normal, have their foot where they were set off."""
+    """Points at a distance from the path along its normal have their foot where they were set off."""
     model = kinfmu.compile(kinfmu.load("triple_rocker"), engine=engine)
     places = [[str(name) for name in model.outputs].index(name) for name in ("tracer.x", "tracer.y")]
     limits = kinfmu.check(model.mechanism).range
