@@ -390,7 +390,10 @@ class SignalName(str):
         return self.partition("(")[0].partition(".")[0] if "." in self.partition("(")[0] else ""
 
 
+_OF_FORCES = {*KINDS, "length", "angle"}  # of the columns of forces; springs have a length or an angle
+
+
 def read_force(text: str, kind: str) -> ForceName | None:
-    """Return the force, inertia or energy that a name in a file states; None if the text is no such name."""
+    """Return the force, inertia, energy or length that a name in a file states; None if the text is no such name."""
     owner, _, noun = text.partition(".") if "." in text else ("", "", text)
-    return ForceName(owner, noun, Quantity(kind)) if noun and text[0] != "." and kind in KINDS else None
+    return ForceName(owner, noun, Quantity(kind)) if noun and text[0] != "." and kind in _OF_FORCES else None

@@ -10,6 +10,7 @@ import numpy as np
 
 from kinfmu.analysis.driver_path import follow
 from kinfmu.analysis.singular import DriverRange, driver_range
+from kinfmu.analysis.unit_notes import unit_notes
 from kinfmu.analysis.values import LOOKS, degrees, law_values, value_text
 from kinfmu.drivers import AngleDriver, DistanceDriver
 from kinfmu.equations.start_poses import StartValues, is_in_world_coordinates, open_joints_text, start_from_poses
@@ -36,7 +37,8 @@ def file_notes(mechanism: Mechanism, written: Mechanism | None = None) -> Iterat
     """Yield a line for unused parameters and one for each angle that looks like degrees without a unit.
 
     Also one for each driven distance that starts below 0, for each cam or load that turns beyond the end of its law,
-    and for gravity without masses. written: the mechanism as in its file, whose angles count.
+    for gravity without masses, and for probable slips of units. written: the mechanism as in its file, whose bare
+    numbers count.
     """
     unused = mechanism.unused_parameters
     if unused:
@@ -53,6 +55,7 @@ def file_notes(mechanism: Mechanism, written: Mechanism | None = None) -> Iterat
     yield from _cams(mechanism)
     yield from _loads(mechanism)
     yield from _bare_angles(mechanism if written is None else written)
+    yield from unit_notes(mechanism if written is None else written)
 
 
 def _bare_angles(mechanism: Mechanism) -> Iterator[str]:

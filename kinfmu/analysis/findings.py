@@ -116,13 +116,15 @@ class Findings:
         (coordinates), suggestions (name, and the keys of the driver's table).
         measures: over (the motion, as text), values: name, type, value, unit, driver, at (driver values), at_unit,
         reason (why the value is null), refused: reason by name; null without measures.
-        forces, only with masses or loads: over (the motion, as text), efforts, largest_reaction (of a joint; null if
-        none is determined) and shaking (force and moment): name, value (the peak with its sign), unit, driver, at
-        (driver value), at_unit, rms;
-        reduced_inertias: name, smallest, largest, unit; undetermined: reactions, and rows that share their load;
-        lift_offs (contacts of cams that would have to pull): joint, force (column), sense (1 if positive values press),
-        unit, driver, at_unit, parts (begin, end), extent ('turn' if it pulls at every angle of the driver, 'motion' if
-        in the whole motion, else 'part'), largest_tension (of a lever the moment; value, at);
+        forces, only with masses or loads: over (the motion, as text), gravity ([x, y] in m/s2 or null), efforts,
+        largest_reaction (of a joint; null if none is determined) and shaking (force and moment): name, value (the peak
+        with its sign), unit, driver, at (driver value), at_unit, rms; reduced_inertias and loads (effort and length or
+        angle of springs and dampers): name, smallest, largest, unit; undetermined: reactions, and rows that share their
+        load; left_tables (loads beyond the tables of their laws): load, table and reached (first and last argument),
+        unit, kept (first and last effort), effort_unit; lift_offs (contacts of cams that would have to pull): joint,
+        force (column), sense (1 if positive values press), unit, driver, at_unit, parts (begin, end), extent ('turn' if
+        it pulls at every angle of the driver, 'motion' if in the whole motion, else 'part'), largest_tension (of a
+        lever the moment; value, at);
         reason (why there are no numbers), samples_without_numbers.
         cams, only of mechanisms with cams: joint, element ('roller', 'knife edge', 'flat face', 'unknown'), driver (in
         whose values `at`, begin and end are), reason (why there are no values), cam, follower, swings (true or false),

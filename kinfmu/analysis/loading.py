@@ -7,7 +7,7 @@ measures use place them, to 1e-9 where forces are smooth. Where samples have no 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -16,20 +16,21 @@ import numpy as np
 
 from kinfmu.analysis.cams import CamFindings
 from kinfmu.analysis.lift_off import LiftOff, lift_offs
-from kinfmu.analysis.measuring import SAMPLES_PER_TURN, turns_of_cycle
+from kinfmu.analysis.measuring import motion_of_check, name_of_run
 from kinfmu.analysis.singular import DriverRange
 from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.joints.cam import Cam
-from kinfmu.laws import ConstantSpeed, External
+from kinfmu.laws import Spline
+from kinfmu.loads.following import Following
 from kinfmu.mechanism import Mechanism
 from kinfmu.motion.motion import Motion, break_places, force_of
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import effort_noun
 from kinfmu.plan.undetermined import shared_reactions, unknown_contacts, why_unknown
 from kinfmu.run import FloatArray, Run
-from kinfmu.run.axis import axis_of
+from kinfmu.run.axis import TIME
 from kinfmu.sweep import solve
-from kinfmu.units import unit_of
+from kinfmu.units import METRES, ForceName, Quantity, unit_of
 
 EQUAL = 1e-9  # relative: of two sizes that differ by less, the first is reported
 
@@ -52,8 +53,8 @@ class ForcePeak:
 
 
 @dataclass(frozen=True)
-class InertiaRange:
-    """The smallest and the largest value of a reduced inertia."""
+class ForceRange:
+    """The smallest and the largest value of a reduced inertia, or of the force or length of a spring."""
 
     name: str
     smallest: float
@@ -71,23 +72,44 @@ class UnknownContact:
 
 
 @dataclass(frozen=True)
+class LeftTable:
+    """A load whose argument leaves the table of its law, which keeps its first and last value there.
+
+    load: its name; table, reached: first and last argument, of the table and of the motion; kept: the first and the
+    last effort of the table; unit, effort_unit: of these.
+    """
+
+    load: str
+    table: tuple[float, float]
+    reached: tuple[float, float]
+    unit: str
+    kept: tuple[float, float]
+    effort_unit: str
+
+
+@dataclass(frozen=True)
 class Loading:
     """Forces over a motion.
 
-    over: the motion, as text; efforts: of each driver; inertias: reduced; reaction: the joint that transmits the
-    largest determined force; shaking: force and moment on the ground; undetermined: reactions that share a load, with
-    the rows that share it; reason: why there are no numbers, '' if there are; missing: samples without numbers;
-    lift_offs: contacts of cams that would have to pull; unknown_contacts: contacts of cams without a known direction.
+    over: the motion, as text; gravity: [m/s2], None without; efforts: of each driver; inertias: reduced; loads: of
+    springs and dampers, of each its effort, then its length or angle; reaction: the joint that transmits the largest
+    determined force; shaking: force and moment on the ground; undetermined: reactions that share a load, with the rows
+    that share it; reason: why there are no numbers, '' if there are; missing: samples without numbers;
+    left_tables: loads beyond their tables; lift_offs: contacts of cams that would have to pull; unknown_contacts:
+    contacts of cams without a known direction.
     """
 
     over: str
+    gravity: tuple[float, float] | None = None
     efforts: tuple[ForcePeak, ...] = ()
-    inertias: tuple[InertiaRange, ...] = ()
+    inertias: tuple[ForceRange, ...] = ()
+    loads: tuple[ForceRange, ...] = ()
     reaction: ForcePeak | None = None
     shaking: tuple[ForcePeak, ...] = ()
     undetermined: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = ()
     reason: str = ""
     missing: int = 0
+    left_tables: tuple[LeftTable, ...] = ()
     lift_offs: tuple[LiftOff, ...] = ()
     unknown_contacts: tuple[UnknownContact, ...] = ()
 
@@ -95,12 +117,15 @@ class Loading:
         """Return the forces as plain data."""
         return {
             "over": self.over,
+            "gravity": None if self.gravity is None else list(self.gravity),
             "efforts": [asdict(effort) for effort in self.efforts],
             "reduced_inertias": [asdict(inertia) for inertia in self.inertias],
+            "loads": [asdict(load) for load in self.loads],
             "largest_reaction": None if self.reaction is None else asdict(self.reaction),
             "shaking": [asdict(peak) for peak in self.shaking],
             "undetermined": [{"reactions": list(names), "rows": list(rows)} for names, rows in self.undetermined],
             "unknown_contacts": [asdict(one) | {"reactions": list(one.reactions)} for one in self.unknown_contacts],
+            "left_tables": [asdict(one) for one in self.left_tables],
             "lift_offs": [one.as_json() for one in self.lift_offs],
             "reason": self.reason or None,
             "samples_without_numbers": self.missing,
@@ -110,8 +135,7 @@ class Loading:
 def loading(plan: SolvePlan, ranges: Sequence[DriverRange], cams: Sequence[CamFindings] = ()) -> Loading | None:
     """Return the forces of a mechanism over its motion; None without masses and loads.
 
-    A single driver with a constant speed, or without a law, that turns all the way round makes one cycle, without a law
-    at 1 rad/s; any other motion is the run of the file.
+    They are those of the motion of `motion_of_check`.
 
     Args:
         plan: The plan of the mechanism.
@@ -138,37 +162,35 @@ def loading(plan: SolvePlan, ranges: Sequence[DriverRange], cams: Sequence[CamFi
 def _over_motion(mechanism: Mechanism, ranges: Sequence[DriverRange], cams: Sequence[CamFindings]) -> Loading:
     """Return the forces over a motion, without those that are undetermined."""
     try:
-        arguments, over = _motion(mechanism, ranges)
+        arguments, over = motion_of_check(mechanism, ranges)
         run = _with_breaks(solve(mechanism, **arguments), mechanism, arguments)
-        over = over or f"the run of the file, {axis_of(run).range()}"
+        over = over or name_of_run(run)
         missing = int((~run.good).sum())
         if missing == len(run):
             return Loading(over, reason="no sample has numbers", missing=missing)
         forces = _Forces(run)
         efforts = tuple(map(forces.peak, _efforts(mechanism)))
-        inertias, shaking = tuple(forces.inertias()), tuple(map(forces.peak, ("shaking_force", "shaking_moment")))
+        loads = {load.name for load in mechanism.loads if load.columns}
+        inertias = forces.ranges(name for name in run.force_names if name.noun.startswith("reduced_inertia"))
+        of_loads = forces.ranges(name for name in run.force_names if name.owner in loads)
+        shaking = tuple(map(forces.peak, ("shaking_force", "shaking_moment")))
+        metre = METRES[mechanism.length_unit]
+        gravity = None if mechanism.gravity is None else (mechanism.gravity.x * metre, mechanism.gravity.y * metre)
         reaction, lifts = forces.largest_reaction(), forces.lift_offs(cams)
-        return Loading(over, efforts, inertias, reaction, shaking, missing=missing, lift_offs=lifts)
+        return Loading(
+            over,
+            gravity,
+            efforts,
+            inertias,
+            of_loads,
+            reaction,
+            shaking,
+            missing=missing,
+            left_tables=tuple(forces.left_tables(mechanism)),
+            lift_offs=lifts,
+        )
     except KinfmuError as reason:
         return Loading("no motion", reason=str(reason))
-
-
-def _motion(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> tuple[dict[str, Any], str]:
-    """Return the motion as `solve` takes it, over time where a law gives it, since laws of loads may need times."""
-    if len(mechanism.drivers) != 1 or not ranges or ranges[0].turns is None:
-        return {}, ""
-    (driver,), turns = mechanism.drivers, turns_of_cycle(mechanism, ranges[0].turns)
-    count = "one turn" if turns == 1 else f"{turns} turns"
-    angle, speed_name, _ = driver.inputs()
-    turned = np.linspace(0.0, turns * math.tau, turns * SAMPLES_PER_TURN + 1)
-    if isinstance(driver.law, External):
-        start = float(driver.law.at(mechanism.run.start))
-        return {angle: start + turned, speed_name: 1.0}, f"{count} of {driver.name} at 1 rad/s"
-    if isinstance(driver.law, ConstantSpeed) and (speed := float(driver.law.speed)):
-        unit = unit_of(speed_name.quantity, mechanism.length_unit)
-        times = mechanism.run.start + turned / abs(speed)
-        return {"t": times}, f"{count} of {driver.name} at {speed:.6g} {unit}"
-    return {}, ""
 
 
 def _with_breaks(run: Run, mechanism: Mechanism, arguments: dict[str, Any]) -> Run:
@@ -210,12 +232,34 @@ class _Forces:
         unit = next((place.unit for place in run.places() if place.name == name), "N")
         return ForcePeak(name, value, unit, driver, at, at_unit, _rms(run, force_of(run, name)))
 
-    def inertias(self) -> Iterator[InertiaRange]:
-        """Yield the ranges of the reduced inertias."""
-        for name in self._run.force_names:
-            if name.noun.startswith("reduced_inertia") and np.isfinite(self._run[name]).any():
-                (low, _), (high, _) = self._extremes(name)
-                yield InertiaRange(name, low, high, unit_of(name.quantity, self._run.length_unit))
+    def ranges(self, names: Iterable[ForceName]) -> tuple[ForceRange, ...]:
+        """Return the ranges of forces that have numbers."""
+        found = [(name, self._extremes(name)) for name in names if np.isfinite(self._run[name]).any()]
+        unit = self._run.length_unit
+        return tuple(
+            ForceRange(name, low + 0.0, high + 0.0, unit_of(name.quantity, unit))
+            for name, ((low, _), (high, _)) in found
+        )
+
+    def left_tables(self, mechanism: Mechanism) -> Iterator[LeftTable]:
+        """Yield the loads whose arguments leave their tables."""
+        for load in mechanism.loads:
+            if not isinstance(load, Following) or not isinstance(load.law, Spline) or load.law.repeats:
+                continue
+            if load.over is None and self._run.axis == TIME:
+                low, high = float(self._run.t[0]), float(self._run.t[-1])
+            elif load.over is not None and self._motion is not None:
+                low, high = (float(extreme.value) for extreme in self._motion.history(load.over).extremes())
+            else:
+                continue
+            (first, below), (last, above) = load.law.points[0], load.law.points[-1]
+            low, high = (
+                end if abs(end - own) > EQUAL * (last - first) else own for end, own in ((low, first), (high, last))
+            )
+            if low < first or high > last:
+                effort, argument = (unit_of(Quantity(kind), mechanism.length_unit) for kind in load.law_kinds)
+                kept = float(below), float(above)
+                yield LeftTable(load.name, (float(first), float(last)), (low, high), argument, kept, effort)
 
     def largest_reaction(self) -> ForcePeak | None:
         """Return the largest force that a joint transmits; None if there is none that is determined."""

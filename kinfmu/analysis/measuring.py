@@ -11,8 +11,8 @@ import numpy as np
 
 from kinfmu.analysis.driver_path import follow
 from kinfmu.analysis.singular import DriverRange, driver_range
-from kinfmu.errors import KinfmuError
-from kinfmu.laws import ConstantSpeed
+from kinfmu.errors import KinfmuError, RequestError
+from kinfmu.laws import ConstantSpeed, ConstantValue, External, Law, Polynomial
 from kinfmu.laws.law import NEARLY
 from kinfmu.loads.following import Following
 from kinfmu.mechanism import Mechanism
@@ -21,7 +21,6 @@ from kinfmu.plan import SolvePlan
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
 from kinfmu.sweep import solve
-from kinfmu.units import unit_of
 
 SAMPLES_PER_TURN = 360
 _MOST_TURNS = 24  # of the law of a load
@@ -47,8 +46,7 @@ class Measurements:
 def measurements(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> Measurements | None:
     """Measure the motion of a mechanism; None if it declares no measures.
 
-    A single driver that turns all the way round makes one cycle, at the speed of its law if that is constant, else at 1
-    rad per unit of the argument; any other motion is the run of the file.
+    They are those of the motion of `motion_of_check`.
 
     Args:
         mechanism: The mechanism.
@@ -59,7 +57,8 @@ def measurements(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> Measure
         return None
     names = [reading.name for reading in mechanism.measures]
     try:
-        run, over = _motion(replace(mechanism, coordinates="all"), ranges)
+        arguments, over = motion_of_check(mechanism, ranges)
+        run = solve(replace(mechanism, coordinates="all"), **arguments)
     except KinfmuError as reason:
         return Measurements("no motion", (), dict.fromkeys(names, str(reason)))
     values: list[MeasuredValue] = []
@@ -69,17 +68,38 @@ def measurements(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> Measure
             values += measure(run, [name]).values()
         except KinfmuError as reason:
             refused[name] = str(reason).removeprefix(f"[measures.{name}]: ")
-    return Measurements(over, tuple(values), refused)
+    return Measurements(over or name_of_run(run), tuple(values), refused)
 
 
-def _motion(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> tuple[Run, str]:
-    """Return the samples of the motion, and what it is as text."""
+def motion_of_check(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> tuple[dict[str, Any], str]:
+    """Return the motion of which `check` reports measures and forces, as `solve` takes it, and what it is as text.
+
+    A single driver that turns all the way round makes one cycle if its speed is constant: at that speed, or at 1 rad/s
+    if the file does not move it. Any other motion is the run of the file: both are empty. `[run] over` chooses.
+
+    Raises:
+        RequestError: `[run] over` asks for a turn that the drivers cannot make.
+
+    """
     inputs, over = _cycle(mechanism, ranges)
-    if mechanism.loads and inputs and isinstance(law := mechanism.drivers[0].law, ConstantSpeed) and law.speed:
-        angles, speed = next(iter(inputs.values())), float(law.speed)
+    if inputs and (mechanism.loads or mechanism.has_masses) and (speed := constant_speed(mechanism.drivers[0].law)):
+        angles = next(iter(inputs.values()))
         inputs = {"t": mechanism.run.start + (angles - angles[0]) / abs(speed)}  # laws of loads may need times
-    run = solve(mechanism, **inputs)
-    return run, over or f"the run of the file, {axis_of(run).range()}"
+    return inputs, over
+
+
+def name_of_run(run: Run) -> str:
+    """Return what the motion is that the file makes."""
+    return f"the run of the file, {axis_of(run).range()}"
+
+
+def constant_speed(law: Law) -> float | None:
+    """Return the speed of a law that has the same one at all times, 0 for one that stands still; None for others."""
+    if isinstance(law, ConstantSpeed):
+        return float(law.speed)
+    if isinstance(law, Polynomial) and not any(law.coefficients[2:]):
+        return float(sum(law.coefficients[1:]))
+    return 0.0 if isinstance(law, External | ConstantValue) else None
 
 
 def turns_of_cycle(mechanism: Mechanism, turns: int) -> int:
@@ -111,14 +131,18 @@ def driver_cycle(plan: SolvePlan) -> tuple[dict[str, Any], str]:
 
 
 def _cycle(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> tuple[dict[str, Any], str]:
-    if len(mechanism.drivers) != 1 or not ranges or ranges[0].turns is None:
+    over, drivers = mechanism.run.over, mechanism.drivers
+    if len(drivers) != 1 or not ranges or ranges[0].turns is None:
+        if over == "turn":
+            raise RequestError("over = 'turn' needs a single driver that turns all the way round; 'run' is the other")
         return {}, ""
-    (driver,), turns = mechanism.drivers, turns_of_cycle(mechanism, ranges[0].turns)
-    speed = driver.law.speed if isinstance(driver.law, ConstantSpeed) else 0.0
+    (driver,), speed = drivers, constant_speed(drivers[0].law)
+    if over == "run" or (speed is None and not over):
+        return {}, ""
+    turns = turns_of_cycle(mechanism, ranges[0].turns)
     angle, speed_name, _ = driver.inputs()
     start = float(driver.law.at(mechanism.run.start))
     angles = start + np.linspace(0.0, turns * math.tau, turns * SAMPLES_PER_TURN + 1)
     count = "one turn" if turns == 1 else f"{turns} turns"
-    at = f"at {float(speed):.6g} {unit_of(speed_name.quantity, mechanism.length_unit)}"
-    over = f"{count} of {driver.name} {at if speed else 'at speed 1, so that rates are per rad'}"
-    return {angle: angles, speed_name: float(speed) or 1.0}, over
+    at = f"{speed:.6g} rad/s" if speed else "1 rad/s, so that rates are per rad"
+    return {angle: angles, speed_name: speed or 1.0}, f"{count} of {driver.name} at {at}"

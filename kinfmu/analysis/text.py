@@ -10,7 +10,7 @@ from typing import NamedTuple
 from kinfmu.analysis.cam_text import cam_lines
 from kinfmu.analysis.findings import Findings
 from kinfmu.analysis.lift_off import LiftOff
-from kinfmu.analysis.loading import ForcePeak, UnknownContact
+from kinfmu.analysis.loading import ForcePeak, LeftTable, UnknownContact
 from kinfmu.analysis.loops import FourBar, Link, SliderCrank
 from kinfmu.analysis.named_loops import NamedLoop
 from kinfmu.analysis.singular import DriverRange, LimitPosition
@@ -284,15 +284,25 @@ def _forces(report: Findings) -> Iterator[ReportLine]:
     yield ReportLine("forces", f"over {loading.over}{missing}")
     if loading.reason:
         yield ReportLine("", f"no values, because {loading.reason}")
+    if loading.gravity is not None:
+        yield ReportLine("", f"gravity: ({loading.gravity[0]:.6g}, {loading.gravity[1]:.6g}) m/s2")
     for effort in loading.efforts:
         yield ReportLine("", f"{effort.name}: peak {_peak_text(effort)}, rms {effort.rms:.6g} {effort.unit}")
     for inertia in loading.inertias:
         ends = f"{inertia.smallest:.6g} to {inertia.largest:.6g} {inertia.unit}"
         yield ReportLine("", f"{inertia.name}: {ends}")
+    for of_effort, of_quantity in zip(loading.loads[::2], loading.loads[1::2], strict=True):
+        name, _, noun = of_effort.name.rpartition(".")
+        ends = f"{noun} {of_effort.smallest:.6g} to {of_effort.largest:.6g} {of_effort.unit}"
+        noun = of_quantity.name.rpartition(".")[2]
+        unit = of_quantity.unit
+        yield ReportLine("", f"{name}: {ends}, {noun} {of_quantity.smallest:.6g} to {of_quantity.largest:.6g} {unit}")
     if loading.reaction is not None:
         yield ReportLine("", f"largest reaction: {loading.reaction.name} {_peak_text(loading.reaction)}")
     for peak in loading.shaking:
         yield ReportLine("", f"{peak.name}: peak {_peak_text(peak)}")
+    for one in loading.left_tables:
+        yield ReportLine("", _left_table_text(one))
     for lift in loading.lift_offs:
         yield ReportLine("", _lift_off_text(lift))
     for contact in loading.unknown_contacts:
@@ -303,6 +313,20 @@ def _forces(report: Findings) -> Iterator[ReportLine]:
         joints = {redundant[row] for row in others}
         shared = [name for name in names if name.partition(".")[0] not in joints]
         yield ReportLine("", f"statically indeterminate: {_names(shared)} share the load with {_names(others)}")
+
+
+def _left_table_text(one: LeftTable) -> str:
+    """Return what a load does beyond its table."""
+
+    def extent(ends: tuple[float, float]) -> str:
+        low, high = (degrees(end) if one.unit == "rad" else f"{end:.6g} {one.unit}" for end in ends)
+        return f"from {low} to {high}"
+
+    (first, last), (low, high) = one.table, one.reached
+    kept = [f"{one.kept[0]:.6g} {one.effort_unit} before it"] if low < first else []
+    kept += [f"{one.kept[1]:.6g} {one.effort_unit} after it"] if high > last else []
+    both = f"its table goes {extent(one.table)}, the motion {extent(one.reached)}"
+    return f"{one.load}: {both}; it keeps {' and '.join(kept)}"
 
 
 def contact_text(contact: UnknownContact) -> str:

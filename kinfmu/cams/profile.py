@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,8 @@ from kinfmu.cams.traced import ComplexArray, Traced, traced
 from kinfmu.errors import KinfmuError, MechanismError, RequestError
 from kinfmu.files.whole_file import write_whole
 from kinfmu.joints import CamFlatFace, CamRoller
-from kinfmu.run import FloatArray
+from kinfmu.run import Column, FloatArray
+from kinfmu.run.tables import csv_lines
 from kinfmu.units import degrees_of
 
 TURN = 2.0 * math.pi
@@ -70,15 +72,15 @@ class CamProfile:
     driver: FloatArray | None = None
     driver_name: str = ""
 
-    def write_csv(self, path: str | Path, *, units: bool = False, degrees: bool = False) -> None:
-        """Write the table into a .csv file; units: True for names such as 'x [mm]'; degrees: True for angles in deg.
+    def write_csv(self, path: str | Path, *, degrees: bool = False, **form: Any) -> None:
+        """Write the table into a .csv file; degrees: True for angles in deg; form: as `csv_lines` of tables has it.
 
         Raises:
             KinfmuError: The file cannot be written.
 
         """
         try:
-            write_whole(Path(path), "".join(self.csv_lines(units=units, degrees=degrees)).encode())
+            write_whole(Path(path), "".join(self.csv_lines(degrees=degrees, **form)).encode())
         except OSError as error:
             raise KinfmuError(f"{path}: cannot be written ({error.strerror or error})") from None
 
@@ -100,12 +102,10 @@ class CamProfile:
             found.append(("face_offset", unit, self.offset))
         return [_in_degrees(*column) for column in found] if degrees else found
 
-    def csv_lines(self, *, units: bool = False, degrees: bool = False) -> Iterator[str]:
+    def csv_lines(self, *, degrees: bool = False, **form: Any) -> Iterator[str]:
         """Yield the lines of a CSV table, each with its end; arguments as in `write_csv`."""
-        columns = self.columns(degrees=degrees)
-        yield ",".join(f"{name} [{unit}]" if units else name for name, unit, _ in columns) + "\n"
-        for row in zip(*((values + 0.0).tolist() for _, _, values in columns), strict=True):
-            yield ",".join(map(repr, row)) + "\n"
+        columns = (Column(name, unit, values + 0.0) for name, unit, values in self.columns(degrees=degrees))
+        return csv_lines([*columns], **form)
 
 
 def _in_degrees(name: str, unit: str, values: FloatArray) -> tuple[str, str, FloatArray]:

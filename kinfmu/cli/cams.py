@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -13,6 +14,7 @@ from kinfmu.cli.group import errors_of
 from kinfmu.cli.pages import mechanism_of
 from kinfmu.cli.quantities import driver_value
 from kinfmu.cli.settings import checked_settings
+from kinfmu.cli.tables import csv_form
 from kinfmu.errors import RequestError, listed
 from kinfmu.files.whole_file import suffix_of
 from kinfmu.units import Quantity
@@ -28,11 +30,11 @@ def export_cam(
     tolerance: str | None,
     settings: Sequence[tuple[str, str]],
     *,
-    units: bool,
     degrees: bool,
+    **form: Any,
 ) -> None:
-    """Write the profile of a cam of a mechanism, or of the mechanism of a record."""
-    valid = {"run", "output", "cam", "tolerance", "settings", "units", "degrees"}
+    """Write the profile of a cam of a mechanism, or of the mechanism of a record; form: as `csv_form` takes it."""
+    valid = {"run", "output", "cam", "tolerance", "settings", "degrees", *form}
     others = [name for name, value in click.get_current_context().params.items() if value and name not in valid]
     if others:
         options = listed(f"--{name}" for name in others).replace("--other", "a second run").replace("across", "x")
@@ -40,8 +42,7 @@ def export_cam(
     suffix = ".csv" if output == STANDARD_OUTPUT else suffix_of(output)
     if suffix not in FORMATS:
         raise click.UsageError(f"{output}: the profile of a cam is written as {listed(FORMATS)}")
-    if units and suffix != ".csv":
-        raise click.UsageError(f"--units: only for .csv, not {suffix}")
+    form = csv_form(suffix, (".csv",), **form)
     if degrees and suffix != ".csv":
         about = "its figure has angles in deg" if suffix != ".dxf" else "a drawing has no angles"
         raise click.UsageError(f"--degrees: of a cam only for .csv, not {suffix}; {about}")
@@ -72,11 +73,11 @@ def export_cam(
             profile = cam_profile(mechanism, joint, tolerance=within)
             about = f" ({len(profile.angle)} corners, within {within:.3g} {unit} of the curve)"
     if output == STANDARD_OUTPUT:
-        for line in profile.csv_lines(units=units, degrees=degrees):
+        for line in profile.csv_lines(degrees=degrees, **form):
             click.echo(line, nl=False)
         return
     if suffix == ".csv":
-        profile.write_csv(output, units=units, degrees=degrees)
+        profile.write_csv(output, degrees=degrees, **form)
     else:
         from kinfmu.draw import cam
 

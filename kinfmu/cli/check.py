@@ -16,6 +16,7 @@ from kinfmu.cli.group import errors_of, main
 from kinfmu.cli.quantities import driver_value
 from kinfmu.cli.settings import checked_settings, set_option
 from kinfmu.errors import KinfmuError, MechanismError, listed
+from kinfmu.mechanism.body import MEASURED_OVER
 
 if TYPE_CHECKING:
     from kinfmu.analysis import Assemblies, Report
@@ -33,6 +34,7 @@ FIGURES = (".svg", ".png", ".pdf")
     "--figure", "picture", type=OutputFile(*FIGURES), help="Draw the mechanism with its names: .svg, .png or .pdf."
 )
 @click.option("--at", metavar="VALUE", help="Driver value of the pose that --figure draws, such as 45deg or 20mm.")
+@click.option("--over", type=click.Choice(MEASURED_OVER), help="Motion of measures and forces; default: as in [run].")
 @set_option
 def check(
     mechanism: str,
@@ -41,6 +43,7 @@ def check(
     assemblies: bool,
     picture: Path | None,
     at: str | None,
+    over: str | None,
     settings: tuple[tuple[str, str], ...],
 ) -> None:
     """Check a mechanism and report its properties.
@@ -57,6 +60,8 @@ def check(
             _print_part(mechanism, problem, as_json=as_json)
         raise
     mech = checked_settings(loaded, settings).mechanism()
+    if over is not None:
+        mech = replace(mech, run=replace(mech.run, over=over))
     value = _value(mech, mechanism, at, picture)
     with errors_of(mechanism):
         report = checked(mech, written=loaded)

@@ -17,6 +17,7 @@ from kinfmu.cli.group import errors_of, main
 from kinfmu.cli.pages import PAGES, mechanism_of, write_page
 from kinfmu.cli.quantities import on_axis
 from kinfmu.cli.settings import checked_settings, set_option
+from kinfmu.cli.tables import csv_form, table_options
 from kinfmu.errors import RequestError, listed
 from kinfmu.files.whole_file import suffix_of
 
@@ -29,12 +30,12 @@ DRAWING = ".dxf"
 FORMATS = (*TABLES, *PLOTS, *ANIMATIONS, DRAWING)
 
 
-def _write(run: Run, path: Path, columns: Sequence[str], *, units: bool, width: int | None, **how: Any) -> None:
+def _write(run: Run, path: Path, columns: Sequence[str], *, width: int | None, **how: Any) -> None:
     """Write a run in the format of the path's suffix."""
     if suffix_of(path) in TABLES:
         from kinfmu.log import write_table
 
-        write_table(run, path, columns or None, units=units)
+        write_table(run, path, columns or None, **how)
     elif suffix_of(path) in PLOTS:
         from kinfmu.draw import plot
 
@@ -45,17 +46,18 @@ def _write(run: Run, path: Path, columns: Sequence[str], *, units: bool, width: 
         animate(run, path, width=width)
 
 
-def _write_svaj(run: Run, output: Path, name: str, *, units: bool, degrees: bool) -> None:
+def _write_svaj(run: Run, output: Path, name: str, *, degrees: bool, **form: Any) -> None:
     """Write displacement, velocity, acceleration and jerk as a table."""
-    from kinfmu.log.table import lines_of, write_columns
+    from kinfmu.log.table import write_columns
     from kinfmu.motion.svaj_table import svaj_columns
+    from kinfmu.run.tables import csv_lines
 
     columns = svaj_columns(run, name, degrees=degrees)
     if output == STANDARD_OUTPUT:
-        for line in lines_of(columns, units=units):
+        for line in csv_lines(columns, **form):
             click.echo(line, nl=False)
         return
-    write_columns(run, columns, output, units=units)
+    write_columns(run, columns, output, **form)
     click.echo(f"written: {output}")
 
 
@@ -143,7 +145,8 @@ def _on_axis_of(run: Run, text: str) -> float:
 @click.option(
     "--degrees",
     is_flag=True,
-    help="Angles in deg: in plots, where driver values and those of --x always are, and in tables of --svaj and --cam.",
+    help="Angles in deg, and their rates in time: in tables, and in plots, where driver values and those of --x always "
+    "are.",
 )
 @click.option(
     "--start", metavar="VALUE", help="First sample: time [s], or driver value of solve --angle, such as 30deg."
@@ -168,7 +171,7 @@ def _on_axis_of(run: Run, text: str) -> float:
     metavar="LENGTH",
     help="Largest distance of the polygon of a cam's .dxf from the curve, such as 0.01mm. Default: 1e-5 of the cam.",
 )
-@click.option("--units", is_flag=True, help="Write units into the first line of a CSV file: coupler.x [m].")
+@table_options
 @set_option
 def export(
     run: str,
@@ -187,6 +190,8 @@ def export(
     cam: str | None,
     tolerance: str | None,
     units: bool,
+    separator: str | None,
+    decimal: str | None,
     settings: tuple[tuple[str, str], ...],
 ) -> None:
     """Write a run as a table, as plots, as an animation or as a page; or a mechanism as a page.
@@ -208,7 +213,8 @@ def export(
     if width is not None:
         _check_width(width)
     if cam is not None:
-        export_cam(run, output, cam, tolerance, settings, units=units, degrees=degrees)
+        given: dict[str, Any] = {"units": units, "separator": separator, "decimal": decimal}
+        export_cam(run, output, cam, tolerance, settings, degrees=degrees, **given)
         return
     if tolerance is not None:
         raise click.UsageError(f"--tolerance {tolerance}: only for the .dxf of a cam, with --cam")
@@ -216,25 +222,24 @@ def export(
         _export_page(run, output, start, stop, settings)
         return
     from kinfmu.log import read
-    from kinfmu.log.table import csv_lines
+    from kinfmu.log.table import columns_of
+    from kinfmu.run.tables import csv_lines
 
     suffix = ".csv" if output == STANDARD_OUTPUT else suffix_of(output)
-    if units and suffix != ".csv":
-        where = "Parquet and npz always hold the units" if suffix in TABLES else "plots show the units at their axes"
-        raise click.UsageError(f"--units: only for .csv, not {suffix}; {where}")
+    form = csv_form(suffix, TABLES, units=units, separator=separator, decimal=decimal)
     plot_only = {
         "--x": across,
         "--overlay": overlay,
         "--polar": polar,
         "a second run": other,
     }
-    if not (svaj and suffix in TABLES):
+    if suffix not in TABLES:
         plot_only |= {"--svaj": svaj, "--degrees": degrees}
-    given = [name for name, value in plot_only.items() if value]
-    if given and suffix not in PLOTS:
-        also = "; --svaj also for tables" if "--svaj" in given else ""
-        raise click.UsageError(f"{listed(given)}: only for plots, {listed(PLOTS)}, not {suffix}{also}")
-    excluded = [name for name in given if name not in ("--svaj", "--degrees")] + ["--columns"] * (columns is not None)
+    asked = [name for name, value in plot_only.items() if value]
+    if asked and suffix not in PLOTS:
+        also = "".join(f"; {name} also for tables" for name in asked if name in ("--svaj", "--degrees"))
+        raise click.UsageError(f"{listed(asked)}: only for plots, {listed(PLOTS)}, not {suffix}{also}")
+    excluded = [name for name in asked if name not in ("--svaj", "--degrees")] + ["--columns"] * (columns is not None)
     if svaj and excluded:
         raise click.UsageError(f"--svaj excludes {listed(excluded)}")
     if at is not None and suffix != DRAWING:
@@ -246,10 +251,10 @@ def export(
         raise click.UsageError(f"--columns {columns}: only for tables and plots, {valid}, not {suffix}")
     part = _between(read(Path(run)), start, stop)
     if svaj and suffix in TABLES:
-        _write_svaj(part, output, svaj, units=units, degrees=degrees)
+        _write_svaj(part, output, svaj, degrees=degrees, **form)
         return
     if output == STANDARD_OUTPUT:
-        for line in csv_lines(part, names_in(columns), units=units):
+        for line in csv_lines(columns_of(part, names_in(columns), degrees=degrees), **form):
             click.echo(line, nl=False)
         return
     if suffix == DRAWING:
@@ -264,10 +269,11 @@ def export(
         drawn(part, output, svaj, degrees=degrees)
         click.echo(f"written: {output}")
         return
-    how: dict[str, Any] = {"x": names_in(across) or (), "overlaid": overlay, "polar": polar, "degrees": degrees}
+    how: dict[str, Any] = {"degrees": degrees}
+    how |= form if suffix in TABLES else {"x": names_in(across) or (), "overlaid": overlay, "polar": polar}
     if other is not None:
         how |= {"other": _between(read(other), start, stop), "names": (Path(run).stem, other.stem)}
-    _write(part, output, names_in(columns) or (), units=units, width=width, **how)
+    _write(part, output, names_in(columns) or (), width=width, **how)
     click.echo(f"written: {output}")
 
 

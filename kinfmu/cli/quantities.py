@@ -96,7 +96,7 @@ def driver_value(option: str, text: str, quantity: Quantity, length_unit: str) -
         value = _number(text, quantity, length_unit)
     except ValueError as error:
         raise click.UsageError(f"{option} {text}: {error}") from None
-    if quantity.kind == "angle" and looks_like_degrees(value) and is_bare(text):
+    if quantity == Quantity("angle") and looks_like_degrees(value) and is_bare(text):
         note(f"{option} {text}: {text} rad, {in_turns(value)}; write {text}deg for degrees")
     return value
 
@@ -111,7 +111,7 @@ def is_bare(text: str) -> bool:
 
 
 def _number(text: str, quantity: Quantity, length_unit: str = "m") -> float:
-    """Return '360deg' in radians, '1.5' unchanged, '3mm' in the unit of length; a ValueError lists the valid units."""
+    """Return '360deg' in radians, '1.5' unchanged, '1/3 mm' in the unit of length; a ValueError lists the units."""
     known = factors(quantity, length_unit)
     text = spelled(text)
     for unit in sorted(known, key=len, reverse=True):
@@ -121,8 +121,9 @@ def _number(text: str, quantity: Quantity, length_unit: str = "m") -> float:
     else:
         factor = 1.0
     try:
-        number = float(text) * factor
-    except ValueError:
+        above, slash, below = text.partition("/")
+        number = (float(above) / float(below) if slash else float(text)) * factor
+    except (ValueError, ZeroDivisionError):
         raise ValueError(f"'{text}' is not a number{f' (units: {listed(known)})' if known else ''}") from None
     if not math.isfinite(number):
         raise ValueError(f"'{text}' is not a finite number")

@@ -13,8 +13,9 @@ from kinfmu import gallery
 from kinfmu.cli.arguments import OutputFile, mechanism_argument, names_in, outputs_option
 from kinfmu.cli.group import errors_of, main, on_interrupt
 from kinfmu.cli.messages import note, report, warn
-from kinfmu.cli.quantities import RangeArgument, is_bare
+from kinfmu.cli.quantities import RangeArgument, driver_value, is_bare
 from kinfmu.cli.settings import TOLERANCE, Settings, checked_settings, set_option, tolerance_of
+from kinfmu.cli.tables import csv_form, table_options
 from kinfmu.errors import listed
 from kinfmu.files.whole_file import suffix_of
 from kinfmu.units import Quantity, in_turns, looks_like_degrees
@@ -48,7 +49,14 @@ HALF_TURN = math.pi  # [rad]; a longer step between samples is probably a wrappe
     "angle",
     metavar="A:B:N",
     help="N driver values from A to B in place of times, such as 0deg:360deg:361 or 0mm:50mm:101. Bare numbers are in "
-    "rad or in the file's unit of length. Rates are derivatives with respect to the driver; time counts the samples.",
+    "rad or in the file's unit of length. Rates are derivatives with respect to the driver, without --speed; time "
+    "counts the samples.",
+)
+@click.option(
+    "--speed",
+    metavar="VALUE",
+    help="Speed of --angle, such as 60rpm or 20mm/s: rates are then per second. Bare numbers are in rad/s or in the "
+    "file's unit of length per second.",
 )
 @click.option("--wrap", is_flag=True, help="Unwrap --angle: no step is more than half a turn.")
 @outputs_option
@@ -59,6 +67,8 @@ HALF_TURN = math.pi  # [rad]; a longer step between samples is probably a wrappe
     show_default=True,
     help="native: compiled C, for long sweeps; auto: chosen by the number of samples.",
 )
+@click.option("--degrees", is_flag=True, help="Angles of a table in deg, and their rates in time.")
+@table_options
 @set_option
 @on_interrupt("stopped before the run was complete: nothing was written")
 def solve(
@@ -66,7 +76,12 @@ def solve(
     output: Path,
     times: tuple[float, float, float] | None,
     angle: str | None,
+    speed: str | None,
     wrap: bool,
+    degrees: bool,
+    units: bool,
+    separator: str | None,
+    decimal: str | None,
     settings: tuple[tuple[str, str], ...],
     outputs: str | None,
     engine: str,
@@ -83,14 +98,21 @@ def solve(
 
     if times and angle:
         raise click.UsageError("--times and --angle exclude each other")
-    if wrap and not angle:
-        raise click.UsageError("--wrap needs --angle")
+    for option, value in (("--wrap", wrap), (f"--speed {speed}", speed)):
+        if value and not angle:
+            raise click.UsageError(f"{option} needs --angle")
+    form = csv_form(suffix_of(output), TABLES, units=units, separator=separator, decimal=decimal)
+    if degrees and suffix_of(output) == RECORD:
+        raise click.UsageError(f"--degrees: only for tables, {listed(TABLES)}; export writes those of a record")
     mech = gallery.load(mechanism)
     given = checked_settings(mech, settings, (TOLERANCE,))
     t, samples = None, {}
     if angle:
         _check_one_driver(mechanism, given)
         samples = _driver_values(angle, mech.drivers[0], mech.length_unit, wrap)
+        if speed:
+            name = mech.drivers[0].inputs()[1]
+            samples[name] = driver_value("--speed", speed, name.quantity, mech.length_unit)
     else:
         t = run_times(RunSettings(*times)) if times else None
         _warn_of_external(mech.drivers)
@@ -109,7 +131,7 @@ def solve(
     if suffix_of(output) == RECORD:
         write_mcap(run, output)
     else:
-        write_table(run, output)
+        write_table(run, output, degrees=degrees, **form)
     report(run, f"written to {output}", by_samples=angle is not None)
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from kinfmu.draw.animation import placed_run
+from kinfmu.draw.lines import Lines
 from kinfmu.draw.painting import placed
 from kinfmu.draw.pose_at import pose_at
 from kinfmu.draw.writing import write_bytes
@@ -76,14 +77,20 @@ def _drawing(ezdxf: Any, shown: Instant, length_unit: str) -> str:
     space = drawing.modelspace()
     for body in (GROUND_NAME, *(body.name for body in shown.mechanism.moving_bodies)):
         drawing.layers.add(body, true_color=ezdxf.rgb2int(shown.colour(body)))
-    for shape in placed(shown, shapes(shown)):
-        if shape.kind not in _DRAWN:
-            continue
-        look = {"layer": shape.frame if drawing.layers.has_entry(shape.frame) else GROUND_NAME}
+    drawn = [shape for shape in placed(shown, shapes(shown)) if shape.kind in _DRAWN]
+    extent = float(np.ptp(np.concatenate([shape.points for shape in drawn]), axis=0).max()) if drawn else 0.0
+    lines: dict[str, Lines] = {}
+    circles: set[tuple[str, float, float, float]] = set()
+    for shape in sorted(drawn, key=lambda shape: not shape.is_closed):  # lines along a rim are parts of the rim
+        layer = shape.frame if drawing.layers.has_entry(shape.frame) else GROUND_NAME
         if shape.radius:
-            space.add_circle(tuple(map(float, shape.points[0])), shape.radius, dxfattribs=look)
-        elif len(shape.points) > 1:
-            space.add_lwpolyline(shape.points.tolist(), close=shape.is_closed, dxfattribs=look)
+            (x, y), radius = map(float, shape.points[0]), float(shape.radius)
+            circles.add((layer, x, y, radius))
+            continue
+        for points, is_closed in lines.setdefault(layer, Lines(extent)).new(shape.points, is_closed=shape.is_closed):
+            space.add_lwpolyline(points.tolist(), close=is_closed, dxfattribs={"layer": layer})
+    for layer, x, y, radius in sorted(circles):
+        space.add_circle((x, y), radius, dxfattribs={"layer": layer})
     for name in shown.body_points:
         space.add_point(tuple(map(float, shown.point(name))), dxfattribs={"layer": body_of(name)})
     text = io.StringIO()

@@ -39,6 +39,12 @@ _ROWS = {
     "force_y": "force along y",
     "moment": "moment",
 }
+_OF_LOADS = {
+    "force": "force along the line of its points, positive where it pushes them apart",
+    "length": "distance of its points",
+    "torque": "torque on its second body, counter-clockwise",
+    "angle": "angle of its second body from its first",
+}
 _OF_CAMS = {
     CamRoller: "force of the cam on its follower, from pole to roller, positive where pressed",
     CamFlatFace: "force of the cam on its follower, along the face's normal, positive where pressed",
@@ -186,6 +192,8 @@ def variable_description(plan: SolvePlan, name: ForceName) -> str:
         if type(joint) in _OF_CAMS:
             return f"Joint {name.owner}: {_OF_CAMS[type(joint)]}"
         return f"Joint {name.owner}: {_ROWS.get(name.noun, name.noun)} of its first body on its second"
+    if any(load.name == name.owner for load in plan.mechanism.loads):
+        return f"Load {name.owner}: {_OF_LOADS[name.noun]}"
     noun, _, other = name.noun.partition(".")
     if other:
         return f"Driver {name.owner}: change of its effort with the acceleration of driver {other}"

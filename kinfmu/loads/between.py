@@ -39,6 +39,7 @@ class BetweenPoints(Load):
     Leaves are springs and dampers.
     """
 
+    columns: ClassVar[tuple[str, ...]] = ("force", "length")
     between: tuple[str, str]
 
     @property

@@ -23,6 +23,7 @@ class BetweenBodies(Load):
     Leaves are torsion springs and dampers.
     """
 
+    columns: ClassVar[tuple[str, ...]] = ("torque", "angle")
     between: tuple[str, str]
 
     def bodies(self) -> tuple[str, ...]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,13 +15,14 @@ from kinfmu.log.record import description, ending
 from kinfmu.log.target import replacing
 from kinfmu.run import Column, Run
 from kinfmu.run.channels import kept_columns, select
-from kinfmu.run.tables import arrow_table
+from kinfmu.run.tables import arrow_table, csv_lines, in_degrees
 
 SUFFIXES = (".csv", ".parquet", ".npz")
-ROWS = 4096  # of a CSV file converted at once: Python's numbers take four times the memory
 
 
-def write_table(run: Run, path: str | Path, columns: Sequence[str] | None = None, *, units: bool = False) -> None:
+def write_table(
+    run: Run, path: str | Path, columns: Sequence[str] | None = None, *, degrees: bool = False, **form: Any
+) -> None:
     """Write columns of `run` to a .csv, .parquet or .npz file, in the run's order.
 
     CSV: one line of names, then one line per sample, as `pandas.read_csv(path)` reads it; samples without numbers are
@@ -32,7 +34,9 @@ def write_table(run: Run, path: str | Path, columns: Sequence[str] | None = None
         path: The file; its suffix chooses the format.
         columns: Names such as 'coupler.x', 'coupler.*', 'q' or '-error', see kinfmu.run.channels; time and status are
             always written. Default: all columns.
-        units: True: names in the first line of a CSV file have their units, such as 'coupler.x [m]'.
+        degrees: True: angles, and their rates in time, in deg.
+        **form: Of a CSV file: units=True for names such as 'coupler.x [m]' in the first line, and one character each as
+            separator= (default: ",") and decimal= (default: ".").
 
     Raises:
         RequestError: The run has no column of that name.
@@ -41,16 +45,16 @@ def write_table(run: Run, path: str | Path, columns: Sequence[str] | None = None
 
     """
     _check_suffix(path)
-    write_columns(select(run, columns), _columns(run, columns), path, units=units)
+    write_columns(select(run, columns), columns_of(run, columns, degrees=degrees), path, **form)
 
 
-def write_columns(run: Run, columns: Sequence[Column], path: str | Path, *, units: bool = False) -> None:
+def write_columns(run: Run, columns: Sequence[Column], path: str | Path, **form: Any) -> None:
     """Write columns that are computed from a run, as `write_table` does those of the run; errors as there."""
     suffix = _check_suffix(path)
     with replacing(path) as temporary:
         if suffix == ".csv":
             with temporary.open("w", encoding="utf-8", newline="") as file:
-                file.writelines(lines_of(columns, units=units))
+                file.writelines(csv_lines(columns, **form))
         elif suffix == ".parquet":
             _write_parquet(run, temporary, columns)
         else:
@@ -64,34 +68,20 @@ def _check_suffix(path: str | Path) -> str:
     return suffix
 
 
-def _columns(run: Run, names: Sequence[str] | None) -> list[Column]:
-    """Return the columns chosen, with 0.0 in place of -0.0, whose sign has no meaning in a table."""
+def columns_of(run: Run, names: Sequence[str] | None = None, *, degrees: bool = False) -> list[Column]:
+    """Return the columns chosen, as `write_table` does, with 0.0 in place of -0.0: its sign has no meaning in a table.
+
+    Raises:
+        RequestError: The run has no column of that name.
+
+    """
     kept = None if names is None else kept_columns(run, names)
-    return [
+    found = [
         column._replace(values=column.values + 0)
         for column in select(run, names).columns()
         if kept is None or column.name in kept
     ]
-
-
-def csv_lines(run: Run, columns: Sequence[str] | None = None, *, units: bool = False) -> Iterator[str]:
-    """Yield the lines of a CSV table, each with its end; arguments and errors as in `write_table`."""
-    return lines_of(_columns(run, columns), units=units)
-
-
-def lines_of(chosen: Sequence[Column], *, units: bool = False) -> Iterator[str]:
-    """Yield the lines of a CSV table of columns, each with its end; units as in `write_table`."""
-    names = [f"{column.name} [{column.unit}]" if units else column.name for column in chosen]
-    yield ",".join(map(_quoted, names)) + "\n"
-    for start in range(0, len(chosen[0].values), ROWS):
-        block = (column.values[start : start + ROWS].tolist() for column in chosen)
-        for row in zip(*block, strict=True):
-            yield ",".join(map(repr, row)) + "\n"  # repr: shortest text of the same bits
-
-
-def _quoted(name: str) -> str:
-    """Return a name as a CSV field."""
-    return '"' + name.replace('"', '""') + '"' if set(name) & set(',"\n\r') else name
+    return [*map(in_degrees, found)] if degrees else found
 
 
 def _write_parquet(run: Run, path: Path, columns: Sequence[Column]) -> None:

@@ -252,19 +252,29 @@ def _is_computed(value: Any) -> bool:
     return isinstance(value, Computed) or (isinstance(value, tuple) and any(isinstance(one, Computed) for one in value))
 
 
+RUN_TIMES = ("start", "stop", "step")
+MEASURED_OVER = ("run", "turn")
+
+
 @dataclass(frozen=True)
 class RunSettings:
-    """Start, stop and communication step of the intended run, all [s]."""
+    """Start, stop and communication step of the intended run, all [s].
+
+    over: The motion of which `check` reports measures and forces: 'run', 'turn' of the driver, '' for the default.
+    """
 
     start: float = 0.0
     stop: float = 1.0
     step: float = 0.01
+    over: str = ""
 
     def __post_init__(self) -> None:
-        values = [getattr(self, key) for key in ("start", "stop", "step")]
+        if self.over not in ("", *MEASURED_OVER):
+            raise MechanismError(f"[run] over = {quoted(self.over)} must be 'run' or 'turn'")
+        values = [getattr(self, key) for key in RUN_TIMES]
         if any(isinstance(value, str | Expression) for value in values):
             return  # checked when the mechanism has resolved them
-        for key, value in zip(("start", "stop", "step"), values, strict=True):
+        for key, value in zip(RUN_TIMES, values, strict=True):
             check_number(f"[run] {key}", value)
         if self.step <= 0.0:
             raise MechanismError(f"[run] step = {float(self.step)!r} must be positive")

@@ -201,10 +201,12 @@ def _check_names_of_results(members: Members, parameters: Mapping[str, Parameter
         for name in member.inputs():
             if name in parameters:
                 raise MechanismError(f"[parameters] {name}: {what} '{member.name}' has an input of this name already")
-    drivers = {driver.name for driver in members.drivers}
+    drivers, joints = ({member.name for member in own} for own in (members.drivers, members.joints))
     for load in members.loads:
         if load.name in drivers:
             raise MechanismError(f"[loads.{load.name}]: a driver has this name already; give the load another one")
+        if load.columns and load.name in joints:  # such as spring.force
+            raise MechanismError(f"[loads.{load.name}]: a joint has this name already; give the load another one")
 
 
 def table_of(member: Joint | Driver | Load) -> str:

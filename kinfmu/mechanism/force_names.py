@@ -14,7 +14,7 @@ from kinfmu.units import ForceName, Quantity, force_sizes
 _INERTIAS = {("angle", "angle"): "inertia", ("length", "length"): "mass"}
 _MIXED_INERTIA = "mass_moment"  # of a turning and a sliding driver
 
-NEVER_NEGATIVE = frozenset({"reduced_inertia", "kinetic_energy"})  # sums of masses times squares
+NEVER_NEGATIVE = frozenset({"reduced_inertia", "kinetic_energy", "length"})  # sums of masses times squares, distances
 
 
 class HasForces(Protocol):
@@ -34,7 +34,7 @@ class HasForces(Protocol):
 
 
 def force_names(mechanism: HasForces) -> tuple[ForceName, ...]:
-    """Return the names of efforts, inertias, energies and external loads; none without masses and loads."""
+    """Return the names of efforts, inertias, energies, springs and external loads; none without masses and loads."""
     has_masses = any(body.has_mass for body in mechanism.bodies)
     if not (has_masses or mechanism.loads):
         return ()
@@ -51,6 +51,7 @@ def force_names(mechanism: HasForces) -> tuple[ForceName, ...]:
                 names.append(ForceName(driver.name, noun, quantity))
     energies = ("kinetic_energy", "potential_energy") if has_masses else ("potential_energy",)
     names += [ForceName("", energy, Quantity("energy")) for energy in energies]
+    names += [ForceName(load.name, noun, Quantity(noun)) for load in mechanism.loads for noun in load.columns]
     return (*names, *external_names(mechanism))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from operator import is_
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ from kinfmu.laws import Law, LawQuantity
 from kinfmu.loads import Load
 from kinfmu.measures import PoseQuantity
 from kinfmu.measures.arithmetic import Value
-from kinfmu.mechanism.body import Body, Gravity, Point, Start
+from kinfmu.mechanism.body import RUN_TIMES, Body, Gravity, Point, Start
 from kinfmu.mechanism.declared import keys_of
 from kinfmu.readings import Reading
 from kinfmu.units import CoordinateName, Quantity, is_of_angle
@@ -80,7 +80,7 @@ class Members:
 
     def changed(self, change: Change) -> Members:
         """Return the members with each number replaced by change(path, value, quantity); equal parts stay identical."""
-        run = {key.name: change(("run", key.name), getattr(self.run, key.name), TIME) for key in fields(self.run)}
+        run = {key: change(("run", key), getattr(self.run, key), TIME) for key in RUN_TIMES}
         return Members(
             tuple(_body(body, change) for body in self.bodies),
             tuple(_member(joint, ("joints", joint.name), change) for joint in self.joints),

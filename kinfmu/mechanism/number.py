@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.mechanism.dimension import Dimension
@@ -13,6 +13,10 @@ from kinfmu.mechanism.valid import check_number, is_number, quoted
 from kinfmu.units import Quantity, every_unit, factors, unit_of
 
 _PLAIN = re.compile(r"\s*[+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?[ \t]*([^\W\d][^\s*+()-]*|\N{DEGREE SIGN})\s*")  # number, word
+_NUMBER = r"[0-9.]+(?:[eE][+-]?[0-9]+)?"
+_QUOTIENT = re.compile(  # of which the unit belongs to both numbers: '1/360 s'
+    rf"\s*([+-]?{_NUMBER})\s*/\s*({_NUMBER})[ \t]*((?:[^\W\d]|\N{{DEGREE SIGN}})[^*+()-]*)"
+)
 _WORDS = re.compile(r"\s*+[+-]?\s*+[^\W\d]\w*+(?:[\s-]++\w++)*+\s*+")  # 'y', '-x', 'Y axis', 'x-axis'
 EXAMPLES = {
     "angle": "60 deg",
@@ -69,7 +73,7 @@ def read_number(where: str, value: object, quantity: Quantity | None, length_uni
     if isinstance(value, str):
         known = factors(quantity, length_unit) if quantity else every_unit(length_unit)
         try:
-            expression = Expression(value, length_unit)
+            expression = _expression(value, length_unit)
         except MechanismError as error:
             plain = _PLAIN.fullmatch(value)
             if plain and quantity and known:  # a number with a wrong unit, not an expression
@@ -93,6 +97,16 @@ def read_number(where: str, value: object, quantity: Quantity | None, length_uni
         raise MechanismError(f"{where} = {quoted(value)} must be {valid}")
     check_number(where, value)
     return value if isinstance(value, NumberWithUnit) else float(value)  # type: ignore[arg-type]  # is_number has checked it
+
+
+def _expression(text: str, length_unit: str) -> Expression:
+    """Return an expression; of a quotient of two numbers with a unit, such as '1/360 s', one number."""
+    quotient = _QUOTIENT.fullmatch(text)
+    if quotient:
+        above, below, unit = quotient.groups()
+        with suppress(ValueError, ZeroDivisionError, MechanismError):
+            return Expression(f"{float(above) / float(below)!r} {unit}", length_unit)
+    return Expression(text, length_unit)
 
 
 def given_unit(value: object) -> str:

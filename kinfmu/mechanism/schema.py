@@ -16,7 +16,7 @@ from kinfmu.laws.sequence import DWELL
 from kinfmu.loads import LOADS
 from kinfmu.measures import POSE_QUANTITIES
 from kinfmu.measures.placement import Reference
-from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.body import GROUND_NAME, MEASURED_OVER
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
 from kinfmu.mechanism.expression_text import LONGEST
 from kinfmu.mechanism.number import EXAMPLES
@@ -59,6 +59,11 @@ def schema() -> Schema:
                 "start": _number(Quantity("time"), "First sample [s]; default: 0"),
                 "stop": _number(Quantity("time"), "Last sample [s]; default: 1"),
                 "step": _number(Quantity("time"), "Communication step [s]; default: 0.01"),
+                "over": {
+                    "enum": list(MEASURED_OVER),
+                    "description": "Motion of which check reports measures and forces; default: a turn of a single "
+                    "driver that turns round at constant speed, else the run",
+                },
             }
         ),
         "bodies": _named("body", f"Bodies; '{GROUND_NAME}' does not move", **names),

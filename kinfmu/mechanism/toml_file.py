@@ -14,7 +14,7 @@ from kinfmu.joints import JOINTS
 from kinfmu.laws import LAWS, RISES, External, Law, Segment, Spline
 from kinfmu.loads import LOADS
 from kinfmu.measures import POSE_QUANTITIES, PoseQuantity
-from kinfmu.mechanism.body import MASS_KEYS, Body, Gravity, RunSettings, Start
+from kinfmu.mechanism.body import MASS_KEYS, RUN_TIMES, Body, Gravity, RunSettings, Start
 from kinfmu.mechanism.declared import REQUIRED, Takes, keys_of
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.mechanism.parameters import Parameter
@@ -305,7 +305,7 @@ def _segment(where: str, table: Mapping[str, Any]) -> Segment:
 
 
 def _run(table: Mapping[str, Any]) -> RunSettings:
-    check_keys("[run]", table, ("start", "stop", "step"))
+    check_keys("[run]", table, (*RUN_TIMES, "over"))
     return RunSettings(**table)
 
 

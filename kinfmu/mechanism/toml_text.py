@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import fields
 from typing import Any
 
 from kinfmu.errors import MechanismError
 from kinfmu.laws.sequence import DWELL
 from kinfmu.measures import PoseQuantity
-from kinfmu.mechanism.body import RunSettings
+from kinfmu.mechanism.body import RUN_TIMES
 from kinfmu.mechanism.declared import keys_of
 from kinfmu.mechanism.expression import Computed
 from kinfmu.mechanism.mechanism import Mechanism
@@ -42,7 +41,9 @@ def text(mechanism: Mechanism, *, as_written: bool = False) -> str:
             *(_parameter(name, p, mechanism, as_written) for name, p in mechanism.parameters.items()),
         ]
     lines += ["", "[run]"]
-    lines += [f"{key.name} = {_toml(getattr(parts.run, key.name))}" for key in fields(RunSettings)]
+    lines += [f"{key} = {_toml(getattr(parts.run, key))}" for key in RUN_TIMES]
+    if parts.run.over:
+        lines.append(f"over = {_toml(parts.run.over)}")
     for body in parts.bodies:
         lines += ["", f"[bodies.{body.name}]"]
         points = ", ".join(f"{name} = {_toml(point)}" for name, point in body.points.items())

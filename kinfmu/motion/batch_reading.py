@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from kinfmu.mechanism.settings import LawConstant
 from kinfmu.motion.crowding import is_crowded
 from kinfmu.motion.design_points import dependent_numbers, points_of_designs
 from kinfmu.motion.driven_samples import driven_samples
+from kinfmu.motion.geometry import moves_evenly
 from kinfmu.motion.history import FEWEST
 from kinfmu.motion.measure import (
     MeasuredValue,
@@ -278,7 +279,7 @@ class BatchReading:
         reasons = []
         for reading in readings:
             try:
-                found = self._value_of(run, motion, reading)
+                found = self._value_of(run, motion, reading, batch.of(k))
             except KinfmuError as error:
                 reasons.append(str(error))
                 continue
@@ -286,11 +287,12 @@ class BatchReading:
             reasons += [found.reason] if found.reason else []
         return reasons[0] if reasons else ""
 
-    def _value_of(self, run: Run, motion: Motion, reading: Reading) -> MeasuredValue:
+    def _value_of(self, run: Run, motion: Motion, reading: Reading, parameters: Mapping[str, float]) -> MeasuredValue:
         """Return a measure of one design, as `measure` does."""
         if reading.name in self._dependent:
             (reading,) = chosen_measures(motion.mechanism, [self._asked[reading.name]])
-        return read_value(run, motion, reading)
+        solved = partial(self._model.solve, parameters=parameters, tolerance=self._tolerance, anew=self._anew)
+        return read_value(run, motion, reading, solved)
 
     def _found(self, reading: Reading, motion: Motion) -> Finding:
         try:
@@ -385,9 +387,14 @@ class BatchReading:
                 return names
         elif driven[0].ndim == 3:
             return names
+        drive = self.motion.drive
+        varies = drive is not None and not moves_evenly(drive)
         forces = measured_forces(self._model.mechanism)
-        margins = {reading.name for reading in self._readings if isinstance(reading, LowestMargin)}
-        return self._dependent | margins | {one.name for one in self._readings if getattr(one, "of", None) in forces}
+        return self._dependent | {
+            one.name
+            for one in self._readings
+            if isinstance(one, LowestMargin) or getattr(one, "of", None) in forces or (varies and one.compares_rates)
+        }
 
     @cached_property
     def _dependent(self) -> set[str]:

@@ -23,6 +23,7 @@ _POLISHES = 12
 _NEAR = 0.05  # [rad] from the direction that fits the samples, in which a better one is searched
 _SECTIONS = 40  # each leaves 0.62 of the range; the deviation changes with the square of what is left
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+_STRETCH = 0.7  # logarithm of the radius by the fitted one, within which a better one is searched
 _EQUAL = 1e-14  # of the size of the path; distances closer than this are equal
 
 
@@ -102,8 +103,7 @@ def deviation(x: History, y: History, shape: type[Line] | type[Circle]) -> Float
     fitted = best.parameters
     found = _largest(best, x, y)
     candidates = [_polished(best, x, y, contacts)]
-    if isinstance(best, Line):
-        candidates.append(_turned(fitted, x, y, contacts))
+    candidates.append((_turned if isinstance(best, Line) else _along_normal)(fitted, x, y, contacts))
     for candidate in candidates:
         best.parameters = candidate
         found = np.fmin(found, _largest(best, x, y))
@@ -206,6 +206,53 @@ def _turned(fitted: FloatArray, x: History, y: History, contacts: IntArray) -> F
         low, high = np.where(is_left, low, left), np.where(is_left, right, high)
     theta = 0.5 * (low + high)
     parameters[is_double] = np.stack([strip(theta)[1], theta], axis=-1)
+    return parameters
+
+
+def _along_normal(fitted: FloatArray, x: History, y: History, contacts: IntArray) -> FloatArray:
+    """Return the circles whose ring touches a path at two points of one radius, such as a bent oval.
+
+    Two of the four contacts are then neighbours. The two points have a common normal, on which the centre may be
+    anywhere in a range: the best ring is not unique. Elsewhere the fitted circles are returned.
+    """
+    is_double = np.diff(np.sort(contacts, axis=1), axis=1).min(axis=1) <= 1
+    parameters = fitted.copy()
+    if not is_double.any():
+        return parameters
+    x, y = (History(t.x, t.value[is_double], t.rate[is_double], t.acceleration[is_double]) for t in (x, y))
+    shape, rows = Circle.__new__(Circle), np.arange(len(x.value))
+    shape.parameters = fitted[is_double]
+    ends = History.of(x, shape.distance(x.taylor, y.taylor)).extremes()
+    at = np.stack([end.x for end in ends], axis=-1)  # of the nearest and the farthest point
+    for _ in range(_POLISHES):
+        (p_x, v_x, a_x), (p_y, v_y, a_y) = (t.at(at) for t in (x, y))
+        d_x, d_y = p_x[:, 1:] - p_x[:, :1], p_y[:, 1:] - p_y[:, :1]
+        slope = d_x * v_x + d_y * v_y  # 0 at both points
+        sign = np.array([-1.0, 1.0])
+        matrix = np.empty((len(rows), 2, 2))
+        own = sign * (v_x * v_x + v_y * v_y) + d_x * a_x + d_y * a_y
+        across = v_x[:, 0] * v_x[:, 1] + v_y[:, 0] * v_y[:, 1]
+        matrix[:, 0, 0], matrix[:, 1, 1], matrix[:, 0, 1], matrix[:, 1, 0] = own[:, 0], own[:, 1], across, -across
+        at = np.clip(at - (np.linalg.pinv(matrix) @ slope[..., None])[..., 0], x.x[0], x.x[-1])
+    near, far = (np.stack([t.at(at)[0][:, k] for t in (x, y)], axis=-1) for k in (0, 1))
+    width = np.linalg.norm(far - near, axis=-1, keepdims=True)
+    normal = np.divide(far - near, width, out=np.zeros_like(near), where=width > 0.0)
+
+    def circles(stretch: FloatArray) -> FloatArray:
+        """Return the circles with centres on the normal, at a multiple of the fitted radius from its points."""
+        radius = fitted[is_double, 0] * np.exp(stretch)
+        return np.concatenate([radius[:, None], 0.5 * (near + far) - radius[:, None] * normal], axis=-1)
+
+    def size(stretch: FloatArray) -> FloatArray:
+        shape.parameters = circles(stretch)
+        return _largest(shape, x, y)
+
+    low, high = np.full(len(rows), -_STRETCH), np.full(len(rows), _STRETCH)
+    for _ in range(_SECTIONS):
+        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+        is_left = size(left) < size(right)
+        low, high = np.where(is_left, low, left), np.where(is_left, right, high)
+    parameters[is_double] = circles(0.5 * (low + high))
     return parameters
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from kinfmu.display import Displayed
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import measured_forces
+from kinfmu.motion.geometry import geometry_of
 from kinfmu.motion.motion import Motion
 from kinfmu.motion.needed import needed
 from kinfmu.readings import LowestMargin, Reading
@@ -133,10 +134,14 @@ def listed_measures(measures: Iterable[Reading | str] | Reading | str) -> list[R
     return found  # type: ignore[return-value]
 
 
-def read_value(run: Run, motion: Motion, reading: Reading) -> MeasuredValue:
-    """Return the value of a measure, which holds numbers, on a run and its motion."""
+def read_value(run: Run, motion: Motion, reading: Reading, solved: Callable[..., Run] | None = None) -> MeasuredValue:
+    """Return the value of a measure, which holds numbers, on a run and its motion.
+
+    solved: Solves the run's mechanism for inputs; default: `solve`.
+    """
     unit = motion.mechanism.length_unit
     try:
+        motion = geometry_of(run, motion, reading, solved)
         quantities = needed(motion.mechanism, [reading]).quantities
         motion = motion.going_round(bool(motion.goes_round(quantities)))
         with np.errstate(all="ignore"):  # quotients at samples where the driver rests are NaN

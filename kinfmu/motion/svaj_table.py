@@ -5,7 +5,8 @@ from __future__ import annotations
 from kinfmu.motion.motion_curve import MotionCurve, motion_curve
 from kinfmu.run import Column, Run
 from kinfmu.run.axis import TIME, rates_per
-from kinfmu.units import Quantity, degrees_of, unit_of
+from kinfmu.run.tables import in_degrees
+from kinfmu.units import Quantity, unit_of
 
 NAMES = ("position", "velocity", "acceleration", "jerk")
 
@@ -40,11 +41,6 @@ def svaj_columns(run: Run, name: str, *, degrees: bool = False) -> list[Column]:
     for order, unit in enumerate(units_of(run, curve)):
         found.append(Column(NAMES[order], unit, curve.table[:, order]))
     if degrees:
-        found = [_in_degrees(column) for column in found]
+        found = [*map(in_degrees, found)]
     found = [column._replace(values=column.values + 0.0) for column in found]  # no -0.0
     return [*found, Column("side", "1", curve.side)]
-
-
-def _in_degrees(column: Column) -> Column:
-    unit, factor = degrees_of(column.unit)
-    return Column(column.name, unit, column.values * factor)

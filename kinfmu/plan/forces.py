@@ -21,6 +21,8 @@ from functools import reduce
 from typing import NamedTuple
 
 from kinfmu.equations.graph import Graph, Node
+from kinfmu.loads import Load
+from kinfmu.measures.arithmetic import sqrt
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import effort_noun, external_names, force_names
 from kinfmu.plan.mechanics import Coefficients, Mechanics
@@ -124,8 +126,21 @@ def _forces(plan: SolvePlan, mechanics: Mechanics) -> dict[str, Node]:
     else:  # motions by two drivers may cancel, and the terms of their inertias with them
         found["kinetic_energy"] = _sum(graph, (one.amount * (one.rate * one.rate) for one in inertias)) * 0.5
     found["potential_energy"] = _potential_energy(plan, mechanics)
+    for load in mechanics.members.loads:
+        if load.columns:
+            found |= zip((f"{load.name}.{noun}" for noun in load.columns), _of_load(mechanics, load), strict=True)
     found |= {name: graph.symbol(name) for name in external_names(plan.mechanism)}
     return found
+
+
+def _of_load(mechanics: Mechanics, load: Load) -> tuple[Node, Node]:
+    """Return the effort of a spring or damper and its quantity, in the mechanism's unit of length."""
+    efforts, measured = mechanics.efforts(load), mechanics.measured(load)
+    if len(measured) == 2:  # the components of a spring without a free length, which pulls
+        efforts, measured = ([sqrt(a * a + b * b)] for a, b in (efforts, measured))
+        efforts = [-efforts[0]]
+    (effort,), (quantity,) = efforts, measured
+    return effort, quantity * (1.0 / mechanics.metre) if load.kinds()[0] == "length" else quantity
 
 
 def _inertias(mechanics: Mechanics) -> list[_Inertia]:

@@ -56,6 +56,15 @@ class PathDistance(Reading):
     begin: Begin = None
     end: End = None
 
+    def __post_init__(self) -> None:
+        try:
+            points = tuple((x, y) for x, y in self.targets)
+        except (TypeError, ValueError):
+            raise MechanismError(
+                f"[measures.{self.name}] targets = {self.targets!r} must be a list of points [[x, y], ...]"
+            ) from None
+        object.__setattr__(self, "targets", points)
+
     def check(self) -> None:
         if not self.targets:
             raise MechanismError(f"[measures.{self.name}] targets must hold one point or more")

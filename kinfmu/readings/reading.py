@@ -48,6 +48,7 @@ class Reading(ABC):
 
     type: ClassVar[str]  # its name in mechanism files
     counted_from: ClassVar[str] = ""  # what its value is a deviation from, where that is not 0
+    compares_rates: ClassVar[bool] = False  # with each other: geometry, which does not depend on the driver's speed
     name: str
     begin: float | None = None
     end: float | None = None

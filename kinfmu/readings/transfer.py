@@ -56,6 +56,7 @@ class PressureAngle(Reading):
     """
 
     type: ClassVar[str] = "pressure_angle"
+    compares_rates: ClassVar[bool] = True
 
     name: str
     cam: Annotated[BodyName, "the cam"]
@@ -79,10 +80,12 @@ class PressureAngle(Reading):
 class VelocityRatio(Reading):
     """Extreme of the speed of a quantity over that of another: omega_out / omega_in.
 
-    Where the other one turns back while the quantity moves, the ratio has no bound, so that there is no extreme.
+    With one driver it is geometry: the law of the driver may stand still. Where the other one turns back while the
+    quantity moves, the ratio has no bound, so that there is no extreme.
     """
 
     type: ClassVar[str] = "velocity_ratio"
+    compares_rates: ClassVar[bool] = True
 
     name: str
     of: Measured
@@ -102,10 +105,12 @@ class VelocityRatio(Reading):
 class MechanicalAdvantage(Reading):
     """Lowest mechanical advantage: force or torque out over in, the inverse of the largest velocity ratio.
 
-    It is 0 where the other quantity turns back while the first one moves.
+    With one driver it is geometry: the law of the driver may stand still. It is 0 where the other quantity turns back
+    while the first one moves.
     """
 
     type: ClassVar[str] = "mechanical_advantage"
+    compares_rates: ClassVar[bool] = True
 
     name: str
     of: Measured

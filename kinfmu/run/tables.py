@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from importlib import import_module
 from typing import Any, NamedTuple
 
 from numpy.typing import NDArray
 
-from kinfmu.errors import MissingPackageError
+from kinfmu.errors import MissingPackageError, RequestError
+from kinfmu.units import degrees_of
 
 
 class Column(NamedTuple):
@@ -18,6 +19,46 @@ class Column(NamedTuple):
     name: str
     unit: str
     values: NDArray[Any]  # (n,)
+
+
+ROWS = 4096  # of a CSV file converted at once: Python's numbers take four times the memory
+
+
+def csv_lines(
+    columns: Sequence[Column], *, units: bool = False, separator: str = ",", decimal: str = "."
+) -> Iterator[str]:
+    """Yield the lines of a CSV table, each with its end: numbers with the shortest text of the same bits.
+
+    Args:
+        columns: The columns.
+        units: True: names in the first line have their units, such as 'coupler.x [m]'.
+        separator: Between the columns.
+        decimal: Decimal sign of the numbers.
+
+    Raises:
+        RequestError: Separator and decimal sign are equal, or not one character each.
+
+    """
+    if len(separator) != 1 or len(decimal) != 1 or separator == decimal:
+        raise RequestError(f"separator = {separator!r} and decimal = {decimal!r} must be two different characters")
+    names = [f"{column.name} [{column.unit}]" if units else column.name for column in columns]
+    yield separator.join(_quoted(name, separator) for name in names) + "\n"
+    for start in range(0, len(columns[0].values), ROWS):
+        block = (column.values[start : start + ROWS].tolist() for column in columns)
+        for row in zip(*block, strict=True):
+            line = separator.join(map(repr, row)) + "\n"
+            yield line if decimal == "." else line.replace(".", decimal)
+
+
+def _quoted(name: str, separator: str) -> str:
+    """Return a name as a CSV field."""
+    return '"' + name.replace('"', '""') + '"' if set(name) & {separator, *'"\n\r'} else name
+
+
+def in_degrees(column: Column) -> Column:
+    """Return a column with angles, and their rates in time, in degrees; other columns as they are."""
+    unit, factor = degrees_of(column.unit)
+    return column if unit == column.unit else Column(column.name, unit, column.values * factor)
 
 
 class Tabular(ABC):

@@ -101,7 +101,7 @@ def _motion(mechanism: Mechanism, table: Mapping[str, Any]) -> tuple[Any, dict[s
         }
         if settings["step"] <= 0.0 or settings["stop"] < settings["start"]:
             raise StudyError(f"{where} must have a positive step, and stop after start")
-        return run_times(RunSettings(**settings)), {}
+        return run_times(RunSettings(settings["start"], settings["stop"], settings["step"])), {}
     if len(mechanism.drivers) != 1:
         names = ", ".join(driver.name for driver in mechanism.drivers)
         raise StudyError(

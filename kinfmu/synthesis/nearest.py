@@ -9,9 +9,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from kinfmu.run import FloatArray
+from kinfmu.run import FloatArray, IntArray
 
-_ROUNDS = 3  # Newton steps on exact poses, from a sample at most half a spacing away
+_ROUNDS = 80  # most steps on exact poses; three are usual, halving down to rounding takes 50
+_ENOUGH = 1e-14  # of the spacing of samples; a point for which the next step is smaller is found
+_SLOW = 0.5  # of the step before; a larger step is no step of Newton near a root
 Curve = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]  # u (m,) -> values, rates, accelerations
 
 
@@ -44,11 +46,58 @@ def nearest(
     low, high = u[k] - spacing, u[k] + spacing
     if ends is not None:
         low, high = np.maximum(low, min(ends)), np.minimum(high, max(ends))
-    found = np.clip(u[k] + _to_foot(samples[0][k], samples[1][k], samples[2][k], wanted, periods, spacing), low, high)
+    _, first = _to_foot(samples[0][k], samples[1][k], samples[2][k], wanted, periods, spacing)
+
+    def step(u: FloatArray, rows: IntArray) -> tuple[FloatArray, FloatArray]:
+        return _to_foot(*curve(u), wanted[rows], periods, spacing)
+
+    return _refined(np.clip(u[k] + first, low, high), u[k], low, high, step)
+
+
+def _refined(
+    found: FloatArray,
+    good: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    step_at: Callable[[FloatArray, IntArray], tuple[FloatArray, FloatArray]],
+) -> FloatArray:
+    """Return the roots (m,) of functions between bounds, by Newton's method; where it is slow an interval is halved.
+
+    Args:
+        found: (m,) first guesses.
+        good: (m,) arguments that are known to have numbers.
+        low: (m,) lower bounds.
+        high: (m,) upper bounds.
+        step_at: Of arguments of some rows, and these: positive where a root is below; the step of Newton.
+
+    """
+    found, good, low, high = (np.array(one, dtype=float) for one in (found, good, low, high))
+    before, enough = high - low, _ENOUGH * float((high - low).max(initial=0.0))
+    is_tried = np.zeros((2, len(found)), dtype=bool)  # the bounds, which are tried themselves before halves
+    rows = np.arange(len(found))
     for _ in range(_ROUNDS):
-        p, v, a = curve(found)
-        found = np.clip(found + np.nan_to_num(_to_foot(p, v, a, wanted, periods, spacing)), low, high)
-    return np.asarray(found)
+        u = found[rows]
+        side, step = step_at(u, rows)
+        has_gap = ~np.isfinite(side)  # beyond a limit of the path
+        side = np.where(has_gap, u - good[rows], side)
+        good[rows] = np.where(has_gap, good[rows], u)
+        is_tried[0, rows] |= side < 0.0
+        is_tried[1, rows] |= side > 0.0
+        low[rows], high[rows] = np.where(side < 0.0, u, low[rows]), np.where(side > 0.0, u, high[rows])
+        a, b = low[rows], high[rows]
+        wanted = np.where(has_gap, u, u + np.nan_to_num(step))
+        new = np.clip(wanted, a, b)
+        is_beyond = ((wanted < a) & is_tried[0, rows]) | ((wanted > b) & is_tried[1, rows])
+        is_slow = is_beyond | has_gap | (np.abs(new - u) > _SLOW * before[rows])
+        new = np.where(is_slow & (side != 0.0), 0.5 * (a + b), new)
+        moved = np.abs(new - u)
+        found[rows] = new
+        is_open = moved**3 > enough * before[rows] ** 2
+        before[rows] = moved
+        rows = rows[is_open & (b - a > enough)]
+        if not len(rows):
+            break
+    return found
 
 
 def modulo(r: FloatArray, periods: FloatArray) -> FloatArray:
@@ -61,14 +110,14 @@ def modulo(r: FloatArray, periods: FloatArray) -> FloatArray:
 
 def _to_foot(
     p: FloatArray, v: FloatArray, a: FloatArray, wanted: FloatArray, periods: FloatArray, spacing: float
-) -> FloatArray:
-    """Return the step to the nearest point."""
+) -> tuple[FloatArray, FloatArray]:
+    """Return half the slope of the square of the distance, and the step to the nearest point."""
     r = modulo(p - wanted, periods)
     slope, along = (r * v).sum(axis=1), (v * v).sum(axis=1)
     curvature = along + (r * a).sum(axis=1)
     curvature = np.where(curvature > 0.1 * along, curvature, along)
     step = np.divide(-slope, curvature, out=np.zeros_like(slope), where=curvature > 0.0)
-    return np.asarray(np.clip(step, -spacing, spacing))
+    return slope, np.asarray(np.clip(step, -spacing, spacing))
 
 
 def crossings(u: FloatArray, curve: Curve, levels: FloatArray) -> FloatArray:
@@ -87,21 +136,31 @@ def crossings(u: FloatArray, curve: Curve, levels: FloatArray) -> FloatArray:
     """
     x = curve(u)[0][:, 0]
     spacing = abs(float(u[1] - u[0]))
-    found, before = np.empty(len(levels)), float(u[0])
+    found, before = np.empty((4, len(levels))), float(u[0])  # guess, bounds, 1 or -1 as the output rises or falls
     for j, level in enumerate(levels):
         gap = x - level
         places = np.flatnonzero((gap[:-1] <= 0.0) != (gap[1:] <= 0.0))
         places = places[np.isfinite(gap[places]) & np.isfinite(gap[places + 1])]
         guesses = u[places] - gap[places] * (u[places + 1] - u[places]) / (gap[places + 1] - gap[places])
-        if not len(guesses):
-            guesses = u[[int(np.nanargmin(np.abs(gap)))]] if np.isfinite(gap).any() else guesses
-        if not len(guesses):
+        if len(guesses):
+            nearest_one = int(np.abs(guesses - before).argmin())
+            k = int(places[nearest_one])
+            rising = np.sign((gap[k + 1] - gap[k]) * (u[1] - u[0]))
+            found[:, j] = guesses[nearest_one], *sorted((u[k], u[k + 1])), rising
+        elif np.isfinite(gap).any():  # it may touch the value between two samples
+            guess = u[int(np.nanargmin(np.abs(gap)))]
+            found[:, j] = guess, guess - spacing, guess + spacing, 0.0
+        else:
             raise NotReachedError
-        before = found[j] = guesses[int(np.abs(guesses - before).argmin())]
-    for _ in range(_ROUNDS):
-        p, v, _ = (table[:, 0] for table in curve(found))
+        before = found[0, j]
+    guesses, low, high, signs = found
+
+    def step(u: FloatArray, rows: IntArray) -> tuple[FloatArray, FloatArray]:
+        p, v, _ = (table[:, 0] for table in curve(u))
         with np.errstate(all="ignore"):
-            found = found + np.clip(np.nan_to_num((levels - p) / v), -spacing, spacing)
-    if not np.abs(curve(found)[0][:, 0] - levels).max() <= 1e-6 * (np.abs(levels).max() + np.nanmax(np.abs(x))):
+            return (p - levels[rows]) * signs[rows], np.clip((levels[rows] - p) / v, -spacing, spacing)
+
+    at = _refined(guesses, guesses, low, high, step)
+    if not np.abs(curve(at)[0][:, 0] - levels).max() <= 1e-6 * (np.abs(levels).max() + np.nanmax(np.abs(x))):
         raise NotReachedError
-    return np.asarray(found)
+    return at

@@ -6,12 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from kinfmu.display import Displayed
-from kinfmu.errors import KinfmuError
+from kinfmu.errors import KinfmuError, listed
+from kinfmu.mechanism import Mechanism
 from kinfmu.run import FloatArray
 from kinfmu.sweep.continued import continued
 from kinfmu.synthesis import display_units
@@ -76,40 +77,96 @@ class FitResult(FitOutcome, Displayed):
         draw(self, path, ax)
 
 
+class _Design(NamedTuple):
+    """An optimum as a mechanism file of its own.
+
+    fitted, jacobian: Of the search; own: of the mechanism file, None if it does not assemble; note: on the file.
+    """
+
+    optimum: Optimum
+    settings: Mapping[str, float | str]
+    mechanism: Mechanism
+    z: FloatArray
+    fitted: Evaluation
+    jacobian: FloatArray
+    own: Evaluation | None
+    note: str
+
+    @property
+    def is_fitted(self) -> bool:
+        """Whether the file gives the motion that was fitted; at a change point it may take the other branch."""
+        return self.own is not None and abs(self.own.total - self.fitted.total) <= _SAME * self.fitted.total + 1e-12
+
+    @property
+    def total(self) -> float:
+        return math.inf if self.own is None else self.own.total
+
+
 def result_of(equations: Equations, optima: Sequence[Optimum], tried: int, refused: Mapping[str, int]) -> FitResult:
-    """Return the result of a search; its errors are those of the mechanism as a file of its own."""
-    problem, best = equations.problem, optima[0]
-    settable = problem.mechanism.settable
-    settings = {name: settable.as_in_file(name, best.parameters[name]) for name in problem.parameters}
-    followed = continued(problem.mechanism, settings)
-    z = np.array([(best.parameters[name] - b.low) / (b.high - b.low) for name, b in problem.bounds.items()])
-    fitted, jacobian = equations.at(z)
-    found, listed, note = fitted, fitted, followed.message
-    try:
-        again = Equations(problem.of(followed.mechanism), "python")
-        again.scale = equations.scale
-        found, _ = again.at(z)
-        if abs(found.total - fitted.total) > _SAME * fitted.total + 1e-12:
-            note = f"the mechanism file assembles in another way: its sum of squares is {found.squares:.6g}"
-        else:
-            listed = found
-    except (KinfmuError, NotAssembledError) as reason:
-        note = f"the mechanism does not assemble from its file: {reason}"
+    """Return the result of a search; its errors are those of the mechanism as a file of its own.
+
+    The best optimum whose file gives the fitted motion is chosen; if there is none, the one with the smallest sum of
+    its file.
+    """
+    problem, designs = equations.problem, []
+    for optimum in optima:
+        designs.append(_as_file(equations, optimum))
+        if designs[-1].is_fitted:
+            break
+    best = next((one for one in designs if one.is_fitted), min(designs, key=lambda one: one.total))
+    refuted = [one for one in designs if one is not best and best.is_fitted]
+    found = best.own or best.fitted
+    own_sums = {id(one.optimum): one.own for one in designs if one.own is not None}
+    others = [one for one in optima if one is not best.optimum]
+    shown = [
+        replace(one, squares=own.squares, total=own.total) if (own := own_sums.get(id(one))) else one
+        for one in (best.optimum, *others)
+    ]
     return FitResult(
         problem=problem,
-        parameters={**best.parameters, **{name: float(value) for name, value in settings.items()}},
-        mechanism=followed.mechanism,
+        parameters={**best.optimum.parameters, **{name: float(value) for name, value in best.settings.items()}},
+        mechanism=best.mechanism,
         errors=tuple(_errors(problem, found)),
         residuals=found.residuals[: found.target_count],
         squares=found.squares,
         constraints=tuple(constraint_results(problem, found)),
-        optima=(replace(best, squares=listed.squares, total=listed.total), *optima[1:]),
+        optima=(shown[0], *sorted(shown[1:], key=lambda one: (not one.holds, one.total))),
         tried=tried,
         refused=dict(refused),
-        idle=_idle(problem, jacobian),
-        undetermined=_undetermined(equations, z, fitted, jacobian, optima),
-        note=note,
+        idle=_idle(problem, best.jacobian),
+        undetermined=_undetermined(equations, best.z, best.fitted, best.jacobian, (best.optimum, *others)),
+        note="; ".join(filter(None, [*map(_not_chosen, refuted), best.note])),
     )
+
+
+def _as_file(equations: Equations, optimum: Optimum) -> _Design:
+    """Return an optimum as a mechanism file, started in the pose of the fit."""
+    problem = equations.problem
+    settable = problem.mechanism.settable
+    settings = {name: settable.as_in_file(name, optimum.parameters[name]) for name in problem.parameters}
+    followed = continued(problem.mechanism, settings)
+    z = np.array([(optimum.parameters[name] - b.low) / (b.high - b.low) for name, b in problem.bounds.items()])
+    fitted, jacobian = equations.at(z)
+    try:
+        again = Equations(problem.of(followed.mechanism), "python")
+        again.scale = equations.scale
+        own, _ = again.at(z)
+    except (KinfmuError, NotAssembledError) as reason:
+        note = f"the mechanism does not assemble from its file: {reason}"
+        return _Design(optimum, settings, followed.mechanism, z, fitted, jacobian, None, note)
+    design = _Design(optimum, settings, followed.mechanism, z, fitted, jacobian, own, followed.message)
+    if design.is_fitted:
+        return design
+    return design._replace(
+        note=f"the mechanism file assembles in another way, as at a change point: its sum of squares is "
+        f"{own.squares:.6g}, that of the search {fitted.squares:.6g}"
+    )
+
+
+def _not_chosen(design: _Design) -> str:
+    """Return why an optimum is not the result."""
+    at = listed(f"{name} = {value:.6g}" for name, value in design.optimum.parameters.items())
+    return f"the optimum at {at} is not chosen: {design.note}"
 
 
 def _idle(problem: FitProblem, jacobian: FloatArray) -> tuple[str, ...]:

@@ -10,11 +10,13 @@ import pytest
 from kinfmu import gallery
 from kinfmu.analysis import check
 from kinfmu.analysis.file_notes import file_notes
+from kinfmu.analysis.unit_notes import unit_notes
 from kinfmu.errors import MechanismError
 from kinfmu.joints.cam import CamOscillating
 from kinfmu.laws.sequence import MotionSequence, Segment
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.sweep.continued import continued
+from kinfmu.units import METRES
 from tests.mechanism.test_wrong_files import CRANK_ROCKER, DRIVER
 
 
@@ -305,3 +307,106 @@ def test_angles_that_are_set_are_not_reported_as_numbers_of_the_file() -> None:
 def test_a_start_that_differs_from_the_law_by_rounding_is_followed_to_it(start: str) -> None:
     mechanism = continued(parse(CRANK_ROCKER), {"crank.start": start}).mechanism
     assert not [note for note in check(mechanism).notes if "cannot be reached" in note]
+
+
+BARS = """
+name = "bars"
+units.length = "{unit}"
+[bodies]
+ground.points = {{ O = [0, 0], C = [{g}, 0] }}
+crank.points = {{ O = [0, 0], P = [{a}, 0] }}
+coupler = {{ points = {{ P = [0, 0], Q = [{b}, 0] }}, mass = 1 }}
+rocker.points = {{ C = [0, 0], Q = [{c}, 0] }}
+[joints]
+O = {{ type = "revolute", between = ["ground.O", "crank.O"] }}
+P = {{ type = "revolute", between = ["crank.P", "coupler.P"] }}
+Q = {{ type = "revolute", between = ["coupler.Q", "rocker.Q"] }}
+C = {{ type = "revolute", between = ["ground.C", "rocker.C"] }}
+"""
+SPRING = """
+[gravity]
+x = 0
+y = GRAVITY
+[loads.coil]
+type = "spring"
+between = ["ground.O", "rocker.Q"]
+stiffness = STIFFNESS
+free_length = FREE
+[loads.oil]
+type = "damper"
+between = ["ground.O", "rocker.Q"]
+damping = DAMPING
+"""
+MEANT = {"GRAVITY": '"-9.81 m/s2"', "STIFFNESS": '"2 N/mm"', "FREE": '"80 mm"', "DAMPING": '"3 N s/m"'}
+
+
+def _in_unit(unit: str, **given: str) -> list[str]:
+    """Return the notes on a four-bar of 100 mm to 400 mm with a spring, its lengths as bare numbers."""
+    lengths = {"g": 400, "a": 100, "b": 350, "c": 300}
+    text = BARS.format(unit=unit, **{name: f"{one * 1e-3 / METRES[unit]:g}" for name, one in lengths.items()})
+    loads = SPRING
+    for key, value in (MEANT | given).items():
+        loads = loads.replace(key, value)
+    return [*unit_notes(parse(text + loads))]
+
+
+@pytest.mark.parametrize(
+    ("unit", "given", "understood", "meant"),
+    [
+        ("mm", {"GRAVITY": "-9.81"}, "[gravity] y = -9.81 is -9.81 mm/s2, 0.00981 m/s2 in all", "'-9.81 m/s2'"),
+        ("cm", {"GRAVITY": "-9.8"}, "[gravity] y = -9.8 is -9.8 cm/s2, 0.098 m/s2 in all", "'-9.8 m/s2'"),
+        ("m", {"GRAVITY": "-9810"}, "[gravity] y = -9810 is -9810 m/s2", "'-9810 mm/s2'"),
+        ("m", {"GRAVITY": "-981"}, "[gravity] y = -981 is -981 m/s2", "'-981 cm/s2'"),
+        (
+            "mm",
+            {"STIFFNESS": "2"},
+            "[loads.coil] stiffness = 2 is 2 N/m, although the unit of length is mm",
+            "'2 N/mm'",
+        ),
+        (
+            "cm",
+            {"STIFFNESS": "5"},
+            "[loads.coil] stiffness = 5 is 5 N/m, although the unit of length is cm",
+            "'5 N/cm'",
+        ),
+        ("mm", {"DAMPING": "5"}, "[loads.oil] damping = 5 is 5 N s/m", "'5 N s/mm'"),
+        ("mm", {"FREE": "0.08"}, "[loads.coil] free_length: 0.08 is 0.08 mm, about a thousandth of", "'0.08 m'"),
+        ("m", {"FREE": "80"}, "[loads.coil] free_length: 80 is 80 m, about a thousand times", "'80 mm'"),
+    ],
+)
+def test_a_bare_number_of_another_unit_is_noted_with_what_is_understood_and_probably_meant(
+    unit: str, given: dict[str, str], understood: str, meant: str
+) -> None:
+    (note,) = _in_unit(unit, **given)
+    assert note.startswith(understood)
+    assert meant in note
+
+
+@pytest.mark.parametrize(
+    ("unit", "given"),
+    [
+        ("mm", {}),
+        ("mm", {"GRAVITY": "-9810"}),
+        ("mm", {"GRAVITY": '"-9.81 mm/s2"'}),  # as it is written
+        ("mm", {"GRAVITY": "-1620"}),  # the moon's
+        ("m", {"GRAVITY": "-9.81"}),
+        ("m", {"STIFFNESS": "2", "DAMPING": "5", "FREE": "0.08"}),
+        ("mm", {"STIFFNESS": '"2 N/m"', "DAMPING": '"5 N s/m"'}),
+        ("mm", {"FREE": "12"}),
+        ("mm", {"FREE": "0"}),
+        ("mm", {"FREE": '"0.08 mm"'}),
+    ],
+)
+def test_numbers_in_a_probable_unit_are_not_noted(unit: str, given: dict[str, str]) -> None:
+    assert _in_unit(unit, **given) == []
+
+
+@pytest.mark.parametrize(("length", "noted"), [("0.35", True), ("3.5", False), ("350000", False), ("0.001", False)])
+def test_a_length_of_a_thousandth_of_all_others_is_noted(length: str, noted: bool) -> None:
+    mechanism = parse(BARS.format(unit="mm", g=400, a=100, b=length, c=300))
+    notes = [*unit_notes(mechanism)]
+    assert bool(notes) is noted
+    if noted:
+        others = "the other lengths (100 to 400 mm); write '0.35 m' if intended"
+        assert notes == [f"[bodies.coupler] points.Q: 0.35 is 0.35 mm, about a thousandth of {others}"]
+        assert notes[0] in check(mechanism).notes

@@ -209,3 +209,62 @@ crank = { type = "angle", of = "crank", law = "constant_speed", start = 0.123, s
         assert found.reaction.value == pytest.approx(float(force), rel=1e-9)  # at the outer dead centre
     samples = kinfmu.solve(parse(text, "ram.toml"), np.linspace(0, 2 * math.pi / 11.25, 361))["crank.torque"]
     assert np.abs(samples).max() < value * (1.0 - 1e-7)  # the peak is between the samples
+
+
+def test_gravity_springs_and_loads_beyond_their_tables_are_reported() -> None:
+    loads = """
+[gravity]
+x = 0
+y = -9.81
+[loads.coil]
+type = "spring"
+between = ["ground.F", "arm.E"]
+stiffness = 40
+free_length = 0.1
+[loads.push]
+type = "force_along"
+at = "arm.E"
+over = { measure = "coordinate", of = "arm.E", axis = "x" }
+law = "spline"
+points = [[-0.3, 1], [-0.1, 2], [0.1, 2], [0.2, 5]]
+[loads.gust]
+type = "torque"
+on = "arm"
+law = "spline"
+points = [[0, 0], [0.5, 3], [0.7, 3], [1, 7]]
+[loads.whole]
+type = "torque"
+on = "arm"
+over = { measure = "angle", of = "arm" }
+law = "spline"
+points = [[0, 0], [2, 1], [4, 1], ["360 deg", 0]]
+"""
+    text = f"""
+name = "arm"
+units.length = "m"
+[bodies]
+ground.points = {{ O = [0, 0], F = [1, 0] }}
+arm = {{ points = {{ O = [0, 0], E = [0.4, 0] }}, mass = 1 }}
+[joints]
+O = {{ type = "revolute", between = ["ground.O", "arm.O"] }}
+[drivers]
+arm = {{ type = "angle", of = "arm", law = "constant_speed", speed = 4 }}
+{loads}"""
+    report = kinfmu.check(parse(text))
+    found = report.loading
+    assert found is not None
+    assert found.gravity == (0.0, -9.81)
+    force, length = found.loads
+    assert (force.smallest, force.largest) == pytest.approx((-40.0 * 1.3, -40.0 * 0.5), rel=1e-9)
+    assert (length.smallest, length.largest, length.unit) == (pytest.approx(0.6), pytest.approx(1.4), "m")
+    push, gust = found.left_tables  # the table of a whole turn is not left
+    assert push.reached == pytest.approx((-0.4, 0.4))
+    assert gust.reached == pytest.approx((0.0, math.tau / 4.0))
+    shown = [line.strip() for line in str(report).splitlines()]
+    assert "gravity: (0, -9.81) m/s2" in shown
+    assert "coil: force -52 to -20 N, length 0.6 to 1.4 m" in shown
+    beyond = "push: its table goes from -0.3 m to 0.2 m, the motion from -0.4 m to 0.4 m; it keeps "
+    assert f"{beyond}1 N before it and 5 N after it" in shown
+    assert "gust: its table goes from 0 s to 1 s, the motion from 0 s to 1.5708 s; it keeps 7 N m after it" in shown
+    written = report.as_json()["forces"]
+    assert (written["gravity"], len(written["loads"]), len(written["left_tables"])) == ([0.0, -9.81], 2, 2)

@@ -8,8 +8,10 @@ from dataclasses import replace
 import pytest
 
 import kinfmu
+from kinfmu.mechanism import toml_text
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.readings import Maximum, Minimum, PeakSpeed, Range, TimeRatio
+from kinfmu.studies.definition import define
 
 
 def test_a_driver_that_turns_round_is_measured_over_one_turn_at_its_speed() -> None:
@@ -96,3 +98,101 @@ def test_a_mechanism_without_measures_has_no_such_section() -> None:
     assert report.measured is None
     assert report.as_json()["measures"] is None
     assert "measures" not in str(report)
+
+
+SLIDER_CRANK = """
+name = "press"
+gravity = { x = 0, y = -9.81 }
+run = { stop = 2, step = 0.005 }
+[bodies]
+ground.points = { O = [0, 0] }
+crank = { points = { O = [0, 0], P = [0.2, 0] } }
+rod = { points = { P = [0, 0], S = [0.6, 0] } }
+ram = { points = { S = [0, 0] }, start = { x = 0.7, y = 0, phi = 0 }, mass = 1 }
+[joints]
+O = { type = "revolute", between = ["ground.O", "crank.O"] }
+P = { type = "revolute", between = ["crank.P", "rod.P"] }
+S = { type = "revolute", between = ["rod.S", "ram.S"] }
+guide = { type = "translational", between = ["ground.O", "ram.S"] }
+[drivers]
+crank = { type = "angle", of = "crank", LAW }
+[measures]
+stroke = { type = "range", of = "ram.x" }
+"""
+
+
+def _stroke(low: float, high: float) -> float:
+    """Return the stroke of the ram while the crank moves between two angles, from its formula."""
+    inside = [k * math.pi for k in range(-2, 4) if low <= k * math.pi <= high]
+    x = [0.2 * math.cos(u) + math.sqrt(0.36 - 0.04 * math.sin(u) ** 2) for u in (low, high, *inside)]
+    return max(x) - min(x)
+
+
+CYCLE, RUN, PER_RAD = "one turn of crank at 3 rad/s", "the run of the file, t = 0 to 2 s", "1 rad/s, so that rates are"
+LAWS = [
+    ('law = "constant_speed", start = 1, speed = 3', CYCLE, (0.0, math.tau)),
+    ('law = "polynomial", coefficients = [1, 3]', CYCLE, (0.0, math.tau)),
+    ('law = "external", start = 1', PER_RAD, (0.0, math.tau)),
+    ('law = "constant", level = 1', PER_RAD, (0.0, math.tau)),
+    ('law = "polynomial", coefficients = [1, 0.1, 0.2]', RUN, (1.0, 2.0)),
+    (
+        'law = "harmonic", start = "90 deg", amplitude = "30 deg", frequency = "1 Hz"',
+        RUN,
+        (math.pi / 3, 2 * math.pi / 3),
+    ),
+    ('law = "cycloidal", start = 0.5, rise = -1.5, duration = 1', RUN, (-1.0, 0.5)),
+    ('law = "spline", points = [[0, 1], [0.5, 1.2], [1, 2], [2, 1.5]], ends = "natural"', RUN, None),
+    (
+        'law = "sequence", segments = [{ law = "dwell", duration = 1 }, { law = "3-4-5", rise = 0.5, duration = 1 }]',
+        RUN,
+        (0.0, 0.5),
+    ),
+]
+
+
+@pytest.mark.parametrize(("law", "over", "angles"), LAWS)
+def test_a_law_of_constant_speed_is_measured_over_its_cycle_and_others_over_the_run(
+    law: str, over: str, angles: tuple[float, float] | None
+) -> None:
+    report = kinfmu.check(parse(SLIDER_CRANK.replace("LAW", law)))
+    assert report.measured is not None
+    assert report.loading is not None
+    assert over in report.measured.over
+    assert report.measured.over == report.loading.over
+    assert str(report).count(f"over {report.loading.over}") == 2
+    if angles:
+        assert report.measured.values[0].value == pytest.approx(_stroke(*angles), rel=1e-9)
+
+
+@pytest.mark.parametrize(("law", "over"), [(law, over) for law, over, _ in LAWS])
+def test_the_file_chooses_the_motion_that_is_measured(law: str, over: str) -> None:
+    text = SLIDER_CRANK.replace("LAW", law)
+    turned = kinfmu.check(parse(text.replace("step = 0.005", 'step = 0.005, over = "turn"')))
+    assert turned.measured is not None
+    assert turned.loading is not None
+    assert turned.measured.over == turned.loading.over
+    assert turned.measured.over.startswith("one turn of crank at ")
+    assert turned.measured.values[0].value == pytest.approx(0.4, rel=1e-9)
+    run = kinfmu.check(parse(text.replace("step = 0.005", 'step = 0.005, over = "run"')))
+    assert run.measured is not None
+    assert run.measured.over == RUN
+    if over == CYCLE:
+        assert run.measured.values[0].value == pytest.approx(0.4, rel=1e-9)  # nearly a turn, 1 to 7 rad
+    saved = parse(toml_text.text(turned.mechanism))
+    assert (saved.run.over, saved) == ("turn", turned.mechanism)
+
+
+def test_a_turn_that_the_driver_cannot_make_is_refused_with_the_reason() -> None:
+    mechanism = kinfmu.load("triple_rocker")
+    mechanism = replace(mechanism, run=replace(mechanism.run, over="turn"), measures=(Range("swing", "right.phi"),))
+    text = str(kinfmu.check(mechanism))
+    assert "swing: no value, because over = 'turn' needs a single driver that turns all the way round" in text
+    with pytest.raises(kinfmu.KinfmuError, match=r"\[run\] over = 'cycle' must be 'run' or 'turn'"):
+        parse('name = "a"\nrun.over = "cycle"\n')
+
+
+def test_a_study_measures_the_motion_that_check_measures() -> None:
+    for law, over, _ in LAWS:
+        mechanism = parse(SLIDER_CRANK.replace("LAW", law).replace("[0.2, 0]", '["r", 0]') + "[parameters]\nr = 0.2\n")
+        study = define(mechanism, {"r": {"values": [0.2, 0.21]}})
+        assert over in study.motion.over

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 import kinfmu
 from kinfmu.cli.export import FORMATS
 from kinfmu.draw import animation
+from kinfmu.errors import RequestError
 from kinfmu.log import read, write_mcap
 from tests.cli.conftest import Command, read_csv
 from tests.log.runs import fourbar
@@ -186,8 +188,9 @@ def test_a_table_is_printed_and_its_names_have_units(
     assert written.splitlines()[0] == "time [s],coupler.vx [m/s],coupler.vy [m/s],solver.status [1]"
     printed = command("export", record, "-o", "-", "--columns", "coupler.v*", "--units")
     assert (printed.exit_code, printed.stdout, printed.stderr) == (0, written, "")
-    message = refuses("export", record, "-o", "run.npz", "--units")
-    assert message == "--units: only for .csv, not .npz; Parquet and npz always hold the units"
+    assert command("export", record, "-o", "run.npz", "--units").exit_code == 0  # such tables always hold them
+    message = refuses("export", record, "-o", "run.svg", "--units")
+    assert message == "--units: only for tables, .csv, .parquet, .npz, not .svg"
     assert "channel 'cupler.x' is not known" in refuses("export", record, "-o", "-", "--columns", "cupler.x")
 
 
@@ -213,8 +216,8 @@ def test_displacement_velocity_acceleration_and_jerk_are_plotted(command: Comman
     assert message == "--svaj excludes --polar, --columns"
     message = refuses("export", "run.mcap", "-o", "run.gif", "--svaj", "rocker.phi")
     assert message == "--svaj: only for plots, .svg, .png, .pdf, not .gif; --svaj also for tables"
-    message = refuses("export", "run.mcap", "-o", "run.csv", "--degrees")
-    assert message == "--degrees: only for plots, .svg, .png, .pdf, not .csv"
+    message = refuses("export", "run.mcap", "-o", "run.gif", "--degrees")
+    assert message == "--degrees: only for plots, .svg, .png, .pdf, not .gif; --degrees also for tables"
 
 
 def test_displacement_velocity_acceleration_and_jerk_are_a_table(command: Command, refuses: Callable[..., str]) -> None:
@@ -260,3 +263,70 @@ def test_a_pose_is_drawn_for_cad(record: Path, command: Command, refuses: Callab
     message = refuses("export", record, "-o", "run.csv", "--at", "45")
     assert message == "--at 45: only for .dxf, not .csv"
     assert "'noon' is not a number" in refuses("export", record, "-o", "run.dxf", "--at", "noon")
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".npz"])
+@pytest.mark.parametrize("way", ["export", "solve"])
+def test_tables_of_every_format_have_angles_in_degrees(way: str, suffix: str, command: Command) -> None:
+    assert command("solve", "crank_rocker", "-o", "run.mcap").exit_code == 0
+    run = kinfmu.log.read("run.mcap")
+    source = ("export", "run.mcap") if way == "export" else ("solve", "crank_rocker")
+    result = command(*source, "-o", f"run{suffix}", "--degrees", "--units")
+    assert result.exit_code == 0, result.output
+    if suffix == ".csv":
+        with Path("run.csv").open(encoding="utf-8") as file:
+            header, *rows = csv.reader(file)
+        units = dict(re.fullmatch(r"(\S+) \[(.*)\]", name).groups() for name in header)  # type: ignore[union-attr]
+        table = dict(zip(units, np.array(rows, dtype=float).T, strict=True))
+    elif suffix == ".npz":
+        with np.load("run.npz") as arrays:
+            units = dict(zip(arrays["kinfmu.columns"].tolist(), arrays["kinfmu.units"].tolist(), strict=True))
+            table = {name: arrays[name] for name in units}
+    else:
+        read = pytest.importorskip("pyarrow.parquet").read_table("run.parquet")
+        units = {field.name: field.metadata[b"unit"].decode() for field in read.schema}
+        table = {name: read.column(name).to_numpy() for name in units}
+    assert [column.name for column in run.columns()] == [*units]
+    for name, unit, values in run.columns():
+        is_angle = unit in ("rad", "rad/s", "rad/s2")
+        assert units[name] == (unit.replace("rad", "deg") if is_angle else unit)
+        np.testing.assert_allclose(table[name], np.degrees(values) if is_angle else values, rtol=1e-14)
+
+
+@pytest.mark.parametrize(("separator", "decimal"), [(";", ","), ("tab", ","), ("|", "."), (",", ".")])
+@pytest.mark.parametrize("way", ["export", "print", "svaj", "cam", "solve"])
+def test_csv_files_have_the_separator_and_decimal_sign_of_spreadsheets(
+    way: str, separator: str, decimal: str, command: Command
+) -> None:
+    assert command("solve", "cam_roller", "-o", "run.mcap").exit_code == 0
+    given = {
+        "export": ("export", "run.mcap", "-o", "run.csv"),
+        "print": ("export", "run.mcap", "-o", "-"),
+        "svaj": ("export", "run.mcap", "-o", "run.csv", "--svaj", "lever.phi"),
+        "cam": ("export", "cam_roller", "-o", "run.csv", "--cam", "pitch"),
+        "solve": ("solve", "cam_roller", "-o", "run.csv"),
+    }[way]
+
+    def lines(*more: str) -> list[str]:
+        result = command(*given, "--units", *more)
+        assert result.exit_code == 0, result.output
+        return (result.stdout if way == "print" else Path("run.csv").read_text(encoding="utf-8")).splitlines()
+
+    plain = [*csv.reader(lines())]
+    sign = {"tab": "\t"}.get(separator, separator)
+    written = [*csv.reader(lines("--separator", separator, "--decimal", decimal), delimiter=sign)]
+    assert written[0] == plain[0]
+    assert [[text.replace(decimal, ".") for text in row] for row in written[1:]] == plain[1:]
+    assert any(decimal in text for text in written[1])
+
+
+def test_forms_of_tables_that_do_not_fit_are_wrong_usage(record: Path, refuses: Callable[..., str]) -> None:
+    same = "--decimal ',' needs another separator than the comma: --separator ';'"
+    assert refuses("export", record, "-o", "run.csv", "--decimal", ",") == same
+    assert refuses("solve", "fourbar", "-o", "run.csv", "--decimal", ",") == same
+    message = refuses("solve", "fourbar", "-o", "run.npz", "--separator", ";")
+    assert message == "--separator ';': only for .csv, not .npz"
+    message = refuses("solve", "fourbar", "-o", "run.mcap", "--degrees")
+    assert message == "--degrees: only for tables, .csv, .parquet, .npz; export writes those of a record"
+    with pytest.raises(RequestError, match="must be two different characters"):
+        kinfmu.log.write_table(kinfmu.log.read(record), "run.csv", decimal=",")

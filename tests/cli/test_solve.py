@@ -206,3 +206,29 @@ def test_driver_values_are_lengths_where_a_length_is_driven(
     assert "'0deg' is not a number (units: m, mm, cm" in refuses(
         "solve", "parallel_jaw", "-o", "r.csv", "--angle", "0deg:3:3"
     )
+
+
+@pytest.mark.parametrize("speed", ["60rpm", "1 rev/s", "6.283185307179586", "360/1 deg/s"])
+def test_driver_values_at_a_speed_have_rates_per_second(
+    speed: str, command: Command, refuses: Callable[..., str], tmp_path: Path
+) -> None:
+    angles = ("--angle", "0deg:180deg:181")
+    result = command("solve", "crank_rocker", "-o", "run.csv", *angles, "--speed", speed)
+    assert result.exit_code == 0
+    assert result.stderr == ""
+    table = read_csv(tmp_path / "run.csv")
+    assert command("solve", "crank_rocker", "-o", "unit.csv", *angles).exit_code == 0
+    unit = read_csv(tmp_path / "unit.csv")
+    np.testing.assert_allclose(table["crank_speed"], math.tau, rtol=1e-15)
+    np.testing.assert_allclose(table["rocker.omega"], math.tau * unit["rocker.omega"], rtol=1e-13, atol=1e-15)
+    np.testing.assert_allclose(table["rocker.alpha"], math.tau**2 * unit["rocker.alpha"], rtol=1e-12, atol=1e-12)
+    assert "--speed 60rpm needs --angle" in refuses("solve", "fourbar", "-o", "run.csv", "--speed", "60rpm")
+    assert "'60mm' is not a number (units: " in refuses("solve", "fourbar", "-o", "r.csv", *angles, "--speed", "60mm")
+
+
+@pytest.mark.parametrize("step", ["1/360 s", "1/360s", "1/360", "1000/360 ms"])
+def test_numbers_may_be_quotients(step: str, command: Command, refuses: Callable[..., str], tmp_path: Path) -> None:
+    assert command("solve", "fourbar", "-o", "run.csv", "--times", f"0:1:{step}").exit_code == 0
+    np.testing.assert_allclose(read_csv(tmp_path / "run.csv")["time"], np.arange(361) / 360.0, rtol=1e-15)
+    for wrong in ("1/0 s", "1/x s", "/3 s", "1/2/3 s"):
+        assert "is not a number" in refuses("solve", "fourbar", "-o", "run.csv", "--times", f"0:1:{wrong}")

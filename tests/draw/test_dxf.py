@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -13,9 +14,11 @@ import pytest
 from PIL import Image
 
 import kinfmu
+import kinfmu.gallery
 from kinfmu.draw import animate, animation, dxf
 from kinfmu.draw.video import encoder, mp4
 from kinfmu.errors import FigureError, MissingPackageError
+from kinfmu.mechanism.toml_file import parse
 from kinfmu.run.axis import axis_of
 from tests.log.runs import fourbar
 
@@ -165,3 +168,52 @@ def test_a_video_holds_every_picture(tmp_path: Path, monkeypatch: pytest.MonkeyP
         own, others = (np.abs(seen - np.asarray(one, float)).mean() for one in (image, drawn[k % len(drawn)]))
         assert own < 2.0  # of 255; the format is lossy
         assert others > 2.0 * own
+
+
+CROSSING = """
+name = "bars"
+[bodies]
+ground.points = { O = [0, 0] }
+lever.points = { O = [0, 0], A = [2, 0], B = [4, 0], C = [2, 0], D = [1, 0] }
+plate.points = { B = [0, 0], E = [3, 0], F = [3, 2], G = [1, 0], H = [0, 0] }
+slider.points = { S = [0, 0] }
+[joints]
+O = { type = "revolute", between = ["ground.O", "lever.O"] }
+B = { type = "revolute", between = ["lever.B", "plate.B"] }
+S = { type = "translational", between = ["lever.O", "slider.S"] }
+[drivers]
+lever = { type = "angle", of = "lever", law = "constant_speed" }
+plate = { type = "angle", of = "plate", law = "constant_speed" }
+slider = { type = "distance", between = ["lever.B", "slider.S"], law = "constant_speed", start = 1.5, speed = 0.1 }
+"""
+
+
+@pytest.mark.parametrize("name", ["bars", *kinfmu.gallery.names()])
+def test_no_line_has_length_0_and_none_is_drawn_twice(name: str, tmp_path: Path) -> None:
+    """Sides of one layer that lie on one line overlap nowhere; together they are those of the shapes."""
+    ezdxf = pytest.importorskip("ezdxf")
+    mechanism = parse(CROSSING) if name == "bars" else kinfmu.load(name)
+    dxf(kinfmu.solve(mechanism), tmp_path / "a.dxf")
+    space = ezdxf.readfile(tmp_path / "a.dxf").modelspace()
+    sides: dict[str, list[np.ndarray]] = {}
+    for line in space.query("LWPOLYLINE"):
+        corners = np.array(line.get_points("xy"))
+        corners = np.concatenate([corners, corners[:1]]) if line.closed else corners
+        sides.setdefault(line.dxf.layer, []).extend(np.stack([corners[:-1], corners[1:]], axis=1))
+    circles = [(one.dxf.layer, *one.dxf.center.vec2, one.dxf.radius) for one in space.query("CIRCLE")]
+    assert len(circles) == len(set(circles))
+    for own in map(np.array, sides.values()):
+        extent = np.ptp(own.reshape(-1, 2), axis=0).max()
+        along = own[:, 1] - own[:, 0]
+        lengths = np.hypot(*along.T)
+        assert (lengths > 1e-9 * extent).all()
+        for k, (begin, unit) in enumerate(zip(own[:, 0], along / lengths[:, None], strict=True)):
+            others = own[k + 1 :] - begin
+            off = np.abs(others[..., 0] * unit[1] - others[..., 1] * unit[0]).max(axis=1)
+            low, high = np.sort(others @ unit, axis=1).T
+            common = np.minimum(high, lengths[k]) - np.maximum(low, 0.0)
+            assert not ((off < 1e-9 * extent) & (common > 1e-9 * extent)).any()
+    if name == "bars":
+        total = {layer: float(np.hypot(*np.diff(own, axis=1)[:, 0].T).sum()) for layer, own in sides.items()}
+        assert total["lever"] == pytest.approx(4.0)
+        assert total["plate"] == pytest.approx(3.0 + 2.0 + math.hypot(3.0, 2.0))

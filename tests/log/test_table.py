@@ -11,8 +11,8 @@ import pytest
 
 from kinfmu.errors import LogError
 from kinfmu.log import write_table
-from kinfmu.log.table import ROWS
 from kinfmu.run import Run
+from kinfmu.run.tables import ROWS
 from tests.log.runs import fourbar
 
 

@@ -17,7 +17,8 @@ from kinfmu.mechanism import toml_file
 from kinfmu.mechanism.dimension import Dimension
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.expression_text import DEEPEST, LARGEST_POWER, LONGEST
-from kinfmu.units import Quantity
+from kinfmu.mechanism.number import given_unit, read_number
+from kinfmu.units import Quantity, spelled
 
 VALUES = {"a": 2.0, "b": -0.75, "long_name_2": 1e3}
 FUNCTIONS = {name: getattr(math, name) for name in ("sin", "cos", "tan", "sqrt", "asin", "acos", "atan2")}
@@ -307,3 +308,31 @@ def test_a_bare_number_added_to_a_force_is_in_newtons_in_every_file(written: str
         mechanism = toml_file.parse(head + joint + driver + "".join(lines))
         for one in (mechanism, mechanism.in_metres()):
             assert one.loads[0].x == pytest.approx(newton, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "quantity", "value"),
+    [
+        ("1/360 s", Quantity("time"), 1.0 / 360.0),
+        ("-2/3 mm", Quantity("length"), -2.0 / 3000.0),
+        ("360/7 deg", Quantity("angle"), math.tau / 7.0),
+        ("360/7\N{DEGREE SIGN}", Quantity("angle"), math.tau / 7.0),
+        ("1/3 rev", Quantity("angle"), math.tau / 3.0),
+        (" 1e2/3 rad/s ", Quantity("angle", 1), 100.0 / 3.0),
+        ("2/3 N m", Quantity("torque"), 2.0 / 3.0),
+    ],
+)
+def test_the_unit_of_a_quotient_belongs_to_both_numbers(text: str, quantity: Quantity, value: float) -> None:
+    found = read_number("x", text, quantity, "m")
+    assert found == pytest.approx(value, rel=1e-15)
+    assert (found.text, given_unit(found)) == (text, spelled(text.lstrip("-0123456789e/ ").strip()))  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("text", ["1/0 s", "1 s/2", "a/2", "1/2", "a/2 s"])
+def test_other_divisions_are_expressions_as_before(text: str) -> None:
+    assert read_number("x", text, Quantity("time"), "m") == Expression(text, "m")
+
+
+def test_a_quotient_with_an_unknown_unit_is_reported_as_it_is_written() -> None:
+    with pytest.raises(MechanismError, match="'1/2 crank', character 5: no unit 'crank'"):
+        read_number("x", "1/2 crank", Quantity("length"), "m")

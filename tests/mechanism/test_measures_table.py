@@ -5,17 +5,22 @@ from __future__ import annotations
 import json
 import math
 import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import jsonschema
+import numpy as np
 import pytest
 
+import kinfmu
 from kinfmu import gallery
 from kinfmu.errors import MechanismError
 from kinfmu.measures import DistanceBetween
 from kinfmu.mechanism.schema import schema_text
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text
-from kinfmu.readings import READINGS
+from kinfmu.readings import READINGS, PathDistance
 
 FILE = (gallery.folder() / "crank_rocker" / "mechanism.toml").read_text(encoding="utf-8")
 TABLES = """
@@ -110,3 +115,20 @@ def test_an_error_is_one_line_with_table_and_key(table: str, message: str) -> No
         parse(f"{FILE}\n[measures]\nm = {{ {table} }}\n")
     assert str(error.value).removeprefix("mechanism: ").startswith(message)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "targets",
+    [[[1.5, 2.25]], ([1.5, 2.25], (3.0, 1.0)), np.array([[0.1, 0.2], [0.3, 4]]), [["3 mm", 2.5]], [(1, 2)]],
+)
+def test_targets_of_a_path_distance_are_saved_however_they_are_given(targets: Any, tmp_path: Path) -> None:
+    given = replace(kinfmu.load("crank_rocker"), measures=(PathDistance("d", "coupler.Q", targets),))
+    kinfmu.save(given, tmp_path / "a.toml")
+    assert kinfmu.load(tmp_path / "a.toml") == given
+    assert hash(given.measures[0])
+
+
+@pytest.mark.parametrize("targets", [3, [1.5, 2.5], [[1.5]], [[1.0, 2.0, 3.0]], None])
+def test_targets_that_are_no_points_are_refused(targets: Any) -> None:
+    with pytest.raises(MechanismError, match=r"\[measures.d\] targets = .* must be a list of points \[\[x, y\], ...\]"):
+        PathDistance("d", "coupler.Q", targets)

@@ -83,7 +83,7 @@ CHANGES = {
     "a key of the run that is not known": (
         "step =",
         "steps =",
-        "[run] steps: unknown key; did you mean 'step'?; keys: start, stop, step",
+        "[run] steps: unknown key; did you mean 'step'?; keys: start, stop, step, over",
     ),
     "a key of the units that is not known": (
         'length = "m"',

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
 import kinfmu
+from kinfmu.equations.taylor import Taylor
+from kinfmu.errors import KinfmuError
+from kinfmu.laws import Harmonic
+from kinfmu.measures.arithmetic import cos, sin
+from kinfmu.mechanism.toml_file import parse
+from kinfmu.motion.fitting import Circle, deviation
+from kinfmu.motion.history import History
 from kinfmu.readings import (
     Dwell,
     Maximum,
@@ -187,3 +195,84 @@ def test_a_part_of_the_motion_has_its_own_extremes(begin: float, end: float, low
     assert math.cos(lowest) == pytest.approx(math.cos(at_low))
     assert found["low"].value == pytest.approx(40.0 * math.cos(lowest), **EXACT)
     assert found["high"].value == pytest.approx(40.0 * math.cos(highest), **EXACT)
+
+
+STANDING = [  # laws that stand still for a moment, or for long
+    'law = "harmonic", start = "100 deg", amplitude = "40 deg", frequency = "0.7 Hz"',
+    'law = "sequence", start = 1, segments = [{ law = "dwell", duration = 0.5 }, { law = "cycloidal", rise = 2, '
+    'duration = 0.7 }, { law = "dwell", duration = 0.8 }]',
+    'law = "sequence", segments = [{ law = "3-4-5", rise = "1 rev", duration = 1.5 }, { law = "dwell", duration = 1 }]',
+    'law = "polynomial", coefficients = [0.3, 0, 0.4]',
+    'law = "constant_speed", start = 0.3, speed = -2',
+]
+
+
+@pytest.mark.parametrize(
+    ("law", "engine"), [*((law, "python") for law in STANDING), *((law, "native") for law in STANDING[:2])]
+)
+def test_ratios_are_geometry_where_the_law_stands_still(law: str, engine: str) -> None:
+    """dx/du = -r sin u (1 + r cos u / sqrt(l^2 - r^2 sin^2 u)) of a slider-crank, over the angles of the law."""
+    r, rod = 0.2, 0.6
+    mechanism = parse(f"""
+name = "press"
+run = {{ stop = 2.0, step = 0.0101 }}
+parameters = {{ r = "0.2 m" }}
+[bodies]
+ground.points = {{ O = [0, 0] }}
+crank = {{ points = {{ O = [0, 0], P = ["r", 0] }} }}
+rod = {{ points = {{ P = [0, 0], S = [{rod}, 0] }} }}
+ram = {{ points = {{ S = [0, 0] }}, start = {{ x = 0.7, y = 0, phi = 0 }} }}
+[joints]
+O = {{ type = "revolute", between = ["ground.O", "crank.O"] }}
+P = {{ type = "revolute", between = ["crank.P", "rod.P"] }}
+S = {{ type = "revolute", between = ["rod.S", "ram.S"] }}
+guide = {{ type = "translational", between = ["ground.O", "ram.S"] }}
+[drivers]
+crank = {{ type = "angle", of = "crank", {law} }}
+""")
+    readings = (
+        VelocityRatio("low", "ram.x", extreme="minimum"),
+        VelocityRatio("high", "ram.x"),
+        MechanicalAdvantage("ma", "ram.x"),
+        VelocityRatio("rods", "rod.phi", to="crank.phi"),
+    )
+    run = kinfmu.solve(mechanism, engine=engine)
+    found = kinfmu.measure(run, readings)
+    fine = np.array([mechanism.drivers[0].law.at(t) for t in np.linspace(run.t[0], run.t[-1], 20001)])
+    u = np.linspace(fine.min(), fine.max(), 200001)
+    root = np.sqrt(rod**2 - (r * np.sin(u)) ** 2)
+    ratio, of_rod = -r * np.sin(u) * (1.0 + r * np.cos(u) / root), -r * np.cos(u) / root
+    assert found["low"].value == pytest.approx(ratio.min(), abs=2e-9)
+    assert found["high"].value == pytest.approx(ratio.max(), abs=2e-9)
+    assert found["ma"].value == pytest.approx(1.0 / np.abs(ratio).max(), rel=1e-8)
+    assert found["rods"].value == pytest.approx(of_rod.max(), abs=2e-9)
+    model = kinfmu.compile(mechanism, parameters=["r"], engine=engine)
+    table = kinfmu.measure_designs(model, {"r": [0.2, 0.1]}, readings)
+    for name, one in found.items():
+        assert table[name][0] == pytest.approx(one.value, rel=1e-12)
+    other = -0.1 * np.sin(u) * (1.0 + 0.1 * np.cos(u) / np.sqrt(rod**2 - (0.1 * np.sin(u)) ** 2))
+    assert table["low"][1] == pytest.approx(other.min(), abs=2e-9)
+
+
+def test_a_ratio_to_a_driver_that_rests_for_the_whole_run_has_no_value() -> None:
+    mechanism = kinfmu.load("scotch_yoke")
+    (crank,) = mechanism.drivers
+    rests = replace(mechanism, drivers=(replace(crank, law=Harmonic(0.0, 1.0)),))
+    with pytest.raises(KinfmuError, match="crank does not move"):
+        kinfmu.measure(kinfmu.solve(rests), [MechanicalAdvantage("ma", "yoke.x")])
+
+
+@pytest.mark.parametrize("count", [90, 360])
+@pytest.mark.parametrize("turned", [0.0, 0.7])
+@pytest.mark.parametrize(("half", "width"), [(0.5, 0.05), (0.8, 0.05), (1.2, 0.02), (0.5, 0.1)])
+def test_roundness_of_a_bent_oval_is_half_its_width_although_its_ring_is_not_unique(
+    half: float, width: float, turned: float, count: int
+) -> None:
+    """An oval along an arc: its nearest and farthest point have one normal, on which the centre may be anywhere."""
+    t = np.linspace(0.0, math.tau, count + 1) + 0.0123
+    along = Taylor(t, np.ones_like(t), np.zeros_like(t))
+    angle, radius = cos(along) * half + turned, sin(along) * width + 1.0
+    x, y = (
+        History(t, one.f, one.d1, one.d2, is_closed=True) for one in (radius * cos(angle) + 3.0, radius * sin(angle))
+    )
+    assert float(deviation(x, y, Circle)) == pytest.approx(width, abs=1e-9 if count == 90 else 1e-13)

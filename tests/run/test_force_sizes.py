@@ -15,8 +15,9 @@ from kinfmu.draw.stacks import stacks_of
 from kinfmu.errors import KinfmuError
 from kinfmu.log import read, write_mcap
 from kinfmu.log.record import description
-from kinfmu.log.table import csv_lines, write_table
+from kinfmu.log.table import columns_of, write_table
 from kinfmu.run.channels import select
+from kinfmu.run.tables import csv_lines
 from tests.sweep.test_forces import loaded
 
 SIZES = ("O.force", "P.force", "S.force", "shaking_force")
@@ -29,7 +30,7 @@ def run() -> Run:
 
 def header(run: Run, *columns: str) -> list[str]:
     """The names in the first line of a CSV table, without those that are always there."""
-    (names,) = csv.reader([next(csv_lines(run, columns))])
+    (names,) = csv.reader([next(csv_lines(columns_of(run, columns)))])
     return [name for name in names if name not in ("time", "solver.status")]
 
 

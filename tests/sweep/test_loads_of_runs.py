@@ -14,8 +14,9 @@ import kinfmu
 from kinfmu import Mechanism
 from kinfmu.log import read, write_mcap
 from kinfmu.mechanism.toml_file import parse
-from kinfmu.readings import Peak
+from kinfmu.readings import Maximum, Peak
 from tests.fmu.test_forces import press
+from tests.loads.every_load import LOADS, fourbar
 from tests.mechanisms import reference_fourbar
 from tests.sweep.test_forces import loaded
 
@@ -225,3 +226,73 @@ def test_the_shaking_force_is_computed_without_the_reactions() -> None:
     np.testing.assert_allclose(alone, again.reactions[:, -3:], rtol=1e-13, atol=1e-12)
     np.testing.assert_array_equal(np.stack([part[name] for name in names], axis=1), alone[10:60])
     assert callable(vars(part)["reactions"])
+
+
+ENDS = {  # of the loads of every kind: what they join
+    "coil": ("ground.D", "coupler.M"),
+    "slack": ("ground.D", "coupler.M"),
+    "oil": ("ground.D", "coupler.M"),
+    "strut": ("ground.E", "rocker.Q"),
+}
+
+
+@pytest.mark.parametrize("unit", ["mm", "m"])
+@pytest.mark.parametrize("how", ["python", "native", "python FMU", "native FMU", "record"])
+def test_springs_and_dampers_have_columns_of_force_and_length(unit: str, how: str, tmp_path: Path) -> None:
+    """Force positive where it pushes the points apart; length in the file's unit, angle in rad."""
+    slack = '[loads.slack]\ntype = "spring"\nbetween = ["ground.D", "coupler.M"]\nstiffness = 30\nfree_length = 0\n'
+    mechanism = fourbar(LOADS + slack, has_gravity=True)
+    if unit == "m":
+        mechanism = mechanism.in_metres()
+    run = kinfmu.solve(mechanism, np.linspace(0.0, 1.0, 101), engine="native" if how == "native" else "python")
+    if how.endswith("FMU"):
+        flavour = how.partition(" ")[0]
+        run = kinfmu.simulate(kinfmu.build(mechanism, tmp_path / "a.fmu", flavour=flavour), step=0.01, stop=1.0)
+    elif how == "record":
+        write_mcap(run, tmp_path / "run.mcap")
+        run = read(tmp_path / "run.mcap")
+    metre = 1e-3 if unit == "mm" else 1.0
+    places = mechanism.body_points
+
+    def at(name: str) -> tuple[np.ndarray, np.ndarray]:
+        """World coordinates [m] of a point and its velocity."""
+        body, (x, y) = name.partition(".")[0], places[name]
+        if body == "ground":
+            return metre * np.array([[x], [y]]), np.zeros((2, 1))
+        phi, omega = run[f"{body}.phi"], run[f"{body}.omega"]
+        arm = np.array([x * np.cos(phi) - y * np.sin(phi), x * np.sin(phi) + y * np.cos(phi)])
+        spot = np.array([run[f"{body}.x"], run[f"{body}.y"]]) if f"{body}.x" in run.outputs else None
+        rate = np.array([run[f"{body}.vx"], run[f"{body}.vy"]]) if spot is not None else np.zeros((2, 1))
+        spot = np.array([[run.fixed[f"{body}.x"]], [run.fixed[f"{body}.y"]]]) if spot is None else spot
+        return metre * (spot + arm), metre * (rate + omega * np.array([-arm[1], arm[0]]))
+
+    for name, (first, second) in ENDS.items():
+        (p, v), (q, w) = at(first), at(second)
+        length = np.hypot(*(q - p))
+        rate = ((q - p) * (w - v)).sum(axis=0) / length
+        force = {
+            "coil": -100.0 * (length - 0.05),
+            "slack": -30.0 * length,
+            "oil": -10.0 * rate,
+            "strut": 100.0 + 50.0 / 0.25 * (0.4 - length),
+        }[name]
+        np.testing.assert_allclose(run[f"{name}.length"], length / metre, rtol=1e-12)
+        np.testing.assert_allclose(run[f"{name}.force"], force, rtol=1e-10, atol=1e-12)
+    turn, slip = run["crank.phi"], run["rocker.phi"] - run["coupler.phi"]
+    np.testing.assert_allclose(run["clock.angle"], turn, rtol=1e-13)
+    np.testing.assert_allclose(run["clock.torque"], -turn, rtol=1e-13)
+    np.testing.assert_allclose(run["grease.angle"], slip, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(run["grease.torque"], run["coupler.omega"] - run["rocker.omega"], rtol=0, atol=1e-10)
+    units = {column.name: column.unit for column in run.columns()}
+    assert [units[name] for name in ("coil.force", "coil.length", "clock.torque", "clock.angle")] == [
+        *("N", unit),
+        *("N m", "rad"),
+    ]
+    (longest,) = kinfmu.measure(run, [Maximum("longest", of="coil.length")]).values()
+    assert longest.value == pytest.approx(run["coil.length"].max(), rel=1e-3)
+    assert longest.unit == unit
+
+
+def test_a_spring_and_a_joint_of_one_name_are_refused() -> None:
+    with pytest.raises(kinfmu.KinfmuError, match=r"\[loads.Q\]: a joint has this name already"):
+        fourbar(LOADS.replace("loads.coil", "loads.Q"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import fields, replace
 from pathlib import Path
@@ -26,6 +27,10 @@ from kinfmu.synthesis import (
     PoseTarget,
 )
 from kinfmu.synthesis.angle_notes import angle_notes
+from kinfmu.synthesis.equations import Equations
+from kinfmu.synthesis.nearest import crossings, nearest
+from kinfmu.synthesis.outcome import Optimum
+from kinfmu.synthesis.result import result_of
 from kinfmu.synthesis.search import Found, Sameness, distinct
 from kinfmu.synthesis.text import parameter_rows
 from tests.synthesis.fourbars import LENGTHS, four_bar
@@ -528,3 +533,73 @@ def test_lengths_that_a_function_of_angles_leaves_free_are_noted_with_exact_deri
     assert set(whole.undetermined) == {*lengths}
     del lengths["ground"]
     assert kinfmu.fit(_problem(unknowns=lengths, targets=[target]), starts=2).undetermined == ()
+
+
+AT = np.radians(np.arange(67.0, 427.0, 20.0))  # none at the change point, 180 deg
+
+
+def _at_a_change_point() -> kinfmu.FitProblem:
+    """A fit whose best design is nearly at its bound, where crank + ground = coupler + rocker."""
+    mechanism = four_bar(ground=3.8, coupler=3.0, rocker=2.0)
+    wanted = kinfmu.solve(mechanism, crank_angle=AT, parameters={"ground": 3.999})["rocker.phi"]
+    far = kinfmu.solve(mechanism, crank_angle=AT, parameters={"ground": 3.7})["rocker.phi"]
+    target = FunctionTarget(name="f", of="rocker.phi", points=np.column_stack([AT, wanted + 0.3 * (wanted - far)]))
+    return kinfmu.FitProblem(mechanism, {"ground": (3.5, 4.0), "rocker": (1.7, 2.0)}, [target])
+
+
+def test_an_optimum_at_a_change_point_is_reported_with_the_sums_of_the_search_and_of_its_file() -> None:
+    result = kinfmu.fit(_at_a_change_point(), starts=2, engine="python")
+    found = re.search(r"its sum of squares is (\S+), that of the search (\S+)$", result.note)
+    assert found is not None, result.note
+    assert float(found[1]) == pytest.approx(result.squares, rel=1e-5)
+    assert float(found[2]) < 1e-2 * result.squares
+    _, rocker = np.array(result.problem.targets[0].points).T
+    own = kinfmu.solve(result.mechanism, crank_angle=AT)["rocker.phi"]  # what a user of the file sees
+    turns = math.tau * round(float((own - rocker).mean()) / math.tau)
+    assert result.squares == pytest.approx(float(((own - rocker - turns) ** 2).sum()), rel=1e-6)
+    assert result.optima[0].squares == result.squares
+
+
+def test_another_optimum_is_chosen_where_a_file_does_not_give_the_fitted_motion() -> None:
+    problem = _at_a_change_point()
+    equations = Equations(problem)
+    optima = []
+    for ground in (4.0 - 4e-12, 3.95, 3.9):
+        found, _ = equations.at(np.array([(ground - 3.5) / 0.5, 1.0]))
+        optima.append(Optimum({"ground": ground, "rocker": 2.0}, found.squares, found.total, 1, holds=True))
+    assert optima[0].squares < optima[1].squares < optima[2].squares
+    result = result_of(equations, optima, tried=3, refused={})
+    assert result.parameters["ground"] == 3.95
+    assert result.squares == pytest.approx(optima[1].squares, rel=1e-9)
+    assert result.note.startswith(
+        "the optimum at ground = 4, rocker = 2 is not chosen: the mechanism file assembles in"
+    )
+    assert result.note.endswith(f"that of the search {optima[0].squares:.6g}")
+    assert [one.parameters["ground"] for one in result.optima] == [3.95, 3.9, 4.0 - 4e-12]
+    assert result.optima[2].squares > 100.0 * optima[0].squares  # that of its file
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("side", [-1.0, 0.0, 2.0])
+def test_the_nearest_point_of_a_path_is_converged_close_to_a_dead_centre(side: float, engine: str) -> None:
+    """Points at a distance from the path along its normal have their foot where they were set off."""
+    model = kinfmu.compile(kinfmu.load("triple_rocker"), engine=engine)
+    places = [[str(name) for name in model.outputs].index(name) for name in ("tracer.x", "tracer.y")]
+    limits = kinfmu.check(model.mechanism).range
+    assert limits is not None
+    assert limits.low is not None
+    assert limits.high is not None
+
+    def curve(u: Any) -> Any:
+        run = model.solve(left_angle=u)
+        return tuple(table[:, places] for table in (run.values, run.rates, run.accelerations))
+
+    for near in (1e-1, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10):
+        feet = np.array([limits.low + near, 0.3, limits.high - near])
+        p, v, _ = curve(feet)
+        normal = np.column_stack([-v[:, 1], v[:, 0]]) / np.hypot(*v.T)[:, None]
+        ends = (limits.low, limits.high)
+        found = nearest(np.linspace(*ends, 181), curve, p + side * normal, np.full(2, np.inf), ends)
+        np.testing.assert_allclose(curve(found)[0], p, rtol=0, atol=1e-9)
+        level = crossings(np.linspace(*ends, 181), lambda u: tuple(one[:, :1] for one in curve(u)), p[1:2, 0])
+        assert curve(level)[0][0, 0] == pytest.approx(p[1, 0], abs=1e-11)
