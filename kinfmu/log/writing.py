@@ -26,12 +26,12 @@ import numpy as np
 from kinfmu.errors import MechanismError
 from kinfmu.log.cdr import NANOSECONDS, nanoseconds, zero_of
 from kinfmu.log.mcap_writer import McapWriter
-from kinfmu.log.record import description, ending
+from kinfmu.log.record import computed_when_read, description, ending
 from kinfmu.log.target import replacing
 from kinfmu.log.topics import SOURCE, STATUS_SOURCE, JointTopic, LinkTopic, LogTopic, SampleTopic, joint_topics
 from kinfmu.run import Event, Run
 from kinfmu.run.axis import axis_of
-from kinfmu.run.channels import is_drawn, select
+from kinfmu.run.channels import is_all_but, is_drawn, select
 from kinfmu.run.verdict import sentence, status_events, unexplained
 from kinfmu.version import VERSION
 
@@ -50,7 +50,9 @@ def write_mcap(run: Run, path: str | Path, *, channels: Sequence[str] | None = N
         run: The run.
         path: The file; an older one is replaced when the new one is complete.
         channels: What to keep of every sample, such as ["q", "drawn"] or ["-error"]; see kinfmu.run.channels. Default:
-            everything. ["-drawn"] keeps the record alone, less than half as large.
+            everything. ["-drawn"] keeps the record alone, less than half as large. Margins and errors that were not
+            read from the run yet are written if they are named, or by 'all'; else `read` returns a run that computes
+            them when they are read.
         rate: Samples to keep per second of the run. Default: all.
 
     Raises:
@@ -59,6 +61,8 @@ def write_mcap(run: Run, path: str | Path, *, channels: Sequence[str] | None = N
 
     """
     run = select(run, channels, rate)
+    if not is_all_but(channels):
+        run = run.replaced(margin=run.margin, error=run.error)
     nanoseconds(run.t)  # reports invalid times before a file is made
     with replacing(path) as temporary, FileIO(temporary, "w") as file:
         content = Content(file, run, zero_of(run.t), drawn=is_drawn(channels))
@@ -93,7 +97,7 @@ class Content:
         base = "simulation" if axis.is_time else "number of the sample, one a second"
         about = {"time_base": base, "axis": axis.label, "time_zero_s": str(zero), **_versions()}
         self.until = 0.0  # time of the last sample [s]
-        self._sample = SampleTopic(writer, run)
+        self._sample = SampleTopic(writer, run.part(slice(0, 0)).without(computed_when_read(run)))
         self._topics: list[JointTopic | LinkTopic] = []
         self._log: LogTopic | None = None
         if drawn:
