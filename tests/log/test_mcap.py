@@ -19,6 +19,7 @@ from kinfmu.log import read, write_mcap
 from kinfmu.log.mcap_writer import McapWriter
 from kinfmu.log.topics import field_names
 from kinfmu.log.viewer.headless import executable
+from kinfmu.log.writing import MOST_DRAWN
 from kinfmu.run import Event, Run
 from kinfmu.run.channels import select
 from tests.log.runs import fourbar, with_gap, without_samples
@@ -127,6 +128,19 @@ def test_a_part_of_a_run_reads_back_bit_for_bit(channels: list[str], run_with_ga
     part = select(run_with_gap, channels, 0.5)
     assert len(part) == 91
     assert_same(part, read(tmp_path / "run.mcap"))
+
+
+def test_viewers_draw_evenly_spaced_samples_of_a_long_run(tmp_path: Path) -> None:
+    n = 2 * MOST_DRAWN + 1
+    run = with_gap(fourbar(np.linspace(10.0, 170.0, n)), 4712, 5400)
+    write_mcap(run, tmp_path / "run.mcap")
+    times = np.array([time for time, _ in messages(tmp_path / "run.mcap", "/tf")]) * 1e-9
+    assert MOST_DRAWN / 2 < len(times) <= MOST_DRAWN
+    assert np.abs(times[:, None] - run.t[[0, 4711, 5401, n - 1]]).min(axis=0).max() < 1e-8  # ends, and those of the gap
+    assert not np.any((times > run.t[4711] + 1e-8) & (times < run.t[5401] - 1e-8))
+    apart = np.sort(np.diff(times))
+    assert apart[-2] < 3.1 * 160.0 / n  # without the gap
+    assert_same(run, read(tmp_path / "run.mcap"))
 
 
 def test_what_is_not_logged_is_not_in_the_file(run: Run, tmp_path: Path) -> None:
