@@ -35,7 +35,7 @@ def fit(file: Path, output: Path | None, picture: Path | None, starts: int, seed
 
     if output is not None:
         for own, what in ((file, "the fit file"), (mechanism_file(file), "its mechanism")):
-            if own is not None and output.exists() and output.samefile(own):
+            if own is not None and own.exists() and output.exists() and output.samefile(own):
                 raise click.UsageError(f"-o {output} would replace {what}; choose another name")
 
     with Progress("fitting", 1) as show:

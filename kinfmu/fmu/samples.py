@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import inf
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
-from kinfmu.fmu.block_estimates import BlockEstimates
 from kinfmu.fmu.description import Description
 from kinfmu.fmu.interface import Interface, Variable
 from kinfmu.fmu.layout import UNKNOWN_ERROR
@@ -17,9 +16,10 @@ from kinfmu.fmu.slaves import LoadedSlave
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import force_names, reaction_names_of
 from kinfmu.run import Event, Run
-from kinfmu.run.channels import absent_columns
+from kinfmu.run.channels import absent_columns, is_all_but
 from kinfmu.run.coarse import coarse_samples
 from kinfmu.run.run import Sink
+from kinfmu.scene.estimates import with_estimates
 from kinfmu.solver.python.status import Status
 from kinfmu.units import ForceName, read_inputs
 
@@ -80,8 +80,7 @@ class Samples:
         self.fixed: dict[str, float] = {}
         self._sink: Sink | None = None
         self._passed_on = self._events_passed_on = 0  # number of samples and events that the sink has
-        self._estimates: BlockEstimates | None = None  # replaces reads of samples of status ok
-        self._with_estimates = 0  # number of samples that have them
+        self._computes_estimates = False  # margins and errors are computed when they are read
         self._piece = 1  # number of samples passed to the sink at once
         self._full_at = self._most + 1  # number of samples at which the next piece is passed
         self._due = inf  # wall-clock time at which the next piece is passed in any case
@@ -113,11 +112,7 @@ class Samples:
         self.fixed = dict(zip(names, values, strict=True))
 
     def begin(
-        self,
-        slave: LoadedSlave,
-        channels: Sequence[str] | None,
-        sink: Sink | None,
-        estimates: Callable[[], BlockEstimates | None] = lambda: None,
+        self, slave: LoadedSlave, channels: Sequence[str] | None, sink: Sink | None, *, computes_estimates: bool = False
     ) -> None:
         """Choose the variables to read, and begin the sink's run.
 
@@ -125,54 +120,32 @@ class Samples:
             slave: Slave of the FMU.
             channels: Channels to record. None: all.
             sink: Sink of the run, if any.
-            estimates: Returns what computes margins and estimated errors of samples of status ok, which are then not
-                read from the FMU. Called only if one of these columns is recorded.
+            computes_estimates: Margins and errors follow from mechanism and driver values. Unless `channels` names
+                them, they are not read from the FMU, but computed when they are read from the run.
 
         """
         run = self._run(slice(0, 0))
         self._absent = absent_columns(run, channels)
+        self._computes_estimates = (
+            computes_estimates and is_all_but(channels) and self._absent.isdisjoint(run.input_names)
+        )
         references = self._interface.value_references()
         columns = [name.removeprefix("driven.") for name in self._names]  # names in a run
         asked = [k for k, name in enumerate(columns) if name not in self._absent]
+        if self._computes_estimates:
+            asked = [k for k in asked if k < self._ends[-1 - _ESTIMATES]]
         self._asked = asked if len(asked) < len(columns) else None
         self._reals = np.empty((self._most, len(asked)))
         part = _REALS.index("driven")
         self._drivers = [place for place, k in enumerate(asked) if self._ends[part - 1] <= k < self._ends[part]]
         self._references_of_drivers = [references[self._names[asked[place]]] for place in self._drivers]
         of_asked = [references[self._names[k]] for k in asked]
-        count = sum(k < self._ends[-1 - _ESTIMATES] for k in asked)  # of the columns before the estimates
-        self._estimates = self._known_estimates(asked, estimates) if count < len(asked) else None
-        if self._estimates:
-            self._estimated_columns = [k - self._ends[-1 - _ESTIMATES] for k in asked[count:]]
-            self._read_estimates = slave.reader(of_asked[count:], self._reals[:, count:])
-            of_asked = of_asked[:count]
         self._read = slave.reader(of_asked, self._reals) if of_asked else None
         self._sink = sink
         if sink is not None:
             self._piece = max(FEWEST, PIECE // (8 * (len(asked) + 3)))
             self._full_at, self._due = self._piece, perf_counter() + PERIOD
             sink.begin(self._run(slice(0, 0)))
-
-    def _known_estimates(
-        self, asked: Sequence[int], estimates: Callable[[], BlockEstimates | None]
-    ) -> BlockEstimates | None:
-        """Return the estimates and store the places of the columns they need; None if one of these is not read."""
-        found = estimates() if len(self._drivers) == len(self._variables("driven")) else None
-        places = {self._names[k]: place for place, k in enumerate(asked)}
-        if found is None or not places.keys() >= set(found.unknowns):
-            return None
-        self._unknowns = [places[name] for name in found.unknowns]
-        return found
-
-    def _add_estimates(self) -> None:
-        """Compute margins and estimated errors of the samples of status ok that were added since the last call."""
-        first, self._with_estimates = self._with_estimates, self._size
-        if self._estimates and first < self._size:
-            rows = first + np.flatnonzero(self._status[first : self._size] == Status.OK)
-            known = self._reals[rows]
-            u, ud, udd = (known[:, self._drivers[order::3]] for order in range(3))
-            found = self._estimates(u, ud, udd, known[:, self._unknowns])
-            self._reals[rows, -len(self._estimated_columns) :] = found[:, self._estimated_columns]
 
     def read(self, t: float, slave: LoadedSlave, *, is_kept: bool = True) -> bool:
         """Read a sample, if it is to be kept; return False if it holds no numbers except the driver values."""
@@ -189,8 +162,6 @@ class Samples:
             return True
         elif self._read:
             self._read(row)
-            if status and self._estimates:
-                self._read_estimates(row)
         times, all_status, all_iterations = self._columns
         times[row], all_status[row], all_iterations[row] = t, status, iterations
         self._size = row = row + 1
@@ -212,7 +183,6 @@ class Samples:
         """Return all samples as a Run and end the sink's run; reason: the error that ended it, if any."""
         if reason:
             self.log(ERROR, reason)
-        self._add_estimates()
         run = self._run(slice(0, self._size), tuple(self._events))
         self._pass_on()
         if self._sink is not None:
@@ -221,7 +191,6 @@ class Samples:
 
     def _pass_on(self) -> None:
         """Pass the sink the samples and events that it does not have yet."""
-        self._add_estimates()
         rows = slice(self._passed_on, self._size)
         events = tuple(self._events[self._events_passed_on :])
         self._passed_on, self._events_passed_on = self._size, len(self._events)
@@ -243,7 +212,7 @@ class Samples:
         if "solver.iterations" in self._absent:
             iterations[:] = 0
         interface = self._interface
-        return Run.of_texts(
+        run = Run.of_texts(
             t=self._t[rows].copy(),
             outputs=tuple(variable.name for variable in interface.part("values")),
             coordinate_count=interface.coordinate_count,
@@ -271,3 +240,4 @@ class Samples:
             events=events,
             absent=self._absent,
         )
+        return with_estimates(run).without(self._absent) if self._computes_estimates else run

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from zipfile import BadZipFile, ZipFile
@@ -17,7 +16,6 @@ import numpy as np
 
 from kinfmu.errors import FmuError, RequestError, listed
 from kinfmu.fmu import description
-from kinfmu.fmu.block_estimates import BlockEstimates, block_estimates
 from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.fmu_settings import as_set, fmu_settings
 from kinfmu.fmu.input_table import InputTable, input_notes, input_table, times, undriven
@@ -202,8 +200,8 @@ def simulate(
                     samples.read_fixed(one)
                     if interrupted:
                         raise KeyboardInterrupt
-                    estimates = partial(_estimates, folder, interface, settings, table, rows[0])
-                    samples.begin(one, channels, sink, estimates)
+                    computes = _computes_estimates(interface, settings, table, rows[0])
+                    samples.begin(one, channels, sink, computes_estimates=computes)
                     try:
                         driven = [] if table is None else [one.references[name] for name in table.names]
                         _step_through(one, samples, t, kept, driven, rows, progress, interrupted.came)
@@ -262,27 +260,22 @@ def _initialize(
         raise FmuError(complaint())
 
 
-def _estimates(
-    folder: Path,
+def _computes_estimates(
     interface: Interface,
     settings: Mapping[str, float | bool | str],
     table: InputTable | None,
     first: NDArray[np.float64],
-) -> BlockEstimates | None:
-    """Return what computes margins and errors of many samples, or None if errors of estimated rates count too.
+) -> bool:
+    """Return True if margins and errors follow from the driver values: errors of estimated rates do not.
 
     first: inputs at the first sample.
     """
-    if interface.part("states"):  # the estimates need the accelerations that the FMU computes
-        return None
-    if not _time_drives(interface, settings):
-        given = set() if table is None else {name for name, value in zip(table.names, first, strict=True) if value}
-        rates = {variable.name for k, variable in enumerate(interface.part("inputs")) if k % 3}
-        mode = settings.get("rates", "auto")
-        if not (mode == "wired" or (mode == "auto" and rates <= given)):
-            return None
-    values = [settings.get(variable.name, variable.start) for variable in interface.part("parameters")]
-    return block_estimates(folder, tuple([float(value) for value in values if value is not None]))
+    if interface.part("states") or _time_drives(interface, settings):
+        return True
+    given = set() if table is None else {name for name, value in zip(table.names, first, strict=True) if value}
+    rates = {variable.name for k, variable in enumerate(interface.part("inputs")) if k % 3}
+    mode = settings.get("rates", "auto")
+    return mode == "wired" or (mode == "auto" and rates <= given)
 
 
 def _step_through(

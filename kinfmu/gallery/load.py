@@ -14,6 +14,7 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import read
 from kinfmu.mechanism.toml_tables import text_of
 from kinfmu.mechanism.toml_text import text
+from kinfmu.mechanism.valid import quoted
 
 
 def folder() -> Path:
@@ -55,7 +56,7 @@ def load(mechanism: str | Path) -> Mechanism:
         known = names()
         if mechanism not in known:
             raise RequestError(
-                f"'{mechanism}' is not in the gallery{suggestion(mechanism, known)}; gallery: {listed(known)}; "
+                f"{quoted(mechanism)} is not in the gallery{suggestion(mechanism, known)}; gallery: {listed(known)}; "
                 f"files end in .toml"
             )
         return read(folder() / mechanism / "mechanism.toml")

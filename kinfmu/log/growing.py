@@ -114,6 +114,7 @@ class McapLog:
 
     def _put(self, content: Content, run: Run) -> None:
         content.add(run)
+        content.draw(run)
         due = unexplained(self._held, run.events)
         new = unexplained(status_events(run, self._status), run.events)
         self._held = [change for change in new if change.level == "error"]

@@ -19,6 +19,7 @@ from kinfmu.errors import LogError
 from kinfmu.log.record_text import lists_of
 from kinfmu.mechanism.valid import quoted
 from kinfmu.run import Event, Run
+from kinfmu.scene.estimates import with_estimates
 from kinfmu.solver.python.status import Status
 
 FORMAT = "2"  # increased when older files can no longer be read the same way
@@ -35,15 +36,25 @@ _TABLES = (
     "watch",
 )  # of several columns
 
+ESTIMATES = ("margin", "error")  # tables that follow from mechanism and driver values
 _OPTIONAL = ("forces", "reactions", "signals")  # None in a run that has none
+
+
+def computed_when_read(run: Run) -> frozenset[str]:
+    """Return the columns of margins and errors if one is not computed yet: they follow from what the record holds."""
+    if not any(map(run.is_lazy, ESTIMATES)) or not run.mechanism_text or run.absent.intersection(run.input_names):
+        return frozenset()
+    return frozenset(place.name for place in run.places() if place.table in ESTIMATES)
 
 
 def description(run: Run) -> dict[str, str]:
     """Return what is known when a run begins as texts; its info and its mechanism are stored separately."""
+    later = computed_when_read(run)
     lists: dict[str, Any] = {
-        "columns": [place.name for place in run.places()],
+        "columns": [place.name for place in run.places() if place.name not in later],
         "units": {place.name: place.unit for place in run.places()},
         "absent": sorted(run.absent),
+        "computed": sorted(later),
         "outputs": run.outputs,
         "coordinate_count": run.coordinate_count,
         "fixed": {name: float(value) for name, value in run.fixed.items()},
@@ -130,6 +141,8 @@ def run_of(
         events=tuple(events),
     )
     _fill(run, blocks)
+    if about["computed"]:
+        run = with_estimates(run.replaced(absent=frozenset(about["absent"]))).without(about["absent"])
     if not np.isin(run.status, list(Status)).all():
         row = int(np.argmin(np.isin(run.status, list(Status))))
         raise LogError(f"sample {row} has the status {run.status[row]}; known: 0 to {max(Status):d}")
@@ -160,7 +173,7 @@ def _empty(about: Mapping[str, Any], n: int) -> Run:
         reaction_names=about["reactions"],
         signal_names=about["signals"],
         length_unit=about["length_unit"],
-        absent=frozenset(about["absent"]),
+        absent=frozenset(about["absent"]) | frozenset(about["computed"]),
         axis=about["axis"],
         info={},
         **blank,

@@ -14,6 +14,7 @@ from kinfmu.run.axis import SAMPLE, TIME
 from kinfmu.units import METRES, ForceName, SignalName, read_coordinate, read_force, read_inputs
 
 MOST_COLUMNS = 500_000  # three times those of the largest mechanism
+ESTIMATES = ("solver.margin", "solver.error_q", "solver.error_qd", "solver.error_qdd")
 LEVELS = ("info", "warning", "error")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,199}(?:\.[a-z]{1,5})?")
 
@@ -46,6 +47,9 @@ def lists_of(texts: Mapping[str, str]) -> dict[str, Any]:
     found["axis"] = axis = _value(texts, "axis") if "axis" in texts else TIME  # older records have no axis
     if not isinstance(axis, str):
         raise LogError(f"axis of the record = {quoted(axis)} must be the name of an input, or {TIME} or {SAMPLE}")
+    found["computed"] = later = _value(texts, "computed") if "computed" in texts else []  # older records hold estimates
+    if not (_are_lines(later) and set(later) <= set(ESTIMATES)):
+        raise LogError(f"computed of the record = {quoted(later)} must be names among {listed(ESTIMATES)}")
     found |= {table: _forces(texts, table) for table in ("forces", "reactions")}
     found["signals"] = _signals(texts)
     if found["coordinate_count"] > len(found["outputs"]):

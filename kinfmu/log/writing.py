@@ -7,6 +7,7 @@
     /tf                   tf2_msgs/msg/TFMessage                 where they are [m]
     /log                  rcl_interfaces/msg/Log                 changes of status and events
 
+A complete run of more than MOST_DRAWN samples has about that many of them in the drawn topics.
 Samples without numbers (status 3 to 5) are a gap in the drawn topics; the full record keeps every sample unchanged, so
 `read` returns the same run, bit for bit. The mechanism file and the FMU's model description are attachments.
 Metadata: kinfmu.record (names, units, constants), kinfmu.info (of the run: token, parameters), kinfmu.about (versions,
@@ -26,16 +27,17 @@ import numpy as np
 from kinfmu.errors import MechanismError
 from kinfmu.log.cdr import NANOSECONDS, nanoseconds, zero_of
 from kinfmu.log.mcap_writer import McapWriter
-from kinfmu.log.record import description, ending
+from kinfmu.log.record import computed_when_read, description, ending
 from kinfmu.log.target import replacing
 from kinfmu.log.topics import SOURCE, STATUS_SOURCE, JointTopic, LinkTopic, LogTopic, SampleTopic, joint_topics
-from kinfmu.run import Event, Run
+from kinfmu.run import Event, IntArray, Run
 from kinfmu.run.axis import axis_of
-from kinfmu.run.channels import is_drawn, select
+from kinfmu.run.channels import is_all_but, is_drawn, select
 from kinfmu.run.verdict import sentence, status_events, unexplained
 from kinfmu.version import VERSION
 
 ROWS = 4096  # samples in a chunk of a complete run; larger chunks take more memory, smaller ones more time
+MOST_DRAWN = 20_000  # samples of a complete run in the topics that viewers draw; they take three times those of /sample
 LARGEST_CHUNK = 2**26  # [bytes]; readers refuse what unpacks to more than twice that
 MECHANISM_FILE = "mechanism.toml"
 MODEL_DESCRIPTION = "modelDescription.xml"
@@ -50,7 +52,9 @@ def write_mcap(run: Run, path: str | Path, *, channels: Sequence[str] | None = N
         run: The run.
         path: The file; an older one is replaced when the new one is complete.
         channels: What to keep of every sample, such as ["q", "drawn"] or ["-error"]; see kinfmu.run.channels. Default:
-            everything. ["-drawn"] keeps the record alone, less than half as large.
+            everything. ["-drawn"] keeps the record alone, less than half as large. Margins and errors that were not
+            read from the run yet are written if they are named, or by 'all'; else `read` returns a run that computes
+            them when they are read.
         rate: Samples to keep per second of the run. Default: all.
 
     Raises:
@@ -59,17 +63,28 @@ def write_mcap(run: Run, path: str | Path, *, channels: Sequence[str] | None = N
 
     """
     run = select(run, channels, rate)
+    if not is_all_but(channels):
+        run = run.replaced(margin=run.margin, error=run.error)
     nanoseconds(run.t)  # reports invalid times before a file is made
     with replacing(path) as temporary, FileIO(temporary, "w") as file:
         content = Content(file, run, zero_of(run.t), drawn=is_drawn(channels))
+        drawn = run if len(run) <= MOST_DRAWN else run.part(_drawn_samples(run))
         try:
             rows = max(1, min(ROWS, LARGEST_CHUNK // (64 + 8 * sum(1 for _ in run.places()))))
-            for start in range(0, len(run), rows):
-                content.add(run.part(slice(start, start + rows)))
+            for write, samples in ((content.add, run), (content.draw, drawn)):
+                for start in range(0, len(samples), rows):
+                    write(samples.part(slice(start, start + rows)))
             content.log(unexplained(status_events(run), run.events), run.events)
             content.end(run)
         finally:
             content.close()
+
+
+def _drawn_samples(run: Run) -> IntArray:
+    """Return the samples of a long run that are drawn: evenly spaced ones, and both sides of changes of status."""
+    changed = np.flatnonzero(np.diff(run.status))
+    last = len(run) - 1
+    return np.unique(np.concatenate([np.arange(0, last, -(-len(run) // MOST_DRAWN)), changed, changed + 1, [last]]))
 
 
 class Content:
@@ -93,7 +108,7 @@ class Content:
         base = "simulation" if axis.is_time else "number of the sample, one a second"
         about = {"time_base": base, "axis": axis.label, "time_zero_s": str(zero), **_versions()}
         self.until = 0.0  # time of the last sample [s]
-        self._sample = SampleTopic(writer, run)
+        self._sample = SampleTopic(writer, run.part(slice(0, 0)).without(computed_when_read(run)))
         self._topics: list[JointTopic | LinkTopic] = []
         self._log: LogTopic | None = None
         if drawn:
@@ -118,7 +133,11 @@ class Content:
             return
         self._sample.add(run, stamps)
         self.until = float(run.t[-1])
-        for topic in self._topics:
+
+    def draw(self, run: Run) -> None:
+        """Write the next samples that viewers draw."""
+        stamps = nanoseconds(run.t) - self._zero * NANOSECONDS
+        for topic in self._topics if len(run) else ():
             topic.add(run, stamps)
 
     def log(self, changes: Iterable[Event], events: Iterable[Event]) -> None:

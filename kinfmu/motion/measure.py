@@ -13,6 +13,7 @@ from kinfmu.display import Displayed
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import measured_forces
+from kinfmu.mechanism.valid import quoted
 from kinfmu.motion.geometry import geometry_of
 from kinfmu.motion.motion import Motion
 from kinfmu.motion.needed import needed
@@ -113,7 +114,7 @@ def with_measures(mechanism: Mechanism, measures: Iterable[Reading | str] | Read
         elif one in own:
             chosen.append(own[one])
         else:
-            raise RequestError(f"there is no measure '{one}'{suggestion(one, own)}; measures: {listed(own)}")
+            raise RequestError(f"there is no measure {quoted(one)}{suggestion(one, own)}; measures: {listed(own)}")
     return replace(mechanism, measures=tuple(chosen))
 
 

@@ -77,9 +77,14 @@ def is_drawn(names: Sequence[str] | None) -> bool:
     return DRAWN in _kept(names, lambda name: {DRAWN} if name in ("all", DRAWN) else set())
 
 
+def is_all_but(names: Sequence[str] | None) -> bool:
+    """Return True if `names` are all columns, without those that they name with a minus."""
+    return names is None or bool(names and names[0].startswith("-"))
+
+
 def _kept(names: Sequence[str] | None, columns_of: Callable[[str], set[str]]) -> set[str]:
     """Return what is kept after each name has added its columns or removed them."""
-    kept = set(columns_of("all")) if names is None or (names and names[0].startswith("-")) else set()
+    kept = set(columns_of("all")) if is_all_but(names) else set()
     for name in names or ():
         found = columns_of(name.removeprefix("-"))
         kept = kept - found if name.startswith("-") else kept | found
@@ -148,7 +153,7 @@ def chosen_columns(run: Run, names: Sequence[str]) -> tuple[str, ...]:
     columns = list(run.column_units(kept=False))
     constants = {name.derivative(order) for name in run.fixed for order in range(3)}
     usual = [name for name in columns if name not in ("time", *ALWAYS)]
-    kept = dict.fromkeys(usual if names and names[0].startswith("-") else ())
+    kept = dict.fromkeys(usual if is_all_but(names) else ())
     for name in names:
         bare = name.removeprefix("-")
         found = {bare} if bare in constants else _chosen(bare, groups, columns)
@@ -175,7 +180,7 @@ def coordinates(run: Run, names: Sequence[str]) -> tuple[CoordinateName, ...]:
     """
     owners = {name.derivative(order): name for order in range(3) for name in (*run.outputs, *run.fixed)}
     groups, columns = _groups(run), list(run.column_units())
-    kept = dict.fromkeys(columns if names and names[0].startswith("-") else ())
+    kept = dict.fromkeys(columns if is_all_but(names) else ())
     for name in names:
         if name.startswith("-"):
             left_out = _chosen(name[1:], groups, columns)

@@ -277,6 +277,15 @@ class Run(Tabular, Displayed):
         tables = [name for name in _TABLES if self.__dict__[name] is not None]
         return self.replaced(**{name: part(name) for name in tables}, events=events)
 
+    def is_lazy(self, table: str) -> bool:
+        """Return True if a table is not computed yet.
+
+        Args:
+            table: Name of the field, such as 'margin'.
+
+        """
+        return callable(self.__dict__[table])
+
     def replaced(self, **fields: Any) -> Run:
         """Return the run with other fields; what is not computed yet stays so.
 

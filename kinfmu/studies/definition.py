@@ -19,6 +19,7 @@ from kinfmu.errors import KinfmuError, RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism, toml_text
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.mechanism.valid import quoted
+from kinfmu.motion.history import FEWEST
 from kinfmu.motion.measure import chosen_measures
 from kinfmu.motion.needed import needed
 from kinfmu.plan import compile_plan
@@ -215,6 +216,8 @@ def define(
             f"{changed[0]} changes a driver's law, which acts over time: give times "
             f"([run] start, stop and step in a study file) in place of driver values, or neither"
         )
+    if len(motion) < FEWEST:
+        raise RequestError(f"{motion.over}: measures need {FEWEST} samples or more, not {len(motion)}")
     if engine == "auto":
         engine = _engine(len(samples) * len(motion))
     return Study(mechanism, samples, motion, engine, file_text, tuple(_notes(mechanism, parameters)))

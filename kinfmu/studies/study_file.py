@@ -118,4 +118,6 @@ def _motion(mechanism: Mechanism, table: Mapping[str, Any]) -> tuple[Any, dict[s
         raise StudyError(f"{where}: 'from' and 'to' are equal: {first:.9g}; measures need a driver that moves")
     samples = whole_number(f"{where} samples", table.get("samples", 361), FEWEST, MOST_SAMPLES)
     rate = read_constant(f"{where} speed", table.get("speed", 1.0), speed.quantity, mechanism.length_unit)
+    if rate == 0.0:
+        raise StudyError(f"{where} speed = {quoted(table['speed'])}: measures need a driver that moves")
     return None, {value: np.linspace(first, last, samples), speed: rate}

@@ -81,7 +81,7 @@ def solve(
         set_ones = frozenset(parameters or ())
         derived = [name for name, p in mechanism.parameters.items() if p.expression and name in set_ones]
         chosen = outputs if outputs is None or isinstance(outputs, str) else tuple(outputs)
-        model = _model(mechanism, chosen, tuple(derived), engine)
+        model = kept_model(mechanism, chosen, tuple(derived), engine)
     for driver in model.plan.drivers if inputs and not wrap else ():
         if driver.quantity.kind == "angle":
             _warn_of_degrees(driver.inputs[0], inputs.get(driver.inputs[0]))
@@ -102,7 +102,7 @@ def _warn_of_degrees(name: str, angles: ArrayLike | None) -> None:
 
 
 @lru_cache(maxsize=MODELS_KEPT)
-def _model(mechanism: Mechanism, outputs: Sequence[str] | None, derived: Sequence[str], engine: str) -> Model:
+def kept_model(mechanism: Mechanism, outputs: Sequence[str] | None, derived: Sequence[str], engine: str) -> Model:
     """Return a model whose arguments are the parameters written as numbers, and those derived ones."""
     own = [name for name, parameter in mechanism.parameters.items() if not parameter.expression]
     return Model(compile_plan(mechanism, outputs, [*own, *derived]), engine)

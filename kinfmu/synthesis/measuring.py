@@ -219,7 +219,7 @@ def _reading(where: str, one: Any, mechanism: Mechanism) -> Reading:
         return next(iter(replace(mechanism, measures=(one.of,)).measures))  # texts become numbers
     own = {reading.name: reading for reading in mechanism.measures}
     if one.of not in own:
-        near = suggestion(one.of, own) if isinstance(one.of, str) else ""
+        near = suggestion(one.of, own)
         raise MechanismError(f"{where} of = {quoted(one.of)} is not a measure{near}; measures: {listed(own)}")
     return own[one.of]
 

@@ -14,7 +14,8 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.mechanism.number import unit_advice
 from kinfmu.mechanism.parameters import NUMBER
-from kinfmu.mechanism.valid import check_name
+from kinfmu.mechanism.valid import check_name, quoted
+from kinfmu.readings import Reading
 from kinfmu.run import FloatArray
 from kinfmu.synthesis.argument import Argument, argument_of
 from kinfmu.synthesis.constraints import CONSTRAINTS, Constraint, GrashofConstraint
@@ -186,6 +187,10 @@ class FitProblem:
                 kinds = listed(cls.__name__ for cls in classes)
                 raise RequestError(f"{table}: {type(one).__name__} is not one of {kinds}")
             check_name(f"[{table}]", one.name)
+            over = getattr(one, "over", None)
+            for key, value in (("of", getattr(one, "of", "")), ("over", "" if over is None else over)):
+                if not isinstance(value, str | Reading):
+                    raise MechanismError(f"[{table}.{one.name}] {key} = {quoted(value)} must be a name")
         return [one.name for one in members]
 
     def _parameter_bounds(self, argument: Argument) -> dict[str, Bounds]:

@@ -85,7 +85,7 @@ class TracedPoints:
         self._written = mechanism
         self.points = dict(mechanism.points)
 
-    def outputs(self, where: str, of: object) -> tuple[CoordinateName, ...]:
+    def outputs(self, where: str, of: str) -> tuple[CoordinateName, ...]:
         """Return the names of a point's coordinates.
 
         Raises:
@@ -94,16 +94,17 @@ class TracedPoints:
         """
         known = self._written.body_points
         if of in self.points:
-            return tuple(CoordinateName(str(of), axis) for axis in "xy")
+            return tuple(CoordinateName(of, axis) for axis in "xy")
         if of not in known:
             names = [*self._written.points, *known]
-            near = suggestion(of, names) if isinstance(of, str) else ""
-            raise MechanismError(f"{where} = {quoted(of)} is not a point{near}; points: {listed(names)}")
+            raise MechanismError(
+                f"{where} = {quoted(of)} is not a point{suggestion(of, names)}; points: {listed(names)}"
+            )
         name = next((name for name, target in self.points.items() if target == of), "")
         if not name:
             taken = {*self.points, *(body.name for body in self._written.bodies)}
             name = next(name for k in range(len(taken) + 1) if (name := f"traced_{k}") not in taken)
-            self.points[name] = str(of)
+            self.points[name] = of
         return tuple(CoordinateName(name, axis) for axis in "xy")
 
 
@@ -182,7 +183,7 @@ def _function(
     """Return a function in the common form."""
     for key, name in (("of", target.of), ("over", target.over)):
         if name is not None and name not in coordinates:
-            near = suggestion(name, coordinates) if isinstance(name, str) else ""
+            near = suggestion(name, coordinates)
             raise MechanismError(f"{where} {key} = {quoted(name)} is not an output{near}; valid: {listed(coordinates)}")
     x = argument.quantity if target.over is None else coordinates[target.over].quantity()
     of = coordinates[target.of]

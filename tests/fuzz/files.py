@@ -1,4 +1,4 @@
-"""Hostile files of others: FMUs, records, tables of inputs and of laws, and files of other programs in their place."""
+"""Hostile files of others: FMUs, records, tables, fit and study files, and files of other programs in their place."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ import random
 import re
 import struct
 import time
+import tomllib
 import zipfile
 import zlib
-from collections.abc import Callable
-from functools import cache
+from collections.abc import Callable, Iterator
+from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import fmpy  # noqa: F401  # which asks the system for its libraries when it is imported
 import numpy as np
@@ -28,11 +30,14 @@ from kinfmu.log import read, record, recover, write_mcap, write_rrd, write_table
 from kinfmu.log.mcap_writer import ZSTD, Opcode
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.run import Run
+from kinfmu.studies import read_study
 from kinfmu.sweep import solve
+from kinfmu.synthesis import read_problem
 from tests.fuzz.guarded import guarded
 from tests.fuzz.hostile_text import CANARY, hostile
 from tests.fuzz.mechanisms import Find, invoke, judge_refusal
 from tests.fuzz.summary import Summary
+from tests.studies.linkage import TEXT as HOEKEN
 
 QUICK = 3.0  # [s] of the processor for a file of some kilobytes, pictures aside
 ODD_NUMBERS = ("-1", "0", "1e999", "nan", "99999999999999999999", "0x10", "1_0", "", "true", "-0.0", "1e-320", "\u0663")
@@ -58,7 +63,17 @@ def trial(seed: int, summary: Summary) -> None:
 def kind_of(seed: int) -> Callable[[random.Random, Find], None]:
     """The kind of a trial."""
     rare = {0: _bombs, 1: _others}.get(seed // 12 % 6) if seed % 12 == 11 else None
-    usual = (_fmu_bytes, _fmu_texts, _fmu_files, _record_bytes, _record_texts, _record_samples, _inputs, _tables)
+    usual = (
+        _fmu_bytes,
+        _fmu_texts,
+        _fmu_files,
+        _record_bytes,
+        _record_texts,
+        _record_samples,
+        _inputs,
+        _tables,
+        _designs,
+    )
     return rare or usual[seed % len(usual)]
 
 
@@ -114,6 +129,84 @@ def damaged(content: bytes, drawn: random.Random, first: int = 0) -> bytes:
             case _:
                 changed[at : at + 1] = bytes(byte ^ 1 << drawn.randrange(8) for byte in changed[at : at + 1])
     return bytes(changed)
+
+
+# ------------------------------------------------------------------------------------------- fit and study files
+
+FIT = """
+mechanism = "hoeken.toml"
+over = "driver"
+unknowns = { crank = [20, 50] }
+targets.free = { type = "path", of = "coupler.Q", points = [[1, 2], [2, 3], [3, 3]], begin = 0, end = 2 }
+targets.timed = { type = "path", of = "coupler.Q", points = [[1, 2]], at = [0.1], start = [0, 1], weight = [2] }
+targets.steps = { type = "path", of = "coupler.Q", points = [[1, 2]], step = "10 deg", start = 0.1, weight = 2 }
+targets.poses = { type = "poses", of = "coupler", poses = [[1, 2, 0.1]], length = 10, at = [0.1], start = 0 }
+targets.swing = { type = "measure", of = "swing", value = "40 deg", weight = 2 }
+constraints.bars = { type = "grashof", links = ["crank", "rocker", "base", "55 mm"], shortest = "crank", gap = 1 }
+constraints.far = { type = "margin", minimum = 0.1, weight = 2 }
+constraints.limits = { type = "measure", of = "swing", minimum = 0.1, maximum = 2, weight = 3 }
+[targets.function]
+type = "function"
+of = "rocker.phi"
+over = "coupler.phi"
+points = [[0, 0.1]]
+start = [0, 1]
+offset = [0, 1]
+begin = 0
+end = 3
+"""
+STUDY = """
+mechanism = "hoeken.toml"
+sampling = "sobol"
+designs = 2
+seed = 1
+report = ["swing", "own"]
+parameters.crank = { from = 15, to = 25 }
+parameters.rocker = { tolerance = 0.1, distribution = "normal", deviations = 3, nominal = 50 }
+parameters.base = { values = [39, 40] }
+measures.own = { type = "range", of = "rocker.phi" }
+"""
+MOTIONS = "run = { start = 0, stop = 1, step = 0.1 }\n", "run = { from = 0, to = 3, samples = 20, speed = 2 }\n"
+
+
+def _designs(drawn: random.Random, find: Find) -> None:
+    """Every key of a fit file and of a study file, left out or with odd values in its place."""
+    Path("hoeken.toml").write_text(HOEKEN, encoding="utf-8")
+    for text, read_file in ((FIT, read_problem), (STUDY + drawn.choice(MOTIONS), read_study)):
+        usual = tomllib.loads(text)
+        for place in _places(usual):
+            odd = drawn.choice((*ODD_VALUES, ["a"], [1], [[1, 2]], [[1, 2], [3]], 1979, "a\nb", "1 deg", usual))
+            lines = [f"{key} = {_toml(part)}" for key, part in _put(usual, place, odd).items() if part is not None]
+            Path("design.toml").write_text("\n".join(lines), encoding="utf-8")
+            attempt(partial(read_file, "design.toml"), find)
+
+
+def _places(value: object) -> Iterator[tuple[Any, ...]]:
+    """The places of all parts of tables and lists, as keys and numbers one after another."""
+    for key in value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ():
+        yield (key,)
+        yield from ((key, *rest) for rest in _places(value[key]))
+
+
+def _put(value: Any, place: tuple[Any, ...], part: object) -> Any:
+    """The value with another part at a place; None leaves it out."""
+    if not place:
+        return part
+    changed = value.copy()
+    changed[place[0]] = _put(value[place[0]], place[1:], part)
+    return changed
+
+
+def _toml(value: Any) -> str:
+    """A value as TOML; None is left out of tables, and an empty text in lists."""
+    if isinstance(value, dict):
+        entries = [f"{json.dumps(key)} = {_toml(part)}" for key, part in value.items() if part is not None]
+        return "{" + ", ".join(entries) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    if isinstance(value, float):
+        return repr(value)
+    return json.dumps("" if value is None else value)
 
 
 # ------------------------------------------------------------------------------------------------------------ FMUs

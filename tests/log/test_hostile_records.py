@@ -52,8 +52,15 @@ DEEP = "[" * 100_000
 ODD: list[Any] = [None, True, -1, 1.5, 10**400, "a", [], {}, [1], {"a": 1}, {"a.x": []}]
 ODD += [["\ud800"], ["a\nb"], [["a.x"]]]
 KEYS = ("columns", "units", "absent", "outputs", "coordinate_count", "fixed", "input_names", "watch_names")
-KEYS += ("length_unit", "format")
-FITTING = {"absent": ([],), "units": ({},), "watch_names": (), "fixed": ({},), "coordinate_count": ()}  # by key
+KEYS += ("length_unit", "format", "computed")
+FITTING = {
+    "absent": ([],),
+    "computed": ([],),
+    "units": ({},),
+    "watch_names": (),
+    "fixed": ({},),
+    "coordinate_count": (),
+}  # by key
 
 
 @pytest.mark.parametrize("key", KEYS)
@@ -86,6 +93,7 @@ def test_odd_texts_at_the_end_are_one_line(run: Run, tmp_path: Path, key: str) -
         ({"coordinate_count": "8"}, "coordinate_count of the record = 8 is more than its outputs"),
         ({"watch_names": '["AB", "CD"]'}, "columns of the record do not match its outputs, inputs, forces and watches"),
         ({"absent": '["coupler.x"]'}, "columns of the record do not match its outputs, inputs, forces and watches"),
+        ({"computed": '["solver.status"]'}, "must be names among solver.margin, solver.error_q"),
         ({"columns": '["time", "time"]'}, "columns of the record hold a name twice"),
         ({"format": "9\n9"}, r"format '9\n9' of the record; this version of kinfmu reads '2'"),
     ],

@@ -19,6 +19,7 @@ from kinfmu.log import read, write_mcap
 from kinfmu.log.mcap_writer import McapWriter
 from kinfmu.log.topics import field_names
 from kinfmu.log.viewer.headless import executable
+from kinfmu.log.writing import MOST_DRAWN
 from kinfmu.run import Event, Run
 from kinfmu.run.channels import select
 from tests.log.runs import fourbar, with_gap, without_samples
@@ -129,6 +130,19 @@ def test_a_part_of_a_run_reads_back_bit_for_bit(channels: list[str], run_with_ga
     assert_same(part, read(tmp_path / "run.mcap"))
 
 
+def test_viewers_draw_evenly_spaced_samples_of_a_long_run(tmp_path: Path) -> None:
+    n = 2 * MOST_DRAWN + 1
+    run = with_gap(fourbar(np.linspace(10.0, 170.0, n)), 4712, 5400)
+    write_mcap(run, tmp_path / "run.mcap")
+    times = np.array([time for time, _ in messages(tmp_path / "run.mcap", "/tf")]) * 1e-9
+    assert MOST_DRAWN / 2 < len(times) <= MOST_DRAWN
+    assert np.abs(times[:, None] - run.t[[0, 4711, 5401, n - 1]]).min(axis=0).max() < 1e-8  # ends, and those of the gap
+    assert not np.any((times > run.t[4711] + 1e-8) & (times < run.t[5401] - 1e-8))
+    apart = np.sort(np.diff(times))
+    assert apart[-2] < 3.1 * 160.0 / n  # without the gap
+    assert_same(run, read(tmp_path / "run.mcap"))
+
+
 def test_what_is_not_logged_is_not_in_the_file(run: Run, tmp_path: Path) -> None:
     write_mcap(run, tmp_path / "run.mcap", channels=["coupler.*", "drawn"])
     with (tmp_path / "run.mcap").open("rb") as file:
@@ -145,13 +159,50 @@ def test_what_is_not_logged_is_not_in_the_file(run: Run, tmp_path: Path) -> None
     assert (len(position), len(velocity)) == (5, 0)
 
 
-def test_margins_and_errors_that_are_not_logged_are_not_computed(run: Run, tmp_path: Path) -> None:
+@pytest.mark.parametrize("channels", [None, ["-drawn"], ["-error", "-margin"], ["q", "qd"]])
+def test_margins_and_errors_are_not_computed_for_a_record(channels: list[str] | None, run: Run, tmp_path: Path) -> None:
     def never() -> NoReturn:
         raise AssertionError("this was not to be computed")
 
-    late = dataclasses.replace(run, margin=never, error=never)
-    write_mcap(late, tmp_path / "run.mcap", channels=["-error", "-margin"])
-    assert read(tmp_path / "run.mcap").absent == {"solver.margin", *(f"solver.error_{q}" for q in ("q", "qd", "qdd"))}
+    write_mcap(dataclasses.replace(run, margin=never, error=never), tmp_path / "run.mcap", channels=channels)
+    back = read(tmp_path / "run.mcap")
+    assert back.absent == select(run, channels).absent
+    with (tmp_path / "run.mcap").open("rb") as file:
+        sample = next(one for one in make_reader(file).get_summary().channels.values() if one.topic == "/sample")
+    assert {name for name in sample.metadata if "margin" in name or "error" in name} == set()
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("driven", [{}, {"crank_angle": np.linspace(0.5, 6.5, 90), "crank_speed": 2.0}])
+def test_margins_and_errors_of_a_record_are_those_of_its_run(
+    driven: dict[str, np.ndarray], engine: str, tmp_path: Path
+) -> None:
+    run = kinfmu.solve(kinfmu.load("crank_rocker"), engine=engine, **driven)
+    write_mcap(run, tmp_path / "run.mcap")
+    back = read(tmp_path / "run.mcap")
+    assert run.is_lazy("error")
+    assert back.is_lazy("error")
+    np.testing.assert_allclose(back.margin, run.margin, rtol=1e-9)
+    np.testing.assert_allclose(back.error, run.error, rtol=0.0 if engine == "python" else 0.9)
+    write_mcap(run, tmp_path / "run.mcap")  # they have been read
+    assert not read(tmp_path / "run.mcap").is_lazy("error")
+    assert_same(run, read(tmp_path / "run.mcap"))
+
+
+def test_an_error_of_a_record_is_at_least_what_its_numbers_are_off(tmp_path: Path) -> None:
+    run = kinfmu.solve(kinfmu.load("crank_rocker"))
+    values, rates, accelerations = (table.copy() for table in (run.values, run.rates, run.accelerations))
+    values[3, 0] += 1e-9
+    values[4, 0] += 0.1  # another pose
+    rates[5, 0] += 1e-6
+    accelerations[6, 0] -= 1e-3
+    write_mcap(run.replaced(values=values, rates=rates, accelerations=accelerations), tmp_path / "run.mcap")
+    back = read(tmp_path / "run.mcap")
+    off = [back.error[3, 0], back.error[4, 0], back.error[5, 1], back.error[6, 2]]
+    np.testing.assert_allclose(off, [1e-9, 0.1, 1e-6, 1e-3], rtol=1e-5)
+    assert np.flatnonzero(np.isnan(back.margin)).tolist() == [4]
+    rows = np.r_[0:3, 7 : len(run)]
+    assert np.array_equal(back.error[rows], run.error[rows])
 
 
 def test_rerun_verifies_the_file(any_run: Run, tmp_path: Path) -> None:

@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import kinfmu
+from kinfmu.cli import main
 from kinfmu.errors import KinfmuError, RequestError, StudyError
 from kinfmu.studies import read_study
 from kinfmu.studies.variation import Grid, Tolerance, UniformRange
@@ -44,6 +46,9 @@ WRONG = {
     f"{CRANK}[run]\nfrom = '1 mm'\nto = 2": "[run] from = '1 mm': unit 'mm' must be one of rad, deg, rev",
     f"{CRANK}[run]\nstop = 1\nstep = 0": "[run] must have a positive step, and stop after start",
     f"{CRANK}[run]\nfrom = 1\nto = 2\nsamples = 1": "[run] samples = 1 must be a whole number from 3 to 1",
+    f"{CRANK}[run]\nstop = 0\nstep = 1": "t = 0 to 0 s: measures need 3 samples or more, not 1",
+    f"{CRANK}[run]\nstop = 1\nstep = 1": "t = 0 to 1 s: measures need 3 samples or more, not 2",
+    f"{CRANK}[run]\nfrom = 1\nto = 2\nspeed = '0 rpm'": "[run] speed = '0 rpm': measures need a driver that moves",
     f"{CRANK}[run]\nfrom = 1\nto = 1": "[run]: 'from' and 'to' are equal: 1; measures need a driver that moves",
     f"{CRANK}[run]\nstop = 1\nstep = '1e-12 s'": "[run] 0 to 1 s in steps of 1e-12 s: more than 10000000 samples",
     f"designs = 1000000000\nsampling = 'latin_hypercube'\n{CRANK}": (
@@ -88,6 +93,9 @@ def test_a_mistake_is_named_with_its_place(text: str, tmp_path: Path) -> None:
         read_study(path)
     assert str(error.value).startswith(f"{path}: ")
     assert WRONG[text] in str(error.value)
+    done = CliRunner().invoke(main, ["study", str(path)])
+    assert (done.exit_code, done.output) == (1, f"kinfmu: {error.value}\n")
+    assert not list(tmp_path.glob("*.parts"))
 
 
 @pytest.mark.parametrize("table", WRONG_PARAMETERS)

@@ -407,6 +407,9 @@ def test_the_files_of_a_fit_are_never_replaced_by_its_result(tmp_path: Path) -> 
         assert done.exit_code == 2
         assert f"would replace {what}; choose another name" in done.output
         assert (tmp_path / name).read_bytes() == before
+    (tmp_path / "linkage.toml").unlink()
+    done = CliRunner().invoke(main, ["fit", str(path), "-o", str(tmp_path / "fit.toml").replace("fit", "other")])
+    assert done.exit_code == 1
     with pytest.raises(kinfmu.KinfmuError, match="fit needs a FitProblem or the path of a fit file, not int"):
         kinfmu.fit(5)  # type: ignore[arg-type]
 
@@ -419,6 +422,10 @@ def _poses(**keys: Any) -> dict[str, Any]:
     return {"targets": [PoseTarget(**{"name": "p", "of": "rocker", "poses": [(0, 0, 0)], "length": 1.0, **keys})]}
 
 
+def _function(**keys: Any) -> dict[str, Any]:
+    return {"targets": [FunctionTarget(**{"name": "f", "of": "rocker.phi", "points": [(0, 1)], **keys})]}
+
+
 def _swing(minimum: str, maximum: str) -> MeasureConstraint:
     return MeasureConstraint(name="swing", of=Range("swing", of="rocker.phi"), minimum=minimum, maximum=maximum)
 
@@ -427,6 +434,7 @@ def _grashof(*links: str) -> dict[str, Any]:
     return {"constraints": [GrashofConstraint(name="g", links=links)]}
 
 
+NO_NAMES: list[Any] = [["coupler.X"], {"a": 1}, 3, 1.5, True, None]
 CASES: list[tuple[dict[str, Any], str]] = [
     ({"unknowns": {"cranck": (0, 1)}}, r"\[unknowns\] .*'cranck'; did you mean 'crank'"),
     ({"unknowns": {"crank": (2, 1)}}, r"\[unknowns\] crank = \(2, 1\): the low bound must be below"),
@@ -437,6 +445,14 @@ CASES: list[tuple[dict[str, Any], str]] = [
     ({"targets": []}, "needs targets"),
     ({"targets": [PATH, PATH]}, "two targets or constraints have the name 'curve'"),
     (_path(of="coupler.Z"), "'coupler.Z' is not a point; did you mean"),
+    *((_path(of=name), "of = .* must be a name") for name in NO_NAMES),
+    *((_poses(of=name), "must be a name") for name in NO_NAMES),
+    *((_function(of=name), "must be a name") for name in NO_NAMES),
+    *((_function(over=name), "over = .* must be a name") for name in NO_NAMES[:-1]),
+    *(
+        ({"targets": [MeasureTarget(name="m", of=name, value=1)]}, r"\[targets.m\] of = .* must be a name")
+        for name in NO_NAMES
+    ),
     (_path(points=[(1, 2, 3)]), r"list \[\[x, y\], ...\]; number 1 is"),
     (_path(at=[1]), "at must be a list of 4 values of crank"),
     (_path(start=1), "start needs 'at' or 'step'"),
@@ -450,7 +466,7 @@ CASES: list[tuple[dict[str, Any], str]] = [
     (_path(weight=-1.0), "weights must be 0 or more"),
     (_poses(of="rokker"), "moving body; did you mean 'rocker'"),
     (_poses(length=0), "length = 0 must be positive"),
-    ({"targets": [FunctionTarget(name="f", of="rocker.ph", points=[(0, 1)])]}, "did you mean 'rocker.phi'"),
+    (_function(of="rocker.ph"), "did you mean 'rocker.phi'"),
     ({"targets": [MeasureTarget(name="m", of="stroke", value=1)]}, "'stroke' is not a measure"),
     (_grashof("crank"), "must be four lengths"),
     (_grashof("crank", "coupler", "rocker", "groun"), "did you mean 'ground'"),

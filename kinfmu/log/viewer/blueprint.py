@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from kinfmu.log.viewer.linkage import trail_path, trail_time, view_box
 from kinfmu.log.viewer.series import KINDS, ORDERS, Group
@@ -21,13 +22,16 @@ if TYPE_CHECKING:
 SHORTEST_SHOW, LONGEST_SHOW = 5.0, 30.0  # [s], limits of the time to play the whole run
 SWEEP_SHOW = 10.0  # [s] to play a run that has no time
 EDGE = 0.01  # of the run's time, left free before and after the curves
-LABEL = 30.0  # [points], half of the label of a tick such as +100 ms; most runs end at a tick
+LABEL = 31.0  # [points], half of the label of a tick such as +100 ms; most runs end at a tick
 LEGEND_EDGE, LETTER = 34.0, 7.0  # [points]; width of a legend around its names, and of a letter
 ABREAST = 4  # most plots of efforts and signals in a row
 FEW = 4  # plots of two runs, up to which they are wide
-PLOT, NARROW = 400.0, 200.0  # [points], widths of plots on a usual screen
+WIDTH, HEIGHT = 870.0, 820.0  # [points], of all plots and states on a usual screen
+NUMBERS, CAPTION = 65.0, 44.0  # [points] of a plot: width of the numbers of y, height of the title and of those of x
+EDGE_Y = 0.1  # of the distance of labels, by which an axis ends beyond a label
+LABELLED = 24.0  # [points]; Rerun labels the multiples of that power of ten whose distance is at least this
 STATUS, LANES = 0.13, 0.17  # of the height of the right side, for the states of one run and of two
-LEAST_LEGEND, MOST_LEGEND = 0.15, 0.6  # of the run's time, left free after the curves for the legend
+LEAST_LEGEND, MOST_LEGEND = 0.15, 0.8  # of the run's time, left free after the curves for the legend
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,26 +66,17 @@ def single(
     """
     import rerun.blueprint as rrb
 
-    rows: list[rrb.Container | rrb.View] = []
-    for order in ORDERS:
-        found = [curves[order, kind] for kind in KINDS if (order, kind) in curves]
-        if found:
-            rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], timeline, [run]) for group in found]))
-    if forces:
-        width = NARROW if len(forces) > len(KINDS) else PLOT
-        rows += _abreast([plot(group.title, [("", group)], timeline, [run], width) for group in forces])
+    rows = _rows([_alone(curves.get((order, kind))) for kind in KINDS] for order in ORDERS)
+    rows += _abreast(_known(map(_alone, forces)))
     shares = [2.0] * len(rows)
     if solver:
-        rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], timeline, [run], NARROW) for group in solver]))
+        rows.append(_known(map(_alone, solver)))
         shares.append(1.5)
     has_motion = bool(run.outputs) or any(one.scene for one in drawn)
-    if has_motion:
-        rows.append(status_view([""], timeline, [run]))
-        shares.append(STATUS * sum(shares) / (1.0 - STATUS) if shares else 1.0)
+    right = _stacked(rows, shares, timeline, [run], [""] if has_motion else [])
     linked = [linkage_view([one.root], timeline, [one.run], [one.scene], one.title, one.arrows) for one in drawn]
     linkages = (linked[0] if len(linked) == 1 else rrb.Grid(*linked)) if has_motion and linked else None
     left = _left(linkages, [""], [run])
-    right = rrb.Vertical(*rows, row_shares=shares)
     return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), timeline, [run])
 
 
@@ -100,46 +95,86 @@ def compared(
     """
     import rerun.blueprint as rrb
 
-    overlaid = [row for order in ORDERS if (row := _overlaid(order, timeline, runs, curves))]
-    of_loads = [_both(path, timeline, runs, loads) for path in dict.fromkeys([*loads[0], *loads[1]])]
-    rows: list[rrb.Container | rrb.View] = [*overlaid[:1]] if difference or not loaded else []
+    overlaid = [[_of_both((order, kind), curves) for kind in KINDS] for order in ORDERS]
+    of_loads = [_of_both(path, loads) for path in dict.fromkeys([*loads[0], *loads[1]])]
+    both = _rows(overlaid) + _abreast(_known(of_loads), ABREAST - 1)
+    moved = [[_apart(difference.get((order, kind))) for kind in KINDS] for order in ORDERS]
     most = 2 if len(loaded) <= FEW else ABREAST - 1  # titles of comparisons are long
-    if not rows:
-        rows += _abreast([_both(group.path, timeline, runs, loads) for group in loaded], most)
-    for order in ORDERS:
-        found = [difference[order, kind] for kind in KINDS if (order, kind) in difference]
-        if found:
-            rows.append(
-                rrb.Horizontal(
-                    *[plot(f"B - A: {group.title}", [("/difference", group)], timeline, runs) for group in found]
-                )
-            )
-    width = NARROW if len(loaded) > len(KINDS) else PLOT
-    rows += _abreast(
-        [plot(f"B - A: {group.title}", [("/difference", group)], timeline, runs, width) for group in loaded], most
-    )
-    rows.append(status_view(["/a", "/b"], timeline, runs))
+    forces = _abreast(_known([_of_both(group.path, loads) for group in loaded]), most)
+    forces += _abreast(_known(map(_apart, loaded)), most)
+    tabs = {"B - A": _rows(overlaid)[:1] + _rows(moved) if difference else forces}
+    tabs |= {"B - A of forces": forces if difference else [], "A and B": both}
+    shown = [(name, rows) for name, rows in tabs.items() if rows] or [("A and B", both)]
+    stacks = [
+        _stacked(rows, [2.0] * len(rows), timeline, runs, ["/a", "/b"] if k == 0 else [], name)
+        for k, (name, rows) in enumerate(shown)
+    ]
     left = _left(linkage_view(["/a/linkage", "/b/linkage"], timeline, runs, scenes), ["/a", "/b"], runs)
-    plots = len(rows) - 1
-    status = 2.0 * plots * LANES / (1.0 - LANES) or 1.0
-    apart = rrb.Vertical(*rows, row_shares=[2.0] * plots + [status], name="B - A")
-    both = rrb.Vertical(*overlaid, *_abreast(of_loads, ABREAST - 1), name="A and B")
-    right = rrb.Tabs(apart, both)
+    right = rrb.Tabs(*stacks) if len(stacks) > 1 else stacks[0]
     return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), timeline, runs)
 
 
-def _abreast(views: Sequence[rrb.View], most: int = ABREAST) -> list[rrb.Container]:
-    """Return rows of at most so many views, of about the same length."""
+class Plot(NamedTuple):
+    """A plot of curves: its title, and its groups with their root entities."""
+
+    title: str
+    groups: Sequence[tuple[str, Group]]
+
+
+def _alone(group: Group | None) -> Plot | None:
+    """Return a plot of a group of the only run, if there is one."""
+    return Plot(group.title, [("", group)]) if group else None
+
+
+def _of_both(key: Any, found: Sequence[Mapping[Any, Group]]) -> Plot | None:
+    """Return a plot of a group of both runs; None if neither has it."""
+    pair = [(root, of[key]) for root, of in zip(("/a", "/b"), found, strict=True) if key in of]
+    return Plot(f"{pair[0][1].title} of A (wide) and B", pair) if pair else None
+
+
+def _apart(group: Group | None) -> Plot | None:
+    """Return a plot of a difference, if there is one."""
+    return Plot(f"B - A: {group.title}", [("/difference", group)]) if group else None
+
+
+def _known(plots: Iterable[Plot | None]) -> list[Plot]:
+    return [one for one in plots if one]
+
+
+def _rows(rows: Iterable[Iterable[Plot | None]]) -> list[list[Plot]]:
+    """Return the rows that hold plots."""
+    return [found for row in rows if (found := _known(row))]
+
+
+def _abreast(plots: Sequence[Plot], most: int = ABREAST) -> list[list[Plot]]:
+    """Return rows of at most so many plots, of about the same length, and of fewer where legends would hide curves."""
+    fitting = [k for k in range(1, most + 1) if all(_legend_part(plot, WIDTH / k) < MOST_LEGEND for plot in plots)]
+    most = max(fitting, default=1)
+    abreast = -(-len(plots) // -(-len(plots) // most)) if plots else 1
+    return [list(plots[k : k + abreast]) for k in range(0, len(plots), abreast)]
+
+
+def _stacked(
+    rows: Sequence[Sequence[Plot]],
+    shares: Sequence[float],
+    timeline: Timeline,
+    runs: Sequence[Run],
+    roots: Sequence[str],
+    name: str | None = None,
+) -> rrb.Container:
+    """Return rows of plots, with these shares of the height, and below them the states of the runs with these roots."""
     import rerun.blueprint as rrb
 
-    abreast = -(-len(views) // -(-len(views) // most)) if views else 1
-    return [rrb.Horizontal(*views[k : k + abreast]) for k in range(0, len(views), abreast)]
-
-
-def _both(path: str, timeline: Timeline, runs: tuple[Run, Run], loads: Sequence[Mapping[str, Group]]) -> rrb.View:
-    """Return a plot of the efforts of one unit of both runs."""
-    pair = [(root, of[path]) for root, of in zip(("/a", "/b"), loads, strict=True) if path in of]
-    return plot(f"{pair[0][1].title} of A (wide) and B", pair, timeline, runs, NARROW)
+    lanes = (0.0, STATUS, LANES)[len(roots)]
+    height = HEIGHT * (1.0 - lanes) / (sum(shares) or 1.0)
+    views: list[rrb.Container | rrb.View] = [
+        rrb.Horizontal(*[plot(*one, timeline, runs, WIDTH / len(row), share * height) for one in row])
+        for row, share in zip(rows, shares, strict=True)
+    ]
+    if roots:
+        views.append(status_view(roots, timeline, runs))
+        shares = [*shares, lanes / (1.0 - lanes) * sum(shares) or 1.0]
+    return rrb.Vertical(*views, row_shares=list(shares), name=name)
 
 
 def _left(linkage: rrb.View | rrb.Container | None, roots: Sequence[str], runs: Sequence[Run]) -> rrb.Container:
@@ -155,20 +190,6 @@ def _left(linkage: rrb.View | rrb.Container | None, roots: Sequence[str], runs: 
     if any(notable_events(run) for run in runs):
         return rrb.Vertical(linkage, card_view(), log_view(roots), row_shares=[1.5, 0.9, 0.6])
     return rrb.Vertical(linkage, card_view(), row_shares=[1.7, 1.0])
-
-
-def _overlaid(
-    order: str, timeline: Timeline, runs: tuple[Run, Run], curves: Sequence[Mapping[tuple[str, str], Group]]
-) -> rrb.Container | None:
-    """Return plots of the curves of both runs, one for each unit; None if they have none of that order."""
-    import rerun.blueprint as rrb
-
-    plots = []
-    for kind in KINDS:
-        pair = [(root, of[order, kind]) for root, of in zip(("/a", "/b"), curves, strict=True) if (order, kind) in of]
-        if pair:
-            plots.append(plot(f"{pair[0][1].title} of A (wide) and B", pair, timeline, runs))
-    return rrb.Horizontal(*plots) if plots else None
 
 
 def arranged(content: rrb.Container, timeline: Timeline, runs: Sequence[Run]) -> rrb.Blueprint:
@@ -217,29 +238,49 @@ def plot(
     groups: Sequence[tuple[str, Group]],
     timeline: Timeline,
     runs: Sequence[Run],
-    width: float = PLOT,
+    width: float = WIDTH / 2,
+    height: float = HEIGHT / 4,
 ) -> rrb.TimeSeriesView:
-    """Return a plot of curves with a legend; groups: (root entity, group); width: of the plot [points]."""
+    """Return a plot of curves with a legend; groups: (root entity, group); width, height: of the plot [points]."""
     import rerun.blueprint as rrb
 
-    names = [name for _, group in groups for name in group.names]
-    has_legend = len(names) > 1  # a long legend scrolls
-    ranges = [group.shown for _, group in groups if group.shown]
-    axis_y = rrb.ScalarAxis(range=(min(low for low, _ in ranges), max(high for _, high in ranges))) if ranges else None
+    has_legend = sum(len(group.names) for _, group in groups) > 1  # a long legend scrolls
+    after = min(max(_legend_part(Plot(title, groups), width), LEAST_LEGEND), MOST_LEGEND)
+    ranges = [group.extent for _, group in groups if group.extent]
+    low, high = min((low for low, _ in ranges), default=0.0), max((high for _, high in ranges), default=0.0)
     return rrb.TimeSeriesView(
         name=title,
         origin="/",
         contents=[f"{root}/{group.path}" for root, group in groups],
-        axis_x=time_axis(timeline, runs, _legend_part(names, width) if has_legend else LABEL / width),
-        axis_y=axis_y,
+        axis_x=time_axis(timeline, runs, after if has_legend else LABEL / (width - NUMBERS)),
+        axis_y=rrb.ScalarAxis(range=with_two_labels(low, high, height - CAPTION)) if ranges else None,
         plot_legend=rrb.PlotLegend(corner="RightTop", visible=has_legend),
     )
 
 
-def _legend_part(names: Sequence[str], width: float) -> float:
-    """Return the part of the run's time that the legend of these curves hides in a plot of this width [points]."""
-    legend = LEGEND_EDGE + LETTER * max(map(len, names))
-    return min(max(legend / max(width - legend, 1.0), LEAST_LEGEND), MOST_LEGEND)
+def with_two_labels(low: float, high: float, height: float) -> tuple[float, float]:
+    """Return a range of y with at least two labels on an axis of this height [points]: one alone, 0, states no scale.
+
+    The range ends beyond a label if it holds less than two.
+    """
+    step = 10.0 ** math.ceil(math.log10(LABELLED * (high - low) / max(height, LABELLED)))
+    first, last = math.ceil(low / step), math.floor(high / step)
+    if last > first:
+        return low, high
+    below, above, edge = (first - 1) * step, (last + 1) * step, EDGE_Y * step
+    is_nearer_above = above - high < low - below
+    if last < first or not is_nearer_above:
+        low = below - edge
+    if last < first or is_nearer_above:
+        high = above + edge
+    return low, high
+
+
+def _legend_part(plot: Plot, width: float) -> float:
+    """Return the part of the run's time that the legend hides in a plot of this width [points], 0 without a legend."""
+    names = [name for _, group in plot.groups for name in group.names]
+    legend = LEGEND_EDGE + LETTER * max(map(len, names), default=0)
+    return legend / max(width - NUMBERS - legend, 1.0) if len(names) > 1 else 0.0
 
 
 def linkage_view(

@@ -13,7 +13,16 @@ from kinfmu.log.cdr import nanoseconds
 from kinfmu.log.viewer.blueprint import compared
 from kinfmu.log.viewer.card import plain
 from kinfmu.log.viewer.decimated import decimated
-from kinfmu.log.viewer.differences import common, difference_of, differs, loads_of, most_apart
+from kinfmu.log.viewer.differences import (
+    SAME,
+    common,
+    difference_of,
+    loads_apart,
+    loads_of,
+    most_apart,
+    moves_apart,
+    size_of,
+)
 from kinfmu.log.viewer.linkage import Linkage
 from kinfmu.log.viewer.loads import log_loads
 from kinfmu.log.viewer.package import require_viewer
@@ -28,6 +37,7 @@ from kinfmu.scene import palette
 from kinfmu.scene.scene import drawable
 
 MOST_LISTED = 6  # coordinates that a line names
+MOST_PERCENT = 1000  # of a difference; a larger part states only that the value in A is small
 MOST_ROWS = 10  # efforts of the card's table
 
 
@@ -77,12 +87,10 @@ def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = 
     differences = groups(apart) if apart else {}
     curves = [groups(run) for run in shown]
     loads = [{group.path: group for group in loads_of(run)} for run in shown]
-    load_differences = {group.path: group for group in loads_of(apart)} if apart else {}
-    moved = {key: group for key, group in differences.items() if differs(group, curves[0].get(key))}
-    loaded = [group for path, group in load_differences.items() if differs(group, loads[0].get(path))]
-    layout = compared(
-        timeline, (shown[0], shown[1]), scenes, curves, moved or ({} if loaded else differences), loads, loaded
-    )
+    load_differences = loads_of(apart) if apart else []
+    moved = {key: group for key, group in differences.items() if moves_apart(group, curves[0].get(key))}
+    loaded = loads_apart(load_differences, loads[0])
+    layout = compared(timeline, (shown[0], shown[1]), scenes, curves, moved, loads, loaded)
     in_views = [group for found in (*curves, differences) for group in found.values()]
     own_name = application(shown, [*in_views, *loads[0].values(), *loads[1].values(), *moved.values(), *loaded])
     with recording(path, f"{names[0]} and {names[1]}", layout, own_name) as rec:
@@ -98,7 +106,7 @@ def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = 
             for group in (*own.values(), *loads[number].values()):
                 log_group(rec, look.root, timeline, drawn, _named(group, look), look.curves)
             log_status(rec, look.root, timeline, timeline.placed(run))
-        for group in (*differences.values(), *load_differences.values()):
+        for group in (*differences.values(), *load_differences):
             log_group(rec, "/difference", timeline, apart or a, group)
         decimation = [
             f"{look.name}: {text}"
@@ -157,9 +165,9 @@ def _card(a: Run, b: Run, difference: Run | None, names: tuple[str, str], notes:
         lines += [f"{_differ(a)}: B is interpolated linearly at those of A.", ""]
     lines += _loads(a, difference)
     apart, equal = [], []
+    visible = [_visible(a, difference, table) for table in ("values", "rates", "accelerations")]
     for k, name in enumerate(difference.outputs):
-        tables = (difference.values, difference.rates, difference.accelerations)
-        largest = [_largest(table[:, k]) for table in tables]
+        largest = [_largest(table[:, k]) for table in visible]
         if set(largest) <= {"0", "-"} and "0" in largest:
             equal.append(plain(name))
         else:
@@ -167,7 +175,7 @@ def _card(a: Run, b: Run, difference: Run | None, names: tuple[str, str], notes:
     if apart:
         lines += ["| largest difference | position | velocity | acceleration |", "|---|---:|---:|---:|", *apart, ""]
     if equal:
-        lines += [f"Equal in both: {', '.join(equal)}.", ""]
+        lines += [f"Equal in both, to a billionth of the largest value: {', '.join(equal)}.", ""]
     return "\n".join(lines)
 
 
@@ -192,8 +200,25 @@ def _loads(a: Run, difference: Run) -> list[str]:
     ]
 
 
+def _visible(a: Run, difference: Run, table: str) -> FloatArray:
+    """Return a table of B - A in which columns that are only round-off, of the largest value of their kind, are 0."""
+    apart, own = np.array(getattr(difference, table)), getattr(a, table)
+    of_a = [a.outputs.index(name) for name in difference.outputs]
+    for is_angle in (True, False):
+        columns = [k for k, name in enumerate(difference.outputs) if name.is_angle == is_angle]
+        largest = size_of(own[:, [of_a[k] for k in columns]][a.good])
+        for k in columns:
+            if size_of(apart[:, k]) <= SAME * largest:
+                apart[np.isfinite(apart[:, k]), k] = 0.0
+    return apart
+
+
 def _percent(part: float) -> str:
-    return f"{100.0 * part:.2g} %" if part < np.inf else "-"
+    """Return '2.5 %', '113 %' or, where the value in A is small, 'over 1000 %'."""
+    percent = 100.0 * part
+    if percent > MOST_PERCENT:
+        return f"over {MOST_PERCENT} %" if part < np.inf else "-"
+    return f"{percent:.2g} %" if percent < 10.0 else f"{percent:.0f} %"
 
 
 def _differ(run: Run) -> str:

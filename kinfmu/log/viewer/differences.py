@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import axis_of
 from kinfmu.units import CoordinateName, ForceName, SignalName, unit_of
 
-SAME = 1e-9  # of the largest value; smaller differences are not visible
+SAME = 1e-9  # of the largest value, a billionth; smaller differences are not visible
 
 
 class Apart(NamedTuple):
@@ -80,28 +80,44 @@ def loads_of(run: Run) -> list[Group]:
     return [*efforts(run), *reactions(run), *signals(run)]
 
 
-def differs(group: Group, own: Group | None) -> bool:
-    """Return True if a difference is visible, compared with the curves of a run itself."""
-    return own is None or _size(group.values) > SAME * _size(own.values)
+def moves_apart(group: Group, own: Group | None) -> bool:
+    """Return True if a difference of coordinates is visible, compared with the curves of a run itself."""
+    return own is None or size_of(group.values) > SAME * max(size_of(own.values), *map(abs, own.shown or (0.0,)))
+
+
+def loads_apart(differences: Sequence[Group], own: Mapping[str, Group]) -> list[Group]:
+    """Return the differences of efforts, reactions and signals that are visible, compared with all of their unit."""
+    sizes: dict[str, float] = {}
+    for path, group in own.items():
+        sizes[_kind(path)] = max(size_of(group.values), sizes.get(_kind(path), 0.0))
+    return [one for one in differences if size_of(one.values) > SAME * sizes.get(_kind(one.path), 0.0)]
+
+
+def _kind(path: str) -> str:
+    """Return 'torque' for 'reactions/torque'; the paths of signals are kinds of their own."""
+    return path if path.startswith("signals") else path.rpartition("/")[2]
 
 
 def most_apart(a: Run, difference: Run) -> list[Apart]:
-    """Return forces, reactions and signals that differ, those that differ most of their size first."""
-    found = []
+    """Return forces, reactions and signals that differ visibly, those that differ most of their size first."""
     names: tuple[ForceName | SignalName, ...] = (
         *difference.force_names,
         *difference.reaction_names,
         *difference.signal_names,
     )
+    found, sizes = [], dict[str, float]()
     for name in names:
         if name in difference.absent:
             continue
-        largest, size = (_size(np.where(a.good, run[name], np.nan)) for run in (difference, a))
-        if largest > SAME * size:
-            unit = name.unit if isinstance(name, SignalName) else unit_of(name.quantity, a.length_unit)
-            found.append(Apart(name, largest, unit, largest / size if size else np.inf))
-    return sorted(found, key=lambda one: -one.part)
+        largest, size = (size_of(np.where(a.good, run[name], np.nan)) for run in (difference, a))
+        unit = name.unit if isinstance(name, SignalName) else unit_of(name.quantity, a.length_unit)
+        kind = name if isinstance(name, SignalName) else unit
+        sizes[kind] = max(size, sizes.get(kind, 0.0))
+        found.append((kind, Apart(name, largest, unit, largest / size if size else np.inf)))
+    visible = [one for kind, one in found if one.largest > SAME * sizes[kind]]
+    return sorted(visible, key=lambda one: -one.part)
 
 
-def _size(values: FloatArray) -> float:
+def size_of(values: FloatArray) -> float:
+    """Return the largest size of the numbers among values; 0 without any."""
     return float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))

@@ -130,7 +130,7 @@ def application(runs: Sequence[Run], groups: Iterable[Group]) -> str:
 
     The viewer keeps one layout per application, so recordings that need another layout get another id.
     """
-    ranges = [(group.path, group.shown) for group in groups]
+    ranges = [(group.path, group.extent) for group in groups]
     spans = [(float(run.t.min()), float(run.t.max())) for run in runs if len(run)]
     facts = repr(
         (spans, ranges, [(run.mechanism_text, run.outputs, run.axis, bool(notable_events(run))) for run in runs])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -29,6 +30,21 @@ class Group:
     values: FloatArray
     shown: tuple[float, float] | None = None
     is_stepped: bool = False
+
+    @cached_property
+    def extent(self) -> tuple[float, float] | None:
+        """The range of the axis before its labels are placed; None for Rerun's own: of diagnostics, and of constants.
+
+        It is `shown`, or contains all values and ends at 2 digits, so that equal motions have equal layouts.
+        """
+        known = self.values[np.isfinite(self.values)]
+        if self.shown or self.path.startswith("solver/") or not len(known):
+            return self.shown
+        low, high = float(known.min()), float(known.max())
+        if not 0.0 < high - low < np.inf:
+            return None
+        digit = 10.0 ** (np.floor(np.log10(high - low)) - 1.0)
+        return float(np.floor(low / digit - 1.0) * digit), float(np.ceil(high / digit + 1.0) * digit)
 
     @property
     def is_scattered(self) -> bool:
@@ -86,7 +102,7 @@ def efforts(run: Run) -> list[Group]:
                 path=f"forces/{kind}",
                 title=f"{run.force_names[columns[0]] if len(columns) == 1 else kind} "  # one curve has no legend
                 f"[{unit_of(Quantity(kind), run.length_unit)}]",
-                names=tuple(str(run.force_names[k]) for k in columns),
+                names=tuple(str(run.force_names[k]).removesuffix("_energy") for k in columns),
                 colours=tuple(palette.body(place) for place in range(len(columns))),
                 values=values,
                 shown=shown_range(values, size),

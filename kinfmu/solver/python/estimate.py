@@ -8,9 +8,6 @@ which moves all blocks that come after it. The effect on outputs and rates is co
 velocity and acceleration are formed again at the moved pose, so that they contain the effect of a bad condition and of
 rounding at each stage. The estimate is the sum over the sources. Near a singular point, of determinant m, errors grow
 like 1/m, 1/m^2, 1/m^3. On a bridge the source is the difference of its two widths and the errors of its nodes.
-
-Where no pose is bridged and no block has more than two unknowns, no code here branches on a value, so that it also
-takes arrays, the values of many poses at once (see kinfmu.fmu.block_estimates).
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ import kinfmu
 from kinfmu.errors import LogError
 from kinfmu.log import write_rrd
 from kinfmu.log.viewer import headless
-from kinfmu.log.viewer.comparison import in_common, write_comparison
+from kinfmu.log.viewer.comparison import _percent, in_common, write_comparison
 from kinfmu.log.viewer.rerun_file import _check_whole
 from kinfmu.run import Run
 from kinfmu.run.channels import select
@@ -193,7 +193,7 @@ def test_the_card_of_a_comparison_lists_what_differs_and_names_what_is_equal(run
     write_comparison(run, dataclasses.replace(run, values=moved), tmp_path / "compare.rrd")
     (text,) = documents(tmp_path / "compare.rrd", "/card")
     assert "| A.x | 0.25 | 0 | 0 |" in text
-    assert "Equal in both: crank.phi, coupler.x, coupler.y, coupler.phi, rocker.phi, A.y." in text
+    assert "of the largest value: crank.phi, coupler.x, coupler.y, coupler.phi, rocker.phi, A.y." in text
     assert "coupler.x |" not in text
 
 
@@ -210,7 +210,7 @@ def test_runs_that_differ_in_forces_only_are_compared_by_their_forces(tmp_path: 
     assert "| parameter | A | B |\n|---|---:|---:|\n| g | 1 | 2 |" in text
     apart = b["crank.torque"] - a["crank.torque"]
     largest, part = np.abs(apart).max(), np.abs(apart).max() / np.abs(a["crank.torque"]).max()
-    assert f"| crank.torque | {largest:.3g} N m | {100.0 * part:.2g} % |" in text
+    assert f"| crank.torque | {largest:.3g} N m | {100.0 * part:.0f} % |" in text
     assert "| kinetic" not in text
     parts = [float(line.split("|")[3].strip(" %")) for line in text.splitlines() if line.endswith("% |")]
     assert parts == sorted(parts, reverse=True)
@@ -221,6 +221,35 @@ def test_runs_that_differ_in_forces_only_are_compared_by_their_forces(tmp_path: 
         tmp_path / "compare.rrd"
     )
     assert verified(tmp_path / "compare.rrd")
+
+
+def test_round_off_of_two_runs_is_no_difference(tmp_path: Path) -> None:
+    """An engine whose moment at the guide is round-off alone: neither in the table nor in plots."""
+    times = np.linspace(0.0, 0.04, 101)
+    a = kinfmu.solve(kinfmu.load("engine"), times, engine="python")
+    b = kinfmu.solve(kinfmu.load("engine"), times, engine="native")
+    tables = {name: getattr(b, name) * (1.0 + 1e-14) for name in ("values", "rates", "accelerations", "reactions")}
+    write_comparison(a, b.replaced(**tables), tmp_path / "compare.rrd")
+    (text,) = documents(tmp_path / "compare.rrd", "/card")
+    assert "Equal in both, to a billionth of the largest value: crank.phi, rod.x, rod.y, rod.phi, piston.y." in text
+    assert "largest difference" not in text
+    assert "%" not in text
+    blueprint = subprocess.run(
+        [headless.executable(), "rrd", "print", "-vvv", str(tmp_path / "compare.rrd")],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    assert "of A (wide) and B" in blueprint
+    assert "B - A: " not in blueprint
+
+
+@pytest.mark.parametrize(
+    ("part", "text"),
+    [(0.0123, "1.2 %"), (0.0999, "10 %"), (2.04, "204 %"), (9.99, "999 %"), (11.0, "over 1000 %"), (np.inf, "-")],
+)
+def test_parts_are_percent_without_powers_of_ten(part: float, text: str) -> None:
+    assert _percent(part) == text
 
 
 def test_runs_of_different_times_are_compared_by_interpolation(tmp_path: Path) -> None:

@@ -37,7 +37,8 @@ def _selected(path: Path) -> None:
 
 
 def _compared(path: Path) -> None:
-    write_comparison(fourbar(np.arange(181.0)), with_gap(fourbar(np.arange(0.0, 181.0, 0.5)), 40, 60), path)
+    other = with_gap(fourbar(np.arange(0.0, 181.0, 0.5)), 40, 60)
+    write_comparison(fourbar(np.arange(181.0)), other.replaced(values=1.01 * other.values), path)
 
 
 def _loaded(path: Path) -> None:
