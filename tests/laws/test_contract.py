@@ -62,6 +62,23 @@ def test_no_key_of_a_law_is_a_key_of_a_joint_or_driver(cls: type[Law]) -> None:
 
 
 @every_law
+@given(data=st.data())
+def test_steps_of_a_path_through_a_law_never_turn_back_and_are_bounded(cls: type[Law], data: st.DataObject) -> None:
+    """Where there are none, the law is straight; tables are bent at their ends."""
+    law = data.draw(laws(cls))
+    constants = {name: constant.value for name, constant in law.constants().items()}
+    x = np.sort(data.draw(st.lists(coordinates, min_size=2, max_size=8)))
+    steps = [float(law.fewest_steps(float(at), **constants)) for at in x]
+    changes = np.diff(steps)
+    slack = 1e-9 * (1.0 + max(map(abs, steps)))
+    assert (changes >= -slack).all() or (changes <= slack).all()
+    assert (np.abs(changes) <= float(law.most_steps(**constants)) * np.diff(x) + slack).all()
+    if cls not in (Polynomial, Spline) and np.ptp(steps) == 0.0:
+        middle = law.at(0.5 * (x[0] + x[-1]))
+        assert middle == pytest.approx(0.5 * (law.at(x[0]) + law.at(x[-1])), abs=1e-9)
+
+
+@every_law
 @given(data=st.data(), x=coordinates)
 def test_a_traced_law_has_the_bits_of_the_formula_and_its_exact_derivatives(
     cls: type[Law], data: st.DataObject, x: float
