@@ -19,6 +19,8 @@ from kinfmu.plan.companions import BlockStructure, with_companions
 from kinfmu.plan.trace import Tracer, is_parameter
 from kinfmu.units import CoordinateName
 
+_LEAST_DIVISOR = 0.5  # of the largest factor of a length in a row: along an axis 1e-6 rad from x, y follows from x
+
 
 @dataclass(frozen=True)
 class Structure:
@@ -142,8 +144,11 @@ def _with_assignments(
     for index in rows:
         traced = row(index, known)
         inside = [one.coordinate for one in symbols([traced]) if one.coordinate is not None and one.name in columns]
-        for name in sorted(inside, key=lambda name: (name.is_angle, columns.index(name))):
-            if name in assigned or linear_coefficient(traced, tracer.symbols[name]) is None:
+        inside.sort(key=lambda name: (name.is_angle, columns.index(name)))
+        factors = [abs(linear_coefficient(traced, tracer.symbols[name]) or 0.0) for name in inside]
+        largest = max((factor for name, factor in zip(inside, factors, strict=True) if not name.is_angle), default=0.0)
+        for name, factor in zip(inside, factors, strict=True):
+            if name in assigned or factor == 0.0 or (factor < _LEAST_DIVISOR * largest and not name.is_angle):
                 continue
             others = {other for other in inside if other != name}
             if _reaches(needs, others, name):
