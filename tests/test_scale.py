@@ -339,20 +339,22 @@ def far_slider_crank(x: float, y: float) -> tuple[Mechanism, Residual]:
         [
             Body("ground", {"O": (x, y)}),
             Body("crank", {"O": (0, 0), "P": (1, 0)}, (x, y, 0.5)),
+            Body("rod", {"P": (0, 0), "S": (2.5, 0)}, (x + 0.88, y + 0.48, -0.19)),
             Body("slider", {"S": (0, 0)}, (x + 3.3, y, 0)),
         ],
         [
             Revolute("O", ("ground.O", "crank.O")),
-            Distance("rod", ("crank.P", "slider.S"), 2.5),
+            Revolute("P", ("crank.P", "rod.P")),
+            Revolute("S", ("rod.S", "slider.S")),
             Translational("rail", ("ground.O", "slider.S")),
         ],
         [CoordinateDriver("slide", "slider.S", "x", ConstantSpeed(x + 3.3, -1.0))],
-        coordinates=("crank.phi", "slider.x"),
+        coordinates=("crank.phi", "rod.phi", "slider.x"),
     )
 
     def residual(q: Sequence[Any], u: Any) -> list[Any]:
-        dx, dy = x + oracle.cos(q[0]) - q[1], oracle.sin(q[0])
-        return [dx * dx + dy * dy - mp.mpf(2.5) ** 2, q[1] - u]
+        crank, rod = ((oracle.cos(phi), oracle.sin(phi)) for phi in q[:2])
+        return [x + crank[0] + rod[0] * 2.5 - q[2], crank[1] + rod[1] * 2.5, q[2] - u]
 
     return mechanism, residual
 
@@ -421,7 +423,7 @@ def far_rack(x: float, y: float) -> tuple[Mechanism, Residual]:
 def test_estimates_count_the_offset_of_what_is_tied_to_the_world(
     made: Callable[[float, float], tuple[Mechanism, Residual]], engine: Literal["python", "native"]
 ) -> None:
-    for sizes in (30.0, 1000.7, 1e5 + 0.7, *([] if made is far_slider_crank else [1e6 + 0.7, 1e8 + 0.7])):
+    for sizes in (30.0, 1000.7, 1e6 + 0.7, *([] if made is far_slider_crank else [1e8 + 0.7])):
         mechanism, residual = made(sizes, -sizes)
         run = kinfmu.solve(mechanism, np.linspace(0.0, 1.2, 13), engine=engine)
         assert run.good.all()
