@@ -39,9 +39,9 @@ def numbers_of(name: str, values: ArrayLike, what: str = "numbers") -> FloatArra
             values = np.ma.stack(list(map(np.ma.asanyarray, items)))
         array = np.asanyarray(values)
         types |= set(map(type, array.ravel().tolist())) if array.dtype == object else {array.dtype.type}
-        for kinds, said in _NO_NUMBERS.items():
+        for kinds, what_they_are in _NO_NUMBERS.items():
             if any(issubclass(one, kinds) for one in types):
-                raise RequestError(f"{name} must be {what}, not {said}")
+                raise RequestError(f"{name} must be {what}, not {what_they_are}")
         if np.ma.is_masked(array):
             place = np.argwhere(np.ma.getmaskarray(array))[0]
             where = f"[{', '.join(map(str, place))}]" if array.ndim else ""
