@@ -3,20 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import AngleDriver, Body, ConstantSpeed, Distance, Mechanism, Revolute, Run, Translational
+from kinfmu import (
+    AngleBetween,
+    AngleDriver,
+    Body,
+    ConstantSpeed,
+    CoordinateDriver,
+    CoordinateOf,
+    Coupling,
+    Distance,
+    Mechanism,
+    RackAndPinion,
+    Revolute,
+    Run,
+    Translational,
+)
 from kinfmu.errors import InconsistentError
 from kinfmu.plan import compile_plan
 from kinfmu.solver.python import Status
 from tests import oracle
 from tests.gallery_members import every_member
-from tests.oracle import Motion, largest_error, mp
+from tests.oracle import Motion, Residual, largest_error, mp
 from tests.scaled import scaled
 
 SCALES = [1e-6, 1e-3, 1.0, 1e3, 1e6]
@@ -315,3 +330,106 @@ def _slider_crank(crank: float, rod: float) -> Mechanism:
         ],
         [AngleDriver("crank", "crank", ConstantSpeed(1.0, 1.0))],
     )
+
+
+def far_slider_crank(x: float, y: float) -> tuple[Mechanism, Residual]:
+    """Its slider is driven by its coordinate in the world."""
+    mechanism = Mechanism(
+        "slider_crank",
+        [
+            Body("ground", {"O": (x, y)}),
+            Body("crank", {"O": (0, 0), "P": (1, 0)}, (x, y, 0.5)),
+            Body("rod", {"P": (0, 0), "S": (2.5, 0)}, (x + 0.88, y + 0.48, -0.19)),
+            Body("slider", {"S": (0, 0)}, (x + 3.3, y, 0)),
+        ],
+        [
+            Revolute("O", ("ground.O", "crank.O")),
+            Revolute("P", ("crank.P", "rod.P")),
+            Revolute("S", ("rod.S", "slider.S")),
+            Translational("rail", ("ground.O", "slider.S")),
+        ],
+        [CoordinateDriver("slide", "slider.S", "x", ConstantSpeed(x + 3.3, -1.0))],
+        coordinates=("crank.phi", "rod.phi", "slider.x"),
+    )
+
+    def residual(q: Sequence[Any], u: Any) -> list[Any]:
+        crank, rod = ((oracle.cos(phi), oracle.sin(phi)) for phi in q[:2])
+        return [x + crank[0] + rod[0] * 2.5 - q[2], crank[1] + rod[1] * 2.5, q[2] - u]
+
+    return mechanism, residual
+
+
+def far_tip(x: float, y: float) -> tuple[Mechanism, Residual]:
+    """A crank driven by a coordinate of its tip."""
+    mechanism = Mechanism(
+        "tip",
+        [Body("ground", {"O": (x, y)}), Body("crank", {"O": (0, 0), "P": (1, 0)}, (x, y, 0.5))],
+        [Revolute("O", ("ground.O", "crank.O"))],
+        [CoordinateDriver("tip", "crank.P", "x", ConstantSpeed(x + 0.9, -1.0))],
+        coordinates=("crank.phi",),
+    )
+    return mechanism, lambda q, u: [x + oracle.cos(q[0]) - u]
+
+
+def far_coupling(x: float, y: float) -> tuple[Mechanism, Residual]:
+    """An arm whose angle follows a coordinate of a crank's tip."""
+    slope, start = 20.0, -20.0 * (x + 0.9)
+    mechanism = Mechanism(
+        "coupling",
+        [
+            Body("ground", {"O": (x, y), "B": (x + 3.0, y)}),
+            Body("crank", {"O": (0, 0), "P": (1, 0)}, (x, y, 0.5)),
+            Body("arm", {"B": (0, 0), "E": (1, 0)}, (x + 3.0, y, 0.0)),
+        ],
+        [
+            Revolute("O", ("ground.O", "crank.O")),
+            Revolute("B", ("ground.B", "arm.B")),
+            Coupling("follow", CoordinateOf("crank.P", "x"), AngleBetween("arm"), ConstantSpeed(start, slope)),
+        ],
+        [AngleDriver("crank", "crank", ConstantSpeed(0.5, 1.0))],
+        coordinates=("crank.phi", "arm.phi"),
+    )
+    return mechanism, lambda q, u: [q[0] - u, q[1] - (start + slope * (x + oracle.cos(q[0])))]
+
+
+def far_rack(x: float, y: float) -> tuple[Mechanism, Residual]:
+    """A rack on a slope, driven by its coordinate in the world; the angle of its small pinion follows."""
+    axis, radius = 0.7, 0.05
+    mechanism = Mechanism(
+        "rack",
+        [
+            Body("ground", {"O": (x, y)}),
+            Body("pinion", {"O": (0, 0)}, (x, y, 0)),
+            Body("rack", {"p": (0, 0), "q": (1, 0)}, (x, y, axis)),
+        ],
+        [
+            Revolute("O", ("ground.O", "pinion.O")),
+            Translational("rail", ("ground.O", "rack.p"), axis, axis),
+            RackAndPinion("mesh", ("ground.O", "rack.p"), "pinion", radius, axis),
+        ],
+        [CoordinateDriver("push", "rack.p", "x", ConstantSpeed(x, 0.5))],
+        coordinates=("pinion.phi", "rack.x", "rack.y"),
+    )
+
+    def residual(q: Sequence[Any], u: Any) -> list[Any]:
+        c, s, dx, dy = mp.cos(axis), mp.sin(axis), q[1] - x, q[2] - y
+        return [q[1] - u, dy * c - dx * s, dx * c + dy * s - radius * q[0]]
+
+    return mechanism, residual
+
+
+@pytest.mark.parametrize("made", [far_slider_crank, far_tip, far_coupling, far_rack])
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_estimates_count_the_offset_of_what_is_tied_to_the_world(
+    made: Callable[[float, float], tuple[Mechanism, Residual]], engine: Literal["python", "native"]
+) -> None:
+    for sizes in (30.0, 1000.7, 1e6 + 0.7, *([] if made is far_slider_crank else [1e8 + 0.7])):
+        mechanism, residual = made(sizes, -sizes)
+        run = kinfmu.solve(mechanism, np.linspace(0.0, 1.2, 13), engine=engine)
+        assert run.good.all()
+        u, ud, udd = run.inputs.T.tolist()
+        exact = oracle.solve(residual, run.q, u, ud, udd)
+        for ours, wanted, estimate in zip((run.q, run.qd, run.qdd), exact, run.error.T, strict=True):
+            off = [largest_error(row, true) for row, true in zip(ours, wanted, strict=True)]
+            assert (np.array(off) <= estimate).all()
+        assert np.median(run.error[:, 0]) < 500.0 * sizes * 2.0**-52

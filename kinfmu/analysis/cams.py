@@ -36,6 +36,7 @@ from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.origin import in_world
+from kinfmu.run.numbers import numbers_of
 
 SLIDING_LIMIT, SWINGING_LIMIT = math.radians(30.0), math.radians(45.0)  # [rad], usual for pressure angles
 _ANGLES = 361  # of a table by default, one a degree
@@ -279,7 +280,7 @@ def cam_profile(
     if tolerance is not None:
         asked = angles_within(placed, tolerance, unit)
     else:
-        asked = np.linspace(0.0, TURN, _ANGLES) if angles is None else np.asarray(angles, dtype=float).reshape(-1)
+        asked = np.linspace(0.0, TURN, _ANGLES) if angles is None else numbers_of("angles", angles).reshape(-1)
     profile = profile_at(placed, asked, unit)
     if turned_by.transmission is None:
         return profile  # the driver's value is the cam's angle, or no single driver turns the cam

@@ -15,6 +15,7 @@ from kinfmu.mechanism import Mechanism
 CamJoint = CamTranslating | CamOscillating | CamRoller | CamFlatFace
 CAM_JOINTS = (CamTranslating, CamOscillating, CamRoller, CamFlatFace)
 NO_PROFILE = "the cam has no closed profile"
+_COAXIAL = 1e-12  # of the follower's arm: a pivot so close to the cam's axle is at it
 _PARALLEL = 1e-9  # sine of the angle between the guide of a follower and the axis of its lift
 
 
@@ -61,8 +62,8 @@ def placed_cam(mechanism: Mechanism, joint: CamJoint, poses: Mapping[str, tuple[
         poses: x, y [length] and phi [rad] by body, ground included; at least of cam, follower and holder.
 
     Raises:
-        MechanismError: The law does not repeat after a turn, the cam has no axle, or the follower no guide; the message
-            states which.
+        MechanismError: The law does not repeat after a turn, the cam has no axle, the follower no guide, or both turn
+            about one axle; the message states which.
 
     """
     at = Placement({name: BodyFrame.of(*pose) for name, pose in poses.items()}, mechanism.body_points)
@@ -85,12 +86,18 @@ def placed_cam(mechanism: Mechanism, joint: CamJoint, poses: Mapping[str, tuple[
     centre = axle.between[0]
     own = axle.between[axle.bodies().index(cam)]
     pivot = seen(holder, at.vector((centre, guide.between[0]))) if isinstance(guide, Revolute) else None
+    touched = seen(holder, at.vector((centre, touching)))
+    if pivot is not None and isinstance(joint, CamRoller | CamFlatFace) and abs(pivot) <= _COAXIAL * abs(touched):
+        raise MechanismError(
+            f"{where}: {NO_PROFILE}: the follower '{follower}' is pinned at the cam's axle, '{guide.between[0]}', so "
+            f"that it turns with the cam; pin it at another point of '{holder}'"
+        )
     direction = 0j
     if isinstance(guide, Translational):
         direction = seen(holder, at.direction(guide.bodies()[0], guide.axis))
         if isinstance(joint, CamTranslating):
             direction = _lift_axis(joint, direction)
-        elif (seen(holder, at.vector((centre, touching))) * direction.conjugate()).real < 0.0:
+        elif (touched * direction.conjugate()).real < 0.0:
             direction = -direction  # outwards
     normal = getattr(joint, "normal", None)
     return PlacedCam(
@@ -103,7 +110,7 @@ def placed_cam(mechanism: Mechanism, joint: CamJoint, poses: Mapping[str, tuple[
         turn=float(at.angle(cam) - at.angle(holder)),
         swing=float(at.angle(follower) - at.angle(holder)),
         quantity=float(joint.follower().value(at)) if isinstance(joint, CamTranslating | CamOscillating) else 0.0,
-        point=seen(holder, at.vector((centre, touching))),
+        point=touched,
         pivot=pivot,
         direction=direction,
         normal=None if normal is None else seen(holder, at.direction(follower, normal)),

@@ -215,5 +215,6 @@ def _renamed(block: Block, names: dict[CoordinateName, CoordinateName], new: dic
         velocity=tuple(new[node] for node in block.velocity),
         acceleration=tuple(new[node] for node in block.acceleration),
         determinant_scale=block.determinant_scale,
+        row_offset=block.row_offset,
         usual=block.usual,
     )

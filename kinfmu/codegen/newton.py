@@ -14,6 +14,7 @@ from kinfmu.plan import Block
 ROUND_OFF = 4e-16  # residual relative to the size below which more steps gain nothing at regular poses
 SETTLED = 1e-13  # residual from which Newton may stop when it no longer falls fourfold
 SETTLED_TALL = 1e-10  # the same of more rows than unknowns: lengths that are consistent to 1e-11 keep them open
+FARTHEST = 5e3  # [sizes]; the residual of a mechanism farther off must still fall below 5e-10, for the usual tolerance
 ITERATIONS = 12
 
 Rows = Sequence[Sequence[str]]
@@ -22,11 +23,6 @@ Rows = Sequence[Sequence[str]]
 def is_small(block: Block) -> bool:
     """Return True for a square block of one or two unknowns, whose solves are unrolled."""
     return len(block.unknowns) <= 2 and len(block.residuals) == len(block.unknowns)
-
-
-def settled_square(block: Block) -> float:
-    """Return the squared residual from which Newton may stop when it no longer falls fourfold."""
-    return float((SETTLED_TALL if len(block.residuals) > len(block.unknowns) else SETTLED) ** 2)
 
 
 def determinant(jacobian: Rows) -> str:
@@ -65,6 +61,17 @@ def square(r: Sequence[str], scales: Sequence[float]) -> str:
         total = " + ".join(f"{name} * {name}" for name in r)
         return total if scales[0] == 1.0 else f"({total}) * {scales[0] ** -2!r}"
     return " + ".join(f"{name} * {name} * {scale**-2!r}" for name, scale in zip(r, scales, strict=True))
+
+
+def settled(block: Block, starts: Iterable[str]) -> str:
+    """Return the squared residual from which Newton may stop when it no longer falls.
+
+    Large numbers are rounded more; those of the start count, so that a diverging iteration gets no larger tolerance.
+    starts: names of the unknowns before the prediction.
+    """
+    sizes = [repr(1.0 + min(block.row_offset, FARTHEST) ** 2), *(f"{start} * {start}" for start in starts)]
+    least = SETTLED_TALL if len(block.residuals) > len(block.unknowns) else SETTLED
+    return f"{least**2!r} * ({' + '.join(sizes)})"
 
 
 def _product(a: str, b: str) -> str:

@@ -14,9 +14,10 @@ from kinfmu.laws.law import Jumps
 from kinfmu.loads import Load
 from kinfmu.mechanism.valid import is_number, quoted
 from kinfmu.run import MOST_SAMPLES
+from kinfmu.run.numbers import numbers_of
 
 TIME = "time"  # the column of a table
-_VALID = "must be a number, a law of time, a function of t or of (t, state), or an array with 'time'"
+_VALID = "a number, a law of time, a function of t or of (t, state), or an array with 'time'"
 
 State = Mapping[str, float]  # values and speeds of the drivers by the names of their inputs
 Effort = Callable[[float, State], float]
@@ -69,7 +70,7 @@ def read_efforts(known: Sequence[str], given: Mapping[str, Any], span: tuple[flo
             by_name[name] = _table(name, times, value)
             jumps.update(t for t in times.tolist() if span[0] < t < span[1])
         else:
-            raise RequestError(f"{name} = {quoted(value)} {_VALID}")
+            raise RequestError(f"{name} = {quoted(value)} must be {_VALID}")
     return Efforts(by_name, tuple(sorted(jumps)))
 
 
@@ -127,20 +128,14 @@ def _function(name: str, function: Callable[..., Any]) -> Effort:
 
 
 def _times(values: Any) -> Any:
-    try:
-        times = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise RequestError("time must be numbers") from None
+    times = numbers_of("time", values)
     if times.ndim != 1 or len(times) == 0 or not np.isfinite(times).all() or not (np.diff(times) > 0.0).all():
         raise RequestError("time must be finite numbers that increase")
     return times
 
 
 def _table(name: str, times: Any, values: Any) -> Effort:
-    try:
-        column = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise RequestError(f"{name} {_VALID}") from None
+    column = numbers_of(name, values, _VALID)
     if column.shape != times.shape or not np.isfinite(column).all():
         raise RequestError(f"{name} must have {len(times)} finite numbers, one for each time")
     return lambda t, state: float(np.interp(t, times, column))  # noqa: ARG005  tables are over time

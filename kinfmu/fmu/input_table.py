@@ -18,6 +18,7 @@ from kinfmu.mechanism import RunSettings
 from kinfmu.mechanism.table_file import read_decimal
 from kinfmu.mechanism.valid import quoted
 from kinfmu.run import MOST_SAMPLES, Event
+from kinfmu.run.numbers import numbers_of
 from kinfmu.run.unwrap import is_long, unwrap
 from kinfmu.units import Quantity, factors, in_turns, looks_like_degrees, quantity_in, spelled
 
@@ -129,7 +130,7 @@ def _unwrapped(table: InputTable, quantities: Mapping[str, Quantity]) -> InputTa
 
 
 def _from_arrays(inputs: Mapping[str, ArrayLike], known: Sequence[str]) -> InputTable:
-    columns = {name: np.atleast_1d(np.asarray(values, dtype=float)) for name, values in inputs.items()}
+    columns = {name: np.atleast_1d(numbers_of(f"inputs: '{name}'", values)) for name, values in inputs.items()}
     _check_names("inputs", list(columns), known)
     rows = len(columns[TIME])
     for name, column in columns.items():

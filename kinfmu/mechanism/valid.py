@@ -36,8 +36,9 @@ def check_number(where: str, value: Any, written: object = None) -> None:
 
 
 def is_number(value: object) -> bool:
-    """Return True for real numbers, False for truth values."""
-    return isinstance(value, Real) and not isinstance(value, bool)
+    """Return True for real numbers, False for truth values and for durations, which numpy counts among the integers."""
+    is_duration = getattr(getattr(value, "dtype", None), "kind", "") == "m"
+    return isinstance(value, Real) and not isinstance(value, bool) and not is_duration
 
 
 def check_line(where: str, text: str) -> None:

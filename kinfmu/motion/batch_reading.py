@@ -40,6 +40,7 @@ from kinfmu.plan.trace import parameter_symbol
 from kinfmu.readings import Finding, LowestMargin, PressureAngle, Reading
 from kinfmu.run import Run
 from kinfmu.run.axis import TIME, axis_for
+from kinfmu.run.numbers import numbers_of
 from kinfmu.solver.python.status import Status
 from kinfmu.sweep import Model
 from kinfmu.sweep.designs import Batch, Driving, parts_of, solve_batch, solve_by_library
@@ -97,7 +98,7 @@ class BatchReading:
         if not self._readings:
             raise RequestError(f"there are no measures: {mechanism.name} declares none, or measures = []; give some")
         self._asked = dict(zip((one.name for one in self._readings), asked or mechanism.measures, strict=True))
-        given = {name: np.asarray(value, dtype=float) for name, value in inputs.items()}
+        given = {name: numbers_of(name, value) for name, value in inputs.items()}
         rows = max((len(array) for array in given.values() if array.ndim == 2), default=1)
         self._batch = batch = Batch(model, parameters, rows)
         self.parameters, self._count = batch.parameters, batch.count

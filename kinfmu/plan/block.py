@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from kinfmu.equations.graph import Node, evaluate, symbols
 from kinfmu.equations.system import Row, System
 from kinfmu.plan.companions import BlockStructure
+from kinfmu.plan.origin import FarRows
 from kinfmu.plan.structure import RowTracer, given_value
 from kinfmu.plan.trace import Tracer, is_parameter
 from kinfmu.units import CoordinateName
@@ -42,6 +43,7 @@ class Block:
     velocity: tuple[Node, ...]
     acceleration: tuple[Node, ...]
     determinant_scale: float  # the largest |determinant| of J over random poses, far from singular
+    row_offset: float  # of the numbers in the rows, in sizes, where they are far from the origin
     usual: tuple[float, ...]  # of three unknowns and more: largest lengths of the rows (if tall, columns) of J
 
     @property
@@ -97,10 +99,12 @@ def build_block(
     structure: BlockStructure,
     fixed: Mapping[str, Node],
     anchor: Mapping[str, float],
+    far: FarRows,
 ) -> Block:
     """Return a block; its rows are traced once, and all its formulas come from that trace.
 
-    anchor: values of all coordinates and parameters, by name of their symbols.
+    anchor: values of all coordinates and parameters, by name of their symbols. far: in the anchor; the scale of a
+    row is as large as its slope there.
     """
     known = ChainMap[str, Node]({}, fixed)  # type: ignore[arg-type]  # the fixed ones are not written to
     assigned = []
@@ -114,7 +118,7 @@ def build_block(
     solved = (*structure.rows, *structure.companions)
     unknowns = [tracer.symbols[name] for name in structure.unknowns]
     residuals = [row(index, known) for index in solved]
-    scales = tuple(float(system.rows[index].scale * system.size) for index in solved)
+    scales = tuple(float(max(system.rows[index].scale, far.slopes[index]) * system.size) for index in solved)
     if structure.companions:  # least squares weigh lengths against angles: as pure numbers
         residuals = [residual / scale for residual, scale in zip(residuals, scales, strict=True)]
         scales = (1.0,) * len(scales)
@@ -133,6 +137,7 @@ def build_block(
         velocity=tuple(rates.of(residuals, at_rest=unknowns)),
         acceleration=tuple(rates.second(residuals, unaccelerated=unknowns)),
         determinant_scale=scale,
+        row_offset=far.offset,
         usual=usual,
     )
 

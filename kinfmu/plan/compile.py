@@ -20,7 +20,7 @@ from kinfmu.plan.conditions import (
     refuse_negative_distances,
     refuse_undefined_loads,
 )
-from kinfmu.plan.origin import localized
+from kinfmu.plan.origin import far_rows, localized
 from kinfmu.plan.path_laws import find_path_laws
 from kinfmu.plan.plan import DriverInfo, MotionNodes, PlanParameter, SolvePlan, nodes_of, position_count
 from kinfmu.plan.structure import RowTracer, find_structure
@@ -102,8 +102,9 @@ def plan_from(
         motions, coordinate_count = _chosen(motions, coordinate_count, outputs, fixed)
     at_anchor: dict[str, float] = dict(zip(system.coordinates, map(float, anchor.q), strict=True))
     at_anchor |= {parameter_symbol(parameter.name): parameter.value for parameter in settable}
+    far = far_rows(system, anchor.q)
     blocks = _needed(
-        [build_block(system, tracer, row, rates, part, known, at_anchor) for part in structure.blocks],
+        [build_block(system, tracer, row, rates, part, known, at_anchor, far) for part in structure.blocks],
         [*(motion.position for motion in motions), *(known.get(name, tracer.symbols[name]) for name in solved)],
     )
     moving = {name for block in blocks for name in block.coordinates}
@@ -115,6 +116,7 @@ def plan_from(
     return SolvePlan(
         mechanism=mechanism,
         size=system.size,
+        row_offset=far.offset,
         origin=origin,
         drivers=tuple(DriverInfo(driver.name, driver.inputs(), driver.quantity) for driver in mechanism.drivers),
         law_constants=mechanism.law_constants,

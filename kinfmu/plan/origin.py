@@ -4,15 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from kinfmu.equations.system import FloatArray, size_of
+from kinfmu.equations.system import FloatArray, System, size_of
 from kinfmu.measures.arithmetic import decimal_sum
 from kinfmu.mechanism import Mechanism, Point, Start
 from kinfmu.units import CoordinateName
 
 FAR = 4.0  # sizes from the world's origin beyond which a mechanism is planned about a ground point of its own
+
+
+class FarRows(NamedTuple):
+    """How the rows of a mechanism are rounded that is tied to the world's origin and far from it.
+
+    offset: how many sizes it is away, 0 for any other mechanism: the numbers in its rows are that much larger than what
+    the rows are about. slopes: the largest |slope| of each row over a length, (m,), then 0 too.
+    """
+
+    offset: float
+    slopes: FloatArray
 
 
 def localized(mechanism: Mechanism) -> tuple[Mechanism, Point]:
@@ -24,12 +36,28 @@ def localized(mechanism: Mechanism) -> tuple[Mechanism, Point]:
     """
     ground = next(body for body in mechanism.bodies if body.is_ground)
     first = next(iter(ground.points.values()), Point(0.0, 0.0))
-    is_tied = any(driver.measured().is_absolute for driver in mechanism.drivers)
-    is_tied = is_tied or any(joint.depends_on_origin for joint in mechanism.joints)
-    is_tied = is_tied or any(load.depends_on_origin for load in mechanism.loads)
-    if is_tied or max(map(abs, first)) <= FAR * size_of(mechanism):
+    if _is_tied(mechanism) or max(map(abs, first)) <= FAR * size_of(mechanism):
         return mechanism, Point(0.0, 0.0)
     return _moved(mechanism, -first.x, -first.y), first
+
+
+def far_rows(system: System, q: FloatArray) -> FarRows:
+    """Return how rows are rounded in a pose q, (n,), of a mechanism that is far from the origin it is tied to."""
+    away = float(np.abs(q.reshape(-1, 3)[:, :2]).max(initial=0.0)) / system.size
+    if away <= FAR or not _is_tied(system.mechanism):
+        return FarRows(0.0, np.zeros(len(system.rows)))
+    is_length = [not name.is_angle for name in system.coordinates]
+    slopes = np.abs(system.jacobian(q)[:, is_length]).max(axis=1, initial=0.0)
+    return FarRows(float(f"{away:.2g}"), np.asarray(slopes))
+
+
+def _is_tied(mechanism: Mechanism) -> bool:
+    """Return whether a driver, a joint or a load prescribes or measures a coordinate in the world."""
+    return (
+        any(driver.measured().is_absolute for driver in mechanism.drivers)
+        or any(joint.depends_on_origin for joint in mechanism.joints)
+        or any(load.depends_on_origin for load in mechanism.loads)
+    )
 
 
 def relative_to(origin: Point, names: Sequence[CoordinateName], values: Mapping[str, float]) -> FloatArray:

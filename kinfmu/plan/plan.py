@@ -53,6 +53,7 @@ class SolvePlan:
     Attributes:
         mechanism: The mechanism that is planned.
         size: Of the mechanism [length]; residuals are relative to it.
+        row_offset: Of the bodies from the plan's origin, in sizes, where it is far: rows are rounded by so much more.
         origin: Place of the plan's own origin in the world; only outputs, `fixed` and start values are in the world.
         drivers: Names and quantities of the drivers, in file order.
         law_constants: Constants of the laws, settable at run time.
@@ -76,6 +77,7 @@ class SolvePlan:
 
     mechanism: Mechanism
     size: float
+    row_offset: float
     origin: Point
     drivers: tuple[DriverInfo, ...]
     law_constants: tuple[LawConstant, ...]
@@ -109,6 +111,11 @@ class SolvePlan:
         """Values of the coordinates that never move, with the parameters as written."""
         nodes = list(self.fixed_nodes.values())
         return dict(zip(self.fixed_nodes, evaluate(nodes, self.parameter_values), strict=True))
+
+    @property
+    def offset(self) -> float:
+        """Distance of the mechanism from the world's origin, in sizes; 0 if it is near."""
+        return max(self.row_offset, *(abs(part) / self.size for part in self.origin))
 
     @property
     def outputs(self) -> tuple[CoordinateName, ...]:

@@ -16,8 +16,11 @@ from kinfmu.equations.redundancy import Redundancy
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import MobilityError, listed
 from kinfmu.plan.companions import BlockStructure, with_companions
+from kinfmu.plan.origin import far_rows
 from kinfmu.plan.trace import Tracer, is_parameter
 from kinfmu.units import CoordinateName
+
+_LEAST_DIVISOR = 0.5  # of the largest factor of a length in a row: along an axis 1e-6 rad from x, y follows from x
 
 
 @dataclass(frozen=True)
@@ -71,8 +74,9 @@ def find_structure(system: System, tracer: Tracer, redundancy: Redundancy, pose:
         missed = [unknown[k] for k in order.unmatched_columns]
         spare = [system.rows[open_rows[k]].name for k in order.unmatched_rows]
         raise MobilityError(f"nothing determines {listed(missed)}; rows to spare: {listed(spare)}")
+    slopes = far_rows(system, pose).slopes
     blocks = [
-        _with_assignments(tracer, row, known, [open_rows[k] for k in rows], [unknown[k] for k in columns])
+        _with_assignments(tracer, row, known, [open_rows[k] for k in rows], [unknown[k] for k in columns], slopes)
         for rows, columns in order.blocks
     ]
 
@@ -135,15 +139,25 @@ def _with_assignments(
     known: Mapping[str, Node],
     rows: Sequence[int],
     columns: Sequence[CoordinateName],
+    slopes: FloatArray,
 ) -> BlockStructure:
-    """Return a block with assignments: rows that give a coordinate outright, without circles among them."""
+    """Return a block with assignments: rows that give a coordinate outright, without circles among them.
+
+    slopes: those of `FarRows`. An angle that follows from lengths there is not assigned, because its rounding
+    is counted as that of a solved row.
+    """
     needs: dict[CoordinateName, set[CoordinateName]] = {}  # assigned coordinate -> coordinates of the block in its row
     assigned: dict[CoordinateName, int] = {}
     for index in rows:
         traced = row(index, known)
         inside = [one.coordinate for one in symbols([traced]) if one.coordinate is not None and one.name in columns]
-        for name in sorted(inside, key=lambda name: (name.is_angle, columns.index(name))):
-            if name in assigned or linear_coefficient(traced, tracer.symbols[name]) is None:
+        inside.sort(key=lambda name: (name.is_angle, columns.index(name)))
+        factors = [abs(linear_coefficient(traced, tracer.symbols[name]) or 0.0) for name in inside]
+        largest = max((factor for name, factor in zip(inside, factors, strict=True) if not name.is_angle), default=0.0)
+        for name, factor in zip(inside, factors, strict=True):
+            if name in assigned or factor == 0.0 or (factor < _LEAST_DIVISOR * largest and not name.is_angle):
+                continue
+            if name.is_angle and slopes[index]:
                 continue
             others = {other for other in inside if other != name}
             if _reaches(needs, others, name):

@@ -25,11 +25,11 @@ from kinfmu.motion.needed import needed
 from kinfmu.plan import compile_plan
 from kinfmu.readings import Reading
 from kinfmu.run import FloatArray
+from kinfmu.run.numbers import numbers_of
 from kinfmu.studies.own_cycle import can_cycle, law_changing
 from kinfmu.studies.sampling import METHODS, Sampling
 from kinfmu.studies.variation import Grid, read_variation, whole_number
 from kinfmu.sweep import Model, compile, run_times  # noqa: A004  as re.compile
-from kinfmu.sweep.driving import numbers_of
 from kinfmu.sweep.engine import require_engine
 from kinfmu.sweep.model import WORTH_COMPILING
 

@@ -18,9 +18,10 @@ from kinfmu.mechanism.valid import LARGEST_NUMBER
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.plan import PlanParameter
 from kinfmu.run import FloatArray, Run
+from kinfmu.run.numbers import numbers_of
 from kinfmu.solver.python.status import Status
 from kinfmu.sweep.arguments import Arguments, Settings
-from kinfmu.sweep.driving import driven_by_inputs, numbers_of
+from kinfmu.sweep.driving import driven_by_inputs
 from kinfmu.sweep.engine import Driven
 from kinfmu.units import CoordinateName
 

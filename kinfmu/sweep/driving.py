@@ -14,13 +14,13 @@ from kinfmu.errors import KinfmuError, RequestError, listed, suggestion
 from kinfmu.mechanism import RunSettings
 from kinfmu.plan import DriverInfo
 from kinfmu.run import MOST_SAMPLES, FloatArray
+from kinfmu.run.numbers import numbers_of
 from kinfmu.run.unwrap import unwrap
 from kinfmu.sweep.engine import Driven
 
 LARGEST_RATE = 1e100  # of drivers; squares of much larger numbers are infinite
 _LARGEST_KEPT = 1_000_000  # numbers
 _FEW = 50  # numbers that are checked sooner one by one
-_DOUBLE = np.dtype(np.float64)
 _NUMBER = (float, int)
 _DEFAULTS = (0.0, 1.0, 0.0)  # of value (which must be given), speed and acceleration
 
@@ -169,21 +169,6 @@ def column_of(name: str, values: ArrayLike, rows: int = 1) -> FloatArray:
         place = np.unravel_index(int(np.argmin(np.isfinite(array))), array.shape)
         raise RequestError(f"{name}[{', '.join(map(str, place))}] is not a finite number")
     return array
-
-
-def numbers_of(name: str, values: ArrayLike, what: str = "numbers") -> FloatArray:
-    """Return an array of floats; raise a RequestError for truth values, complex numbers and what is no number."""
-    if type(values) is np.ndarray and values.dtype is _DOUBLE:
-        return values
-    is_truth = isinstance(values, bool) or getattr(getattr(values, "dtype", None), "kind", "") == "b"
-    if is_truth or (isinstance(values, list | tuple) and bool in set(map(type, values))):
-        raise RequestError(f"{name} must be {what}, not true or false")
-    try:
-        if np.iscomplexobj(values):  # numpy would drop the imaginary parts
-            raise RequestError(f"{name} must be {what}, not complex")
-        return np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise RequestError(f"{name} must be {what}") from None
 
 
 def _refuse_huge(name: str, rates: FloatArray) -> None:

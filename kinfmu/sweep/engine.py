@@ -77,7 +77,7 @@ def tables_for(out: Tables | None, shape: tuple[int, int], order: Literal["C", "
 
 
 def _refuse_table(name: str, array: object, shape: tuple[int, ...]) -> None:
-    if not isinstance(array, np.ndarray):
+    if not isinstance(array, np.ndarray) or isinstance(array, np.ma.MaskedArray):
         raise RequestError(f"out: {name} must be a numpy array, float64 of shape {shape}, not {type(array).__name__}")
     if array.shape != shape or array.dtype != np.float64:
         raise RequestError(f"out: {name} must be float64 of shape {shape}, not {array.dtype} of {array.shape}")

@@ -21,6 +21,7 @@ from kinfmu.plan.reactions import reaction_names_of
 from kinfmu.processes import require_workers
 from kinfmu.run import Event, Run
 from kinfmu.run.axis import TIME, axis_for
+from kinfmu.run.numbers import numbers_of
 from kinfmu.solver.python import Solver, UnsolvableModel, with_parameters
 from kinfmu.solver.python.pose import Vector
 from kinfmu.solver.python.solver import TOLERANCE
@@ -278,7 +279,7 @@ class Model:
             times = column_of("t", run_times(self.mechanism.run) if t is None else t)
         else:
             times = np.arange(driven[0].shape[-2], dtype=float)
-        driving = Driving(times, driven, {name: np.asarray(value, dtype=float) for name, value in inputs.items()})
+        driving = Driving(times, driven, {name: numbers_of(name, value) for name, value in inputs.items()})
         native = workers if self.is_native(batch.count * len(times)) else 0
         return solve_batch(batch, driving, highest=derivatives, tolerance=tolerance, anew=anew, threads=native)
 

@@ -82,15 +82,16 @@ def solve(
         derived = [name for name, p in mechanism.parameters.items() if p.expression and name in set_ones]
         chosen = outputs if outputs is None or isinstance(outputs, str) else tuple(outputs)
         model = kept_model(mechanism, chosen, tuple(derived), engine)
+    run = model.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, anew=anew, out=out, **inputs)
     for driver in model.plan.drivers if inputs and not wrap else ():
         if driver.quantity.kind == "angle":
-            _warn_of_degrees(driver.inputs[0], inputs.get(driver.inputs[0]))
-    return model.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, anew=anew, out=out, **inputs)
+            _warn_of_degrees(driver.inputs[0], inputs[driver.inputs[0]])
+    return run
 
 
-def _warn_of_degrees(name: str, angles: ArrayLike | None) -> None:
+def _warn_of_degrees(name: str, angles: ArrayLike) -> None:
     """Warn of an array of whole numbers over many turns: degrees, where radians are needed."""
-    if angles is None or np.ndim(angles) != 1 or len(angles) < _FEWEST:  # type: ignore[arg-type]  # it is an array
+    if np.ndim(angles) != 1 or len(angles) < _FEWEST:  # type: ignore[arg-type]  # it is an array
         return
     low, high = float(np.min(angles)), float(np.max(angles))
     if high - low >= _WIDE and bool(np.all(np.mod(angles, 1.0) == 0.0)):

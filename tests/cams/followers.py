@@ -87,3 +87,25 @@ ALL = {
     "face on a profile, sliding": lambda: on_tangents(swings=False),
     "face on a profile, swinging": lambda: on_tangents(swings=True),
 }
+
+
+def coaxial(kind: type[CamRoller | CamFlatFace], pole: tuple[float, float]) -> kinfmu.Mechanism:
+    """A lever on the axle of the cam: it turns with the cam."""
+    law = kinfmu.Harmonic(4.0, 1.0, 58.0)
+    contact = (
+        CamRoller("curve", ("cam.E", "lever.F"), law, 5.0)
+        if kind is CamRoller
+        else CamFlatFace("curve", ("cam.E", "lever.F"), law, UP)
+    )
+    at = (60.0, 0.0) if kind is CamRoller else (0.0, 60.0)
+    return kinfmu.Mechanism(
+        "coaxial",
+        [
+            kinfmu.Body("ground", {"O": (0, 0)}),
+            kinfmu.Body("cam", {"O": (0, 0), "E": pole}),
+            kinfmu.Body("lever", {"O": (0, 0), "F": at}, (0, 0, 0.4)),
+        ],
+        [Revolute("O", ("ground.O", "cam.O")), Revolute("P", ("ground.O", "lever.O")), contact],
+        [kinfmu.AngleDriver("cam", "cam", kinfmu.ConstantSpeed(0.0, 1.0))],
+        length_unit="mm",
+    )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from itertools import pairwise
 from typing import Any
 
@@ -299,6 +300,18 @@ def test_a_cam_without_a_profile_is_reported_with_the_reason(case: str) -> None:
     made, message = WRONG[case]
     with pytest.raises(MechanismError, match=message):
         kinfmu.cam_profile(made(), "lift")
+
+
+@pytest.mark.parametrize("kind", [kinfmu.CamRoller, kinfmu.CamFlatFace])
+@pytest.mark.parametrize("pole", [(0.0, 0.0), (2.0, -1.0)])
+def test_a_lever_on_the_axle_of_its_cam_turns_with_it_and_has_no_profile(kind: Any, pole: Any) -> None:
+    mechanism = followers.coaxial(kind, pole)
+    why = r"the follower 'lever' is pinned at the cam's axle, 'ground\.O', so that it turns with the cam"
+    with pytest.raises(MechanismError, match=why):
+        kinfmu.cam_profile(mechanism, "curve")
+    assert re.search(f"curve: no profile, because {why}", str(kinfmu.check(mechanism)))
+    run = kinfmu.solve(mechanism, cam_angle=np.linspace(0.0, TURN, 9))
+    np.testing.assert_allclose(run["lever.phi"] - run["cam.phi"], run["lever.phi"][0], rtol=0.0, atol=1e-12)
 
 
 def test_check_reports_an_undercut_cam_as_its_problem_and_the_motion_is_still_solved() -> None:

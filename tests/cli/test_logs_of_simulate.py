@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -54,3 +56,19 @@ def test_logs_have_the_name_of_what_is_simulated(
     assert command("build", "fourbar", "-o", "other.fmu").exit_code == 0
     assert command("simulate", model, "--stop", "1").exit_code == 0
     assert sorted(path.name for path in (tmp_path / "logs").iterdir()) == [f"{name}.mcap", f"{name}.rrd"]
+
+
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="names of files are Unicode there")
+@pytest.mark.parametrize("place", [b"caf\xe9.toml", b"M\xfcll/mine.toml"])  # Latin-1
+def test_names_of_files_need_not_be_utf8(
+    place: bytes, command: Command, fourbar_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    file = tmp_path / os.fsdecode(place)
+    file.parent.mkdir(exist_ok=True)
+    fourbar_file(name="mine.toml").replace(file)
+    logs = [file.with_suffix(suffix) for suffix in (".mcap", ".rrd")]
+    assert command("simulate", str(file), "--stop", "1", "--mcap", str(logs[0]), "--rrd", str(logs[1])).exit_code == 0
+    assert log.read(logs[0]).good.all()
+    compared = file.with_name(os.fsdecode(b"\xe9.rrd"))
+    assert command("review", str(logs[0]), str(logs[0]), "--save", str(compared)).exit_code == 0
+    assert all(b"RRF" in path.read_bytes()[-64:] for path in (logs[1], compared))

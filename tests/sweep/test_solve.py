@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -118,6 +121,90 @@ def test_wrong_arguments_are_reported_in_one_line(arguments: dict[str, object], 
     with pytest.raises(KinfmuError, match=message) as caught:
         kinfmu.solve(kinfmu.load("fourbar"), **arguments)  # type: ignore[arg-type]
     assert "\n" not in str(caught.value)
+
+
+NO_NUMBERS = {
+    "masked array": (np.ma.array([0.1, 5.0, 0.3], mask=[False, True, False]), r"\[1\] is masked; leave it out"),
+    "list with a masked number": ([0.1, np.ma.masked, 0.3], r"\[1\] is masked; leave it out"),
+    "rows, one masked": ([np.ma.array([0.1, 5.0], mask=[False, True])] * 3, r"\[0, 1\] is masked; leave it out"),
+    "dates": (np.array(["2026-01-01", "2026-01-02", "2026-01-03"], dtype="datetime64[s]"), "not dates$"),
+    "durations": (np.array([1, 2, 3], dtype="timedelta64[s]"), "not durations; divide them by a unit"),
+    "list of durations": ([np.timedelta64(1, "s"), 0.2, 0.3], "not durations; divide them by a unit"),
+    "objects that are durations": (np.array([np.timedelta64(1, "s"), 0.2, 0.3], dtype=object), "not durations"),
+    "records": (np.array([(0.1,), (0.2,), (0.3,)], dtype=[("a", float)]), "not records of several fields$"),
+}
+
+
+@pytest.fixture(scope="module")
+def entries(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Callable[[Any], object]]:
+    """Whatever takes arrays, as functions of one of them."""
+    mechanism = kinfmu.load("jansen_leg")
+    model = kinfmu.compile(mechanism, engine="python")
+    fmu = kinfmu.build(mechanism, tmp_path_factory.mktemp("fmu"), flavour="python", drive="inputs")
+    (length, *_), (driver,) = mechanism.parameters, mechanism.drivers
+    angle, speed, _ = driver.inputs()
+    varied: dict[str, dict[str, Any]] = {length: {"values": [1.0]}}
+    measured = [kinfmu.readings.Range("lift", "foot.y")]
+    loaded = kinfmu.load("fourbar_loaded")
+    return {
+        "t": lambda values: kinfmu.solve(mechanism, values),
+        "angle": lambda values: kinfmu.solve(mechanism, **{angle: values}),
+        "speed": lambda values: model.solve(**{angle: [0.1, 0.2, 0.3], speed: values}),
+        "sensitivities": lambda values: model.sensitivities(**{angle: values}),
+        "designs": lambda values: model.solve_designs({length: values}, [0.0]),
+        "angles of designs": lambda values: model.solve_designs({length: [0.1] * 3}, **{angle: values}),
+        "measured designs": lambda values: kinfmu.measure_designs(model, {length: values}, measures=measured),
+        "angles of measured designs": lambda values: kinfmu.measure_designs(
+            model, {length: [0.1] * 3}, measures=measured, **{angle: values}
+        ),
+        "t of a study": lambda values: kinfmu.study(mechanism, varied, measures=measured, t=values),
+        "angles of a study": lambda values: kinfmu.study(mechanism, varied, measures=measured, **{angle: values}),
+        "inputs of an FMU": lambda values: kinfmu.simulate(fmu, inputs={"time": [0.0, 1.0, 2.0], angle: values}),
+        "times of an FMU": lambda values: kinfmu.simulate(fmu, inputs={"time": values, angle: [0.1, 0.2, 0.3]}),
+        "torque": lambda values: kinfmu.simulate(
+            loaded, drive="torque", inputs={"time": [0.0, 1.0, 2.0], "crank_torque": values}
+        ),
+        "times of a torque": lambda values: kinfmu.simulate(
+            loaded, drive="torque", inputs={"time": values, "crank_torque": [0.1, 0.2, 0.3]}
+        ),
+        "cam": lambda values: kinfmu.cam_profile(kinfmu.load("cam_roller"), "pitch", values),
+    }
+
+
+@pytest.mark.parametrize("case", NO_NUMBERS)
+def test_what_numpy_would_make_numbers_of_is_refused_in_one_line(
+    case: str, entries: dict[str, Callable[[Any], object]]
+) -> None:
+    values, message = NO_NUMBERS[case]
+    for entry, take in entries.items():
+        with pytest.raises(KinfmuError, match=message) as caught:
+            take(values)
+        assert "\n" not in str(caught.value), entry
+
+
+def test_arrays_whose_mask_hides_nothing_are_numbers() -> None:
+    angles = np.linspace(0.0, 1.0, 5)
+    run, same = (kinfmu.solve(kinfmu.load("fourbar"), crank_angle=u) for u in (np.ma.array(angles), angles))
+    np.testing.assert_array_equal(run.values, same.values)
+
+
+@pytest.mark.parametrize("value", [np.timedelta64(1, "s"), np.datetime64("2026-01-01"), np.ma.masked])
+def test_single_values_that_are_no_numbers_are_refused(value: Any) -> None:
+    mechanism = kinfmu.load("fourbar")
+    for take in (
+        lambda: kinfmu.solve(mechanism, [0.0], parameters={"crank.speed": value}),
+        lambda: kinfmu.solve(mechanism, crank_angle=value),
+        lambda: kinfmu.Mechanism("m", [kinfmu.Body("ground", {"O": (value, 0.0)})], [], []),
+    ):
+        with pytest.raises(KinfmuError) as caught:
+            take()
+        assert "\n" not in str(caught.value)
+
+
+def test_masked_tables_are_no_place_for_results() -> None:
+    out = tuple(np.ma.zeros((1, 7)) for _ in range(3))
+    with pytest.raises(KinfmuError, match=r"^out: values must be a numpy array, .*, not MaskedArray$"):
+        kinfmu.solve(kinfmu.load("fourbar"), [0.0], out=out)
 
 
 def test_the_files_own_run_is_solved_by_default() -> None:

@@ -92,7 +92,8 @@ def tables(plan: SolvePlan, solved: Sequence[Block], labels: Mapping[str, str]) 
     ends = list(accumulate(len(block.unknowns) for block in solved))
     return [
         f"const double kf_size = {plan.size!r};",
-        f"const double kf_offset = {max(map(abs, plan.origin)) / plan.size!r};",
+        f"const double kf_offset = {plan.offset!r};",
+        f"const double kf_row_offset = {plan.row_offset!r};",
         *array("double kf_anchor_u", anchor_u),
         *array("double kf_anchor_z", anchor_z),
         *array("double kf_unknown_scales", scales),

@@ -25,7 +25,7 @@ from kinfmu.codegen.newton import (
     opposite_solution,
     outright,
     residual_lines,
-    settled_square,
+    settled,
     solution,
     square,
 )
@@ -183,7 +183,6 @@ class Units:
         jacobian = jacobian_text(writer, block)
         inside += self._determinant(jacobian, block.usual)
         starts = [f"z[row->{self.own[name]}]" for name in block.unknowns]
-        angles = " + ".join(["1.0", *(f"{start} * {start}" for start in starts)])
         names = [identifier(name) for name in block.unknowns]
         return [
             f"/* {', '.join(block.unknowns)} from {', '.join(block.row_names)} */",
@@ -192,7 +191,7 @@ class Units:
             f"for (iteration = 0; iteration < {ITERATIONS}; ++iteration) {{",
             *indented(inside),
             "    if (error <= newton->enough || held",
-            f"        || (16.0 * error > last && error <= {settled_square(block)!r} * ({angles}))) {{",
+            f"        || (16.0 * error > last && error <= {settled(block, starts)})) {{",
             "        break;",
             "    }",
             "    last = error;",

@@ -13,7 +13,7 @@ from kinfmu.codegen.newton import (
     opposite_solution,
     outright,
     residual_lines,
-    settled_square,
+    settled,
     solution,
     square,
 )
@@ -44,10 +44,7 @@ def newton_lines(writer: Writer, block: Block, label: str, starts: Sequence[str]
     jacobian = jacobian_text(writer, block)
     z = [identifier(name) for name in block.unknowns]
     inside += _determinant(label, jacobian, block.usual)
-    # large angles are rounded more; the start's angles count, so that a diverging iteration gets no larger tolerance
-    angles = " + ".join(["1.0", *(f"{start} * {start}" for start in starts)])
-    settled = f"16.0 * error > last and error <= {settled_square(block)!r} * ({angles})"
-    done = f"error <= enough or {held} or ({settled})"
+    done = f"error <= enough or {held} or (16.0 * error > last and error <= {settled(block, starts)})"
     return [
         *before,
         "last = inf",

@@ -33,6 +33,7 @@ from zlib import crc32
 import numpy as np
 
 from kinfmu.errors import LogError
+from kinfmu.files.temporary_folder import temporary_folder
 from kinfmu.log.cdr import nanoseconds
 from kinfmu.log.target import replacing
 from kinfmu.log.viewer.arrows import log_arrows
@@ -146,15 +147,15 @@ def recording(path: str | Path, name: str, layout: rrb.Blueprint, application: s
     """Yield a recording; its complete file replaces `path` when the block ends."""
     import rerun as rr
 
-    with replacing(path) as temporary:
-        rec = rr.RecordingStream(application, recording_id=f"{Path(path).stem}-{uuid4()}")
+    with replacing(path) as temporary, _path_in_utf8(temporary) as saved:
+        rec = rr.RecordingStream(application, recording_id=f"{_in_utf8(Path(path).stem)}-{uuid4()}")
         rec.set_log_time_enabled(False)  # wall-clock time is not needed and takes 16 bytes a row
         rec.set_log_tick_enabled(False)
         try:
-            rec.save(temporary, default_blueprint=layout)
+            rec.save(saved, default_blueprint=layout)
         except RuntimeError as error:  # Rerun's form of an OSError
             raise LogError(f"{path}: cannot be written ({str(error).removeprefix(_ENCODING)})") from error
-        rec.send_recording_name(name)
+        rec.send_recording_name(_in_utf8(name))
         try:
             yield rec
             _flush(rec, path)
@@ -190,7 +191,7 @@ def log_card(rec: rr.RecordingStream, markdown: str) -> None:
     """Log the card."""
     import rerun as rr
 
-    rec.log("/card", rr.TextDocument(markdown, media_type="text/markdown"), static=True)
+    rec.log("/card", rr.TextDocument(_in_utf8(markdown), media_type="text/markdown"), static=True)
 
 
 def log_status(rec: rr.RecordingStream, root: str, timeline: Timeline, run: Run) -> None:
@@ -227,6 +228,23 @@ def _properties(run: Run) -> rr.AnyValues:
     for name, text in {**info, "length_unit": run.length_unit, "verdict": sentence(run)}.items():
         about.with_component_from_data(name, text)
     return about
+
+
+def _in_utf8(name: str) -> str:
+    """Return the name of a file with a question mark for each byte that is not UTF-8."""
+    return name.encode(errors="replace").decode()
+
+
+@contextmanager
+def _path_in_utf8(file: Path) -> Iterator[Path]:
+    """Yield a path of a file that is UTF-8, which Rerun requires: a link to the file if its own path is not."""
+    if _in_utf8(str(file)) == str(file):
+        yield file
+        return
+    with temporary_folder() as folder:
+        link = folder / "run.rrd"
+        link.symlink_to(file.absolute())
+        yield link
 
 
 def _flush(rec: rr.RecordingStream, path: str | Path) -> None:

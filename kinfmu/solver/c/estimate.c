@@ -2,7 +2,7 @@
  *
  * Every solved block is a source. Its rows are known to a few roundings of their terms, so its unknowns z to
  *
- *     |dz| = |J^-1| R (2 eps + residual + eps |z|)        R: scales of the rows, in lengths
+ *     |dz| = |J^-1| R (2 eps (1 + offset) + residual + eps |z|)        R: scales of the rows, in lengths
  *
  * which moves all blocks that come after it. The effect on outputs and rates is computed, not estimated: position,
  * velocity and acceleration are formed again at the moved pose. See kinfmu/solver/python/estimate.py.
@@ -45,7 +45,7 @@ static void make_source(kf_solver *solver, const kf_pose *pose, const kf_driven 
     kf_source *const source = &solver->scratch.source;
     double *const given = source->given_first, *const all_of = solver->scratch.x1; /* of the unknowns */
     const double *rows = kf_row_scales;
-    const double c = kf_known_to(&pose->found, block);
+    const double c = kf_known_to(&pose->found, block), of_rates = weight * KF_ROUNDINGS * KF_EPS * (1.0 + kf_row_offset);
     bool held[KF_ROOM(KF_BLOCKS)];
     int k;
     for (k = 0; k < KF_BLOCKS; ++k) {
@@ -57,8 +57,8 @@ static void make_source(kf_solver *solver, const kf_pose *pose, const kf_driven 
     KF_VELOCITY(&solver->model, &pose->found, kf_at_rest, given, held, all_of);
     for (k = 0; k < KF_UNKNOWNS; ++k) {
         source->z[k] = weight * c * all_of[k];
-        source->first[k] = weight * KF_ROUNDINGS * KF_EPS * drive->speed * all_of[k];
-        source->second[k] = weight * KF_ROUNDINGS * KF_EPS * drive->curve * all_of[k];
+        source->first[k] = of_rates * drive->speed * all_of[k];
+        source->second[k] = of_rates * drive->curve * all_of[k];
     }
     source->missed[0] = source->missed[1] = source->missed[2] = 0.0;
     source->is_given = false;

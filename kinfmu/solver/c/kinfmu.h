@@ -66,8 +66,9 @@ typedef struct {
 /* The model: generated. The rates x1 end with the drivers' speeds, as x ends with their values, and the accelerations x2
  * with theirs. held: one flag for each block, NULL for none: the block's unknowns are given, not solved for.
  */
-extern const double kf_size;   /* of the mechanism, in its unit of length */
-extern const double kf_offset; /* from the world's origin, in sizes */
+extern const double kf_size;       /* of the mechanism, in its unit of length */
+extern const double kf_offset;     /* from the world's origin, in sizes */
+extern const double kf_row_offset; /* of numbers in rows, in sizes */
 extern const double kf_anchor_u[KF_DRIVERS];
 extern const double kf_anchor_z[KF_ROOM(KF_UNKNOWNS)];
 extern const double kf_unknown_scales[KF_ROOM(KF_UNKNOWNS)];

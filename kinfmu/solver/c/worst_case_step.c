@@ -78,7 +78,7 @@ double kf_known_to(const kf_found *found, int block)
 {
     const int first = kf_first_of(block), k = kf_block_ends[block] - first;
     const double largest = kf_larger(0.0, k, found->x + first, kf_unknown_scales + first);
-    return KF_ROUNDINGS * KF_EPS + found->residual + KF_EPS * largest;
+    return KF_ROUNDINGS * KF_EPS * (1.0 + kf_row_offset) + found->residual + KF_EPS * largest;
 }
 
 /* Find the blocks whose worst-case steps are longest, the longest first, and the weight that makes up for the others in a sum

@@ -2,7 +2,7 @@
 
 Every solved block is a source. Its rows are known to a few roundings of their terms, so its unknowns z to
 
-    |dz| = |J^-1| R (4 eps + residual + eps |z|)        R: scales of the rows, in lengths
+    |dz| = |J^-1| R (2 eps (1 + offset) + residual + eps |z|)        R: scales of the rows, in lengths
 
 which moves all blocks that come after it. The effect on outputs and rates is computed, not estimated: position,
 velocity and acceleration are formed again at the moved pose, so that they contain the effect of a bad condition and of
@@ -219,7 +219,7 @@ def _rates(model: Model, pose: Pose, driven: DriverMotion) -> UnknownRates:
 def _sources(model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRates) -> list[Source]:
     """Return the sources of the blocks, only the largest ones if there are many."""
     n = len(model.UNKNOWNS)
-    rounding = ROUNDINGS * EPS + pose.residual
+    rounding = ROUNDINGS * EPS * (1.0 + model.ROW_OFFSET)
     matrices = model.jacobians(pose.values)
     found = []
     for block, matrix in enumerate(matrices):
@@ -231,7 +231,7 @@ def _sources(model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRates
         own = farthest = 0.0
         for z, a, scale in zip(pose.z[low:high], step, scales):  # noqa: B905  one item per unknown
             own, farthest = max(own, abs(z) / scale), max(farthest, abs(a) / scale)
-        c = rounding + EPS * own
+        c = rounding + pose.residual + EPS * own
         found.append((c * farthest, block, step, c))
     count = len(found)
     if count > 2:  # a sum of two is the same in any order
@@ -244,7 +244,7 @@ def _sources(model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRates
         given = (*((0.0,) * low), *step, *((0.0,) * (n - high)))
         all_of = model.velocity(pose.values, still, given, driven.held | 1 << block)
         weight = sqrt(count / len(found))
-        of_z, of_rates = weight * c, weight * ROUNDINGS * EPS
+        of_z, of_rates = weight * c, weight * rounding
         of_first, of_second = of_rates * rates.speed, of_rates * rates.curve
         sources.append(
             Source(

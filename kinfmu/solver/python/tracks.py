@@ -44,6 +44,7 @@ class TrackModel:
         self._mixes = MIXED in model.BLOCK_DRIVERS
         self._slopes: Vector = (0.0,) * len(z)
         self.SIZE, self.OFFSET, self.LENGTH_UNIT = model.SIZE, model.OFFSET, model.LENGTH_UNIT
+        self.ROW_OFFSET = model.ROW_OFFSET
         own = slice(None) if driver == MIXED else slice(driver, driver + 1)
         self.DRIVERS = tuple(model.DRIVERS[own])
         self.DRIVER_KINDS = tuple(model.DRIVER_KINDS[own])
