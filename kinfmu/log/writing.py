@@ -37,7 +37,7 @@ from kinfmu.run.verdict import sentence, status_events, unexplained
 from kinfmu.version import VERSION
 
 ROWS = 4096  # samples in a chunk of a complete run; larger chunks take more memory, smaller ones more time
-MOST_DRAWN = 20_000  # samples of a complete run in the topics that viewers draw; they take three times those of /sample
+MOST_DRAWN = 10_000  # samples of a complete run in the topics that viewers draw; they take three times those of /sample
 LARGEST_CHUNK = 2**26  # [bytes]; readers refuse what unpacks to more than twice that
 MECHANISM_FILE = "mechanism.toml"
 MODEL_DESCRIPTION = "modelDescription.xml"

@@ -85,8 +85,13 @@ def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = 
     scenes, notes = zip(*(drawable(run) for run in shown), strict=True)
     apart = timeline.placed(decimated(difference)) if difference else None
     differences = groups(apart) if apart else {}
-    curves = [groups(run) for run in shown]
-    loads = [{group.path: group for group in loads_of(run)} for run in shown]
+    curves = [
+        {key: _named(group, look) for key, group in groups(run).items()}
+        for run, look in zip(shown, _LOOKS, strict=True)
+    ]
+    loads = [
+        {group.path: _named(group, look) for group in loads_of(run)} for run, look in zip(shown, _LOOKS, strict=True)
+    ]
     load_differences = loads_of(apart) if apart else []
     moved = {key: group for key, group in differences.items() if moves_apart(group, curves[0].get(key))}
     loaded = loads_apart(load_differences, loads[0])
@@ -104,7 +109,7 @@ def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = 
                 linkage.log()
                 log_loads(linkage)
             for group in (*own.values(), *loads[number].values()):
-                log_group(rec, look.root, timeline, drawn, _named(group, look), look.curves)
+                log_group(rec, look.root, timeline, drawn, group, look.curves)
             log_status(rec, look.root, timeline, timeline.placed(run))
         for group in (*differences.values(), *load_differences):
             log_group(rec, "/difference", timeline, apart or a, group)
