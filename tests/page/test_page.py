@@ -108,6 +108,73 @@ def test_the_clock_has_the_digits_of_the_run_and_the_speed_makes_short_runs_visi
     assert 1.5 <= stop / speed <= 30.0  # [s]
 
 
+def _geared(ratio: float) -> kinfmu.Mechanism:
+    """Return the geared five-bar with links that are long enough for all ratios, which shift the phase too."""
+    text = toml_text(kinfmu.load("geared_five_bar"))
+    return parse(re.sub(r"ratio = -2(\.0)?", f"ratio = {ratio}", text).replace("T = [60", "T = [80"))
+
+
+@pytest.mark.parametrize(
+    ("mech", "turns"),
+    [
+        (kinfmu.load("engine"), 2),
+        (kinfmu.load("jansen_leg_loaded"), 1),
+        *((_geared(ratio), turns) for ratio, turns in ((-0.5, 2), (-2.0 / 3.0, 3), (0.75, 4), (-2.0, 1))),
+    ],
+    ids=lambda one: getattr(one, "name", one),
+)
+def test_slider_plots_curves_and_clock_run_over_one_whole_cycle(
+    chromium: Browser, mech: kinfmu.Mechanism, turns: int
+) -> None:
+    (driver,) = mech.drivers
+    start = float(driver.law.at(0.0))
+    speed = float(driver.law.at(1.0)) - start
+    with chromium.open(kinfmu.page.page(mech)) as page:
+        low, high = page.get("k.linkage.ranges[0]")
+        assert [low, high] == pytest.approx([start, start + turns * math.tau])
+        page.tab.click("#tab-plots")
+        page.settle()
+        shown = page.get("k.plots.plots.map(plot => plot.select.value)")
+        table = page.get("({ x: [...k.plots.table.x], columns: k.plots.table.columns.map(one => [...one]) })")
+        curves = page.get("k.linkage.curves([...k.linkage.data.points.keys()])")
+        values = [start + part * turns * math.tau for part in (0.1, 0.264, 0.5277, 0.71, 0.95, 0.3)]
+        seen = []
+        for value in values:
+            page.move(value)
+            clock = float(page.tab.inner_text("#clock").removesuffix(" s"))
+            texts = page.tab.locator("#plots .plot .reading").all_text_contents()
+            slider = float(page.tab.locator("#drivers input[type=range]").input_value())
+            seen.append((slider, page.get("k.linkage.t"), clock, [float(text.split(" ")[0]) for text in texts]))
+        assert page.errors == []
+    assert len(table["x"]) == turns * 360 + 1
+    assert all(math.dist(curve[0], curve[-1]) < 1e-9 for curve in curves if curve)
+    period = turns * math.tau / abs(speed)
+    by_hand = kinfmu.solve(mech, (np.array(values) - start) / speed)
+    for k, (value, (slider, t, clock, numbers)) in enumerate(zip(values, seen, strict=True)):
+        assert slider == pytest.approx(value)
+        assert math.remainder(t - (value - start) / speed, period) == pytest.approx(0.0, abs=1e-12 * period)
+        assert clock == pytest.approx(t, abs=0.01 * period)
+        for name, number, column in zip(shown, numbers, table["columns"], strict=True):
+            factor = 180.0 / math.pi if name.endswith(".phi") else 1.0
+            assert number == pytest.approx(factor * by_hand[name][k], rel=1e-4, abs=1e-6)
+            reach = max(column) - min(column)
+            assert number == pytest.approx(np.interp(value, table["x"], column), abs=2e-3 * reach)
+    turn = kinfmu.solve(mech, (np.array(table["x"]) - start) / speed)
+    for name, column in zip(shown, table["columns"], strict=True):
+        assert np.abs(turn[name] - column).max() < 1e-8 * max(1.0, np.abs(column).max())
+
+
+def test_the_cycle_is_counted_again_with_another_ratio(chromium: Browser) -> None:
+    with chromium.open(kinfmu.page.page(_geared(-2.0))) as page:
+        for ratio, turns in ((-0.5, 2), (-1.5, 2), (-2.25, 4), (-1.0, 1)):
+            page.get(f"k.refresh(() => {{ k.design.set({{'joints.mesh.ratio': {ratio}}}); k.reshape(); }})")
+            page.settle()
+            low, high = page.get("k.linkage.ranges[0]")
+            assert high - low == pytest.approx(turns * math.tau)
+            assert page.get("k.design.isOk")
+        assert page.errors == []
+
+
 def test_page_fits_a_phone(chromium: Browser) -> None:
     with chromium.open(text_of("jansen_leg"), has_touch=True) as page:
         page.resize(PHONE)

@@ -3,7 +3,7 @@
 import { comesTo, partingOf } from "./branches.js";
 import { isGood } from "./engine.js";
 import { CAMS, axlesOf, formsOf } from "./forms.js";
-import { TURN, placed, remainder } from "./geometry.js";
+import { TURN, placed } from "./geometry.js";
 import { grouped } from "./numbers.js";
 import { changePointsOf, rangesOf } from "./ranges.js";
 
@@ -12,6 +12,7 @@ const BOX = 73; // poses that decide what fits into the view
 const FORCES = 90; // poses of a run that decide the scale of forces
 const USUAL = 0.99; // part of the forces that are not outliers
 const LAW = 400; // times at which the laws are tabled
+export const PER_TURN = 360; // samples of plots and tables over a driver, as for the measures of kinfmu check
 
 // Return driver values, speeds and accelerations between the samples of a record.
 function between({ t, columns }, at) {
@@ -188,11 +189,30 @@ export class Linkage {
         });
     }
 
-    // Return the time at which the laws come nearest to driver values.
+    // Return by how much a value of a driver is more than another one, without the cycles after which all repeats.
+    apart(k, value, other) {
+        const period = TURN * (this.turns?.[k] ?? this.data.drivers[k].turns ?? 0);
+        return value - other - (period ? period * Math.round((value - other) / period) : 0);
+    }
+
+    // Return the speed of the only driver if it is constant and gives the motion, else 0.
+    get speed() {
+        const { samples, drivers, run } = this.data;
+        return !samples && drivers.length === 1 && drivers[0].law === "constant_speed" ? this.driven(run.from).ud[0] : 0;
+    }
+
+    // Return the time after which the only driver has made a whole cycle, which may be longer than the run.
+    get cycleEnd() {
+        const { from, to } = this.data.run;
+        return Math.max(to, this.speed && this.turns[0] ? from + (TURN * this.turns[0]) / Math.abs(this.speed) : to);
+    }
+
+    // Return the time at which the laws come nearest to driver values; of several, that nearest to the time shown.
     timeNear(u) {
+        if (this.speed) return this.#timeAt(u[0]);
         const gap = (law) =>
             law.u.reduce((sum, value, k) => {
-                const apart = this.data.drivers[k].turns ? remainder(u[k] - value) : u[k] - value;
+                const apart = this.apart(k, u[k], value);
                 return sum + apart * apart;
             }, 0);
         let best = this.law[0];
@@ -209,6 +229,17 @@ export class Linkage {
             else low = a;
         }
         return Math.min(Math.max(0.5 * (low + high), this.data.run.from), this.data.run.to);
+    }
+
+    // Return the time at which the only driver, at constant speed, has a value; within the run if it does not turn.
+    #timeAt(value, near = this.t) {
+        const { from, to } = this.data.run;
+        const t = from + (value - this.law[0].u[0]) / this.speed;
+        if (!this.turns?.[0]) return Math.min(Math.max(t, from), to);
+        const cycle = (TURN * this.turns[0]) / Math.abs(this.speed);
+        const first = t - cycle * Math.floor((t - from) / cycle);
+        const last = Math.floor((this.cycleEnd - first) / cycle);
+        return first + cycle * Math.min(Math.max(Math.round((near - first) / cycle), 0), last);
     }
 
     // Return speeds and accelerations of the drivers: those of their laws at the time that is shown.
@@ -288,7 +319,8 @@ export class Linkage {
             );
         }
         const [low, high] = this.ranges[0];
-        return Array.from({ length: count + 1 }, (_, k) => Float64Array.of(low + ((high - low) * k) / count));
+        const all = this.#countOf("driver", count);
+        return Array.from({ length: all + 1 }, (_, k) => Float64Array.of(low + ((high - low) * k) / all));
     }
 
     #swept(samples, columns) {
@@ -400,17 +432,25 @@ export class Linkage {
         return most;
     }
 
-    // Visit poses over the driver ("driver") or the run ("time"): visit(x, pose or null).
+    // Return the number of steps of a turn, or of the run, for all turns of the range.
+    #countOf(over, count) {
+        return over === "driver" && !this.data.over ? count * (this.turns[0] || 1) : count;
+    }
+
+    // Visit poses over the driver ("driver") or the run ("time"), in `count` steps of a turn or of the run: visit(x, pose or
+    // null). At a constant speed of the driver, loads have the time at which it comes to x; else that shown.
     visit(over, count, visit) {
         const { run } = this.data;
-        const { probe } = this;
+        const { probe, speed } = this;
         const rates = this.ratesNear();
         const [low, high] = over === "time" ? [run.from, run.to] : this.ranges[0];
+        const all = this.#countOf(over, count);
         probe.restart();
-        for (let k = 0; k <= count; k++) {
-            const x = low + ((high - low) * k) / count;
+        for (let k = 0; k <= all; k++) {
+            const x = low + ((high - low) * k) / all;
             const law = over === "time" ? this.driven(x, probe) : { u: Float64Array.of(x), ...rates };
-            visit(x, isGood(probe.at(law.u, law.ud, law.udd)) ? this.poseOf(probe, over === "time" ? x : this.t) : null);
+            const t = over === "time" ? x : speed ? this.#timeAt(x, run.from) : this.t;
+            visit(x, isGood(probe.at(law.u, law.ud, law.udd)) ? this.poseOf(probe, t) : null);
         }
     }
 }

@@ -1,10 +1,10 @@
 // Plots of quantities over time or the driver, with one cursor for all.
 
 import { transmissions } from "./instants.js";
+import { PER_TURN } from "./linkage.js";
 import { degrees, niceStep, number } from "./numbers.js";
 import { FONT } from "./pen.js";
 
-const SAMPLES = 360;
 const MARGIN = { left: 58, right: 10, top: 10, bottom: 24 };
 
 // Return all quantities that can be plotted: { id, label, unit, read(linkage, pose) }.
@@ -51,16 +51,12 @@ export function defaults(linkage, all) {
 }
 
 // Return x and values of quantities over "time" or "driver"; values are NaN at poses without numbers.
-export function sampled(linkage, over, wanted, count = SAMPLES) {
-    const x = new Float64Array(count + 1);
-    const columns = wanted.map(() => new Float64Array(count + 1));
-    let row = 0;
+export function sampled(linkage, over, wanted, count = PER_TURN) {
+    const x = [];
+    const columns = wanted.map(() => []);
     linkage.visit(over, count, (at, pose) => {
-        x[row] = at;
-        wanted.forEach((one, k) => {
-            columns[k][row] = pose ? one.read(linkage, pose) : NaN;
-        });
-        row += 1;
+        x.push(at);
+        wanted.forEach((one, k) => columns[k].push(pose ? one.read(linkage, pose) : NaN));
     });
     return { x, columns };
 }
