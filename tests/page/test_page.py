@@ -20,6 +20,7 @@ pytestmark = needs_browser
 LARGEST = 300_000  # [bytes] of a page
 LABELS = Path(__file__).with_name("labels.js").read_text("utf-8")
 CONTRASTS = Path(__file__).with_name("contrasts.js").read_text("utf-8")
+JUMPS = Path(__file__).with_name("jumps.js").read_text("utf-8")
 COVERED = Path(__file__).with_name("covered.js").read_text("utf-8")
 
 
@@ -199,6 +200,34 @@ def test_names_cover_neither_each_other_nor_the_linkage(chromium: Browser, name:
             covered = page.tab.evaluate(COVERED, waiting.value.path().read_text("utf-8"))
             assert covered["count"] > 8
             assert covered["found"] == []
+        assert page.errors == []
+
+
+def _light(colour: str) -> float:
+    """Return the relative luminance of a colour '#rrggbb', as WCAG defines it."""
+    parts = [int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5)]
+    red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+@pytest.mark.parametrize(
+    "size", [pytest.param(PHONE, id="phone"), pytest.param(DESKTOP, id="desktop", marks=pytest.mark.long)]
+)
+@pytest.mark.parametrize("name", kinfmu.gallery.names())
+def test_names_keep_their_places_in_a_turn_and_have_the_contrast_of_wcag_aa(
+    chromium: Browser, name: str, size: dict[str, int]
+) -> None:
+    with chromium.open(text_of(name)) as page:
+        page.resize(size)
+        page.get("k.fit()")
+        page.settle()
+        played = page.tab.evaluate(JUMPS)
+        assert played["frames"] >= 60
+        assert len(played["found"]) <= 8, played["found"]
+        pairs = [(*pair, _light(pair[0]) + 0.05, _light(pair[1]) + 0.05) for pair in played["colours"]]
+        contrasts = {f"{text} on {paper}": max(a, b) / min(a, b) for text, paper, a, b in pairs}
+        assert len(contrasts) > 6
+        assert {pair: ratio for pair, ratio in contrasts.items() if ratio < 4.5} == {}
         assert page.errors == []
 
 

@@ -9,6 +9,7 @@ import { changePointsOf, rangesOf } from "./ranges.js";
 
 const CURVE = 720; // points of a coupler curve
 const BOX = 73; // poses that decide what fits into the view
+const TOUR = 24; // steps of a tour of the motion
 const FORCES = 90; // poses of a run that decide the scale of forces
 const USUAL = 0.99; // part of the forces that are not outliers
 const LAW = 400; // times at which the laws are tabled
@@ -311,15 +312,14 @@ export class Linkage {
     // ---- curves and ranges, by the engine that is not shown
 
     // Return the driver values of a curve: over the driver's range, or over the run with several drivers.
-    #samples(count) {
-        const { drivers, run } = this.data;
-        if (drivers.length !== 1) {
+    #samples(count, isOverDriver = this.data.drivers.length === 1, all = this.#countOf("driver", count)) {
+        const { run } = this.data;
+        if (!isOverDriver) {
             return Array.from({ length: count + 1 }, (_, k) =>
                 Float64Array.from(this.driven(run.from + ((run.to - run.from) * k) / count, this.probe).u),
             );
         }
         const [low, high] = this.ranges[0];
-        const all = this.#countOf("driver", count);
         return Array.from({ length: all + 1 }, (_, k) => Float64Array.of(low + ((high - low) * k) / all));
     }
 
@@ -328,6 +328,19 @@ export class Linkage {
         const us = new Float64Array(samples.length * n);
         samples.forEach((u, k) => us.set(u, k * n));
         return this.probe.sweep(us, columns);
+    }
+
+    // Visit poses of the cycle of the only driver, or of the run, each as if it were shown.
+    tour(visit) {
+        const { pose, u } = this;
+        const isCycle = this.data.over || (this.data.drivers.length === 1 && this.turns[0]);
+        this.probe.restart();
+        for (const at of this.#samples(TOUR, isCycle, TOUR)) {
+            if (!isGood(this.probe.at(at, new Float64Array(at.length).fill(1), new Float64Array(at.length)))) continue;
+            [this.pose, this.u] = [this.poseOf(this.probe), at];
+            visit();
+        }
+        [this.pose, this.u] = [pose, u];
     }
 
     // Find what the lengths decide: ranges of the drivers, each with the others at the start of their laws, limits, change

@@ -4,7 +4,7 @@ import { Address } from "./address.js";
 import { arrows } from "./arrows.js";
 import { THEMES } from "./colours.js";
 import { Design } from "./design.js";
-import { draw } from "./drawing.js";
+import { draw, foresee } from "./drawing.js";
 import { $, breakable, element } from "./elements.js";
 import { Engine, unpacked } from "./engine.js";
 import { Frames } from "./frames.js";
@@ -14,6 +14,7 @@ import { Linkage } from "./linkage.js";
 import { ofJoints } from "./messages.js";
 import { Motion } from "./motion.js";
 import { withStop } from "./numbers.js";
+import { PATIENCE, Spots } from "./names.js";
 import { filesPanel, Plots, showPanel } from "./panels.js";
 import { CanvasPen } from "./pen.js";
 import { Transport } from "./transport.js";
@@ -34,6 +35,9 @@ class Page {
         this.traces = new Map();
         this.handles = []; // of drivers, as drawn
         this.hasHidden = false; // names without a place
+        this.spots = new Spots(); // of names
+        this.now = performance.now(); // [ms] of the frame
+        this.isToForesee = true; // before the next frame: it takes as long as some frames
         this.mode = "move";
         this.driver = 0;
         this.canvas = $("drawing");
@@ -71,6 +75,7 @@ class Page {
     }
 
     frame(now, waiting) {
+        this.now = now;
         if (this.motion.isPlaying) this.motion.advance(now);
         for (const work of waiting) work();
         this.#trace();
@@ -96,8 +101,17 @@ class Page {
         const ratio = window.devicePixelRatio || 1;
         c.setTransform(ratio, 0, 0, ratio, 0, 0);
         c.clearRect(0, 0, view.width, view.height);
-        const drawn = draw(new CanvasPen(c), linkage, view, this.theme, this.show, this.extra());
+        this.spots.begin(this.now, linkage.pose, view);
+        const state = `${this.spots.state} ${linkage.changed}`;
+        if (this.isToForesee && this.show.names && state !== this.foreseen) {
+            this.foreseen = state;
+            foresee(linkage, view, this.theme, this.show, this.spots);
+        }
+        this.isToForesee = false;
+        const drawn = draw(new CanvasPen(c), linkage, view, this.theme, this.show, this.extra(), this.spots);
         [this.handles, this.hasHidden] = [drawn.handles, drawn.hasHidden];
+        clearTimeout(this.settling);
+        if (this.spots.isWaiting && !this.isPlaying) this.settling = setTimeout(() => this.refresh(), PATIENCE);
         this.#readouts();
         this.plots.draw();
     }
@@ -241,6 +255,7 @@ class Page {
 
     fit() {
         this.view.fit(this.linkage.box());
+        this.isToForesee = true;
         this.refresh();
     }
 
@@ -296,6 +311,7 @@ class Page {
         [view.width, view.height] = [box.width, box.height];
         [canvas.width, canvas.height] = [Math.round(box.width * ratio), Math.round(box.height * ratio)];
         if (view.isFitted && this.linkage.pose) view.fit(this.linkage.box());
+        this.isToForesee = true;
         this.refresh();
     }
 }

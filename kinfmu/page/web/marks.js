@@ -24,13 +24,13 @@ function scale({ pen, theme, view }, { length, colour, text }, row) {
 
 function transmissionMarks(painter) {
     const { linkage, pen, theme } = painter;
-    for (const { angle, at, arms } of transmissions(linkage)) {
+    transmissions(linkage).forEach(({ angle, at, arms }, k) => {
         const p = painter.dot(at);
         const r = 30;
         const [a, b] = arms.map(([x, y]) => Math.atan2(y, x));
         const sweep = Math.atan2(Math.sin(b - a), Math.cos(b - a));
-        const arc = Array.from({ length: 25 }, (_, k) => {
-            const w = a + (sweep * k) / 24;
+        const arc = Array.from({ length: 25 }, (_, i) => {
+            const w = a + (sweep * i) / 24;
             return [p[0] + r * Math.cos(w), p[1] - r * Math.sin(w)];
         });
         const acute = Math.min(angle, Math.PI - angle);
@@ -39,8 +39,8 @@ function transmissionMarks(painter) {
         painter.names.coverAll(arc, 2);
         const w = a + sweep / 2;
         const label = `${degrees(angle, 1)}${acute < (40 * Math.PI) / 180 ? " poor" : ""}`;
-        painter.name(label, [[p[0] + (r + 6) * Math.cos(w), p[1] - (r + 6) * Math.sin(w)]], colour, 14, -1);
-    }
+        painter.name(label, [[p[0] + (r + 6) * Math.cos(w), p[1] - (r + 6) * Math.sin(w)]], colour, 14, -1, { key: `transmission ${k}` });
+    });
 }
 
 function centreMarks(painter) {

@@ -16,6 +16,7 @@ export class Motion {
             return;
         }
         const { linkage } = this;
+        this.page.isToForesee = true;
         this.clock = null;
         if (linkage.data.over) {
             this.page.refresh();
