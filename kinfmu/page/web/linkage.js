@@ -4,6 +4,7 @@ import { comesTo, partingOf } from "./branches.js";
 import { isGood } from "./engine.js";
 import { CAMS, axlesOf, formsOf } from "./forms.js";
 import { TURN, placed } from "./geometry.js";
+import { dialOf } from "./marks.js";
 import { grouped } from "./numbers.js";
 import { changePointsOf, rangesOf } from "./ranges.js";
 
@@ -276,6 +277,7 @@ export class Linkage {
         if (!ok) {
             const here = result === "unreached" ? shown.gap(vector, this.u).text : "";
             this.failure = result === "unreached" ? message + (here && `; there, ${here}`) : this.#gapOf(shown, vector, message || "the mechanism does not close");
+            this.isOtherBranch = this.failure.includes("on another branch only");
             return false;
         }
         this.#use(which);
@@ -399,6 +401,10 @@ export class Linkage {
         };
         for (const line of this.curves(all, BOX)) line.forEach(add);
         all.forEach((k) => add(this.point(k)));
+        this.data.drivers.forEach((_, k) => {
+            const dial = dialOf(this, k);
+            for (let i = 0; dial && i <= BOX; i++) add(dial.on(dial.low + (dial.span * i) / BOX, dial.reach));
+        });
         for (const shape of this.shapes) {
             if (!shape.radius && !CAMS.includes(shape.kind)) continue;
             const body = this.body(shape.frame);

@@ -121,7 +121,7 @@ class Page {
         const curves = this.drawn.map(({ colour }, k) => ({ line: this.curves[k] || [], colour }));
         if (this.show.traces) for (const [point, line] of this.traces) curves.push({ line, colour: this.drawn.find((one) => one.point === point)?.colour || [90, 90, 90], isTrace: true });
         const { found, legend } = arrows(this);
-        return { curves, arrows: found, legend, held: this.hand.held, pointer: this.hand.pointer, isGhost: !this.design.isOk };
+        return { curves, arrows: found, legend, held: this.hand.place, pointer: this.hand.pointer, isGhost: !this.design.isOk };
     }
 
     #trace() {
@@ -137,8 +137,9 @@ class Page {
     #readouts() {
         this.transport.update();
         const { design, linkage, motion } = this;
-        $("note").hidden = !linkage.leftOut.length;
-        $("note").textContent = `Not drawn with these values: ${linkage.leftOut.join("; ")}. The lines of kinfmu check hold for the saved file.`;
+        if (!this.isPlaying) this.canvas.setAttribute("aria-label", `Drawing of the mechanism at ${this.transport.pose()}. Arrow keys move the driver, space plays, question mark lists all keys.`);
+        const note = linkage.leftOut.length ? `Not drawn with these values: ${linkage.leftOut.join("; ")}. The lines of kinfmu check hold for the saved file.` : "";
+        if ($("note").textContent !== note) [$("note").textContent, $("note").hidden] = [note, !note]; // screen readers speak it
         $("undo").disabled = !design.past.length;
         $("redo").disabled = !design.future.length;
         $("reset").disabled = !design.changes().length;
@@ -268,7 +269,7 @@ class Page {
         this.mode = this.mode === "move" ? "lengths" : "move";
         $("edit").setAttribute("aria-pressed", String(this.mode === "lengths"));
         if (this.mode === "lengths") this.hint("Drag a pin. Lock values in the panel to keep them.");
-        else this.hint("");
+        else this.hand.leavePin();
     }
 
     hint(text) {

@@ -77,7 +77,7 @@ export class Plots {
             const now = one.read(linkage, linkage.pose);
             plot.value.textContent = `${number(now)} ${one.unit}`;
             const xLabel = this.over === "time" ? (linkage.hasTime ? "s" : "") : isAngle ? "" : linkage.data.unit;
-            plot.painter.draw({ x: this.table.x, values: this.table.columns[k], label: one.label, unit: one.unit, cursor, now, theme, isAngle, xLabel });
+            plot.painter.draw({ x: this.table.x, values: this.table.columns[k], label: one.label, unit: one.unit, cursor, now, theme, isAngle, xLabel, isPlaying: this.page.isPlaying });
         });
     }
 }
