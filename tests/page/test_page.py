@@ -590,7 +590,7 @@ def test_plots_over_a_driver_clip_poles_as_export_does(chromium: Browser, name: 
             if np.ptp(known) < 1e-9:
                 continue  # the speed of the driver itself
             low, high = shown_range(known, 0.0) or (known.min(), known.max())
-            edge = 0.061 * (high - low) + 1e-6  # room around the curve
+            edge = 0.061 * (high - low) + 1e-6  # space around the curve
             assert len(ticks) >= 2
             assert [tick for tick in ticks if not low - edge <= tick <= high + edge] == [], (quantity, low, high)
             assert max(ticks) - min(ticks) >= 0.2 * (high - low)
