@@ -19,6 +19,7 @@ exclude_patterns = ["_*"]
 templates_path: list[str] = []
 highlight_language = "none"  # indented blocks are commands and formulas
 default_role = "code"  # single backticks in docstrings
+smartquotes = False  # quotes in docstrings are those of code
 nitpicky = True
 nitpick_ignore_regex = [  # types in signatures that the site does not describe
     ("py:.*", r"(numpy|np|collections|os|pathlib)\..*"),

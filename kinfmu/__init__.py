@@ -2,9 +2,9 @@
 
     import kinfmu
 
-    mech = kinfmu.load("fourbar")
+    mech = kinfmu.load("crank_rocker")
     run = kinfmu.solve(mech, crank_angle=[0.0, 0.5, 1.0])
-    run["coupler.x"]
+    run["tracer.x"]
 
 Names are imported when first used, so that `import kinfmu` takes a few milliseconds. They are listed once: as imports
 in `__init__.pyi`, which type checkers and editors read as well.

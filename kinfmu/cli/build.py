@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from kinfmu.mechanism import Mechanism
 
 
-@main.command(epilog="Example: kinfmu build fourbar --fmi 3 -o fourbar.fmu")
+@main.command(epilog="Example: kinfmu build crank_rocker --fmi 3 -o crank_rocker.fmu")
 @mechanism_argument
 @click.option(
     "-o",

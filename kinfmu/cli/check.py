@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 FIGURES = (".svg", ".png", ".pdf")
 
 
-@main.command(epilog="Example: kinfmu check fourbar --figure fourbar.svg")
+@main.command(epilog="Example: kinfmu check crank_rocker --figure crank_rocker.svg")
 @mechanism_argument
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON, for programs.")
 @click.option("--matrices", is_flag=True, help="Also print the Jacobians at the assembled pose and at singular points.")

@@ -111,7 +111,7 @@ def _on_axis_of(run: Run, text: str) -> float:
     return on_axis("--at", text, axis.label, axis.unit, f", {axis.range()}") / axis.factor
 
 
-@main.command(epilog="Example: kinfmu export logs/fourbar.mcap -o fourbar.svg --columns coupler.x,rocker.phi")
+@main.command(epilog="Example: kinfmu export logs/crank_rocker.mcap -o run.svg --columns tracer.x,tracer.y")
 @click.argument("run", type=RecordOrMechanism(), metavar="RUN|MECH")
 @click.argument("other", required=False, type=InputFile(".mcap"))
 @click.option(

@@ -100,10 +100,10 @@ def main() -> None:
 
     \b
     A first tour:
-      kinfmu new fourbar mine.toml    write a commented mechanism file, to edit
-      kinfmu check mine.toml          report its properties
-      kinfmu simulate mine.toml       build and step its FMU, write logs
-      kinfmu review logs/mine.mcap    open the run in the viewer
+      kinfmu new crank_rocker mine.toml    write a commented mechanism file, to edit
+      kinfmu check mine.toml               report its properties
+      kinfmu simulate mine.toml            build and step its FMU, write logs
+      kinfmu review logs/mine.mcap         open the run in the viewer
 
     Exit status: 0 success, 1 error in the mechanism or the run, 2 wrong usage.
     """  # noqa: D301  click leaves lines behind a backspace as they are

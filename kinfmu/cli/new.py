@@ -14,7 +14,7 @@ from kinfmu.errors import KinfmuError
 from kinfmu.files.whole_file import write_whole
 
 
-@main.command(epilog="Example: kinfmu new fourbar mine.toml")
+@main.command(epilog="Example: kinfmu new crank_rocker mine.toml")
 @mechanism_argument
 @click.argument("file", type=OutputFile(".toml"))
 def new(mechanism: str, file: Path) -> None:

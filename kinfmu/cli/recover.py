@@ -10,7 +10,7 @@ from kinfmu.cli.arguments import InputFile, OutputFile
 from kinfmu.cli.group import main
 
 
-@main.command(epilog="Example: kinfmu recover logs/fourbar.mcap")
+@main.command(epilog="Example: kinfmu recover logs/crank_rocker.mcap")
 @click.argument("run", type=InputFile())
 @click.option(
     "-o",

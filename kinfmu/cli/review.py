@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from kinfmu.log.viewer.timeline import Timeline
 
 
-@main.command(epilog="Example: kinfmu review logs/fourbar.mcap --screenshot fourbar.png --at 45")
+@main.command(epilog="Example: kinfmu review logs/crank_rocker.mcap --screenshot run.png --at 0.5")
 @click.argument("run", type=InputFile(".mcap", ".rrd"))
 @click.argument("other", required=False, type=InputFile(".mcap"))
 @click.option("--save", type=OutputFile(".rrd"), help="Write the recording (.rrd) without opening the viewer.")

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 LOGS = Path("logs")
 
 
-@main.command(epilog="Example: kinfmu simulate fourbar --stop 90 --step 0.5")
+@main.command(epilog="Example: kinfmu simulate crank_rocker --stop 4 --step 0.01")
 @click.argument("model", metavar="FMU|SSP|MECH", type=ModelName())
 @click.option("--start", type=Time(), help="Start time [s]. Default: first row of --input, else that of the model.")
 @click.option("--stop", type=Time(), help="Stop time [s]. Default: last row of --input, else that of the model.")

@@ -28,7 +28,7 @@ RECORD = ".mcap"
 HALF_TURN = math.pi  # [rad]; a longer step between samples is probably a wrapped angle
 
 
-@main.command(epilog="Example: kinfmu solve fourbar -o run.csv --angle 0deg:360deg:361")
+@main.command(epilog="Example: kinfmu solve crank_rocker -o run.csv --angle 0deg:360deg:361")
 @mechanism_argument
 @click.option(
     "-o",

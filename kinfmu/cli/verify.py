@@ -12,7 +12,7 @@ from kinfmu.cli.group import main
 from kinfmu.errors import KinfmuError
 
 
-@main.command(epilog="Example: kinfmu verify fourbar.fmu --results host.csv")
+@main.command(epilog="Example: kinfmu verify crank_rocker.fmu --results host.csv")
 @click.argument("fmu", type=InputFile(".fmu"), metavar="FMU")
 @click.option(
     "--results",

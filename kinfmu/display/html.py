@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from html import escape
 
+_TABLE = "margin: 0 0 1em 0"  # tables may follow each other
 _CELL = "text-align: left; vertical-align: top; white-space: pre-wrap"
 _NUMBER = "text-align: right; vertical-align: top"
 
@@ -29,7 +30,7 @@ def table(rows: Iterable[Sequence[object]], header: Sequence[str] = ()) -> str:
     for row in rows:
         kinds = ["td" if header or number else "th" for number in range(len(row))]
         lines.append(f"<tr>{''.join(_cell(kind, value) for kind, value in zip(kinds, row, strict=True))}</tr>")
-    return f"<table>{''.join(lines)}</table>"
+    return f'<table style="{_TABLE}">{"".join(lines)}</table>'
 
 
 def page(title: str, *parts: str) -> str:

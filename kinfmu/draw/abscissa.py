@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,7 +12,10 @@ from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import DEGREE, axis_of, rates_per
 from kinfmu.units import degrees_of, unit_of
 
-TICK_STEPS = (1, 1.5, 3, 4.5, 6, 9, 10)  # of degrees: 30, 45, 60, 90; of other quantities matplotlib chooses
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_DEGREES = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0, 360.0, 720.0, 1440.0)  # steps of ticks
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,9 +76,33 @@ def labelled(name: str, unit: str) -> str:
 
 
 def axis_label(name: str, unit: str, longest: int) -> str:
-    """Return a name with its unit, which is on a line of its own if both have more letters than `longest`."""
+    """Return a name with its unit, on two lines if both have more letters than `longest`.
+
+    The unit is on a line of its own, or else the name is broken behind a dot or underscore.
+    """
     text = labelled(name, unit)
-    return text if len(text) <= longest or text == name else f"{name}\n{text.removeprefix(name).lstrip()}"
+    if len(text) <= longest:
+        return text
+    if text != name and len(name) <= longest:
+        return f"{name}\n{text.removeprefix(name).lstrip()}"
+    breaks = [k + 1 for k, letter in enumerate(name) if letter in "._"] or [len(text)]
+    at = min(breaks, key=lambda k: max(k, len(text) - k))
+    return f"{text[:at]}\n{text[at:]}".rstrip("\n")
+
+
+def label_size(label: str, longest: int, size: float) -> float:
+    """Return the size of the letters [pt] with which the lines of a label are no longer than `longest` letters are."""
+    return size * min(1.0, longest / max(1, *map(len, label.split("\n"))))
+
+
+def degree_ticks(axes: Axes, most: int) -> None:
+    """Give a horizontal axis of degrees at most this many steps, such as 30, 45 or 90 deg."""
+    from matplotlib.ticker import MultipleLocator
+
+    low, high = axes.get_xlim()
+    step = next((step for step in _DEGREES if abs(high - low) <= most * step), 0.0)
+    if step and abs(high - low) >= 2.0 * step:  # else those that matplotlib chooses
+        axes.xaxis.set_major_locator(MultipleLocator(step))
 
 
 def raised(unit: str) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kinfmu.cams import CamProfile
-from kinfmu.draw.abscissa import TICK_STEPS
+from kinfmu.draw.abscissa import degree_ticks
 from kinfmu.draw.chart import SMALL, dress
 from kinfmu.draw.dxf import DXF_UNITS, POINT_STYLE, without_date
 from kinfmu.draw.motion import COLOUR
@@ -113,7 +113,7 @@ def _figure(profile: CamProfile) -> Figure:
         bottom = _BOTTOM + (1 - k) * (_FIGURE - _PLOT[1])
         plot = made.add_axes((left, bottom / height, _PLOT[0] / width, _PLOT[1] / height))
         (_pressure if k == 0 else _curvature)(plot, profile, across)
-        plot.locator_params(axis="x", nbins=9, steps=TICK_STEPS)
+        degree_ticks(plot, 9)
         plot.margins(x=0.01)
         plot.set_xlabel("angle of the cam [deg]", fontsize=SMALL, color=ink(GREY), labelpad=1.0)
     return made

@@ -82,16 +82,16 @@ def figure(
     return None
 
 
-def sheet_of(shown: Instant, ax: Axes | None = None) -> Sheet:
-    """Return the sheet with everything drawn on it, by default in a figure of its own; needs matplotlib."""
+def sheet_of(shown: Instant, ax: Axes | None = None, more: Sequence[Mark] = ()) -> Sheet:
+    """Return the sheet with everything and `more` drawn on it; default: in a figure of its own; needs matplotlib."""
     mechanism = shown.mechanism
     found = placed(shown, shapes(shown))
     arrows, places, tracks = motion(shown), pins(shown), paths(shown)
-    reach = np.vstack([extent(found), *(mark.extent() for mark in (*arrows, *places, *tracks))])
+    reach = np.vstack([extent(found), *(mark.extent() for mark in (*arrows, *places, *tracks, *more))])
     size = float(np.ptp(reach, axis=0).max())
     sheet = Sheet(reach, shortest(found, size), mechanism.length_unit, mechanism.title or mechanism.name, ax)
     texts = {load.name: load_text(load) for load in mechanism.loads}
-    names = draw(sheet, found, tracks, [*arrows, *places, *gaps(shown)], texts)
+    names = draw(sheet, found, tracks, [*arrows, *places, *gaps(shown), *more], texts)
     names += gravity(sheet, mechanism)
     notes = [text for text in (gap_note(shown), pose_note(shown), *_face_notes(shown)) if text]
     if len(names) <= MOST_NAMES:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from kinfmu.draw.chart import SMALL, dress
-from kinfmu.draw.drawing import figure
-from kinfmu.draw.sheet import INCH, ink
+from kinfmu.draw.drawing import sheet_of
+from kinfmu.draw.instant import instant
+from kinfmu.draw.names import Mark, Name
+from kinfmu.draw.sheet import INCH, Sheet, ink
 from kinfmu.draw.writing import check_target, write
 from kinfmu.mechanism import Mechanism
 from kinfmu.run import FloatArray
@@ -101,8 +104,25 @@ def figure_of(shown: Fitted) -> Figure:
     return made
 
 
+@dataclass(frozen=True, eq=False)
+class _CurveToCome(Mark):
+    """A curve that is drawn over the mechanism, off which names are kept."""
+
+    curve: Curve
+
+    def extent(self) -> FloatArray:
+        points = np.vstack([self.curve.whole, self.curve.wanted])
+        return points[np.isfinite(points).all(axis=1)]
+
+    def draw(self, sheet: Sheet) -> list[Name]:
+        sheet.cover(self.curve.whole[np.isfinite(self.curve.whole).all(axis=1)], matters=1.0)
+        for point in self.curve.wanted:
+            sheet.cover(np.array([point, point]), matters=2.0, width=_MARKER)
+        return []
+
+
 def _mechanism(axes: Axes, shown: Fitted) -> None:
-    figure(shown.mechanism, at=shown.at, ax=axes)
+    sheet_of(instant(shown.mechanism, shown.at, with_gap=True), axes, [_CurveToCome(curve) for curve in shown.curves])
     if not shown.curves:
         return
     points = np.vstack([curve.wanted for curve in shown.curves])

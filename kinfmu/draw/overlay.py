@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinfmu.draw.abscissa import TICK_STEPS, Abscissa, abscissa, labelled, unit_in
+from kinfmu.draw.abscissa import Abscissa, abscissa, degree_ticks, label_size, labelled, unit_in
 from kinfmu.draw.chart import SMALL, dress, numbers, powers_of_ten
 from kinfmu.draw.curves import LOST, gaps, rows_of
 from kinfmu.draw.polar import radial_scale
@@ -31,6 +31,7 @@ _WIDTH, _HEIGHT, _SQUARE = (
     130.0,
     330.0,
 )  # [pt] of a panel; longest side of an equal or polar one
+_LONGEST = 28  # letters of a name with its unit that fit next to a panel in one line
 _TICK = 36.0  # [pt] for a number along the horizontal axis of an equal panel
 _LEFT, _RIGHT, _TOP, _BOTTOM, _GAP = 60.0, 24.0, 34.0, 34.0, 16.0  # [pt] around and between panels
 _LEGEND_LINE, _LEGEND_COLUMNS = 12.0, 3  # [pt]; names in a line of a legend
@@ -282,10 +283,11 @@ def _scales(axes: Any, shown: Overlay, panel: Sequence[str], values: FloatArray,
             axes.set_ylim(*shown_values)
         unit = numbers(axes, unit)
     if x.is_angle:
-        axes.locator_params(axis="x", nbins=9, steps=TICK_STEPS)
         axes.margins(x=0.01)
+        degree_ticks(axes, 9)
     name = panel[0] if len(panel) == 1 else ""
-    axes.set_ylabel(labelled(name, unit).strip(), fontsize=SMALL, color=grey, labelpad=3.0, parse_math=False)
+    label = labelled(name, unit).strip()
+    axes.set_ylabel(label, fontsize=label_size(label, _LONGEST, SMALL), color=grey, labelpad=3.0, parse_math=False)
     if x.is_axis and not any(name.startswith("solver.status") for name in panel):
         for run in shown.runs:
             for first, last in gaps(run, shown.x(run, panel[0]).values):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from kinfmu.draw.abscissa import TICK_STEPS, axis_label
+from kinfmu.draw.abscissa import axis_label, degree_ticks, label_size
 from kinfmu.draw.chart import SMALL, dress, numbers, powers_of_ten
 from kinfmu.draw.curves import LOST, curves, gaps, rows_of
 from kinfmu.draw.overlay import (
@@ -226,7 +226,7 @@ def _panel(axes: Axes, runs: Sequence[Run], panel: Panel, *, degrees: bool) -> N
     run, axis, known = runs[0], axis_of(runs[0]), np.concatenate(everything)
     axes.set_xlim(*_span(np.concatenate([axis_of(one).values for one in runs])))
     if axis.unit == "deg":
-        axes.locator_params(axis="x", nbins=6, steps=TICK_STEPS)
+        degree_ticks(axes, 6)
     if is_log:
         powers_of_ten(axes, np.maximum(np.abs(known), LEAST))
     else:
@@ -235,7 +235,8 @@ def _panel(axes: Axes, runs: Sequence[Run], panel: Panel, *, degrees: bool) -> N
             axes.set_ylim(limits[0] * factor, limits[1] * factor)
         axes.locator_params(axis="y", nbins=4)
         unit = numbers(axes, unit)
-    axes.set_ylabel(axis_label(panel.label, unit, _LONGEST), fontsize=SMALL, color=ink(GREY), labelpad=3.0)
+    label = axis_label(panel.label, unit, _LONGEST)
+    axes.set_ylabel(label, fontsize=label_size(label, _LONGEST, SMALL), color=ink(GREY), labelpad=3.0)
     is_kept = all(panel.column not in one.absent for one in runs)
     if not is_kept or (is_force and not len(known)):
         words = "not determined" if is_kept else "not kept"

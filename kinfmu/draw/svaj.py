@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinfmu.draw.abscissa import TICK_STEPS, Abscissa, abscissa, labelled
+from kinfmu.draw.abscissa import Abscissa, abscissa, degree_ticks, labelled
 from kinfmu.draw.chart import SMALL, dress, numbers
 from kinfmu.draw.curves import rows_of
 from kinfmu.draw.overlay import curve_colour, range_of, sheet_title
@@ -97,7 +97,7 @@ def _sheet(run: Run, across: Abscissa, name: str, table: FloatArray, units: list
         axes.locator_params(axis="y", nbins=4)
         unit = numbers(axes, unit)
         if across.is_angle:
-            axes.locator_params(axis="x", nbins=9, steps=TICK_STEPS)
+            degree_ticks(axes, 9)
         axes.set_ylabel(labelled(letter, unit), fontsize=SMALL, color=ink(GREY))
         axes.yaxis.set_label_coords(-50.0 / _WIDTH, 0.5)
         axes.tick_params(labelbottom=order == len(LETTERS) - 1)

@@ -15,6 +15,7 @@ import numpy as np
 
 from kinfmu.analysis import Report
 from kinfmu.analysis.loops import FourBar, Place
+from kinfmu.analysis.measuring import turns_of_cycle
 from kinfmu.analysis.text import contact_text
 from kinfmu.draw.instant import instant
 from kinfmu.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
@@ -246,6 +247,7 @@ def _driver(driver: Driver, shown: Instant, report: Report, numbers: Mapping[str
         "inputs": [str(name) for name in driver.inputs()],
         "start": float(driver.law.at(shown.mechanism.run.start)),
         "direction": shown.directions.get(driver.name, 1.0),
+        "loadTurns": turns_of_cycle(shown.mechanism, 1) if len(shown.mechanism.drivers) == 1 else 1,
         "turns": None,
         "limits": [],
         "changePoints": [],
@@ -264,7 +266,7 @@ def _driver(driver: Driver, shown: Instant, report: Report, numbers: Mapping[str
         found["axis"] = float(driver.axis)
     for reach in report.ranges:
         if reach.driver == driver.name:
-            found["turns"] = reach.turns
+            found["turns"] = reach.turns and math.lcm(reach.turns, found["loadTurns"])
             found["reach"] = list(reach.reach)
             found["limits"] = [{"at": limit.value, "text": limit.kind} for limit in reach.limits]
             found["changePoints"] = [point.value for point in reach.points if point.kind == "change point"]

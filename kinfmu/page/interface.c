@@ -270,7 +270,7 @@ bool kf_page_gap(void)
             kf_append_watch(refusal, model, found, "gap ", "%.4g");
         } else if (!has_gap && KF_BLOCKS > 0) {
             append_rows(weakest, "closes", "close");
-            kf_append(refusal, " on another branch only: gap 0 %s", kf_length_unit);
+            kf_append(refusal, " on another branch only");
         }
     }
     memcpy(settings, bound, sizeof bound);

@@ -9,22 +9,27 @@ started.then((page) => {
 
 function serve(page) {
     takeBack(page);
+    const style = "padding: 10px 14px; color: var(--ink); overflow-wrap: anywhere; font-size: 14px; ";
     const line = element("div", { id: "file-problem", role: "alert", hidden: true });
-    line.style = "padding: 10px 14px; border-bottom: 1px solid var(--bad); background: var(--bad-back); color: var(--ink); overflow-wrap: anywhere; font-size: 14px";
+    line.style = `${style}border-bottom: 1px solid var(--bad); background: var(--bad-back)`;
+    const busy = element("div", { id: "file-busy", role: "status", hidden: true, textContent: "The file was saved. Its page is being made; until then this is the page before." });
+    busy.style = `${style}position: absolute; right: 10px; bottom: 26px; border: 1px solid var(--line); border-radius: 8px; background: var(--panel)`; // over the drawing, which keeps its size
     document.querySelector("header").after(line);
-    const tell = (text) => {
+    $("stage").append(busy);
+    const tell = (text, isBusy = false) => {
         line.textContent = text;
         line.hidden = !text;
+        busy.hidden = !isBusy;
     };
     const buttons = serverButtons(page);
     const states = new EventSource("changes");
     states.addEventListener("state", (event) => {
-        const { version, problem } = JSON.parse(event.data);
+        const { version, problem, isBusy } = JSON.parse(event.data);
         buttons.forEach((button) => (button.disabled = false));
         if (version !== SERVED) {
             keep(page);
             location.reload();
-        } else tell(problem && `The file cannot be used as it is: ${problem}`);
+        } else tell(problem && `The file cannot be used as it is: ${problem}`, isBusy);
     });
     states.addEventListener("error", () => {
         buttons.forEach((button) => (button.disabled = true));

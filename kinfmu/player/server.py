@@ -225,7 +225,7 @@ class _Handler(BaseHTTPRequestHandler):
                 self.wfile.write(b":\n\n")
             else:
                 seen = state.change
-                data = json.dumps({"version": state.version, "problem": state.problem})
+                data = json.dumps({"version": state.version, "problem": state.problem, "isBusy": state.is_busy})
                 self.wfile.write(f"event: state\ndata: {data}\n\n".encode())
 
     def _fmu(self, fmi: int) -> None:

@@ -23,12 +23,14 @@ class State(NamedTuple):
         change: Counts the changes of this state.
         version: Counts the pages.
         problem: Why the file has no newer page; empty if it is the page of the file as it is.
+        is_busy: True while the page of a changed file is being made.
 
     """
 
     change: int
     version: int
     problem: str
+    is_busy: bool = False
 
 
 class PlaySource:
@@ -92,6 +94,7 @@ class PlaySource:
         if stamp == self._stamp or stamp != before:
             return
         self._stamp = stamp
+        self._tell(problem=self._state.problem, is_busy=True)
         try:
             mechanism = load(self._name)
             text = self._page_of(mechanism)
@@ -105,15 +108,15 @@ class PlaySource:
         while self.path and not self._closed.wait(PERIOD):
             self.look()
 
-    def _tell(self, mechanism: Mechanism | None = None, text: str = "", problem: str = "") -> None:
+    def _tell(
+        self, mechanism: Mechanism | None = None, text: str = "", problem: str = "", *, is_busy: bool = False
+    ) -> None:
         with self._news:
-            change, version, before = self._state
+            change, version, *_ = self._state
             if mechanism is not None and text != self._page:
                 self.mechanism, self._page = mechanism, text
                 version += 1
-            elif problem == before:
-                return
-            self._state = State(change + 1, version, problem)
+            self._state = State(change + 1, version, problem, is_busy)
             self._news.notify_all()
 
     def _stamped(self) -> tuple[int, int, int] | None:

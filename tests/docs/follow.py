@@ -64,14 +64,14 @@ FILES = {  # the file of each block of TOML, where the text above does not annou
     "measures.md": ["hoeken.toml", "hoeken.toml"],
 }
 BEFORE = {  # commands for the files that a page takes as given
-    "commands.md": ["kinfmu solve fourbar -o host.csv", "python examples/dc_motor/build.py ."],
+    "commands.md": ["kinfmu solve crank_rocker -o host.csv", "python examples/dc_motor/build.py ."],
     "fmu.md": ["kinfmu solve fourbar -o host.csv", "kinfmu new toggle_press press.toml"],
     "host-omsimulator.md": ["kinfmu solve fourbar -o fourbar_res.csv"],
     "host-openmodelica.md": ["kinfmu solve fourbar -o fourbar_res.csv"],
     "host-pyfmi.md": ["kinfmu solve fourbar -o pyfmi.csv"],
     "host-simulink.md": ["kinfmu build fourbar --si", "kinfmu solve fourbar -o simulink.csv"],
     "hosts.md": ["kinfmu build fourbar", "kinfmu solve fourbar -o host.csv"],
-    "playing.md": ["kinfmu new fourbar mine.toml", "kinfmu simulate mine.toml"],
+    "playing.md": ["kinfmu new crank_rocker mine.toml", "kinfmu simulate mine.toml"],
 }
 FROM_PAGES = {"commands.md": ["fitting.md", "studies.md"]}  # pages whose files a page takes as given
 SHOWN = re.compile(r"(print\(.*\))  # (.*)")

@@ -7,10 +7,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.transforms import Bbox
 
 import kinfmu
 from kinfmu.draw.fitted import Curve, Fitted, figure_of
 from kinfmu.draw.sheet import INCH
+from kinfmu.run import FloatArray
 
 
 def panels(step: float) -> list[Axes]:
@@ -46,3 +49,23 @@ def test_points_close_together_are_separate_and_enlarged() -> None:
 def test_points_far_apart_need_no_panel() -> None:
     (drawing,) = panels(0.3)
     assert markers(drawing)[0] == 6.0
+
+
+@pytest.mark.parametrize("name", ["crank_rocker", "jansen_leg", "slider_crank", "watt_six_bar", "double_crank"])
+def test_the_name_of_the_driver_keeps_off_a_curve_through_its_usual_place(name: str) -> None:
+    mech = kinfmu.load(name)
+
+    def drawn(curve: FloatArray) -> tuple[Axes, Bbox]:
+        made = figure_of(Fitted(mech, 1.0, [Curve("path", curve[:2], curve[:2], curve)], []))
+        FigureCanvasAgg(made).draw()
+        (text,) = (text for text in made.axes[0].texts if text.get_text().startswith(f"{mech.drivers[0].name} = "))
+        return made.axes[0], text.get_window_extent()
+
+    far = np.array([[0.0, 0.0], [0.0, 1e-3]])
+    axes, box = drawn(far)
+    x, y = (box.x0 + box.x1) / 2.0, (box.y0 + box.y1) / 2.0
+    across = np.linspace([x - 40.0, y - 9.0], [x + 40.0, y + 9.0], 200)
+    curve = axes.transData.inverted().transform(across)
+    axes, box = drawn(curve)
+    on_paper = axes.transData.transform(curve)
+    assert not ((box.min + 1.0 < on_paper) & (on_paper < box.max - 1.0)).all(axis=1).any()

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import kinfmu
 from kinfmu.draw import plot
-from kinfmu.draw.abscissa import axis_label
+from kinfmu.draw.abscissa import axis_label, degree_ticks, label_size
 from kinfmu.draw.chart import numbers
 from kinfmu.draw.curves import gaps, rows_of
+from kinfmu.draw.overlay import overlay, overlay_sheet
 from kinfmu.draw.plots import _sheet, _shown
 from kinfmu.draw.stacks import _title_of, stacks_of, usual_coordinates
 from kinfmu.errors import FigureError, RequestError
@@ -84,6 +87,44 @@ def test_names_of_axes_stay_off_numbers_and_numbers_differ() -> None:
         )
     assert axis_label("reduced_inertia", "kg m2", 19) == "reduced_inertia\n[kg m²]"
     assert axis_label("torque", "N m", 19) == "torque [N m]"
+    assert axis_label("reduced_inertia.stick_cylinder", "kg", 20) == "reduced_inertia.\nstick_cylinder [kg]"
+    assert label_size("a" * 40, 20, 8.0) == 4.0
+
+
+@pytest.mark.parametrize("name", ["excavator_loaded", "jansen_leg_loaded", "fourbar_chain"])
+def test_names_of_axes_stay_off_each_other_and_within_the_sheet(name: str) -> None:
+    mech = kinfmu.load(name)
+    run = kinfmu.solve(mech, np.linspace(mech.run.start, mech.run.stop, 30))
+    longest = {
+        unit: max((c for c, u in run.column_units().items() if u == unit), key=len, default="")
+        for unit in ("m", "rad", "N")
+    }
+    overlaid = [column for column in longest.values() if column and column not in run.absent]
+    for made in (
+        _sheet((run,), stacks_of(run, [])),
+        overlay_sheet(overlay((run,), ("A", "B"), overlaid, (), degrees=False, polar=False)),
+    ):
+        canvas = FigureCanvasAgg(made)
+        canvas.draw()
+        labels = [axes.yaxis.label for axes in made.axes if axes.get_ylabel()]
+        boxes = [label.get_window_extent(canvas.get_renderer()) for label in labels]
+        assert len(boxes) >= 2
+        for (one, a), (other, b) in combinations(zip(labels, boxes, strict=True), 2):
+            apart = a.x1 <= b.x0 or b.x1 <= a.x0 or a.y1 <= b.y0 or b.y1 <= a.y0
+            assert apart, (one.get_text(), other.get_text())
+        assert all(box.x0 >= 0.0 and box.y0 >= 0.0 and box.y1 <= made.bbox.y1 for box in boxes)
+
+
+@pytest.mark.parametrize("span", [1.3, 9.0, 27.0, 36.0, 54.0, 90.0, 100.0, 135.0, 180.0, 270.0, 360.0, 720.0, 1440.0])
+@pytest.mark.parametrize("most", [6, 9])
+def test_ticks_of_degrees_are_round(span: float, most: int) -> None:
+    axes = Figure().subplots()
+    axes.set_xlim(-0.01 * span, 1.01 * span)
+    degree_ticks(axes, most)
+    steps = np.diff(axes.get_xticks())
+    assert np.ptp(steps) < 1e-9
+    assert steps[0] in (0.2, 0.25, 0.5, 1, 2, 5, 10, 15, 30, 45, 60, 90, 180, 360)
+    assert 2 <= span / steps[0] <= most + 1
 
 
 def test_the_same_run_gives_the_same_bytes(run: Run, tmp_path: Path) -> None:

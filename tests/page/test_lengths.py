@@ -16,7 +16,7 @@ from tests.page.engines import NODE, needs_node
 
 SCRIPT = Path(__file__).with_name("break_lengths.mjs")
 DATA = re.compile(r'id="data">([^<]*)<')
-GAP = re.compile(r"rows? [\w., ]+ (do(es)? not close|closes? on another branch only): gap [\d.e-]+ (mm|m)")
+GAP = re.compile(r"rows? [\w., ]+ (do(es)? not close: gap [\d.e-]+ (mm|m)|closes? on another branch only)")
 BRANCH = re.compile(r"with these values the mechanism moves on another branch beyond \w+ = [\d.-]+°")
 SAME = 1e-12  # of the size, and [rad]
 JUMP = 0.25  # of the size, and [rad], between neighbouring lengths

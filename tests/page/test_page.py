@@ -14,12 +14,14 @@ import kinfmu
 import kinfmu.page
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text as toml_text
+from kinfmu.run.axis import shown_range
 from tests.page.browser import DESKTOP, PHONE, Browser, browser, needs_browser, text_of
 
 pytestmark = needs_browser
 LARGEST = 300_000  # [bytes] of a page
 LABELS = Path(__file__).with_name("labels.js").read_text("utf-8")
 CONTRASTS = Path(__file__).with_name("contrasts.js").read_text("utf-8")
+JUMPS = Path(__file__).with_name("jumps.js").read_text("utf-8")
 COVERED = Path(__file__).with_name("covered.js").read_text("utf-8")
 
 
@@ -108,6 +110,73 @@ def test_the_clock_has_the_digits_of_the_run_and_the_speed_makes_short_runs_visi
     assert 1.5 <= stop / speed <= 30.0  # [s]
 
 
+def _geared(ratio: float) -> kinfmu.Mechanism:
+    """Return the geared five-bar with links that are long enough for all ratios, which shift the phase too."""
+    text = toml_text(kinfmu.load("geared_five_bar"))
+    return parse(re.sub(r"ratio = -2(\.0)?", f"ratio = {ratio}", text).replace("T = [60", "T = [80"))
+
+
+@pytest.mark.parametrize(
+    ("mech", "turns"),
+    [
+        (kinfmu.load("engine"), 2),
+        (kinfmu.load("jansen_leg_loaded"), 1),
+        *((_geared(ratio), turns) for ratio, turns in ((-0.5, 2), (-2.0 / 3.0, 3), (0.75, 4), (-2.0, 1))),
+    ],
+    ids=lambda one: getattr(one, "name", one),
+)
+def test_slider_plots_curves_and_clock_run_over_one_whole_cycle(
+    chromium: Browser, mech: kinfmu.Mechanism, turns: int
+) -> None:
+    (driver,) = mech.drivers
+    start = float(driver.law.at(0.0))
+    speed = float(driver.law.at(1.0)) - start
+    with chromium.open(kinfmu.page.page(mech)) as page:
+        low, high = page.get("k.linkage.ranges[0]")
+        assert [low, high] == pytest.approx([start, start + turns * math.tau])
+        page.tab.click("#tab-plots")
+        page.settle()
+        shown = page.get("k.plots.plots.map(plot => plot.select.value)")
+        table = page.get("({ x: [...k.plots.table.x], columns: k.plots.table.columns.map(one => [...one]) })")
+        curves = page.get("k.linkage.curves([...k.linkage.data.points.keys()])")
+        values = [start + part * turns * math.tau for part in (0.1, 0.264, 0.5277, 0.71, 0.95, 0.3)]
+        seen = []
+        for value in values:
+            page.move(value)
+            clock = float(page.tab.inner_text("#clock").removesuffix(" s"))
+            texts = page.tab.locator("#plots .plot .reading").all_text_contents()
+            slider = float(page.tab.locator("#drivers input[type=range]").input_value())
+            seen.append((slider, page.get("k.linkage.t"), clock, [float(text.split(" ")[0]) for text in texts]))
+        assert page.errors == []
+    assert len(table["x"]) == turns * 360 + 1
+    assert all(math.dist(curve[0], curve[-1]) < 1e-9 for curve in curves if curve)
+    period = turns * math.tau / abs(speed)
+    by_hand = kinfmu.solve(mech, (np.array(values) - start) / speed)
+    for k, (value, (slider, t, clock, numbers)) in enumerate(zip(values, seen, strict=True)):
+        assert slider == pytest.approx(value)
+        assert math.remainder(t - (value - start) / speed, period) == pytest.approx(0.0, abs=1e-12 * period)
+        assert clock == pytest.approx(t, abs=0.01 * period)
+        for name, number, column in zip(shown, numbers, table["columns"], strict=True):
+            factor = 180.0 / math.pi if name.endswith(".phi") else 1.0
+            assert number == pytest.approx(factor * by_hand[name][k], rel=1e-4, abs=1e-6)
+            reach = max(column) - min(column)
+            assert number == pytest.approx(np.interp(value, table["x"], column), abs=2e-3 * reach)
+    turn = kinfmu.solve(mech, (np.array(table["x"]) - start) / speed)
+    for name, column in zip(shown, table["columns"], strict=True):
+        assert np.abs(turn[name] - column).max() < 1e-8 * max(1.0, np.abs(column).max())
+
+
+def test_the_cycle_is_counted_again_with_another_ratio(chromium: Browser) -> None:
+    with chromium.open(kinfmu.page.page(_geared(-2.0))) as page:
+        for ratio, turns in ((-0.5, 2), (-1.5, 2), (-2.25, 4), (-1.0, 1)):
+            page.get(f"k.refresh(() => {{ k.design.set({{'joints.mesh.ratio': {ratio}}}); k.reshape(); }})")
+            page.settle()
+            low, high = page.get("k.linkage.ranges[0]")
+            assert high - low == pytest.approx(turns * math.tau)
+            assert page.get("k.design.isOk")
+        assert page.errors == []
+
+
 def test_page_fits_a_phone(chromium: Browser) -> None:
     with chromium.open(text_of("jansen_leg"), has_touch=True) as page:
         page.resize(PHONE)
@@ -132,6 +201,34 @@ def test_names_cover_neither_each_other_nor_the_linkage(chromium: Browser, name:
             covered = page.tab.evaluate(COVERED, waiting.value.path().read_text("utf-8"))
             assert covered["count"] > 8
             assert covered["found"] == []
+        assert page.errors == []
+
+
+def _light(colour: str) -> float:
+    """Return the relative luminance of a colour '#rrggbb', as WCAG defines it."""
+    parts = [int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5)]
+    red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+@pytest.mark.parametrize(
+    "size", [pytest.param(PHONE, id="phone"), pytest.param(DESKTOP, id="desktop", marks=pytest.mark.long)]
+)
+@pytest.mark.parametrize("name", kinfmu.gallery.names())
+def test_names_keep_their_places_in_a_turn_and_have_the_contrast_of_wcag_aa(
+    chromium: Browser, name: str, size: dict[str, int]
+) -> None:
+    with chromium.open(text_of(name)) as page:
+        page.resize(size)
+        page.get("k.fit()")
+        page.settle()
+        played = page.tab.evaluate(JUMPS)
+        assert played["frames"] >= 60
+        assert len(played["found"]) <= 8, played["found"]
+        pairs = [(*pair, _light(pair[0]) + 0.05, _light(pair[1]) + 0.05) for pair in played["colours"]]
+        contrasts = {f"{text} on {paper}": max(a, b) / min(a, b) for text, paper, a, b in pairs}
+        assert len(contrasts) > 6
+        assert {pair: ratio for pair, ratio in contrasts.items() if ratio < 4.5} == {}
         assert page.errors == []
 
 
@@ -463,6 +560,45 @@ def test_the_first_plots_are_of_coordinates_that_move(chromium: Browser, more: s
         assert page.errors == []
 
 
+@pytest.mark.parametrize("name", ["triple_rocker", "peaucellier", "stephenson_six_bar", "crank_rocker"])
+def test_plots_over_a_driver_clip_poles_as_export_does(chromium: Browser, name: str) -> None:
+    mech = kinfmu.load(name)
+    body = mech.moving_bodies[1].name
+    text = toml_text(mech).replace(f"[bodies.{body}]\n", f'[bodies.{body}]\nmass = "1 kg"\n')
+    is_flat_without = []
+    with chromium.open(kinfmu.page.page(parse(text))) as page:
+        page.tab.click("#tab-plots")
+        page.settle()
+        offered = [one for one in page.get("k.plots.all.map(one => one.id)") if "omega" in one or "torque" in one]
+        for quantity in offered[:6]:
+            page.tab.locator("#plots .plot select").first.select_option(quantity)
+            page.settle()
+            ticks = page.tab.evaluate(
+                """() => {
+                    const write = CanvasRenderingContext2D.prototype.fillText;
+                    const ticks = [];
+                    CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
+                        if (this.textAlign === "right" && /^-?[0-9.e+-]+$/.test(text)) ticks.push(Number(text));
+                    };
+                    window.kinfmu.plots.plots[0].painter.draw(window.kinfmu.plots.plots[0].painter.last);
+                    CanvasRenderingContext2D.prototype.fillText = write;
+                    return ticks;
+                }"""
+            )
+            values = np.array(page.get("[...k.plots.table.columns[0]].map(one => one ?? NaN)"), dtype=float)
+            known = values[np.isfinite(values)]
+            if np.ptp(known) < 1e-9:
+                continue  # the speed of the driver itself
+            low, high = shown_range(known, 0.0) or (known.min(), known.max())
+            edge = 0.061 * (high - low) + 1e-6  # space around the curve
+            assert len(ticks) >= 2
+            assert [tick for tick in ticks if not low - edge <= tick <= high + edge] == [], (quantity, low, high)
+            assert max(ticks) - min(ticks) >= 0.2 * (high - low)
+            is_flat_without.append(np.ptp(known) > 3.0 * (high - low))
+        assert page.errors == []
+    assert any(is_flat_without) == (name != "crank_rocker")
+
+
 def test_click_in_a_plot_moves_the_crank(chromium: Browser) -> None:
     with chromium.open(text_of("crank_rocker")) as page:
         page.tab.click("#tab-plots")
@@ -518,6 +654,164 @@ def test_keyboard_alone_moves_plays_and_changes_values(chromium: Browser) -> Non
         page.settle()
         assert page.get("k.design.values.get('bodies.crank.points.P.x')") == 20
         assert page.errors == []
+
+
+@pytest.mark.parametrize("name", ["crank_rocker", "jansen_leg", "slider_crank"])
+def test_a_pin_is_chosen_and_moved_by_keys(chromium: Browser, name: str) -> None:
+    with chromium.open(text_of(name)) as page:
+        keyboard, ring = page.tab.keyboard, "k.linkage.pose && k.hand.place"
+        page.tab.focus("#drawing")
+        start = page.get("k.linkage.u[0]")
+        seen = set()
+        for _ in range(20):
+            keyboard.press("p")
+            page.settle()
+            hint = page.tab.inner_text("#hint")
+            body, _, point = hint.split(" at ")[0].partition(".")
+            at = page.get(
+                "k.linkage.point(k.linkage.data.points.findIndex("
+                f"one => one.body === '{body}' && one.name === '{point}'))"
+            )
+            assert page.get(ring) == pytest.approx(at)
+            seen.add((body, point))
+        assert 2 <= len(seen) < 20
+        keyboard.press("Shift+p")
+        keyboard.press("p")
+        page.settle()
+        step = 10.0 ** math.floor(math.log10(page.get("k.linkage.data.size")) - 2)
+        tried = moved = 0
+        for key, way in (
+            ("ArrowRight", (1, 0)),
+            ("ArrowUp", (0, 1)),
+            ("Shift+ArrowLeft", (-10, 0)),
+            ("ArrowDown", (0, -1)),
+        ):
+            before = page.get(ring)
+            keyboard.press(key)
+            page.settle()
+            tried += 1
+            moved += page.get(ring) == pytest.approx([before[k] + way[k] * step for k in (0, 1)], abs=0.35 * step)
+        assert moved >= 2, tried
+        assert page.get("k.linkage.u[0]") == start  # the driver rests
+        assert page.get("k.design.changes().length") > 0
+        keyboard.press("Control+z")
+        keyboard.press("Escape")
+        page.settle()
+        assert page.get("k.hand.place") is None
+        keyboard.press("ArrowRight")
+        page.settle()
+        assert page.get("k.linkage.u[0]") != start
+        assert page.errors == []
+
+
+def test_nothing_is_spoken_at_frame_rate_and_the_drawing_states_its_pose(chromium: Browser) -> None:
+    live = "[aria-live]:not([aria-live=off]), [role=status], [role=alert], [role=log], [role=timer], output"
+    with chromium.open(text_of("crank_rocker")) as page:
+        page.tab.click("#tab-plots")
+        page.move(math.radians(45.0))
+        label = page.tab.locator("#drawing").get_attribute("aria-label")
+        assert "crank = 45 deg" in str(label)
+        assert page.tab.inner_text("#clock") in str(label)
+        page.tab.evaluate(
+            """live => {
+                window.spoken = [];
+                new MutationObserver((changes) => changes.forEach(({ target }) => {
+                    const one = target.nodeType === 1 ? target : target.parentElement;
+                    if (one.closest(live) || one.matches("canvas")) window.spoken.push(one.id || one.outerHTML);
+                })).observe(document.body, { subtree: true, childList: true, characterData: true, attributes: true });
+            }""",
+            live,
+        )
+        clock = page.tab.inner_text("#clock")
+        page.tab.click("#play")
+        page.tab.wait_for_timeout(400)
+        page.tab.click("#play")
+        assert page.tab.inner_text("#clock") != clock
+        spoken = page.tab.evaluate("window.spoken")
+        assert len(spoken) <= 4, spoken  # when it stops
+        assert str(page.tab.locator("#drawing").get_attribute("aria-label")) != label
+        assert page.errors == []
+
+
+@pytest.mark.parametrize(
+    "name", ["crank_rocker", "triple_rocker", "cam_roller", "slider_crank", "toggle_press", "five_bar"]
+)
+@pytest.mark.parametrize("size", [PHONE, DESKTOP], ids=["phone", "desktop"])
+def test_fit_shows_the_circles_of_the_drivers(chromium: Browser, name: str, size: dict[str, int]) -> None:
+    with chromium.open(text_of(name)) as page:
+        page.resize(size)
+        page.get("k.fit()")
+        page.settle()
+        page.tab.evaluate(
+            """() => {
+                const { context: c, canvas } = window.kinfmu;
+                const [line, dash] = [c.lineTo.bind(c), c.setLineDash.bind(c)];
+                let [points, kept] = [[], []];
+                const [begin, move] = [c.beginPath.bind(c), c.moveTo.bind(c)];
+                c.beginPath = () => { points = []; begin(); };
+                c.moveTo = (x, y) => { points.push([x, y]); move(x, y); };
+                c.lineTo = (x, y) => { points.push([x, y]); line(x, y); };
+                c.setLineDash = (of) => { if (String(of) === "2,4") kept.push(...points); dash(of); };
+                window.kinfmu.paint();
+                window.dial = kept;
+            }"""
+        )
+        dial = np.array(page.get("window.dial"))
+        width, height = page.get("[k.view.width, k.view.height]")
+        assert len(dial) >= 73
+        assert dial.min() >= 8.0  # the handle has a radius of 8 px
+        assert dial[:, 0].max() <= width - 8.0
+        assert dial[:, 1].max() <= height - 8.0
+
+
+def test_notes_and_long_rows_leave_scale_and_check_boxes_alone(chromium: Browser) -> None:
+    with chromium.open(text_of("geared_five_bar")) as page:
+        page.get("k.design.set({'joints.mesh.offset': 0.1}) && k.reshape()")
+        for size in (PHONE, DESKTOP):
+            page.resize(size)
+            page.tab.click("#tab-show")
+            assert page.tab.locator("#note").is_visible()
+            left = page.tab.locator("#note").bounding_box()["x"]  # type: ignore[index]
+            scale = page.tab.evaluate(
+                """() => {
+                    const { context: c } = window.kinfmu;
+                    const write = c.fillText.bind(c);
+                    const ends = [];
+                    c.fillText = (text, x, y) => {
+                        if (x === 4) ends.push(x + c.measureText(text).width);
+                        write(text, x, y);
+                    };
+                    window.kinfmu.paint();
+                    delete c.fillText;
+                    return ends;
+                }"""
+            )
+            assert scale
+            assert left >= max(scale)
+            boxes = page.tab.locator(".check input")
+            sizes = {
+                (box["width"], box["height"])
+                for box in (boxes.nth(k).bounding_box() for k in range(boxes.count()))
+                if box
+            }
+            assert sizes == {(18, 18)}
+        assert page.errors == []
+
+
+def test_a_length_that_closes_on_another_branch_only_names_no_gap(chromium: Browser) -> None:
+    with chromium.open(text_of("crank_rocker")) as page:
+        assert (
+            page.get("k.inWords('rows C.x, C.y close on another branch only')")
+            == "joint C closes on another branch only"
+        )
+        page.get("k.design.set({ 'bodies.crank.points.P.x': 20.5 }) && k.reshape()")  # now by the engine of all numbers
+        page.get("k.linkage.shown.bind = () => ({ ok: false, result: 'refused', message: '' })")
+        page.get("k.linkage.shown.gap = () => ({ hasGap: false, text: 'rows C.x, C.y close on another branch only' })")
+        page.get("k.refresh(() => { k.design.set({ 'bodies.crank.points.P.x': 21 }); })")
+        page.settle()
+        banner = page.tab.inner_text("#banner")
+        assert banner.startswith("Another branch: ")
+        assert "joint C closes on another branch only. The last good" in banner
 
 
 def test_a_pose_that_is_too_far_is_refused_by_that_reason_alone(chromium: Browser) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import json
 import socket
+import threading
 from collections.abc import Iterator
 from http import HTTPStatus
 from pathlib import Path
@@ -52,7 +53,7 @@ def ask(
 
 
 def states(server: PlayServer) -> Iterator[dict[str, Any]]:
-    """Yield what is reported to pages."""
+    """Yield what is reported to pages, apart from pages in the making."""
     connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=30)
     connection.request("GET", f"/{server.url.split('/')[3]}/changes")
     answer = connection.getresponse()
@@ -60,7 +61,9 @@ def states(server: PlayServer) -> Iterator[dict[str, Any]]:
     while True:
         line = answer.readline().decode()
         if line.startswith("data: "):
-            yield json.loads(line.removeprefix("data: "))
+            state = json.loads(line.removeprefix("data: "))
+            if not state.pop("isBusy"):
+                yield state
 
 
 def test_the_page_is_served_to_its_own_address_only(server: PlayServer) -> None:
@@ -173,6 +176,33 @@ def test_the_page_works_under_its_security_policy(server: PlayServer, tmp_path: 
         page.tab.locator("#file-problem", has_text="kinfmu play has ended").wait_for()
         assert page.tab.locator("#save-fmu3").is_disabled()
         assert all("ERR_" in error for error in page.errors)  # the server is gone
+
+
+@needs_browser
+def test_while_a_page_is_made_the_old_one_states_it_and_goes_on(
+    server: PlayServer, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made, may_end = server.source._page_of, threading.Event()
+
+    def slow(mechanism: kinfmu.Mechanism) -> str:
+        may_end.wait(60.0)
+        return made(mechanism)
+
+    monkeypatch.setattr(server.source, "_page_of", slow)
+    with browser(tmp_path) as chromium, chromium.open_at(server.url, bypass_csp=True) as page:
+        busy = page.tab.locator("#file-busy")
+        assert busy.is_hidden()
+        drawn = page.get("k.canvas.toDataURL()")
+        size = page.get("[k.view.width, k.view.height]")
+        file.write_text(file.read_text("utf-8").replace("Crank-rocker that", "A crank-rocker that"), "utf-8")
+        busy.wait_for(state="visible")
+        assert busy.inner_text().startswith("The file was saved. Its page is being made")
+        assert page.get("[k.view.width, k.view.height]") == size
+        assert page.get("k.canvas.toDataURL()") == drawn
+        page.move(1.0)
+        assert page.get("k.linkage.u[0]") == 1.0
+        may_end.set()
+        page.tab.wait_for_function("document.getElementById('title').textContent.startsWith('A crank')")
 
 
 @needs_browser

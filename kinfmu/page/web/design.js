@@ -105,7 +105,10 @@ export class Design {
         if (same(values, this.linkage.bound)) this.failure = "";
         else this.#bind();
         this.saved = new Map(values);
-        if (this.isOk && !u.every((value, k) => value === this.linkage.u[k])) this.linkage.goTowards(u);
+        if (this.isOk && !u.every((value, k) => value === this.linkage.u[k])) {
+            this.linkage.t = this.linkage.timeNear(u);
+            this.linkage.goTowards(u);
+        }
         return ignored;
     }
 }

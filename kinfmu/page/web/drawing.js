@@ -1,6 +1,6 @@
 // The drawing of a linkage: shapes, pins, names, curves, arrows, marks.
 
-import { edgeOf, fillOf, GREY, paleOf } from "./colours.js";
+import { edgeOf, fillOf, GREY, inkOf, paleOf } from "./colours.js";
 import { distance, distanceToSegment, isSlim, outline, placed } from "./geometry.js";
 import { gravity, loads } from "./loads.js";
 import { marks } from "./marks.js";
@@ -9,10 +9,30 @@ import { grouped, niceStep, number } from "./numbers.js";
 import { widthOf } from "./pen.js";
 import { BUTTONS } from "./view.js";
 
-// Draw a pose; show: what is switched on; view: from the plane to pixels. Returns the handles { driver, body, at } of drivers,
-// and whether names have no place.
-export function draw(pen, linkage, view, theme, show, extra) {
-    const painter = new Painter(pen, linkage, view, theme, extra.isGhost);
+// Draw a pose; show: what is switched on; view: from the plane to pixels; spots: of names in the frames before. Returns the
+// handles { driver, body, at } of drivers, and whether names have no place.
+export function draw(pen, linkage, view, theme, show, extra, spots) {
+    const painter = painted(pen, linkage, view, theme, show, extra, spots);
+    if (show.names) {
+        painter.names.draw();
+        if (extra.pointer) painter.names.drawAt(extra.pointer.at, extra.pointer.reach);
+    }
+    return { handles: painter.handles, hasHidden: painter.names.hidden.length > 0 };
+}
+
+// Find the spots of names that are free at most poses of the motion.
+export function foresee(linkage, view, theme, show, spots) {
+    const frames = [];
+    linkage.tour(() => frames.push(painted(NO_PEN, linkage, view, theme, show, NOTHING_MORE, spots).names));
+    spots.foresee(frames);
+}
+
+const NO_PEN = { line() {}, circle() {}, text() {} };
+const NOTHING_MORE = { curves: [], arrows: [], legend: [], held: null, isGhost: false };
+
+// Return the painter that has painted all but the names.
+function painted(pen, linkage, view, theme, show, extra, spots) {
+    const painter = new Painter(pen, linkage, view, theme, extra.isGhost, spots);
     painter.grid(show.grid);
     painter.curves(extra.curves, show);
     painter.wheels();
@@ -27,18 +47,14 @@ export function draw(pen, linkage, view, theme, show, extra) {
     painter.pins(extra.held);
     if (show.loads) gravity(painter);
     marks(painter, show, extra);
-    if (show.names) {
-        painter.names.draw();
-        if (extra.pointer) painter.names.drawAt(extra.pointer.at, extra.pointer.reach);
-    }
-    return { handles: painter.handles, hasHidden: painter.names.hidden.length > 0 };
+    return painter;
 }
 
 class Painter {
-    constructor(pen, linkage, view, theme, isGhost) {
+    constructor(pen, linkage, view, theme, isGhost, spots) {
         Object.assign(this, { pen, linkage, view, theme, isGhost });
         this.pose = linkage.pose;
-        this.names = new Names(pen, view, theme);
+        this.names = new Names(pen, view, theme, spots);
         this.handles = [];
         this.fine = linkage.fineness;
         this.width = Math.max(4, Math.min(15, 13 * this.fine));
@@ -47,6 +63,10 @@ class Painter {
 
     edge(colour) {
         return this.isGhost ? edgeOf(GREY, this.theme) : edgeOf(colour, this.theme);
+    }
+
+    ink(colour) {
+        return inkOf(this.isGhost ? GREY : colour, this.theme);
     }
 
     fill(colour) {
@@ -241,12 +261,12 @@ class Painter {
                 this.pen.line(rib.map(place), { width: width * 0.5, colour: fill });
                 this.names.coverAll(rib.map(place), width * 0.5);
             }
-            const middles = routes.flatMap(({ points, closed }) => middlesOf(points, closed));
+            const middles = middlesOf(routes);
             const gap = (p) => Math.min(...routes.flatMap(({ points, closed }) => sidesOf(points, closed).map((side) => distanceToSegment(p, ...side) - width / 2)));
             const inside = found.closed ? centreOf(routes[0].points) : null;
             const first = place(found.corners[0] || [0, 0]);
-            if (middles.length) this.name(link.name, middles, edge, width / 2 + 8, 2, { inside, gap });
-            else this.name(link.name, [first], edge, 24, 3, { gap: (p) => distance(p, first) - width });
+            if (middles.length) this.name(link.name, middles, this.ink(link.colour), width / 2 + 8, 2, { inside, gap });
+            else this.name(link.name, [first], this.ink(link.colour), 24, 3, { gap: (p) => distance(p, first) - width });
         }
     }
 
@@ -257,8 +277,25 @@ class Painter {
         const away = this.direction(shape);
         const isOn = (p) => Math.abs((p[0] - a[0]) * away[0] + (p[1] - a[1]) * away[1]) < 0.1; // [px]
         routes.push({ points: [a, b], closed: false });
-        this.name(shape.name, [0.5, 0.3, 0.7].map((part) => [0, 1].map((k) => a[k] + part * (b[k] - a[k]))), this.theme.ink, width + 8, 3);
+        this.name(shape.name, middlesOf([{ points: [a, b], closed: false }]), this.theme.ink, width + 8, 3);
         for (const route of routes) route.points = route.points.map((p) => (isOn(p) ? [0, 1].map((k) => p[k] + 0.5 * width * away[k]) : p));
+    }
+
+    // Return for each point the first one that is always at the same place: of its body, or joined by a pin.
+    get pinOf() {
+        const { linkage } = this;
+        if (linkage.pinsFor !== linkage.pose.locals) {
+            linkage.pinsFor = linkage.pose.locals;
+            const { points, joints } = linkage.data;
+            const places = points.map((_, k) => `${linkage.bodyOf[k]} ${linkage.local(k)}`);
+            const first = new Map(places.map((place, k) => [place, k]).reverse());
+            linkage.pinList = places.map((place) => first.get(place));
+            for (const { points: both } of joints.filter(({ type }) => type === "revolute")) {
+                const [kept, other] = both.map((point) => linkage.pinList[point]).sort((a, b) => a - b);
+                linkage.pinList = linkage.pinList.map((pin) => (pin === other ? kept : pin));
+            }
+        }
+        return linkage.pinList;
     }
 
     get outlines() {
@@ -281,7 +318,7 @@ class Painter {
             this.pen.line(points, { width: width + 1.2, colour: this.edge(GREY) });
             this.pen.line(points, { width: Math.max(width - 1, 1), colour: fillOf(GREY, this.theme) });
             this.names.cover(...points, width);
-            this.name(bar.name, middlesOf(points, false), this.edge(GREY), width / 2 + 8, 3, { gap: (p) => distanceToSegment(p, ...points) });
+            this.name(bar.name, middlesOf([{ points, closed: false }]), this.ink(GREY), width / 2 + 8, 3, { gap: (p) => distanceToSegment(p, ...points) });
         }
     }
 
@@ -326,7 +363,7 @@ class Painter {
             const disc = Math.min(Math.max(piston, 7), tube - 3);
             this.pen.line([at(disc - 1.6), at(disc + 1.6)], { width: 1.15 * w - 1, colour: this.edge(GREY), cap: "butt" });
             this.names.cover(a, b, 1.15 * w);
-            this.name(barrel.name, [at(0.35 * length), at(0.6 * length)], this.edge(GREY), 0.6 * w + 8, 3, { gap: (p) => distanceToSegment(p, a, b) });
+            this.name(barrel.name, [0.35, 0.6].map((part, id) => ({ at: at(part * length), id, along })), this.ink(GREY), 0.6 * w + 8, 3, { gap: (p) => distanceToSegment(p, a, b) });
         }
     }
 
@@ -335,10 +372,9 @@ class Painter {
         const radius = Math.max(2.4, 0.33 * this.width);
         const [done, withName, named] = [new Set(), new Set(), new Set()]; // places of pins, those with names, names with places
         const isOfInterest = new Set(linkage.data.interest.map(({ point }) => point));
-        const key = (p) => `${Math.round(p[0])} ${Math.round(p[1])}`;
         const pin = (point, text, rank = 1) => {
             const p = this.dot(linkage.point(point));
-            const place = key(p);
+            const place = this.pinOf[point];
             if (!done.has(place)) {
                 done.add(place);
                 pen.circle(...p, radius, { width: 1.6, colour: theme.ink, fill: theme.pin });
@@ -352,7 +388,7 @@ class Painter {
         };
         const end = (point) => { // of a bar, cylinder or spring, whose own name is at its middle
             const { name } = linkage.data.points[point];
-            pin(point, withName.has(key(this.dot(linkage.point(point)))) || isOfInterest.has(point) ? "" : name, 4);
+            pin(point, withName.has(this.pinOf[point]) || isOfInterest.has(point) ? "" : name, 4);
         };
         const joints = linkage.data.joints.filter((joint) => joint.points && !["translational", "cam_flat_face"].includes(joint.type));
         const [bars, others] = [true, false].map((isBar) => joints.filter((joint) => (joint.type === "distance") === isBar));
@@ -363,8 +399,8 @@ class Painter {
         for (const { name, point, colour } of linkage.data.interest) {
             const p = this.dot(linkage.point(point));
             pen.circle(...p, radius + 0.6, { width: 1.6, colour: theme.ink, fill: this.edge(colour) });
-            if (!done.has(key(p))) this.names.boxes.add([p[0] - radius, p[1] - radius, p[0] + radius, p[1] + radius]);
-            if (!named.has(`${name} ${key(p)}`)) this.name(name, [p], theme.ink, radius + 8, 0, { gap: (one) => distance(one, p) - radius });
+            if (!done.has(this.pinOf[point])) this.names.boxes.add([p[0] - radius, p[1] - radius, p[0] + radius, p[1] + radius]);
+            if (!named.has(`${name} ${this.pinOf[point]}`)) this.name(name, [p], theme.ink, radius + 8, 0, { gap: (one) => distance(one, p) - radius });
         }
         if (held) pen.circle(...this.dot(held), radius + 6, { width: 2.5, colour: theme.accent });
     }
@@ -375,10 +411,16 @@ function sidesOf(points, closed) {
     return ends.slice(1).map((b, k) => [ends[k], b]);
 }
 
-function middlesOf(points, closed) {
-    const edges = sidesOf(points, closed);
-    edges.sort((p, q) => distance(...q) - distance(...p));
-    return edges.flatMap(([a, b]) => [0.5, 0.35, 0.65].map((part) => [a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])]));
+const PARTS = [0.5, 0.35, 0.65]; // of a line, where its name may be
+
+// Return places for a name along lines, those of the longest line first.
+function middlesOf(lines) {
+    const sides = lines.flatMap(({ points, closed }) => sidesOf(points, closed)).map(([a, b], number) => ({ a, b, number, length: distance(a, b) }));
+    sides.sort((p, q) => q.length - p.length);
+    return sides.flatMap(({ a, b, number, length }) => {
+        const along = [(b[0] - a[0]) / (length || 1), (b[1] - a[1]) / (length || 1)];
+        return PARTS.map((part, k) => ({ at: [a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])], id: PARTS.length * number + k, along }));
+    });
 }
 
 function centreOf(points) {

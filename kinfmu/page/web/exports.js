@@ -3,6 +3,7 @@
 import { SvgPen } from "./pen.js";
 import { THEMES } from "./colours.js";
 import { draw } from "./drawing.js";
+import { Spots } from "./names.js";
 import { quantities, sampled } from "./plots.js";
 
 export function download(name, text, type) {
@@ -54,7 +55,9 @@ export function table(linkage, over) {
 export function drawing(linkage, view, show, extra) {
     const theme = THEMES.light;
     const pen = new SvgPen(Math.round(view.width), Math.round(view.height), theme.paper);
-    draw(pen, linkage, view, theme, show, { ...extra, pointer: null });
+    const spots = new Spots();
+    spots.begin(0, linkage.pose, view);
+    draw(pen, linkage, view, theme, show, { ...extra, pointer: null }, spots);
     return pen.svg();
 }
 

@@ -1,11 +1,16 @@
 // The hand on the drawing: mouse, touch and wheel.
 
+import { distance } from "./geometry.js";
 import { gripAt, handleAt, parametersOf, pinAt, place, pull, stretch } from "./grips.js";
+import { number } from "./numbers.js";
+
+const SAME_PIN = 1e-6; // of the size; points that are closer are one pin
 
 export class Hand {
     constructor(page) {
         this.page = page;
         this.held = null; // the place that is held, for the drawing
+        this.pin = null; // number of the point that the keys move
         this.pointer = null; // { at, reach } of the mouse or the last touch [px], for names without a place
         const { canvas, view } = page;
         const held = new Map(); // pointers on the canvas
@@ -78,6 +83,55 @@ export class Hand {
             page.zoom(Math.exp(-0.0016 * event.deltaY * (event.deltaMode ? 20 : 1)), at(event));
         }, { passive: false });
         canvas.addEventListener("dblclick", (event) => this.#toggleCurve(view.plane(at(event)), reach(event)));
+    }
+
+    // Return the place that is held, or the pin that the keys move; null without one.
+    get place() {
+        return this.held || (this.pin === null ? null : this.page.linkage.point(this.pin));
+    }
+
+    // Choose the next pin, or the one before (-1), among those that values which are not locked move.
+    choosePin(way) {
+        const { page } = this;
+        const { linkage, design } = page;
+        const isNew = (k, i, all) => all.findIndex((other) => distance(linkage.point(other), linkage.point(k)) < SAME_PIN * linkage.data.size) === i;
+        const pins = linkage.data.points.map((_, k) => k).filter(isNew).filter((k) => parametersOf(linkage, design, k).length);
+        if (page.mode !== "lengths") page.toggleMode();
+        if (!pins.length) {
+            page.hint("No value that is not locked moves a pin.");
+            return;
+        }
+        const now = pins.indexOf(this.pin);
+        this.pin = pins[(now < 0 ? (way > 0 ? 0 : pins.length - 1) : now + way + pins.length) % pins.length];
+        this.#tellPin(" Arrow keys move it, P chooses the next one.");
+        page.refresh();
+    }
+
+    // Move the chosen pin by steps; it is one step to undo.
+    movePin(x, y) {
+        const { page } = this;
+        const { linkage } = page;
+        page.motion.play(false);
+        page.refresh(() => {
+            const step = 10 ** Math.floor(Math.log10(linkage.data.size) - 2);
+            const [px, py] = linkage.point(this.pin);
+            this.#drag({ kind: "pin", point: this.pin, names: null }, [px + x * step, py + y * step]);
+            this.held = null;
+            if (page.design.isOk) this.#tellPin("");
+        });
+        page.commit();
+    }
+
+    leavePin() {
+        this.pin = null;
+        this.page.hint("");
+        this.page.refresh();
+    }
+
+    #tellPin(more) {
+        const { linkage } = this.page;
+        const { body, name } = linkage.data.points[this.pin];
+        this.page.hint(`${body}.${name} at ${linkage.point(this.pin).map((x) => number(x)).join(", ")} ${linkage.data.unit}.${more}`);
     }
 
     #grab(p, reach) {

@@ -29,8 +29,12 @@ export function keyboard(page) {
             page.view.pan(x, y);
             page.refresh();
         };
+        const { hand } = page;
+        const far = event.shiftKey ? 10 : 1;
+        const arrow = (x, y) => (hand.pin !== null ? hand.movePin(x * far, y * far) : x ? by(x) : choose(-y));
         const acts = {
-            arrowleft: () => by(-1), arrowright: () => by(1), arrowup: () => choose(-1), arrowdown: () => choose(1),
+            arrowleft: () => arrow(-1, 0), arrowright: () => arrow(1, 0), arrowup: () => arrow(0, 1), arrowdown: () => arrow(0, -1),
+            p: () => hand.choosePin(event.shiftKey ? -1 : 1), escape: () => hand.leavePin(),
             home: () => (linkage.data.over ? page.pick("driver", linkage.data.over.from) : page.pick("time", linkage.data.run.from)), "+": () => page.zoom(1.2), "=": () => page.zoom(1.2), "-": () => page.zoom(1 / 1.2),
             f: () => page.fit(), e: () => page.toggleMode(), "?": () => $("keys").showModal(),
             w: () => pan(0, 40), s: () => pan(0, -40), a: () => pan(40, 0), d: () => pan(-40, 0),

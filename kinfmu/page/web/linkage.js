@@ -3,15 +3,18 @@
 import { comesTo, partingOf } from "./branches.js";
 import { isGood } from "./engine.js";
 import { CAMS, axlesOf, formsOf } from "./forms.js";
-import { TURN, placed, remainder } from "./geometry.js";
+import { TURN, placed } from "./geometry.js";
+import { dialOf } from "./marks.js";
 import { grouped } from "./numbers.js";
 import { changePointsOf, rangesOf } from "./ranges.js";
 
 const CURVE = 720; // points of a coupler curve
 const BOX = 73; // poses that decide what fits into the view
+const TOUR = 24; // steps of a tour of the motion
 const FORCES = 90; // poses of a run that decide the scale of forces
 const USUAL = 0.99; // part of the forces that are not outliers
 const LAW = 400; // times at which the laws are tabled
+export const PER_TURN = 360; // samples of plots and tables over a driver, as for the measures of kinfmu check
 
 // Return driver values, speeds and accelerations between the samples of a record.
 function between({ t, columns }, at) {
@@ -188,11 +191,30 @@ export class Linkage {
         });
     }
 
-    // Return the time at which the laws come nearest to driver values.
+    // Return by how much a value of a driver is more than another one, without the cycles after which all repeats.
+    apart(k, value, other) {
+        const period = TURN * (this.turns?.[k] ?? this.data.drivers[k].turns ?? 0);
+        return value - other - (period ? period * Math.round((value - other) / period) : 0);
+    }
+
+    // Return the speed of the only driver if it is constant and gives the motion, else 0.
+    get speed() {
+        const { samples, drivers, run } = this.data;
+        return !samples && drivers.length === 1 && drivers[0].law === "constant_speed" ? this.driven(run.from).ud[0] : 0;
+    }
+
+    // Return the time after which the only driver has made a whole cycle, which may be longer than the run.
+    get cycleEnd() {
+        const { from, to } = this.data.run;
+        return Math.max(to, this.speed && this.turns[0] ? from + (TURN * this.turns[0]) / Math.abs(this.speed) : to);
+    }
+
+    // Return the time at which the laws come nearest to driver values; of several, that nearest to the time shown.
     timeNear(u) {
+        if (this.speed) return this.#timeAt(u[0]);
         const gap = (law) =>
             law.u.reduce((sum, value, k) => {
-                const apart = this.data.drivers[k].turns ? remainder(u[k] - value) : u[k] - value;
+                const apart = this.apart(k, u[k], value);
                 return sum + apart * apart;
             }, 0);
         let best = this.law[0];
@@ -209,6 +231,17 @@ export class Linkage {
             else low = a;
         }
         return Math.min(Math.max(0.5 * (low + high), this.data.run.from), this.data.run.to);
+    }
+
+    // Return the time at which the only driver, at constant speed, has a value; within the run if it does not turn.
+    #timeAt(value, near = this.t) {
+        const { from, to } = this.data.run;
+        const t = from + (value - this.law[0].u[0]) / this.speed;
+        if (!this.turns?.[0]) return Math.min(Math.max(t, from), to);
+        const cycle = (TURN * this.turns[0]) / Math.abs(this.speed);
+        const first = t - cycle * Math.floor((t - from) / cycle);
+        const last = Math.floor((this.cycleEnd - first) / cycle);
+        return first + cycle * Math.min(Math.max(Math.round((near - first) / cycle), 0), last);
     }
 
     // Return speeds and accelerations of the drivers: those of their laws at the time that is shown.
@@ -244,6 +277,7 @@ export class Linkage {
         if (!ok) {
             const here = result === "unreached" ? shown.gap(vector, this.u).text : "";
             this.failure = result === "unreached" ? message + (here && `; there, ${here}`) : this.#gapOf(shown, vector, message || "the mechanism does not close");
+            this.isOtherBranch = this.failure.includes("on another branch only");
             return false;
         }
         this.#use(which);
@@ -280,15 +314,15 @@ export class Linkage {
     // ---- curves and ranges, by the engine that is not shown
 
     // Return the driver values of a curve: over the driver's range, or over the run with several drivers.
-    #samples(count) {
-        const { drivers, run } = this.data;
-        if (drivers.length !== 1) {
+    #samples(count, isOverDriver = this.data.drivers.length === 1, all = this.#countOf("driver", count)) {
+        const { run } = this.data;
+        if (!isOverDriver) {
             return Array.from({ length: count + 1 }, (_, k) =>
                 Float64Array.from(this.driven(run.from + ((run.to - run.from) * k) / count, this.probe).u),
             );
         }
         const [low, high] = this.ranges[0];
-        return Array.from({ length: count + 1 }, (_, k) => Float64Array.of(low + ((high - low) * k) / count));
+        return Array.from({ length: all + 1 }, (_, k) => Float64Array.of(low + ((high - low) * k) / all));
     }
 
     #swept(samples, columns) {
@@ -296,6 +330,19 @@ export class Linkage {
         const us = new Float64Array(samples.length * n);
         samples.forEach((u, k) => us.set(u, k * n));
         return this.probe.sweep(us, columns);
+    }
+
+    // Visit poses of the cycle of the only driver, or of the run, each as if it were shown.
+    tour(visit) {
+        const { pose, u } = this;
+        const isCycle = this.data.over || (this.data.drivers.length === 1 && this.turns[0]);
+        this.probe.restart();
+        for (const at of this.#samples(TOUR, isCycle, TOUR)) {
+            if (!isGood(this.probe.at(at, new Float64Array(at.length).fill(1), new Float64Array(at.length)))) continue;
+            [this.pose, this.u] = [this.poseOf(this.probe), at];
+            visit();
+        }
+        [this.pose, this.u] = [pose, u];
     }
 
     // Find what the lengths decide: ranges of the drivers, each with the others at the start of their laws, limits, change
@@ -354,6 +401,10 @@ export class Linkage {
         };
         for (const line of this.curves(all, BOX)) line.forEach(add);
         all.forEach((k) => add(this.point(k)));
+        this.data.drivers.forEach((_, k) => {
+            const dial = dialOf(this, k);
+            for (let i = 0; dial && i <= BOX; i++) add(dial.on(dial.low + (dial.span * i) / BOX, dial.reach));
+        });
         for (const shape of this.shapes) {
             if (!shape.radius && !CAMS.includes(shape.kind)) continue;
             const body = this.body(shape.frame);
@@ -400,17 +451,25 @@ export class Linkage {
         return most;
     }
 
-    // Visit poses over the driver ("driver") or the run ("time"): visit(x, pose or null).
+    // Return the number of steps of a turn, or of the run, for all turns of the range.
+    #countOf(over, count) {
+        return over === "driver" && !this.data.over ? count * (this.turns[0] || 1) : count;
+    }
+
+    // Visit poses over the driver ("driver") or the run ("time"), in `count` steps of a turn or of the run: visit(x, pose or
+    // null). At a constant speed of the driver, loads have the time at which it comes to x; else that shown.
     visit(over, count, visit) {
         const { run } = this.data;
-        const { probe } = this;
+        const { probe, speed } = this;
         const rates = this.ratesNear();
         const [low, high] = over === "time" ? [run.from, run.to] : this.ranges[0];
+        const all = this.#countOf(over, count);
         probe.restart();
-        for (let k = 0; k <= count; k++) {
-            const x = low + ((high - low) * k) / count;
+        for (let k = 0; k <= all; k++) {
+            const x = low + ((high - low) * k) / all;
             const law = over === "time" ? this.driven(x, probe) : { u: Float64Array.of(x), ...rates };
-            visit(x, isGood(probe.at(law.u, law.ud, law.udd)) ? this.poseOf(probe, over === "time" ? x : this.t) : null);
+            const t = over === "time" ? x : speed ? this.#timeAt(x, run.from) : this.t;
+            visit(x, isGood(probe.at(law.u, law.ud, law.udd)) ? this.poseOf(probe, t) : null);
         }
     }
 }

@@ -4,7 +4,7 @@ import { Address } from "./address.js";
 import { arrows } from "./arrows.js";
 import { THEMES } from "./colours.js";
 import { Design } from "./design.js";
-import { draw } from "./drawing.js";
+import { draw, foresee } from "./drawing.js";
 import { $, breakable, element } from "./elements.js";
 import { Engine, unpacked } from "./engine.js";
 import { Frames } from "./frames.js";
@@ -14,6 +14,7 @@ import { Linkage } from "./linkage.js";
 import { ofJoints } from "./messages.js";
 import { Motion } from "./motion.js";
 import { withStop } from "./numbers.js";
+import { PATIENCE, Spots } from "./names.js";
 import { filesPanel, Plots, showPanel } from "./panels.js";
 import { CanvasPen } from "./pen.js";
 import { Transport } from "./transport.js";
@@ -34,6 +35,9 @@ class Page {
         this.traces = new Map();
         this.handles = []; // of drivers, as drawn
         this.hasHidden = false; // names without a place
+        this.spots = new Spots(); // of names
+        this.now = performance.now(); // [ms] of the frame
+        this.isToForesee = true; // before the next frame: it takes as long as some frames
         this.mode = "move";
         this.driver = 0;
         this.canvas = $("drawing");
@@ -71,6 +75,7 @@ class Page {
     }
 
     frame(now, waiting) {
+        this.now = now;
         if (this.motion.isPlaying) this.motion.advance(now);
         for (const work of waiting) work();
         this.#trace();
@@ -96,8 +101,17 @@ class Page {
         const ratio = window.devicePixelRatio || 1;
         c.setTransform(ratio, 0, 0, ratio, 0, 0);
         c.clearRect(0, 0, view.width, view.height);
-        const drawn = draw(new CanvasPen(c), linkage, view, this.theme, this.show, this.extra());
+        this.spots.begin(this.now, linkage.pose, view);
+        const state = `${this.spots.state} ${linkage.changed}`;
+        if (this.isToForesee && this.show.names && state !== this.foreseen) {
+            this.foreseen = state;
+            foresee(linkage, view, this.theme, this.show, this.spots);
+        }
+        this.isToForesee = false;
+        const drawn = draw(new CanvasPen(c), linkage, view, this.theme, this.show, this.extra(), this.spots);
         [this.handles, this.hasHidden] = [drawn.handles, drawn.hasHidden];
+        clearTimeout(this.settling);
+        if (this.spots.isWaiting && !this.isPlaying) this.settling = setTimeout(() => this.refresh(), PATIENCE);
         this.#readouts();
         this.plots.draw();
     }
@@ -107,7 +121,7 @@ class Page {
         const curves = this.drawn.map(({ colour }, k) => ({ line: this.curves[k] || [], colour }));
         if (this.show.traces) for (const [point, line] of this.traces) curves.push({ line, colour: this.drawn.find((one) => one.point === point)?.colour || [90, 90, 90], isTrace: true });
         const { found, legend } = arrows(this);
-        return { curves, arrows: found, legend, held: this.hand.held, pointer: this.hand.pointer, isGhost: !this.design.isOk };
+        return { curves, arrows: found, legend, held: this.hand.place, pointer: this.hand.pointer, isGhost: !this.design.isOk };
     }
 
     #trace() {
@@ -123,8 +137,9 @@ class Page {
     #readouts() {
         this.transport.update();
         const { design, linkage, motion } = this;
-        $("note").hidden = !linkage.leftOut.length;
-        $("note").textContent = `Not drawn with these values: ${linkage.leftOut.join("; ")}. The lines of kinfmu check hold for the saved file.`;
+        if (!this.isPlaying) this.canvas.setAttribute("aria-label", `Drawing of the mechanism at ${this.transport.pose()}. Arrow keys move the driver, space plays, question mark lists all keys.`);
+        const note = linkage.leftOut.length ? `Not drawn with these values: ${linkage.leftOut.join("; ")}. The lines of kinfmu check hold for the saved file.` : "";
+        if ($("note").textContent !== note) [$("note").textContent, $("note").hidden] = [note, !note]; // screen readers speak it
         $("undo").disabled = !design.past.length;
         $("redo").disabled = !design.future.length;
         $("reset").disabled = !design.changes().length;
@@ -241,6 +256,7 @@ class Page {
 
     fit() {
         this.view.fit(this.linkage.box());
+        this.isToForesee = true;
         this.refresh();
     }
 
@@ -253,7 +269,7 @@ class Page {
         this.mode = this.mode === "move" ? "lengths" : "move";
         $("edit").setAttribute("aria-pressed", String(this.mode === "lengths"));
         if (this.mode === "lengths") this.hint("Drag a pin. Lock values in the panel to keep them.");
-        else this.hint("");
+        else this.hand.leavePin();
     }
 
     hint(text) {
@@ -296,6 +312,7 @@ class Page {
         [view.width, view.height] = [box.width, box.height];
         [canvas.width, canvas.height] = [Math.round(box.width * ratio), Math.round(box.height * ratio)];
         if (view.isFitted && this.linkage.pose) view.fit(this.linkage.box());
+        this.isToForesee = true;
         this.refresh();
     }
 }

@@ -24,13 +24,13 @@ function scale({ pen, theme, view }, { length, colour, text }, row) {
 
 function transmissionMarks(painter) {
     const { linkage, pen, theme } = painter;
-    for (const { angle, at, arms } of transmissions(linkage)) {
+    transmissions(linkage).forEach(({ angle, at, arms }, k) => {
         const p = painter.dot(at);
         const r = 30;
         const [a, b] = arms.map(([x, y]) => Math.atan2(y, x));
         const sweep = Math.atan2(Math.sin(b - a), Math.cos(b - a));
-        const arc = Array.from({ length: 25 }, (_, k) => {
-            const w = a + (sweep * k) / 24;
+        const arc = Array.from({ length: 25 }, (_, i) => {
+            const w = a + (sweep * i) / 24;
             return [p[0] + r * Math.cos(w), p[1] - r * Math.sin(w)];
         });
         const acute = Math.min(angle, Math.PI - angle);
@@ -39,8 +39,8 @@ function transmissionMarks(painter) {
         painter.names.coverAll(arc, 2);
         const w = a + sweep / 2;
         const label = `${degrees(angle, 1)}${acute < (40 * Math.PI) / 180 ? " poor" : ""}`;
-        painter.name(label, [[p[0] + (r + 6) * Math.cos(w), p[1] - (r + 6) * Math.sin(w)]], colour, 14, -1);
-    }
+        painter.name(label, [[p[0] + (r + 6) * Math.cos(w), p[1] - (r + 6) * Math.sin(w)]], colour, 14, -1, { key: `transmission ${k}` });
+    });
 }
 
 function centreMarks(painter) {
@@ -82,28 +82,36 @@ function arrow(painter, { from, along, colour, text }) {
     if (text) painter.name(text, [b], ink, 10, -1);
 }
 
-// Return how far the cam of a body reaches from a place, in pixels: a circle within it would look like its base circle.
-function outerOf(painter, body, centre) {
-    const corners = painter.all(...CAMS).filter((shape) => shape.frame === body).flatMap((shape) => painter.at(shape));
-    return corners.reduce((most, p) => Math.max(most, distance(painter.dot(p), centre)), 0);
+// Return the circle on which a turning driver has its range: about its pivot, around all of its body, so that it does not look
+// like the base circle of a cam; on(u, r): a place on it; null for other drivers.
+export function dialOf(linkage, k) {
+    const driver = linkage.data.drivers[k];
+    if (driver.kind !== "angle" || driver.pivot === null || driver.pivot === undefined) return null;
+    const body = linkage.body(driver.body);
+    const [pivot, centre] = [linkage.local(driver.pivot), linkage.point(driver.pivot)];
+    const points = linkage.data.points.map((_, i) => i).filter((i) => linkage.bodyOf[i] === body);
+    const far = points.reduce((best, i) => (distance(linkage.local(i), pivot) > distance(linkage.local(best), pivot) ? i : best), driver.pivot);
+    const [tx, ty] = linkage.local(far).map((value, i) => value - pivot[i]);
+    const cams = linkage.shapes.filter((shape) => shape.frame === driver.body && CAMS.includes(shape.kind));
+    const outer = cams.map(({ anchor, points: corners }) => {
+        const { x, y } = linkage.data.points[anchor] || { x: pivot[0], y: pivot[1] };
+        return Math.max(...corners.map((p) => distance(p, [x, y])));
+    });
+    const turn = linkage.bodyPose(body)[2] - linkage.u[k] + (tx || ty ? Math.atan2(ty, tx) : 0);
+    const [low, high] = linkage.ranges[k];
+    const on = (u, r) => [centre[0] + r * Math.cos(u + turn), centre[1] + r * Math.sin(u + turn)];
+    return { body, reach: Math.max(Math.hypot(tx, ty), ...outer), low, span: Math.min(high - low, TURN), on };
 }
 
-// Mark the range of a turning driver, its limits and change points on a circle about its pivot, with a handle at its value.
+// Mark the range of a turning driver, its limits and change points on its circle, with a handle at its value.
 function driverMarks(painter) {
-    const { linkage, pen, theme } = painter;
-    linkage.data.drivers.forEach((driver, k) => {
-        if (driver.kind !== "angle" || driver.pivot === null || driver.pivot === undefined) return;
-        const centre = painter.dot(linkage.point(driver.pivot));
-        const body = linkage.body(driver.body);
-        const reach = Math.max(...linkage.data.points.map((_, i) => (linkage.bodyOf[i] === body ? distance(painter.dot(linkage.point(i)), centre) : 0)));
-        const radius = Math.max(reach, outerOf(painter, driver.body, centre), 24) + 16;
-        const base = linkage.bodyPose(body)[2] - linkage.u[k];
-        const tip = linkage.data.points.reduce((best, _, i) => (linkage.bodyOf[i] === body && distance(linkage.local(i), linkage.local(driver.pivot)) > distance(linkage.local(best), linkage.local(driver.pivot)) ? i : best), driver.pivot);
-        const [tx, ty] = linkage.local(tip).map((value, i) => value - linkage.local(driver.pivot)[i]);
-        const turn = base + (tx || ty ? Math.atan2(ty, tx) : 0);
-        const on = (u, r) => [centre[0] + r * Math.cos(u + turn), centre[1] - r * Math.sin(u + turn)];
-        const [low, high] = linkage.ranges[k];
-        const span = Math.min(high - low, TURN);
+    const { linkage, pen, theme, view } = painter;
+    linkage.data.drivers.forEach((_, k) => {
+        const dial = dialOf(linkage, k);
+        if (!dial) return;
+        const { body, low, span } = dial;
+        const radius = Math.max(dial.reach * view.scale, 24) + 16;
+        const on = (u, r) => painter.dot(dial.on(u, r / view.scale));
         pen.line(Array.from({ length: 73 }, (_, i) => on(low + (span * i) / 72, radius)), { width: 1.4, colour: theme.quiet, dash: [2, 4] });
         const mark = (u, colour, label) => {
             pen.line([on(u, radius - 7), on(u, radius + 7)], { width: 3, colour });

@@ -1,7 +1,5 @@
 // Motion: play and pause, and moves of single drivers.
 
-import { TURN } from "./geometry.js";
-
 export class Motion {
     constructor(page) {
         this.page = page;
@@ -18,15 +16,16 @@ export class Motion {
             return;
         }
         const { linkage } = this;
+        this.page.isToForesee = true;
         this.clock = null;
         if (linkage.data.over) {
             this.page.refresh();
             return;
         }
         const t = linkage.timeNear(linkage.u);
-        linkage.t = t >= linkage.data.run.to - 1e-9 ? linkage.data.run.from : t;
+        linkage.t = t >= this.#end(t) - 1e-9 ? linkage.data.run.from : t;
         const law = linkage.driven(linkage.t).u;
-        this.glide = linkage.u.map((value, k) => (linkage.data.drivers[k].turns ? value - law[k] - TURN * Math.round((value - law[k]) / TURN) : value - law[k]));
+        this.glide = linkage.u.map((value, k) => linkage.apart(k, value, law[k]));
         this.page.refresh();
     }
 
@@ -41,7 +40,7 @@ export class Motion {
             return;
         }
         let t = linkage.t + elapsed * this.page.transport.pace;
-        if (t > to) {
+        if (t > this.#end(linkage.t)) {
             t = from + ((t - from) % (to - from));
             if (!this.#repeats()) this.glide = null;
         }
@@ -70,7 +69,13 @@ export class Motion {
     }
 
     #repeats() {
-        return this.linkage.data.drivers.every((driver) => driver.turns);
+        return this.linkage.turns.every(Boolean);
+    }
+
+    // Return where a play that is now at a time ends: after the run, or, beyond it, after the cycle of the driver.
+    #end(t) {
+        const { to } = this.linkage.data.run;
+        return t > to ? this.linkage.cycleEnd : to;
     }
 
     // Move a driver to a value, as far as the mechanism goes.

@@ -39,7 +39,7 @@ export class Plots {
             select.append(group);
         }
         select.value = id;
-        const value = element("output");
+        const value = element("span", { className: "reading" }); // no <output>: screen readers would speak it in each frame
         const remove = element("button", { textContent: "\u00d7", title: "Remove the plot", "aria-label": "Remove the plot" });
         const canvas = element("canvas", { tabIndex: 0, role: "img" });
         const card = element("div", { className: "plot" }, element("div", { className: "head" }, select, value, remove), canvas);
@@ -77,7 +77,7 @@ export class Plots {
             const now = one.read(linkage, linkage.pose);
             plot.value.textContent = `${number(now)} ${one.unit}`;
             const xLabel = this.over === "time" ? (linkage.hasTime ? "s" : "") : isAngle ? "" : linkage.data.unit;
-            plot.painter.draw({ x: this.table.x, values: this.table.columns[k], label: one.label, unit: one.unit, cursor, now, theme, isAngle, xLabel });
+            plot.painter.draw({ x: this.table.x, values: this.table.columns[k], label: one.label, unit: one.unit, cursor, now, theme, isAngle, xLabel, isPlaying: this.page.isPlaying });
         });
     }
 }

@@ -1,10 +1,11 @@
 // Plots of quantities over time or the driver, with one cursor for all.
 
 import { transmissions } from "./instants.js";
+import { PER_TURN } from "./linkage.js";
 import { degrees, niceStep, number } from "./numbers.js";
 import { FONT } from "./pen.js";
 
-const SAMPLES = 360;
+const OUTSIDE = 0.01; // part of the values on either side that may be outside the plot
 const MARGIN = { left: 58, right: 10, top: 10, bottom: 24 };
 
 // Return all quantities that can be plotted: { id, label, unit, read(linkage, pose) }.
@@ -51,18 +52,33 @@ export function defaults(linkage, all) {
 }
 
 // Return x and values of quantities over "time" or "driver"; values are NaN at poses without numbers.
-export function sampled(linkage, over, wanted, count = SAMPLES) {
-    const x = new Float64Array(count + 1);
-    const columns = wanted.map(() => new Float64Array(count + 1));
-    let row = 0;
+export function sampled(linkage, over, wanted, count = PER_TURN) {
+    const x = [];
+    const columns = wanted.map(() => []);
     linkage.visit(over, count, (at, pose) => {
-        x[row] = at;
-        wanted.forEach((one, k) => {
-            columns[k][row] = pose ? one.read(linkage, pose) : NaN;
-        });
-        row += 1;
+        x.push(at);
+        wanted.forEach((one, k) => columns[k].push(pose ? one.read(linkage, pose) : NaN));
     });
     return { x, columns };
+}
+
+// Return the range of values that a plot shows: as shown_range of kinfmu/run/axis.py, without a few values that would flatten
+// all others, which grow without bound next to a singular pose.
+export function rangeOf(values) {
+    const known = values.filter(Number.isFinite).sort((a, b) => a - b);
+    if (!known.length) return [0, 1];
+    const at = (part) => {
+        const place = part * (known.length - 1);
+        const k = Math.floor(place);
+        return known[k] + (place - k) * ((known[k + 1] ?? known[k]) - known[k]);
+    };
+    const [least, most] = [known[0], known[known.length - 1]];
+    const [low, high] = [at(OUTSIDE), at(1 - OUTSIDE)];
+    const width = high - low;
+    if (width > 0 && (least < low - width || most > high + width)) return [low - width / 2, high + width / 2];
+    const noise = 1e-9 * Math.max(Math.abs(least), Math.abs(most), 1e-12);
+    if (most - least < noise) return [least - Math.max(Math.abs(least) * 0.1, 1e-6), most + Math.max(Math.abs(most) * 0.1, 1e-6)];
+    return [least, most];
 }
 
 export class Plot {
@@ -99,7 +115,7 @@ export class Plot {
 
     draw(what) {
         this.last = what;
-        const { x, values, label, unit, cursor, now, theme, isAngle, xLabel } = what;
+        const { x, values, label, unit, cursor, now, theme, isAngle, xLabel, isPlaying } = what;
         if (!this.size?.[0]) this.size = [this.canvas.clientWidth, this.canvas.clientHeight];
         const [width, height] = this.size;
         const { canvas } = this;
@@ -112,11 +128,7 @@ export class Plot {
         c.clearRect(0, 0, width, height);
         this.range = [x[0], x[x.length - 1]];
         this.cursor = cursor;
-        let [low, high] = [Infinity, -Infinity];
-        for (const value of values) if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
-        if (low > high) [low, high] = [0, 1];
-        const least = 1e-9 * Math.max(Math.abs(low), Math.abs(high), 1e-12);
-        if (high - low < least) [low, high] = [low - Math.max(Math.abs(low) * 0.1, 1e-6), high + Math.max(Math.abs(high) * 0.1, 1e-6)];
+        let [low, high] = rangeOf(values);
         const pad = 0.06 * (high - low);
         [low, high] = [low - pad, high + pad];
         const px = (value) => MARGIN.left + ((value - this.range[0]) / (this.range[1] - this.range[0] || 1)) * (width - MARGIN.left - MARGIN.right);
@@ -148,6 +160,10 @@ export class Plot {
         c.strokeStyle = theme.accent;
         c.lineWidth = 2;
         c.lineJoin = "round";
+        c.save();
+        c.beginPath();
+        c.rect(MARGIN.left, MARGIN.top, width - MARGIN.left - MARGIN.right, height - MARGIN.top - MARGIN.bottom);
+        c.clip();
         c.beginPath();
         let isDown = false;
         values.forEach((value, k) => {
@@ -160,19 +176,20 @@ export class Plot {
             isDown = true;
         });
         c.stroke();
+        c.restore();
         if (Number.isFinite(cursor)) {
             const at = px(Math.min(this.range[1], Math.max(this.range[0], cursor)));
             c.strokeStyle = theme.ink;
             c.lineWidth = 1;
             line(c, [[at, MARGIN.top], [at, height - MARGIN.bottom]]);
-            if (Number.isFinite(now)) {
+            if (now >= low && now <= high) {
                 c.fillStyle = theme.ink;
                 c.beginPath();
                 c.arc(at, py(now), 4, 0, 2 * Math.PI);
                 c.fill();
             }
         }
-        canvas.setAttribute("aria-label", `${label}: ${number(now)} ${unit}`);
+        if (!isPlaying) canvas.setAttribute("aria-label", `${label}: ${number(now)} ${unit}`);
     }
 }
 

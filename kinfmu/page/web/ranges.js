@@ -6,20 +6,50 @@ import { remainder, TURN } from "./geometry.js";
 const TURNED = 360; // poses of a turn among which change points are looked for
 const NEAR = 0.05; // margin of such a pose that is next to a change point
 const SINGULAR = 1e-5; // margin at a change point
+const MOST_TURNS = 12; // after which a mechanism may repeat, as for kinfmu check
+const PHASES = 8; // of a turn at which poses are compared
+const REPEATS = 1e-6; // [rad, sizes]; poses closer than this are equal
 
-// Return { ranges, limits }: of each driver, the others at the start of their laws.
+// Return { ranges, limits, turns }: of each driver, the others at the start of their laws; turns: after which the mechanism
+// and its loads repeat, null without such a number.
 export function rangesOf(linkage) {
     const start = Array.from(linkage.law[0].u);
     const limits = [];
     const { over } = linkage.data;
+    const turns = linkage.data.drivers.map((driver, k) => (linkage.isChanged ? turnsOf(linkage, driver, k, start) : driver.turns));
     const ranges = linkage.data.drivers.map((driver, k) => {
         if (over?.driver === k) return [Math.min(over.from, over.to), Math.max(over.from, over.to)];
         const ends = reachOf(linkage, driver, k, start[k]).map((end) => endOf(linkage, start, k, end));
         for (const { at, isLimit } of ends) if (isLimit) limits.push({ driver: k, at });
-        if (driver.kind === "angle" && !ends[0].isLimit && !ends[1].isLimit) return [start[k], start[k] + TURN * (driver.turns || 1)];
+        if (driver.kind === "angle" && !ends[0].isLimit && !ends[1].isLimit) return [start[k], start[k] + TURN * (turns[k] || 1)];
         return [ends[0].at, ends[1].at];
     });
-    return { ranges, limits };
+    return { ranges, limits, turns };
+}
+
+// Return the turns of a driver after which the poses of a whole turn, and the loads, repeat; null if they do not.
+function turnsOf(linkage, driver, k, start) {
+    if (driver.kind !== "angle") return null;
+    const u = Float64Array.from(start);
+    const [ones, zeros] = [new Float64Array(u.length).fill(1), new Float64Array(u.length)];
+    const poses = [];
+    const isBack = (a, b) => linkage.part.outputs.every(({ units }, i) => Math.abs(units[0] === "rad" ? remainder(a[i] - b[i]) : (a[i] - b[i]) / linkage.data.size) < REPEATS);
+    linkage.probe.restart();
+    for (let turn = 0; turn <= MOST_TURNS; turn++) {
+        for (let phase = 0; phase < PHASES; phase++) {
+            u[k] = start[k] + TURN * (turn + phase / PHASES);
+            if (!isGood(linkage.probe.at(u, ones, zeros))) return null;
+            poses.push(linkage.probe.q.slice());
+        }
+        if (turn && poses.slice(0, PHASES).every((pose, phase) => isBack(pose, poses[turn * PHASES + phase]))) return leastCommonMultiple(turn, driver.loadTurns);
+    }
+    return null;
+}
+
+function leastCommonMultiple(a, b) {
+    let most = Math.max(a, b);
+    while (most % a || most % b) most += 1;
+    return most;
 }
 
 // Return the change points { driver, at }: those that check states, or those found with other lengths.

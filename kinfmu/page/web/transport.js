@@ -75,6 +75,13 @@ export class Transport {
         });
     }
 
+    // Return time and driver values in words.
+    pose() {
+        const { data } = this.linkage;
+        const values = this.sliders.map(({ field }, k) => `${data.drivers[k].name} = ${field.value} ${shownUnit(data.drivers[k].unit).unit}`);
+        return [...values, ...(data.over ? [] : [$("clock").textContent])].join(", ");
+    }
+
     // Show time and driver values.
     update() {
         const { linkage } = this;
