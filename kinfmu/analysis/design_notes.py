@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields
 from itertools import combinations, pairwise
 from statistics import median_low
 from typing import NamedTuple
@@ -16,7 +15,6 @@ from kinfmu.analysis.values import law_values, value_text
 from kinfmu.equations.system import size_of
 from kinfmu.errors import listed
 from kinfmu.joints import Fixed, Revolute
-from kinfmu.measures import PoseQuantity
 from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
@@ -55,28 +53,14 @@ def motion_notes(mechanism: Mechanism, paths: Sequence[DriverPath], loops: Seque
         yield from _toggles(mechanism, path, loops)
 
 
-def _texts(member: object) -> set[object]:
-    """Return the texts in the fields of a joint, driver, load or measure, and in those of its measured quantity."""
-    found: set[object] = set()
-    for entry in fields(member):  # type: ignore[arg-type]  # all members are dataclasses
-        value = getattr(member, entry.name)
-        if isinstance(value, PoseQuantity):
-            found |= _texts(value)
-        else:
-            found |= {value} if isinstance(value, str) else {*value} if isinstance(value, tuple) else set()
-    return found
-
-
 def unused_points(mechanism: Mechanism, *, of_joints: bool = False) -> str:
     """Return a line on the points of bodies that nothing of the mechanism names; '' if there are none.
 
     of_joints: ends of rods and corners of plates, which only place the mass, do not count as named.
     """
-    used: set[object] = set(mechanism.points.values())
+    used = {*mechanism.named_points}
     if not of_joints:
         used |= {f"{body.name}.{end}" for body in mechanism.bodies for end in body.rod or body.plate or ()}
-    for member in (*mechanism.joints, *mechanism.drivers, *mechanism.loads, *mechanism.measures):
-        used |= _texts(member)
     unused = [name for name in mechanism.body_points if name not in used]
     if not unused:
         return ""

@@ -18,12 +18,11 @@ FAR = 4.0  # sizes from the world's origin beyond which a mechanism is planned a
 def localized(mechanism: Mechanism) -> tuple[Mechanism, Point]:
     """Return the mechanism as seen from its own origin, and the place of that origin in the world [length].
 
-    The origin is the first ground point if the mechanism is far away, else the world's (also if a driver or a law
+    The origin is the first of `ground_points` if the mechanism is far away, else the world's (also if a driver or a law
     prescribes a coordinate in the world). Constraints do not depend on it, and rounding is then relative to the size
     and not to the offset. Points are moved as decimal numbers: the double nearest to 1000000.7 has lost digits.
     """
-    ground = next(body for body in mechanism.bodies if body.is_ground)
-    first = next(iter(ground.points.values()), Point(0.0, 0.0))
+    first = Point(*next(iter(mechanism.ground_points), (0.0, 0.0)))
     is_tied = any(driver.measured().is_absolute for driver in mechanism.drivers)
     is_tied = is_tied or any(joint.depends_on_origin for joint in mechanism.joints)
     is_tied = is_tied or any(load.depends_on_origin for load in mechanism.loads)

@@ -235,3 +235,29 @@ def test_a_rod_across_the_slide_of_its_driver_is_reported_with_its_position() ->
     (note,) = toggles(text, "58 deg", "-88 deg")
     assert note.startswith("the run crosses a toggle position: rod is perpendicular to the slide at ram = ")
     assert float(note.partition("= ")[2].split()[0]) == pytest.approx(math.sqrt(40.0**2 - 35.0**2), rel=1e-8)
+
+
+@pytest.mark.parametrize("far", [9.0, 3e3, 1e7])
+@pytest.mark.parametrize(
+    "starts",
+    [
+        ("78 deg", "102 deg", "0 deg"),
+        ("78 deg", "-102 deg", "60 deg"),  # a gap in the drawing, and another driver value than the law's
+        ("170 deg", "20 deg", "100 deg"),
+    ],
+)
+def test_a_point_that_nothing_uses_decides_nothing(starts: tuple[str, str, str], far: float) -> None:
+    coupler, rocker, crank = starts
+    drawn = (
+        ('start = { x = 20, phi = "78 deg" }', f'start = {{ x = 20, y = 0, phi = "{coupler}" }}'),
+        ('start = { x = 40, phi = "102 deg" }', f'start = {{ x = 40, y = 0, phi = "{rocker}" }}'),
+        ("P = [20, 0] }", f'P = [20, 0] }}\nstart = {{ x = 0, y = 0, phi = "{crank}" }}'),
+    )
+    plain = kinfmu.check(changed(*drawn))
+    for place in ("O = [0, 0], C", "O = [0, 0], P", "P = [0, 0], Q", "C = [0, 0], Q"):
+        report = kinfmu.check(changed(*drawn, (place, f"E = [{far}, {far}], {place}")))
+        unused, *others = report.notes
+        assert unused.endswith("used by no joint, driver, load, measure or point of interest")
+        assert tuple(others) == plain.notes
+        assert report.plan == plain.plan
+        assert [reach.as_json() for reach in report.ranges] == [reach.as_json() for reach in plain.ranges]

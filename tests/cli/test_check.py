@@ -91,7 +91,7 @@ def test_the_matrices_at_sixty_degrees_are_those_of_the_report(command: Command)
 
 def test_assemblies_are_listed_with_the_start_angle_that_chooses_each(command: Command) -> None:
     message = command("check", "double_pendulum", "--assemblies").stdout
-    assert "assemblies  2 at crank = 5 pi/3 (300 deg), distinguished by lower.phi" in message
+    assert "assemblies  2 found at crank = 5 pi/3 (300 deg), distinguished by lower.phi" in message
     assert '              choose it by [bodies.lower] start = { x = -0.491, y = -1, phi = "-172.3 deg" }' in message
     found = json.loads(command("check", "double_pendulum", "--assemblies", "--json").stdout)["assemblies"]
     assert [one["chosen"] for one in found["found"]] == [True, False]
