@@ -304,3 +304,15 @@ def test_the_figure_is_drawn_at_the_pose_asked_for(command: Command, tmp_path: P
     assert refused.exit_code != 0
     assert "--at" in refused.stderr
     assert not (tmp_path / "a.svg").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "kind"),
+    [("[targets.a]", "fit"), ("[unknowns]", "fit"), ("[parameters]", "study"), ('sampling = "sobol"', "study")],
+)
+def test_a_fit_or_study_file_is_told_its_command(
+    text: str, kind: str, tmp_path: Path, fails: Callable[..., str]
+) -> None:
+    path = tmp_path / "design.toml"
+    path.write_text(f'mechanism = "crank_rocker"\n{text}\n')
+    assert f"this is a {kind} file, not a mechanism file; the command is 'kinfmu {kind}'" in fails("check", path)
