@@ -109,7 +109,8 @@ class Findings:
         evaluated), stopped, limits: value, kind ('dead centre', 'change point' or 'end'), bodies (that can move there
         while the driver is fixed), coordinates.
         loops: kind ('four-bar' or 'slider-crank'), links, lengths (by link; 'ground' too), offset (slider-cranks),
-        class, shape, sums, transmission: driver, coupler, output, smallest, at_smallest, largest, at_largest, verdict.
+        class, shape, assembly (of four-bars: 'open' or 'crossed' in the assembled pose), sums, transmission: driver,
+        coupler, output, smallest, at_smallest, largest, at_largest, verdict.
         dyads (pairs of links in none of the loops that have a transmission angle): links (of a guided link, it and its
         slider or guiding joint), lengths, joint (where they meet, or null), between (bodies), transmission.
         advice: null if drivers and degrees of freedom match, else missing (number), surplus (name, implied_by), loose

@@ -187,11 +187,13 @@ def _four_bar_class(named: NamedLoop, loop: FourBar) -> str:
         return (
             f"does not close: its longest side ({kind.small:.6g}) is longer than the others together ({kind.large:.6g})"
         )
+    assembled = f"{named.assembly} as assembled" if named.assembly else ""
     sign = _sign(kind.small, kind.large, kind.name)
     sums = f"shortest + longest ({kind.small:.6g}) {sign} sum of the two others ({kind.large:.6g})"
     if kind.name == "change point":
-        shape = f" ({kind.shape})" if kind.shape else ""
-        return f"change point{shape}: {sums}; the links can fall in line"
+        words = [kind.shape] if kind.shape else []
+        words += [assembled] if assembled and "parallelogram" not in kind.shape else []
+        return f"change point{f' ({listed(words)})' if words else ''}: {sums}; the links can fall in line"
     turns = {
         "crank-rocker": f"{first} can turn all the way round, {last} rocks",
         "rocker-crank": f"{last} can turn all the way round, {first} rocks",
@@ -199,7 +201,7 @@ def _four_bar_class(named: NamedLoop, loop: FourBar) -> str:
         "double rocker": f"{coupler} can turn all the way round, {first} and {last} rock",
         "triple rocker": "no link can turn all the way round",
     }
-    return f"{kind.name}: {sums}; {turns[kind.name]}"
+    return f"{listed([kind.name, *([assembled] if assembled else [])])}: {sums}; {turns[kind.name]}"
 
 
 def _slider_crank_class(named: NamedLoop, loop: SliderCrank) -> str:
