@@ -268,7 +268,7 @@ def _measures(report: Findings) -> Iterator[ReportLine]:
     measured = report.measured
     if measured is None:
         return
-    yield ReportLine("measures", f"over {measured.over}")
+    yield ReportLine("measures", f"over {measured.over}{_without_loads(report)}")
     for value in measured.values:
         yield ReportLine(
             "", f"{value.name} = {measured_text(value)}" if not value.reason else _no_value(value.name, value.reason)
@@ -282,7 +282,7 @@ def _forces(report: Findings) -> Iterator[ReportLine]:
     if loading is None:
         return
     missing = f"; {loading.missing} samples have no numbers" if loading.missing and not loading.reason else ""
-    yield ReportLine("forces", f"over {loading.over}{missing}")
+    yield ReportLine("forces", f"over {loading.over}{_without_loads(report)}{missing}")
     if loading.reason:
         yield ReportLine("", f"no values, because {loading.reason}")
     for effort in loading.efforts:
@@ -304,6 +304,12 @@ def _forces(report: Findings) -> Iterator[ReportLine]:
         joints = {redundant[row] for row in others}
         shared = [name for name in names if name.partition(".")[0] not in joints]
         yield ReportLine("", f"statically indeterminate: {_names(shared)} share the load with {_names(others)}")
+
+
+def _without_loads(report: Findings) -> str:
+    """Return ', without [loads.spring]' for the loads that the report leaves out; '' if there are none."""
+    names = [name for name in report.left_out if name.startswith("[loads")]
+    return f", without {listed(names)}" if names else ""
 
 
 def contact_text(contact: UnknownContact) -> str:

@@ -167,6 +167,8 @@ start = 0
 speed = "1 deg/s"
 """
 _SWING = '[measures.swing]\ntype = "range"\nof = "rocker.phi"\n'
+_PUSH = '[loads.push]\ntype = "force"\nat = "rocker.Q"\nx = 3\ny = 0\n'
+_SPRING = '[loads.bad]\ntype = "spring"\n'
 _PEAK = '[measures.peak]\ntype = "maximum"\nof = "crank.torque"\n'
 
 
@@ -236,6 +238,35 @@ _PEAK = '[measures.peak]\ntype = "maximum"\nof = "crank.torque"\n'
             "body a mass, such as mass = '1.2 kg'",
             "[measures.peak]",
             ["range       crank turns all the way", "swing = "],
+        ),
+        *(
+            (
+                "[points]",
+                f"{_PUSH}{_SWING}{_PEAK}{bad}[points]",
+                problem,
+                "[loads.bad]",
+                [
+                    "swing = ",
+                    "peak = 3 N m (crank at 90 deg)",
+                    "turn of crank at 0.0174533 rad/s, without [loads.bad]",
+                    "crank.torque: peak ",
+                ],
+            )
+            for bad, problem in (
+                (
+                    '[loads.bad]\ntype = "force"\nat = "rocker.Z"\n',
+                    "[loads.bad] at: body 'rocker' has no point 'Z'; its points: C, Q",
+                ),
+                (
+                    '[loads.bad]\ntype = "spring"\n',
+                    "[loads.bad] needs the key 'between'; keys: between, stiffness, free_length, preload",
+                ),
+                (
+                    f'{_SPRING}between = ["ground.C", "rocker.C"]\nstiffness = 1\nfree_length = 1\n',
+                    "[loads.bad] between: ground.C and rocker.C are in the same place at the start, so the force has "
+                    "no direction; move a point or the start pose",
+                ),
+            )
         ),
     ],
 )
