@@ -11,15 +11,16 @@ import numpy as np
 
 from kinfmu.analysis.loops import Place
 from kinfmu.codegen.python import load_model
+from kinfmu.drivers import Driver
 from kinfmu.equations.assembly import SINGULAR
 from kinfmu.equations.closing import CLOSED
 from kinfmu.equations.system import FloatArray
+from kinfmu.joints import Joint
 from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.members import texts_of
 from kinfmu.plan import Block, SolvePlan, localized
 from kinfmu.plan.origin import relative_to
-from kinfmu.units import CoordinateName
 
 IN_VAIN = 30  # times the square of the unknowns: known solutions in a row after which the search of a block ends
 TRIES = 300  # times the same: most runs of Newton's method for a block
@@ -94,7 +95,7 @@ class AssemblySearch:
         at = {**plan.fixed, **dict(zip(plan.outputs, self._model.outputs(found[-1]), strict=True))}
         return relative_to(plan.origin, names, at)
 
-    def _coordinates(self, found: tuple[Any, ...]) -> dict[CoordinateName, float]:
+    def _coordinates(self, found: tuple[Any, ...]) -> dict[str, float]:
         return dict(zip(self._plan.mechanism.coordinate_names, self._pose(found).tolist(), strict=True))
 
 
@@ -110,9 +111,11 @@ class _BlockSpace:
             {row.owner for row in (*block.rows, *block.assigned_by)},
             {name.owner for name in block.coordinates},
         )
-        members = [one for one in (*mechanism.joints, *mechanism.drivers) if one.name in owners]
+        members: list[Joint | Driver] = [*mechanism.joints, *mechanism.drivers]
         points = mechanism.body_points
-        names = sorted({str(text) for one in members for text in texts_of(one)} & {*points}) or list(points)
+        names = sorted(
+            {str(text) for one in members if one.name in owners for text in texts_of(one)} & {*points}
+        ) or list(points)
         places = [Place(body_of(name), *map(float, points[name])) for name in names]
         spans = np.ptp([place.world(at) for place in places], axis=0) if places else (plan.size,)
         self._unknowns = block.unknowns

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from kinfmu.analysis.assemblies import Assemblies, find_assemblies
 from kinfmu.analysis.cams import cam_findings
-from kinfmu.analysis.design_notes import motion_notes, near_pivots, part_notes, unused_points
+from kinfmu.analysis.design_notes import motion_notes, near_pivots, part_notes, toggle_positions, unused_points
 from kinfmu.analysis.driver_path import follow
 from kinfmu.analysis.drivers import INSTEAD, DriverAdvice, clearer_problem, driver_advice
 from kinfmu.analysis.dyads import find_dyads
@@ -105,14 +105,26 @@ def check(mechanism: Mechanism, *, written: Mechanism | None = None) -> Report:
     notes += run_notes(plan, ranges)
     loops = find_named_loops(mechanism, redundancy, paths)
     further = find_dyads(mechanism, redundancy, paths, loops)
-    notes += motion_notes(mechanism, paths, loops)
+    notes += motion_notes(mechanism, paths)
     cams = cam_findings(plan, paths)
     notes += [cam.note() for cam in cams if cam.note()]
     cut = next((problem for problem in (cam.problem() for cam in cams) if problem is not None), None)
     measured = measurements(mechanism, ranges)
     forces = loading(plan, ranges, cams)
     return Report(
-        mechanism, redundancy, cut, plan, ranges, loops, None, tuple(notes), measured, forces, cams, dyads=further
+        mechanism,
+        redundancy,
+        cut,
+        plan,
+        ranges,
+        loops,
+        None,
+        tuple(notes),
+        measured,
+        forces,
+        cams,
+        dyads=further,
+        toggles=toggle_positions(mechanism, paths, loops),
     )
 
 

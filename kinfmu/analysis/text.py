@@ -41,7 +41,7 @@ class ReportLine(NamedTuple):
 def findings(report: Findings) -> list[ReportLine]:
     """Return the findings in order."""
     found: list[ReportLine] = []
-    for parts in (_count, _rows, _plan, _advice, _loops, _dyads, _motion, _cams, _measures, _forces, _notes):
+    for parts in (_count, _rows, _plan, _advice, _loops, _dyads, _motion, _toggles, _cams, _measures, _forces, _notes):
         found += parts(report)
     if report.problem is not None:
         found.append(ReportLine("problem", str(report.problem)))
@@ -257,6 +257,14 @@ def _motion(report: Findings) -> Iterator[ReportLine]:
         yield ReportLine("singular", "none in the range")
 
 
+def _toggles(report: Findings) -> Iterator[ReportLine]:
+    for k, toggle in enumerate(report.toggles[:_MOST_LOOPS]):
+        at = value_text(toggle.value, report.mechanism.length_unit, toggle.kind)
+        yield ReportLine("" if k else "toggle", f"{toggle.happens} at {toggle.driver} = {at}")
+    if len(report.toggles) > _MOST_LOOPS:
+        yield ReportLine("", f"and {len(report.toggles) - _MOST_LOOPS} more toggle positions")
+
+
 def _cams(report: Findings) -> Iterator[ReportLine]:
     for k, cam in enumerate(report.cams):
         texts = cam_lines(cam)
@@ -372,7 +380,7 @@ def _change_points(report: Findings, reach: DriverRange, several: bool) -> Itera
 
 def _all_multiples_of_pi(values: list[float]) -> bool:
     """Return True for 0 and pi, modulo whole turns: k pi for every integer k."""
-    return len(values) == 2 and [multiple_of_pi(value) for value in sorted(values)] == ["0", "pi"]
+    return len(values) == 2 and {multiple_of_pi(value % math.tau) for value in values} <= {"0", "pi", "2 pi"}
 
 
 def _range(report: Findings, reach: DriverRange) -> Iterator[ReportLine]:

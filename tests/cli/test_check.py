@@ -341,7 +341,7 @@ def test_the_figure_is_drawn_at_the_pose_asked_for(command: Command, tmp_path: P
     ("text", "kind"),
     [("[targets.a]", "fit"), ("[unknowns]", "fit"), ("[parameters]", "study"), ('sampling = "sobol"', "study")],
 )
-def test_a_fit_or_study_file_is_told_its_command(
+def test_the_message_on_a_fit_or_study_file_names_its_command(
     text: str, kind: str, tmp_path: Path, fails: Callable[..., str]
 ) -> None:
     path = tmp_path / "design.toml"
