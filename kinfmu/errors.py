@@ -111,6 +111,7 @@ OTHER_COORDINATES = {  # words for coordinates and their rates, with the endings
     **dict.fromkeys(("acceleration", "a"), ("alpha", "ax")),
     **dict.fromkeys(("position", "pos"), ("x",)),
 }
+SHORTEST_BEGINNING = 3  # characters of a word that may be the beginning of a longer one, such as tol of tolerance
 LONGEST_WORD = 200  # characters of a word that may be a misspelt name
 
 
@@ -128,9 +129,13 @@ def suggestion(word: str, known: Iterable[str]) -> str:
 
     if len(word) > LONGEST_WORD:  # not a misspelt name, and slow to compare
         return ""
-    known = list(known)
+    known, lower = list(known), word.lower()
     owner, _, ending = word.rpartition(".")
-    others = [OTHER_WORDS.get(word.lower()), *(f"{owner}.{ours}" for ours in OTHER_COORDINATES.get(ending.lower(), ()))]
-    near = [ours for ours in others if ours in known]
-    near = near or difflib.get_close_matches(word, known, n=1) or [k for k in known if k.lower() == word.lower()]
+    others = [OTHER_WORDS.get(lower), *(f"{owner}.{ours}" for ours in OTHER_COORDINATES.get(ending.lower(), ()))]
+    by_lower = {ours.lower(): ours for ours in reversed(known)}
+    near = [ours for ours in (*others, by_lower.get(lower)) if ours in known]
+    if not near and len(word) >= SHORTEST_BEGINNING:
+        begun = [key for key in by_lower if key.startswith(lower) or key.rpartition(".")[2].startswith(lower)]
+        near = [by_lower[key] for key in begun] if len(begun) == 1 else []
+    near = near or [by_lower[key] for key in difflib.get_close_matches(lower, by_lower, n=1)]
     return f"; did you mean '{near[0]}'?" if near else ""

@@ -5,33 +5,31 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.analysis.assembly_search import IN_VAIN, SEED, TRIES, AssemblySearch
 from kinfmu.analysis.held import started
 from kinfmu.analysis.values import degrees, driver_text
-from kinfmu.codegen.python import load_model
-from kinfmu.equations.assembly import SINGULAR, Assembled, find_assembly, start_values
+from kinfmu.equations.assembly import Assembled, find_assembly, start_values
 from kinfmu.equations.closing import CLOSED, close
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import AmbiguousStartError, AssemblyError, KinfmuError, listed
-from kinfmu.mechanism import Mechanism, Point, Start
+from kinfmu.mechanism import Mechanism, Start
 from kinfmu.plan import SolvePlan, compile_plan, localized
 from kinfmu.plan.anchor import find_anchor
-from kinfmu.plan.origin import in_world, relative_to
+from kinfmu.plan.origin import in_world
 from kinfmu.units import CoordinateName
 
 MOST = 64  # assemblies after which the search ends
-_SEED = 1989
-_TRIES = 20_000  # most runs of Newton's method from random unknowns
-_IN_VAIN = 300  # tries without a new pose after which the search counts as complete
 _STARTS = 60  # random poses from which a mechanism without a plan is assembled
+_SPREAD = 2.0  # [sizes] to either side, range of random positions
 _LARGE = 150  # coordinates; more take minutes
 _SAME = 1e-6  # [rad, sizes]; poses closer than this count as one
 _APART = 1e-3  # [rad, sizes]; smallest difference that distinguishes assemblies in the report
-_SPREAD = 2.0  # [sizes] to either side, range of random positions
 _STEPS = 4  # in which a pose is moved to nearby driver values
 _ADVISED = 8  # assemblies for which few start poses are searched
 _SINGLE = 3  # bodies that are tried alone
@@ -52,23 +50,23 @@ class Assembly:
 
 @dataclass(frozen=True)
 class Assemblies:
-    """All assemblies found at these driver values, the file's first.
+    """The assemblies found at these driver values, the file's first.
 
     drivers: values by name [rad or length]; distinguished_by: coordinates of which at least one differs between
-    any two; is_complete: False if the search was ended because there are so many.
+    any two; ended: how the search ended, as text.
     """
 
     mechanism: Mechanism
     drivers: Mapping[str, float] = field(hash=False)
     found: tuple[Assembly, ...]
     distinguished_by: tuple[CoordinateName, ...]
-    is_complete: bool
+    ended: str
 
     def as_json(self) -> dict[str, Any]:
-        """Return plain data: drivers, complete, distinguished_by, found (chosen, coordinates, start by body)."""
+        """Return plain data: drivers, ended, distinguished_by, found (chosen, coordinates, start by body)."""
         return {
             "drivers": dict(self.drivers),
-            "complete": self.is_complete,
+            "ended": self.ended,
             "distinguished_by": list(self.distinguished_by),
             "found": [
                 {
@@ -85,23 +83,23 @@ class Assemblies:
 
 
 def find_assemblies(mechanism: Mechanism, plan: SolvePlan | None = None) -> Assemblies:
-    """Return all assemblies of a mechanism at its start driver values, independent of its start poses.
+    """Return the assemblies found of a mechanism at its start driver values, independent of its start poses.
 
     plan: that of the mechanism; None if its start poses do not close or leave several branches.
-    Newton's method from random unknowns of each block, seeded; poses that differ by whole turns count as one.
+    Poses that differ by whole turns count as one.
 
     Raises:
         KinfmuError: If the mechanism cannot be planned.
         AssemblyError: If no assembly is found.
 
     """
-    whole = replace(mechanism, coordinates="all", points={})
+    whole = replace(mechanism, coordinates="all")
     chosen = None
     if plan is not None:
         chosen, planned = plan.anchor.q, plan if plan.mechanism.coordinates == "all" else compile_plan(whole)
     else:
         planned = compile_plan(started(whole, _some_pose(whole)))
-    poses, is_complete = _poses(planned)
+    poses, ended = _search(planned)
     if chosen is not None and all(_distance(planned, chosen, pose) > _SAME for pose in poses):
         poses.insert(0, chosen)
     is_chosen = [chosen is not None and _distance(planned, chosen, pose) <= _SAME for pose in poses]
@@ -116,54 +114,16 @@ def find_assemblies(mechanism: Mechanism, plan: SolvePlan | None = None) -> Asse
         start = {} if is_chosen[k] else _choice(mechanism, planned, pose, chosen, undecided, is_advised=is_advised)
         found.append(Assembly(_named(planned, pose), is_chosen[k], start))
     drivers = {driver.name: float(u) for driver, u in zip(mechanism.drivers, planned.anchor.u, strict=True)}
-    return Assemblies(mechanism, drivers, tuple(found), apart, is_complete)
+    return Assemblies(mechanism, drivers, tuple(found), apart, ended)
 
 
-def _poses(plan: SolvePlan) -> tuple[list[FloatArray], bool]:
-    """Return poses of all coordinates relative to the plan's origin, and whether the search is complete.
-
-    Half of the tries start from random values of all unknowns, half from those of one block of a known pose: with many
-    blocks, random values of all at once rarely close.
-    """
-    model, rng = load_model(plan), np.random.default_rng(_SEED)
-    u, anchor = model.ANCHOR
-    scales = np.array(model.UNKNOWN_SCALES, dtype=float)
-    is_angle = np.array(model.UNKNOWN_IS_ANGLE, dtype=bool)
-    rest = (0.0,) * len(anchor)
-    known = [np.array(anchor, dtype=float)]
-    poses = [_pose(plan, model, model.position(u, anchor, rest, rest, -0.0)[-1])]
-    in_vain = 0
-    for trial in range(_TRIES):
-        if not anchor or in_vain >= _IN_VAIN or len(poses) >= MOST:
-            break
-        trial_q = np.where(is_angle, math.pi, _SPREAD * scales) * rng.uniform(-1.0, 1.0, len(anchor))
-        trial_q += np.where(is_angle, 0.0, known[0])
-        if trial % 2:
-            start, end = model.BLOCKS[rng.integers(len(model.BLOCKS))]
-            kept = known[rng.integers(len(known))].copy()
-            kept[start:end] = trial_q[start:end]
-            trial_q = kept
-        try:
-            found = model.position(u, tuple(trial_q.tolist()), rest, rest, -0.0)
-        except (ArithmeticError, ValueError):  # singular, or diverged
-            continue
-        if not (found[3] <= CLOSED and found[6] <= CLOSED and found[2] > SINGULAR):
-            continue  # open, or where links may fold without end
-        pose = _pose(plan, model, found[-1])
-        if any(_distance(plan, pose, other) <= _SAME for other in poses):
-            in_vain += 1
-            continue
-        in_vain = 0
-        known.append(np.array(found[0], dtype=float))
-        poses.append(pose)
-    return poses, len(poses) < MOST
-
-
-def _pose(plan: SolvePlan, model: Any, values: tuple[float, ...]) -> FloatArray:
-    """Return all coordinates in the mechanism's order, relative to the plan's origin, angles within half a turn."""
-    at = {**plan.fixed, **dict(zip(plan.outputs, model.outputs(values), strict=True))}
+def _search(plan: SolvePlan) -> tuple[list[FloatArray], str]:
+    """Return poses of all coordinates relative to the plan's origin, and how the search ended."""
     names = plan.mechanism.coordinate_names
-    return _reduced(names, relative_to(plan.origin, names, at))
+    poses = [_reduced(names, pose) for pose in islice(AssemblySearch(plan).poses(), MOST)]
+    if len(poses) == MOST:
+        return poses, f"at {MOST} assemblies"
+    return poses, f"after {IN_VAIN} n^2 known solutions in a row, or {TRIES} n^2 tries, of each block of n unknowns"
 
 
 def _reduced(names: Sequence[CoordinateName], q: FloatArray) -> FloatArray:
@@ -329,9 +289,8 @@ def _assemble_from_random_starts(mechanism: Mechanism) -> FloatArray | None:
     system = System(localized(mechanism)[0])
     if len(system.coordinates) > _LARGE:
         return None
-    u, rng = start_values(system).u, np.random.default_rng(_SEED)
-    ground = next(body for body in system.mechanism.bodies if body.is_ground)
-    middle = np.mean([*ground.points.values()] or [Point(0.0, 0.0)], axis=0)
+    u, rng = start_values(system).u, np.random.default_rng(SEED)
+    middle = np.mean(system.mechanism.ground_points or [(0.0, 0.0)], axis=0)
     centre = np.tile([*middle, 0.0], len(system.coordinates) // 3)
     spread = np.tile([_SPREAD * system.size, _SPREAD * system.size, math.pi], len(system.coordinates) // 3)
     for _ in range(_STARTS):
@@ -351,9 +310,9 @@ def _lines(assemblies: Assemblies) -> Iterator[str]:
         driver_text(driver, assemblies.drivers[driver.name], mechanism.length_unit) for driver in mechanism.drivers
     )
     given = {body.name: body.start for body in mechanism.bodies}
-    many = f"{len(assemblies.found)}" if assemblies.is_complete else f"at least {len(assemblies.found)}"
     apart = f", distinguished by {listed(assemblies.distinguished_by)}" if assemblies.distinguished_by else ""
-    yield f"  assemblies  {many} at {at}{apart}"
+    yield f"  assemblies  {len(assemblies.found)} found at {at}{apart}"
+    yield f"              there may be more: the search ended {assemblies.ended}"
     for k, one in enumerate(assemblies.found, start=1):
         values = [_value(name, one.coordinates[name], mechanism.length_unit) for name in assemblies.distinguished_by]
         if one.is_chosen:

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import dataclass
 from itertools import combinations, pairwise
 from statistics import median_low
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from kinfmu.analysis.driver_path import DriverPath
 from kinfmu.analysis.loops import FourBar, Place, SliderCrank
 from kinfmu.analysis.named_loops import NamedLoop
-from kinfmu.analysis.values import law_values, value_text
+from kinfmu.analysis.values import law_values
 from kinfmu.equations.system import size_of
 from kinfmu.errors import listed
 from kinfmu.joints import Fixed, Revolute
-from kinfmu.measures import PoseQuantity
 from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
@@ -27,6 +26,7 @@ NEAR_PIVOTS = 1e-2  # of the shortest body there; pivots so close are probably i
 _LEAST_LINKS = 4  # fewer have no usual length
 _STILL = 1e-9  # [rad, sizes]; a body that moves less does not move
 _SAME = 1e-9  # of the size; points closer than this coincide
+_IN_LINE = 1e-9  # sine of the angle between links that are in line at a pose
 _EDGE = 1e-6  # of the run's range; positions closer to its ends are not crossed
 
 
@@ -44,27 +44,27 @@ def part_notes(mechanism: Mechanism) -> Iterator[str]:
         )
 
 
-def motion_notes(mechanism: Mechanism, paths: Sequence[DriverPath], loops: Sequence[NamedLoop]) -> Iterator[str]:
-    """Yield one line on bodies that no driver moves, and one for each toggle position that the run crosses.
+@dataclass(frozen=True)
+class TogglePosition:
+    """A position that the run crosses with two links in line, or with a rod perpendicular to its slide.
 
-    paths: of all drivers, one each.
+    driver, value: where [rad or length]; kind: 'angle' or 'length'; happens: the position in words.
     """
+
+    driver: str
+    value: float
+    kind: str
+    happens: str
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the position as plain data."""
+        return {"driver": self.driver, "value": self.value, "position": self.happens}
+
+
+def motion_notes(mechanism: Mechanism, paths: Sequence[DriverPath]) -> Iterator[str]:
+    """Yield one line on bodies that no driver moves; paths: of all drivers, one each."""
     if len(paths) == len(mechanism.drivers):
         yield from _still_bodies(mechanism, paths)
-    for path in paths:
-        yield from _toggles(mechanism, path, loops)
-
-
-def _texts(member: object) -> set[object]:
-    """Return the texts in the fields of a joint, driver, load or measure, and in those of its measured quantity."""
-    found: set[object] = set()
-    for entry in fields(member):  # type: ignore[arg-type]  # all members are dataclasses
-        value = getattr(member, entry.name)
-        if isinstance(value, PoseQuantity):
-            found |= _texts(value)
-        else:
-            found |= {value} if isinstance(value, str) else {*value} if isinstance(value, tuple) else set()
-    return found
 
 
 def unused_points(mechanism: Mechanism, *, of_joints: bool = False) -> str:
@@ -72,11 +72,9 @@ def unused_points(mechanism: Mechanism, *, of_joints: bool = False) -> str:
 
     of_joints: ends of rods and corners of plates, which only place the mass, do not count as named.
     """
-    used: set[object] = set(mechanism.points.values())
+    used = {*mechanism.named_points}
     if not of_joints:
         used |= {f"{body.name}.{end}" for body in mechanism.bodies for end in body.rod or body.plate or ()}
-    for member in (*mechanism.joints, *mechanism.drivers, *mechanism.loads, *mechanism.measures):
-        used |= _texts(member)
     unused = [name for name in mechanism.body_points if name not in used]
     if not unused:
         return ""
@@ -206,28 +204,37 @@ def _welded(mechanism: Mechanism) -> set[str]:
     return found
 
 
-def _toggles(mechanism: Mechanism, path: DriverPath, loops: Sequence[NamedLoop]) -> Iterator[str]:
-    """Yield a line for each toggle position that the run crosses: two links in line, a rod perpendicular to its slide.
+def toggle_positions(
+    mechanism: Mechanism, paths: Sequence[DriverPath], loops: Sequence[NamedLoop]
+) -> tuple[TogglePosition, ...]:
+    """Return the toggle positions that the run crosses, each once, in the order of the drivers and their values."""
+    found: list[TogglePosition] = []
+    for path in paths:
+        driver = next(one for one in mechanism.drivers if one.name == path.name)
+        values = law_values(driver, mechanism.run)
+        low, high = min(values), max(values)
+        is_whole = path.turns is not None and high - low >= path.turns * math.tau * (1.0 - _EDGE)
+        edge = -math.inf if is_whole else _EDGE * (high - low)
+        here = {
+            (toggle.happens, round(at, 6)): TogglePosition(path.name, at, path.kind, toggle.happens)
+            for named in loops
+            for toggle in _toggles_of(named.loop)
+            for at in (path.within_cycle(u, low) for u in _in_line_at(path, toggle))
+            if low + edge < at < high - edge
+        }
+        found += sorted(here.values(), key=lambda position: (position.value, position.happens))
+    return tuple(found)
 
-    A run of a full turn moves every crank through them as intended, so there are no lines for it.
-    """
-    driver = next(one for one in mechanism.drivers if one.name == path.name)
-    values = law_values(driver, mechanism.run)
-    low, high = min(values), max(values)
-    if path.kind == "angle" and high - low >= math.tau * (1.0 - 1e-9):
-        return
-    edge = _EDGE * (high - low)
-    coordinates = [*map(path.coordinates, path.poses)]
-    for named in loops:
-        for toggle in _toggles_of(named.loop):
-            sines = [_sine(toggle, q) for q in coordinates]
-            for (before, after), (one, other) in zip(pairwise(path.poses), pairwise(sines), strict=True):
-                if one * other < 0.0:
-                    zero = path.zero(lambda pose: _sine(toggle, path.coordinates(pose)), before, after)  # noqa: B023
-                    at = _within(path, zero.u[0], low)
-                    if low + edge < at < high - edge:
-                        value = value_text(at, mechanism.length_unit, path.kind)
-                        yield f"the run crosses a toggle position: {toggle.happens} at {path.name} = {value}"
+
+def _in_line_at(path: DriverPath, toggle: _Toggle) -> Iterator[float]:
+    """Yield the driver values on a path at which the sine of a toggle position is 0."""
+    sines = [_sine(toggle, path.coordinates(pose)) for pose in path.poses]
+    for pose, sine in zip(path.poses, sines, strict=True):
+        if abs(sine) <= _IN_LINE:
+            yield pose.u[0]
+    for (before, after), (one, other) in zip(pairwise(path.poses), pairwise(sines), strict=True):
+        if one * other < 0.0 and min(abs(one), abs(other)) > _IN_LINE:
+            yield path.zero(lambda pose: _sine(toggle, path.coordinates(pose)), before, after).u[0]
 
 
 class _Toggle(NamedTuple):
@@ -249,14 +256,6 @@ def _toggles_of(loop: FourBar | SliderCrank) -> tuple[_Toggle, _Toggle]:
         rod = loop.rod.name
         return in_line, _Toggle(loop.pins[1:], loop.direction + math.pi / 2.0, f"{rod} is perpendicular to the slide")
     return in_line, _Toggle(loop.pins[1:], 0.0, f"{second}, {last[0]} fall in line")
-
-
-def _within(path: DriverPath, u: float, low: float) -> float:
-    """Return a driver value moved by whole periods of the mechanism to the first one from `low` on."""
-    if path.turns is None:
-        return u
-    period = path.turns * math.tau
-    return low + (u - low) % period
 
 
 def _sine(toggle: _Toggle, q: Mapping[str, float]) -> float:

@@ -25,6 +25,7 @@ _LARGE = 150  # coordinates; a larger mechanism is followed for one turn only
 _NEAR_LIMIT = 1e-6  # [rad, sizes]; distance from a limit of the poses from which its own is extrapolated
 _REPEATS = 1e-6  # [rad, sizes]; poses closer than this are equal
 _SAME = 1e-15  # of a driver value; places closer than this are equal
+_SAME_PLACE = 1e-9  # [rad]; values closer than this are one place of a cycle
 _MANY = 200  # poses among which no two extremes of a quantity are neighbours
 _NEAR_END = 16  # poses between the last one and a limit, where coordinates change with the root of the distance
 
@@ -62,6 +63,18 @@ class DriverPath:
         """Return the rates of all coordinates per unit of the driver, by name."""
         rates: dict[str, float] = dict(zip(self.plan.outputs, self.solver.rates(pose, (1.0,)), strict=True))
         return {**dict.fromkeys(self.plan.fixed, 0.0), **rates}
+
+    def within_cycle(self, u: float, low: float | None = None) -> float:
+        """Return a driver value moved by whole cycles of the mechanism to the first one from `low` on.
+
+        low: default: the start of the driver's law. A value just below the end of the cycle counts as its start.
+        """
+        if self.turns is None:
+            return u
+        period = self.turns * math.tau
+        low = float(self.plan.mechanism.drivers[0].law.at(self.plan.mechanism.run.start)) if low is None else low
+        ahead = (u - low) % period
+        return low + (0.0 if period - ahead < _SAME_PLACE else ahead)
 
     @cached_property
     def fine_poses(self) -> tuple[Pose, ...]:

@@ -136,7 +136,7 @@ def _suggestions(system: System, start: FloatArray, pose: FloatArray, free: Floa
     """Yield pins that are probably missing, then drivers for the free directions left, the most natural first."""
     for pin in missing_pins(system, start, pose, free):
         yield Suggestion(pin.name, {"type": pin.type, "between": list(pin.between)}, "joints")
-        probe = System(replace(system.mechanism, joints=(pin,), drivers=(), measures=()))
+        probe = System(replace(system.mechanism, joints=(pin,), drivers=(), measures=()), system.size)
         free = free @ null_space(probe.scaled_jacobian(pose) @ free)
     taken = {driver.name for driver in system.mechanism.drivers}
     for driver in _candidates(system.mechanism):
@@ -183,7 +183,7 @@ def _candidates(mechanism: Mechanism) -> Iterator[Driver]:
 
 def _gradient(system: System, driver: Driver, pose: FloatArray) -> FloatArray:
     """Return the gradient of the driven quantity with respect to the scaled coordinates, (n,)."""
-    probe = System(replace(system.mechanism, joints=(), drivers=(driver,), measures=()))
+    probe = System(replace(system.mechanism, joints=(), drivers=(driver,), measures=()), system.size)
     gradient = probe.jacobian(pose)[0] * system.column_scales
     length = float(np.linalg.norm(gradient))
     return np.asarray(gradient / length) if length > 0.0 else gradient

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from kinfmu.analysis.cams import CamFindings
+from kinfmu.analysis.design_notes import TogglePosition
 from kinfmu.analysis.drivers import DriverAdvice
 from kinfmu.analysis.dyads import NamedDyad
 from kinfmu.analysis.loading import Loading
@@ -35,7 +36,7 @@ class Findings:
     None where drivers and degrees of freedom match; notes: further findings, one line each;
     measured: values of the measures, None without measures; loading: efforts and reactions, None without masses, loads;
     cams: one per cam joint; left_out: invalid entries of a file that is reported in part, such as '[drivers.crank]';
-    dyads: further pairs of links that have a transmission angle.
+    dyads: further pairs of links that have a transmission angle; toggles: toggle positions that the run crosses.
     """
 
     mechanism: Mechanism
@@ -51,6 +52,7 @@ class Findings:
     cams: tuple[CamFindings, ...] = ()
     left_out: tuple[str, ...] = ()
     dyads: tuple[NamedDyad, ...] = ()
+    toggles: tuple[TogglePosition, ...] = ()
 
     @property
     def mobility(self) -> int:
@@ -109,9 +111,11 @@ class Findings:
         evaluated), stopped, limits: value, kind ('dead centre', 'change point', 'pole' or 'end'), bodies (that can move
         there while the driver is fixed), coordinates.
         loops: kind ('four-bar' or 'slider-crank'), links, lengths (by link; 'ground' too), offset (slider-cranks),
-        class, shape, sums, transmission: driver, coupler, output, smallest, at_smallest, largest, at_largest, verdict.
+        class, shape, assembly (of four-bars: 'open' or 'crossed' in the assembled pose), sums, transmission: driver,
+        coupler, output, smallest, at_smallest, largest, at_largest, verdict.
         dyads (pairs of links in none of the loops that have a transmission angle): links (of a guided link, it and its
         slider or guiding joint), lengths, joint (where they meet, or null), between (bodies), transmission.
+        toggles (positions of links in line that the run crosses): driver, value, position (text).
         advice: null if drivers and degrees of freedom match, else missing (number), surplus (name, implied_by), loose
         (coordinates), suggestions (name, and the keys of the driver's table).
         measures: over (the motion, as text), values: name, type, value, unit, driver, at (driver values), at_unit,
@@ -162,6 +166,7 @@ class Findings:
             "ranges": [reach.as_json() for reach in self.ranges],
             "loops": [loop.as_json() for loop in self.loops],
             "dyads": [dyad.as_json() for dyad in self.dyads],
+            "toggles": [toggle.as_json() for toggle in self.toggles],
             "advice": None if self.advice is None else self.advice.as_json(),
             "measures": None if self.measured is None else self.measured.as_json(),
             **({} if self.loading is None else {"forces": self.loading.as_json()}),

@@ -13,8 +13,8 @@ class Grashof:
 
     name: 'crank-rocker', 'double crank', 'rocker-crank', 'double rocker', 'triple rocker', 'change point' or 'does not
     close' (four-bars); 'crank turns', 'rod turns', 'nothing turns', 'change point' or 'does not close' (slider-cranks).
-    shape: of a change point, 'parallelogram', 'kite' or '', else ''; small, large: the two sides of the
-    inequality, small <= large where a link can make a full turn [length].
+    shape: of a change point, 'parallelogram', 'antiparallelogram' (a crossed one), 'kite' or '', else ''; small, large:
+    the two sides of the inequality, small <= large where a link can make a full turn [length].
     """
 
     name: str

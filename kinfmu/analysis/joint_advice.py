@@ -43,7 +43,7 @@ def missing_pins(system: System, start: FloatArray, pose: FloatArray, free: Floa
         while name in taken:
             name += "_2"
         pin = Revolute(name, (a, b))
-        probe = System(replace(mechanism, joints=(pin,), drivers=(), measures=()))
+        probe = System(replace(mechanism, joints=(pin,), drivers=(), measures=()), system.size)
         holds = probe.scaled_jacobian(pose) @ free  # (2, k)
         if np.linalg.svd(holds, compute_uv=False)[-1] <= _RANK:
             continue

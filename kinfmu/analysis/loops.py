@@ -14,6 +14,9 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 
 _SAME = 1e-12  # of the size; points of a body closer than this coincide
+_ON_LINE = 1e-9  # [rad]; a point this close to a line is on it
+
+_Point = tuple[float, float]
 
 
 class Place(NamedTuple):
@@ -73,6 +76,11 @@ class FourBar:
     def turned_round(self) -> FourBar:
         """Return the same loop read from its other end."""
         return FourBar(self.frame, self.last, self.coupler, self.first, self.pins[::-1])
+
+    def is_crossed(self, coordinates: Mapping[str, float]) -> bool:
+        """Return True if two opposite sides of the loop cross in a pose; links that only touch do not."""
+        o, p, q, c = (place.world(coordinates) for place in self.pins)
+        return _cross(o, p, q, c) or _cross(p, q, c, o)
 
 
 @dataclass(frozen=True)
@@ -320,6 +328,17 @@ class _Net:
                     dx, dy = place.x - at.x, place.y - at.y
                     moved = guide._replace(x=guide.x + c * dx - s * dy, y=guide.y + s * dx + c * dy)
                     guides.setdefault(pin, []).append(moved)
+
+
+def _cross(a: _Point, b: _Point, c: _Point, d: _Point) -> bool:
+    """Return True if the segments from a to b and from c to d cross."""
+
+    def side(p: _Point, q: _Point, r: _Point) -> float:
+        """Return on which side of the line from p to q a point is: 1.0, -1.0, or 0.0 on it."""
+        area = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+        return 0.0 if abs(area) <= _ON_LINE * math.dist(p, q) * math.dist(p, r) else math.copysign(1.0, area)
+
+    return side(a, b, c) * side(a, b, d) < 0.0 and side(c, d, a) * side(c, d, b) < 0.0
 
 
 def _distance(a: Place, b: Place) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from kinfmu.analysis.driver_path import DriverPath
@@ -19,11 +19,15 @@ MOST = 200  # coordinates; transmission angles of larger mechanisms are not comp
 
 @dataclass(frozen=True)
 class NamedLoop:
-    """A four-bar or slider-crank with its class and its transmission angle over the path of each driver."""
+    """A four-bar or slider-crank with its class and its transmission angle over the path of each driver.
+
+    assembly: of a four-bar in the assembled pose, 'open' or 'crossed'; '' for others, or without a pose.
+    """
 
     loop: FourBar | SliderCrank
     grashof: Grashof
     transmission: tuple[TransmissionRange, ...] = ()
+    assembly: str = ""
 
     def as_json(self) -> dict[str, Any]:
         """Return the loop as plain data."""
@@ -38,6 +42,7 @@ class NamedLoop:
             **sizes,
             "class": kind.name,
             "shape": kind.shape or None,
+            "assembly": self.assembly or None,
             "sums": [kind.small, kind.large],
             "transmission": [angle.as_json() for angle in self.transmission],
         }
@@ -64,7 +69,13 @@ def _four_bars(
         from_last = any(is_led_by_last(path.plan, loop) for path in paths) if paths else loop.last.name in driven
         read = loop.turned_round() if from_last and loop.first.name not in driven else loop
         angles = (transmission_angle(path, read) for path in followed)
-        yield NamedLoop(read, four_bar_class(*read.lengths), tuple(angle for angle in angles if angle is not None))
+        kind, assembly = four_bar_class(*read.lengths), ""
+        if paths:
+            pose = paths[0].coordinates(paths[0].solver.anchor)
+            assembly = "crossed" if read.is_crossed(pose) else "open"
+        if kind.shape == "parallelogram" and assembly == "crossed":
+            kind = replace(kind, shape="antiparallelogram")
+        yield NamedLoop(read, kind, tuple(angle for angle in angles if angle is not None), assembly)
 
 
 def _slider_cranks(loops: Sequence[SliderCrank], followed: Sequence[DriverPath]) -> Iterator[NamedLoop]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from kinfmu.analysis.assemblies import Assemblies, find_assemblies
 from kinfmu.analysis.cams import cam_findings
-from kinfmu.analysis.design_notes import motion_notes, near_pivots, part_notes, unused_points
+from kinfmu.analysis.design_notes import motion_notes, near_pivots, part_notes, toggle_positions, unused_points
 from kinfmu.analysis.driver_path import follow
 from kinfmu.analysis.drivers import INSTEAD, DriverAdvice, clearer_problem, driver_advice
 from kinfmu.analysis.dyads import find_dyads
@@ -20,7 +22,7 @@ from kinfmu.display import Displayed
 from kinfmu.equations.redundancy import find_redundancy
 from kinfmu.equations.start_poses import open_joints_text, start_from_poses
 from kinfmu.equations.system import System
-from kinfmu.errors import AssemblyError, InconsistentError, KinfmuError, MobilityError
+from kinfmu.errors import AssemblyError, InconsistentError, KinfmuError, MechanismError, MobilityError, listed
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.plan import localized, plan_from
@@ -85,6 +87,8 @@ def check(mechanism: Mechanism, *, written: Mechanism | None = None) -> Report:
     try:
         plan = plan_from(mechanism, system, origin, redundancy)
     except KinfmuError as problem:
+        if (rest := _without_load(mechanism, problem.data.get("load"))) is not None:
+            return leaving_out(check(rest[0], written=written), problem, rest[1])
         notes += near_pivots(mechanism) if isinstance(problem, AssemblyError) else ()
         advice = driver_advice(system, redundancy)
         loops = find_named_loops(mechanism, redundancy, ())
@@ -101,15 +105,50 @@ def check(mechanism: Mechanism, *, written: Mechanism | None = None) -> Report:
     notes += run_notes(plan, ranges)
     loops = find_named_loops(mechanism, redundancy, paths)
     further = find_dyads(mechanism, redundancy, paths, loops)
-    notes += motion_notes(mechanism, paths, loops)
+    notes += motion_notes(mechanism, paths)
     cams = cam_findings(plan, paths)
     notes += [cam.note() for cam in cams if cam.note()]
     cut = next((problem for problem in (cam.problem() for cam in cams) if problem is not None), None)
     measured = measurements(mechanism, ranges)
     forces = loading(plan, ranges, cams)
     return Report(
-        mechanism, redundancy, cut, plan, ranges, loops, None, tuple(notes), measured, forces, cams, dyads=further
+        mechanism,
+        redundancy,
+        cut,
+        plan,
+        ranges,
+        loops,
+        None,
+        tuple(notes),
+        measured,
+        forces,
+        cams,
+        dyads=further,
+        toggles=toggle_positions(mechanism, paths, loops),
     )
+
+
+def leaving_out(report: Report, problem: KinfmuError, left_out: tuple[str, ...]) -> Report:
+    """Return the report of the valid part of a mechanism, with its problem and the entries that it leaves out."""
+    left_out = (*left_out, *report.left_out)
+    text = f"this report leaves out {listed(left_out)}, because of the problem"
+    notes = () if report.left_out else report.notes
+    return replace(report, problem=problem, notes=(*notes, text), left_out=left_out)
+
+
+def _without_load(mechanism: Mechanism, name: object) -> tuple[Mechanism, tuple[str, ...]] | None:
+    """Return the mechanism without a load and the measures that need it, and these entries; None without it."""
+    loads = tuple(load for load in mechanism.loads if load.name != name)
+    if len(loads) == len(mechanism.loads):
+        return None
+    left_out, kept = [f"[loads.{name}]"], []
+    for reading in mechanism.measures:
+        try:
+            replace(mechanism, loads=loads, measures=(reading,))
+            kept.append(reading)
+        except MechanismError:
+            left_out.append(f"[measures.{reading.name}]")
+    return replace(mechanism, loads=loads, measures=tuple(kept)), tuple(left_out)
 
 
 def _after_probable_cause(problem: KinfmuError, system: System, advice: DriverAdvice | None) -> KinfmuError:

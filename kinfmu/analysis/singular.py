@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -124,7 +123,7 @@ def driver_range(path: DriverPath) -> DriverRange:
     return DriverRange(
         driver=path.name,
         kind=path.kind,
-        points=tuple(found if path.kind != "angle" or limits else _distinct(found, path.turns or 1)),
+        points=tuple(found if path.kind != "angle" or limits else _distinct(found, path, path.turns or 1)),
         lowest=_position(path, path.low),
         highest=_position(path, path.high),
         turns=path.turns,
@@ -174,21 +173,19 @@ def _determinant(bridge: Bridge, u: float, block: int) -> float:
     return abs(float(pose.determinants[block]))
 
 
-def _distinct(points: Sequence[SingularPoint], turns: int) -> list[SingularPoint]:
-    """Return points reduced to [0, 2 pi turns), or to [0, 2 pi) if every turn has the same points."""
+def _distinct(points: Sequence[SingularPoint], path: DriverPath, turns: int) -> list[SingularPoint]:
+    """Return points within one cycle from the start, or within one turn if every turn has the same points."""
     if turns > 1:
-        once, all_turns = _distinct(points, 1), _modulo(points, turns)
+        once, all_turns = _distinct(points, path, 1), _modulo(points, path, turns)
         return once if len(all_turns) == turns * len(once) else all_turns
-    return _modulo(points, turns)
+    return _modulo(points, path, turns)
 
 
-def _modulo(points: Iterable[SingularPoint], turns: int) -> list[SingularPoint]:
-    """Return points reduced to [0, 2 pi turns), each once, in order."""
+def _modulo(points: Iterable[SingularPoint], path: DriverPath, turns: int) -> list[SingularPoint]:
+    """Return points within some turns from the start of the driver's law, each once, in order."""
     kept: dict[int, SingularPoint] = {}
-    period = turns * math.tau
     for point in points:
-        value = math.fmod(math.fmod(point.value, period) + period, period)
-        value -= period if period - value < 1e-9 else 0.0
+        value = replace(path, turns=turns).within_cycle(point.value)
         kept.setdefault(round(value * 1e7), replace(point, value=value))
     return sorted(kept.values(), key=lambda point: point.value)
 

@@ -42,7 +42,7 @@ class ReportLine(NamedTuple):
 def findings(report: Findings) -> list[ReportLine]:
     """Return the findings in order."""
     found: list[ReportLine] = []
-    for parts in (_count, _rows, _plan, _advice, _loops, _dyads, _motion, _cams, _measures, _forces, _notes):
+    for parts in (_count, _rows, _plan, _advice, _loops, _dyads, _motion, _toggles, _cams, _measures, _forces, _notes):
         found += parts(report)
     if report.problem is not None:
         found.append(ReportLine("problem", str(report.problem)))
@@ -188,11 +188,13 @@ def _four_bar_class(named: NamedLoop, loop: FourBar) -> str:
         return (
             f"does not close: its longest side ({kind.small:.6g}) is longer than the others together ({kind.large:.6g})"
         )
+    assembled = f"{named.assembly} as assembled" if named.assembly else ""
     sign = _sign(kind.small, kind.large, kind.name)
     sums = f"shortest + longest ({kind.small:.6g}) {sign} sum of the two others ({kind.large:.6g})"
     if kind.name == "change point":
-        shape = f" ({kind.shape})" if kind.shape else ""
-        return f"change point{shape}: {sums}; the links can fall in line"
+        words = [kind.shape] if kind.shape else []
+        words += [assembled] if assembled and "parallelogram" not in kind.shape else []
+        return f"change point{f' ({listed(words)})' if words else ''}: {sums}; the links can fall in line"
     turns = {
         "crank-rocker": f"{first} can turn all the way round, {last} rocks",
         "rocker-crank": f"{last} can turn all the way round, {first} rocks",
@@ -200,7 +202,7 @@ def _four_bar_class(named: NamedLoop, loop: FourBar) -> str:
         "double rocker": f"{coupler} can turn all the way round, {first} and {last} rock",
         "triple rocker": "no link can turn all the way round",
     }
-    return f"{kind.name}: {sums}; {turns[kind.name]}"
+    return f"{listed([kind.name, *([assembled] if assembled else [])])}: {sums}; {turns[kind.name]}"
 
 
 def _slider_crank_class(named: NamedLoop, loop: SliderCrank) -> str:
@@ -256,6 +258,14 @@ def _motion(report: Findings) -> Iterator[ReportLine]:
         yield ReportLine("singular", "none in the range")
 
 
+def _toggles(report: Findings) -> Iterator[ReportLine]:
+    for k, toggle in enumerate(report.toggles[:_MOST_LOOPS]):
+        at = value_text(toggle.value, report.mechanism.length_unit, toggle.kind)
+        yield ReportLine("" if k else "toggle", f"{toggle.happens} at {toggle.driver} = {at}")
+    if len(report.toggles) > _MOST_LOOPS:
+        yield ReportLine("", f"and {len(report.toggles) - _MOST_LOOPS} more toggle positions")
+
+
 def _cams(report: Findings) -> Iterator[ReportLine]:
     for k, cam in enumerate(report.cams):
         texts = cam_lines(cam)
@@ -267,7 +277,7 @@ def _measures(report: Findings) -> Iterator[ReportLine]:
     measured = report.measured
     if measured is None:
         return
-    yield ReportLine("measures", f"over {measured.over}")
+    yield ReportLine("measures", f"over {measured.over}{_without_loads(report)}")
     for value in measured.values:
         yield ReportLine(
             "", f"{value.name} = {measured_text(value)}" if not value.reason else _no_value(value.name, value.reason)
@@ -281,7 +291,7 @@ def _forces(report: Findings) -> Iterator[ReportLine]:
     if loading is None:
         return
     missing = f"; {loading.missing} samples have no numbers" if loading.missing and not loading.reason else ""
-    yield ReportLine("forces", f"over {loading.over}{missing}")
+    yield ReportLine("forces", f"over {loading.over}{_without_loads(report)}{missing}")
     if loading.reason:
         yield ReportLine("", f"no values, because {loading.reason}")
     if loading.gravity is not None:
@@ -327,6 +337,12 @@ def _left_table_text(one: LeftTable) -> str:
     kept += [f"{one.kept[1]:.6g} {one.effort_unit} after it"] if high > last else []
     both = f"its table goes {extent(one.table)}, the motion {extent(one.reached)}"
     return f"{one.load}: {both}; it keeps {' and '.join(kept)}"
+
+
+def _without_loads(report: Findings) -> str:
+    """Return ', without [loads.spring]' for the loads that the report leaves out; '' if there are none."""
+    names = [name for name in report.left_out if name.startswith("[loads")]
+    return f", without {listed(names)}" if names else ""
 
 
 def contact_text(contact: UnknownContact) -> str:
@@ -389,7 +405,7 @@ def _change_points(report: Findings, reach: DriverRange, several: bool) -> Itera
 
 def _all_multiples_of_pi(values: list[float]) -> bool:
     """Return True for 0 and pi, modulo whole turns: k pi for every integer k."""
-    return len(values) == 2 and [multiple_of_pi(value) for value in sorted(values)] == ["0", "pi"]
+    return len(values) == 2 and {multiple_of_pi(value % math.tau) for value in values} <= {"0", "pi", "2 pi"}
 
 
 def _range(report: Findings, reach: DriverRange) -> Iterator[ReportLine]:

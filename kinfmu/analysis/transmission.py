@@ -271,14 +271,5 @@ def _extremes(
                 in_line.append(limit.u[0])
                 value = math.copysign(1.0, value)
             found.append((value, limit.u[0]))
-    return _reduced(path, min(found)), _reduced(path, max(found)), tuple(in_line)
-
-
-def _reduced(path: DriverPath, found: tuple[float, float]) -> tuple[float, float]:
-    """Return an extreme with its driver value in [0, 2 pi turns) if the mechanism repeats."""
-    cosine, value = found
-    if path.turns is None:
-        return found
-    period = path.turns * math.tau
-    value = math.fmod(math.fmod(value, period) + period, period)
-    return cosine, 0.0 if period - value < 1e-12 else value
+    least, most = ((cosine, path.within_cycle(u)) for cosine, u in (min(found), max(found)))
+    return least, most, tuple(in_line)

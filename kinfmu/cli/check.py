@@ -94,6 +94,7 @@ def check(
 def _print_part(path: str, problem: MechanismError, *, as_json: bool) -> None:
     """Print what can be found of an invalid mechanism file; nothing if its bodies or joints are invalid."""
     from kinfmu.analysis import check as checked
+    from kinfmu.analysis.report import leaving_out
     from kinfmu.mechanism.partial_file import read_partially
 
     part = read_partially(path)
@@ -104,10 +105,9 @@ def _print_part(path: str, problem: MechanismError, *, as_json: bool) -> None:
     except KinfmuError:  # the file's own problem is reported
         return
     reason = type(problem)(str(problem).removeprefix(f"{path}: "), **problem.data)
-    text = f"this report leaves out {listed(part.left_out)}, because of the problem"
     lacks_driver = any(name.startswith("[drivers") for name in part.left_out)  # then none is missing in the file
     advice = None if lacks_driver else report.advice
-    report = replace(report, problem=reason, notes=(text,), advice=advice, left_out=part.left_out)
+    report = leaving_out(replace(report, notes=(), advice=advice), reason, part.left_out)
     click.echo(json.dumps(report.as_json(), indent=2) if as_json else _text(report))
 
 

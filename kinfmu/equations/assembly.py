@@ -222,8 +222,7 @@ def assemble_from_random_starts(
     is_open = np.array([value is None for body in system.mechanism.moving_bodies for value in body.start])
     if not is_open.any():
         return first
-    ground = next(body for body in system.mechanism.bodies if body.is_ground)
-    middle = np.mean([tuple(point) for point in ground.points.values()] or [(0.0, 0.0)], axis=0)
+    middle = np.mean(system.mechanism.ground_points or [(0.0, 0.0)], axis=0)
     centre = np.tile([*middle, 0.0], len(is_open) // 3)
     spread = np.tile([1.5 * system.size, 1.5 * system.size, np.pi], len(is_open) // 3)
     rng = np.random.default_rng(1989)

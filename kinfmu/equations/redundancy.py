@@ -10,7 +10,7 @@ import numpy as np
 from kinfmu.equations.assembly import AssembledStart, comfortable, find_assembly
 from kinfmu.equations.closing import CONSISTENT, dependent_rows, motion_samples
 from kinfmu.equations.part import Part
-from kinfmu.equations.system import FloatArray, Row, System, length_of
+from kinfmu.equations.system import FloatArray, Row, System, lengths_of
 from kinfmu.joints import Distance, Revolute
 
 _ROUNDING = 2e-14  # the least tolerance, of the mechanism's size: what rounding leaves open of a row that holds
@@ -108,8 +108,8 @@ def _tolerance(system: System, index: int) -> float:
     if isinstance(member.owner, Distance):
         length = member.owner.length
     elif isinstance(member.owner, Revolute):
-        moving = [body for body in system.mechanism.moving_bodies if body.name in member.bodies]
-        length = min([length for length in map(length_of, moving) if length > 0.0], default=length)
+        lengths = lengths_of(system.mechanism)
+        length = min([lengths[body] for body in member.bodies if lengths[body] > 0.0], default=length)
     return max(CONSISTENT * length, _ROUNDING * system.size)
 
 

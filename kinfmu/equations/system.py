@@ -16,9 +16,9 @@ from kinfmu.equations.dual import Dual
 from kinfmu.equations.row_code import RowCode, row_code
 from kinfmu.equations.taylor import Taylor
 from kinfmu.joints import Joint
-from kinfmu.measures.placement import GROUND, BodyFrame, Placement
+from kinfmu.measures.placement import GROUND, BodyFrame, Placement, body_of
 from kinfmu.mechanism import Mechanism
-from kinfmu.mechanism.body import GROUND_NAME, Body
+from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.units import METRES
 
 FloatArray = NDArray[np.float64]
@@ -58,10 +58,11 @@ class System:
         acceleration   Phi_q qdd = gamma         gamma = -(Phi_q qd)_q qd - 2 Phi_qt qd - Phi_tt
     """
 
-    def __init__(self, mechanism: Mechanism) -> None:
+    def __init__(self, mechanism: Mechanism, size: float | None = None) -> None:
+        """Take the size of the mechanism [length], or another one, of which this mechanism is a part."""
         self.mechanism = mechanism
         self.coordinates = mechanism.coordinate_names
-        self.size = size_of(mechanism)
+        self.size = size_of(mechanism) if size is None else size
         per_length = {"angle": 1.0 / self.size, "length": 1.0}
         rows = [
             Row(joint.name, label, scale * per_length[kind], kind)
@@ -217,17 +218,16 @@ def _frames(bodies: Iterable[str], q: Sequence[Any]) -> dict[str, BodyFrame]:
 
 def size_of(mechanism: Mechanism) -> float:
     """Return the mechanism's size [length]: that of its longest body or joint."""
-    longest = max(map(length_of, mechanism.bodies), default=0.0)
-    for joint in mechanism.joints:
-        longest = max(longest, float(joint.reach()))
+    longest = max((*lengths_of(mechanism).values(), *(float(joint.reach()) for joint in mechanism.joints)), default=0.0)
     return longest or 1.0 / METRES[mechanism.length_unit]
 
 
-def length_of(body: Body) -> float:
-    """Return the length of a body [length], measured between its points (and its frame, unless ground)."""
-    points = list(body.points.values()) if body.is_ground else [*body.points.values(), (0.0, 0.0)]
-    xy = np.array(points or [(0.0, 0.0)], dtype=float)
-    return float(np.hypot(*(xy.max(axis=0) - xy.min(axis=0))))
+def lengths_of(mechanism: Mechanism) -> dict[str, float]:
+    """Return the length of each body [length], measured between its named points (and its frame, unless ground)."""
+    places: dict[str, list[tuple[float, float]]] = {body.name: [(0.0, 0.0)] for body in mechanism.moving_bodies}
+    for name, point in mechanism.named_points.items():
+        places.setdefault(body_of(name), []).append(point)
+    return {body: float(np.hypot(*np.ptp(xy, axis=0))) for body, xy in places.items()}
 
 
 def _floats(values: ArrayLike) -> list[float]:

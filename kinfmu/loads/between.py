@@ -27,7 +27,8 @@ def refuse_meeting(name: str, between: tuple[str, str], at: Placement) -> None:
     if math.hypot(d_x, d_y) <= MEET * largest:
         raise MechanismError(
             f"[loads.{name}] between: {between[0]} and {between[1]} are in the same place at the start, so the force "
-            f"has no direction; move a point or the start pose"
+            f"has no direction; move a point or the start pose",
+            load=name,
         )
 
 

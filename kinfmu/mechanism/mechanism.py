@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import PurePath
 from types import MappingProxyType
 from typing import Any
@@ -14,6 +15,7 @@ from kinfmu.errors import RequestError
 from kinfmu.joints import Joint
 from kinfmu.loads import Load
 from kinfmu.measures.arithmetic import Value
+from kinfmu.measures.placement import body_of
 from kinfmu.mechanism.body import GROUND_NAME, Body, Gravity, RunSettings, read_gravity
 from kinfmu.mechanism.checks import (
     check_header,
@@ -24,7 +26,7 @@ from kinfmu.mechanism.checks import (
     coordinate_orders,
 )
 from kinfmu.mechanism.expression import Computed, Expression
-from kinfmu.mechanism.members import Members, NumberPath
+from kinfmu.mechanism.members import Members, NumberPath, texts_of
 from kinfmu.mechanism.metres import in_metres
 from kinfmu.mechanism.parameters import Parameter, parameter_values
 from kinfmu.mechanism.resolve import resolve
@@ -124,6 +126,18 @@ class Mechanism(Live):
     def body_points(self) -> dict[str, tuple[float, float]]:
         """Body-fixed coordinates of every point, by 'body.point'."""
         return self.members.body_points
+
+    @cached_property
+    def named_points(self) -> dict[str, tuple[float, float]]:
+        """Those of `body_points` that a joint, driver, load, measure or point of interest names."""
+        members = (*self.joints, *self.drivers, *self.loads, *self.measures)
+        named = {*self.points.values()}.union(*map(texts_of, members))
+        return {name: point for name, point in self.body_points.items() if name in named}
+
+    @property
+    def ground_points(self) -> list[tuple[float, float]]:
+        """The places of those of `named_points` that are on the ground, in file order."""
+        return [point for name, point in self.named_points.items() if body_of(name) == GROUND_NAME]
 
     @property
     def coordinate_names(self) -> tuple[CoordinateName, ...]:

@@ -92,6 +92,18 @@ class Members:
         )
 
 
+def texts_of(member: object) -> set[object]:
+    """Return the texts in the fields of a joint, driver, load or measure, and in those of its measured quantity."""
+    found: set[object] = set()
+    for entry in fields(member):  # type: ignore[arg-type]  # all members are dataclasses
+        value = getattr(member, entry.name)
+        if isinstance(value, PoseQuantity):
+            found |= texts_of(value)
+        else:
+            found |= {value} if isinstance(value, str) else {*value} if isinstance(value, tuple) else set()
+    return found
+
+
 def path_text(place: NumberPath) -> str:
     """Return a path as in messages: '[bodies.crank] points.P', '[joints.AB] length', '[drivers.crank] speed'."""
     if place[0] in ("run", "gravity"):

@@ -20,8 +20,8 @@ _STEPS = (  # what is left out, until the rest is valid
     ("measures", "loads", "gravity", _MASSES),
     ("measures", "loads", "gravity", _MASSES, "drivers", "run", "points", "outputs"),
 )
-_FORCES = ("loads", "gravity", _MASSES)  # all or none of them: some alone give wrong forces
-_ENTRY = re.compile(rf"(?:{re.escape(NO_DRIVER)})?" r"\[(?:(measures|drivers)\.|(points)\] )([\w-]+)")
+_FORCES = ("loads", "gravity", _MASSES)  # all or none of them where a mass or gravity is invalid
+_ENTRY = re.compile(rf"(?:{re.escape(NO_DRIVER)})?" r"\[(?:(measures|drivers|loads)\.|(points)\] )([\w-]+)")
 _TABLE = re.compile(rf"\[(?:bodies\.[\w-]+\] (?:{'|'.join(MASS_KEYS)})\b|(loads|gravity|run|outputs)\b)")
 _MOST_ENTRIES = 20  # left out one by one
 
@@ -54,7 +54,7 @@ def read_partially(path: str | Path) -> PartialFile | None:
 
 
 def _without_entries(document: Mapping[str, Any], folder: Path) -> PartialFile | None:
-    """Return a file without the measures, drivers, points and tables that its errors name; None for other errors."""
+    """Return a file without the measures, drivers, loads, points and tables that its errors name; None for others."""
     left_out: list[str] = []
     rest = dict(document)
     for _ in range(_MOST_ENTRIES):

@@ -26,6 +26,7 @@ from kinfmu.mechanism.toml_tables import (
     class_of_type,
     named_tables,
     named_values,
+    refuse_other_kind,
     subtable,
     table_keys,
     table_of,
@@ -135,6 +136,7 @@ def _deep_key(text: str) -> int | None:
 
 def mechanism_of(document: dict[str, Any], folder: Path | None) -> Mechanism:
     """Return the mechanism of the tables of a file; folder: where relative paths start, None refuses files."""
+    refuse_other_kind(document, "mechanism", _TABLES)
     check_keys("", document, _TABLES)
     document = expanded(document)
     units = table_of(document, "units")

@@ -10,6 +10,11 @@ from kinfmu.laws import Spline
 from kinfmu.mechanism.declared import keys_of
 from kinfmu.mechanism.valid import check_name, quoted
 
+_OWN_KEYS = {  # keys by which files that name a mechanism differ
+    "fit": {"over", "unknowns", "targets", "constraints"},
+    "study": {"sampling", "designs", "seed", "report", "parameters", "measures", "run"},
+}
+
 
 def table_keys(cls: type) -> list[str]:
     """Return the names of the keys of a joint, driver, load, measure or law; points of a spline can be in a `file`."""
@@ -39,13 +44,18 @@ def check_keys(where: str, table: Mapping[str, Any], known: Iterable[str]) -> No
             raise MechanismError(f"{place}: unknown key{suggestion(key, known)}; keys: {listed(known)}")
 
 
-def refuse_mechanism(document: Mapping[str, Any], kind: str, keys: Iterable[str]) -> None:
-    """Raise a MechanismError for the document of a mechanism in place of that of a study or a fit, its `kind`."""
-    if "bodies" in document and "mechanism" not in document:
+def refuse_other_kind(document: Mapping[str, Any], kind: str, keys: Iterable[str]) -> None:
+    """Raise a MechanismError for the document of another kind of file than `kind`: 'mechanism', 'study' or 'fit'."""
+    if "bodies" in document and "mechanism" not in document and kind != "mechanism":
         raise MechanismError(
             f"this is a mechanism file; a {kind} file names it, such as mechanism = 'fourbar.toml'; keys: "
             f"{listed(keys)}"
         )
+    if "mechanism" in document and "bodies" not in document:
+        kinds = [other for other, own in _OWN_KEYS.items() if own.intersection(document)]
+        other = kinds[0] if len(kinds) == 1 else "study" if kind == "mechanism" else kind
+        if other != kind:
+            raise MechanismError(f"this is a {other} file, not a {kind} file; the command is 'kinfmu {other}'")
 
 
 def table_of(document: Mapping[str, Any], name: str) -> dict[str, Any]:

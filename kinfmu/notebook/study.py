@@ -7,16 +7,16 @@ from kinfmu.draw.writing import svg_text
 from kinfmu.notebook.picture import picture
 from kinfmu.studies import StudyResult
 from kinfmu.studies.figure import figure_of
-from kinfmu.studies.summary import about, failures, measure_rows
+from kinfmu.studies.summary import about, disagreement, failures, measure_rows
 
 
 @html_of.register
 def study_html(result: StudyResult) -> str:
-    """Return the summary, the picture and the first failure of a study."""
+    """Return the summary, the picture, a warning and the first failure of a study."""
     header, *rows = measure_rows(result)
-    failed = failures(result)
+    texts = [f"<p>{escaped(text)}</p>" for text in (disagreement(result), failures(result)) if text]
     shown = picture(lambda: study_svg(result), f"Picture of the study of {result.mechanism.name}")
-    return page(about(result), table(rows, header), shown, f"<p>{escaped(failed)}</p>" if failed else "")
+    return page(about(result), table(rows, header), shown, *texts)
 
 
 @svg_of.register

@@ -30,12 +30,11 @@ class FarRows(NamedTuple):
 def localized(mechanism: Mechanism) -> tuple[Mechanism, Point]:
     """Return the mechanism as seen from its own origin, and the place of that origin in the world [length].
 
-    The origin is the first ground point if the mechanism is far away, else the world's (also if a driver or a law
+    The origin is the first of `ground_points` if the mechanism is far away, else the world's (also if a driver or a law
     prescribes a coordinate in the world). Constraints do not depend on it, and rounding is then relative to the size
     and not to the offset. Points are moved as decimal numbers: the double nearest to 1000000.7 has lost digits.
     """
-    ground = next(body for body in mechanism.bodies if body.is_ground)
-    first = next(iter(ground.points.values()), Point(0.0, 0.0))
+    first = Point(*next(iter(mechanism.ground_points), (0.0, 0.0)))
     if _is_tied(mechanism) or max(map(abs, first)) <= FAR * size_of(mechanism):
         return mechanism, Point(0.0, 0.0)
     return _moved(mechanism, -first.x, -first.y), first

@@ -13,7 +13,7 @@ from kinfmu.gallery.load import load_named_in
 from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.mechanism.number import read_constant
 from kinfmu.mechanism.toml_file import document_of, read_measures, text_in
-from kinfmu.mechanism.toml_tables import check_keys, refuse_mechanism, table_of
+from kinfmu.mechanism.toml_tables import check_keys, refuse_other_kind, table_of
 from kinfmu.mechanism.valid import quoted
 from kinfmu.motion.history import FEWEST
 from kinfmu.run import MOST_SAMPLES
@@ -55,7 +55,7 @@ def read_study(path: str | Path, *, engine: str = "auto") -> Study:
 
 
 def _study(document: dict[str, Any], folder: Path, engine: str, text: str) -> Study:
-    refuse_mechanism(document, "study", KEYS)
+    refuse_other_kind(document, "study", KEYS)
     check_keys("", document, KEYS)
     mechanism = load_named_in(document, folder)
     own = read_measures(document, folder)

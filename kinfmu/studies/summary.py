@@ -5,10 +5,15 @@ from __future__ import annotations
 from math import isfinite
 
 from kinfmu.display import aligned
+from kinfmu.errors import listed
 from kinfmu.studies.rows import StudyRows
 
 MOST_CONTRIBUTIONS = 5  # of a measure
 _HEADER = ("measure", "unit", "nominal", "mean", "deviation", "min", "max", "failures")
+DISAGREES = 0.1  # of a deviation; first order and samples that differ by less agree
+FEWEST_DESIGNS = 16  # whose deviation says something
+CERTAIN = 4.0  # standard errors of a deviation that are not due to chance
+ROUNDING = 1e-9  # of the value; smaller deviations are rounding
 _FIRST_ORDER = "first order"
 
 
@@ -20,10 +25,32 @@ def summary(result: StudyRows) -> str:
     if result.nominal.deviations:
         lines += ["", "contributions to the variance, to first order:"]
         lines += aligned([_contributions(result, name) for name in result.measures], left=3)
-    failed = failures(result)
-    if failed:
-        lines += ["", failed]
+    lines += [line for text in (disagreement(result), failures(result)) if text for line in ("", text)]
     return "\n".join(lines)
+
+
+def disagreement(result: StudyRows) -> str:
+    """Return a warning, as a line, of the measures that are not linear within the tolerances; '' if all are.
+
+    Such a measure has a deviation, or a shift of the mean, in the samples that first order does not explain.
+    """
+    found = []
+    for name in result.measures if result.nominal.deviations else ():
+        sampled, first = result.statistics[name], result.nominal.deviation(name)
+        if sampled.count < FEWEST_DESIGNS or not isfinite(first):
+            continue
+        nominal, larger = result.nominal.measures[name].value, max(sampled.deviation, first)
+        chance = CERTAIN / (2.0 * sampled.count) ** 0.5  # relative, of the deviation of normal samples
+        off = max(abs(sampled.deviation - first), abs(sampled.mean - nominal))
+        if larger > ROUNDING * abs(nominal) and off > (DISAGREES + chance) * larger:
+            found.append(name)
+    if not found:
+        return ""
+    are = "is" if len(found) == 1 else "are"
+    return (
+        f"warning: {listed(found)} {are} not linear within the tolerances: first order and samples disagree; the "
+        "contributions do not hold, the samples do"
+    )
 
 
 def failures(result: StudyRows) -> str:

@@ -12,7 +12,7 @@ from kinfmu.files.whole_file import suffix_of
 from kinfmu.gallery.load import load_named_in
 from kinfmu.mechanism.table_file import read_table
 from kinfmu.mechanism.toml_file import document_of, text_in
-from kinfmu.mechanism.toml_tables import check_keys, class_of_type, named_tables, refuse_mechanism, table_of, text_of
+from kinfmu.mechanism.toml_tables import check_keys, class_of_type, named_tables, refuse_other_kind, table_of, text_of
 from kinfmu.synthesis.constraints import CONSTRAINTS
 from kinfmu.synthesis.problem import FitProblem
 from kinfmu.synthesis.targets import TARGETS, FunctionTarget, PathTarget
@@ -46,7 +46,7 @@ def mechanism_file(path: Path) -> Path | None:
 
 
 def _problem(document: Mapping[str, Any], folder: Path) -> FitProblem:
-    refuse_mechanism(document, "fit", KEYS)
+    refuse_other_kind(document, "fit", KEYS)
     check_keys("", document, KEYS)
     over = document.get("over")
     return FitProblem(

@@ -45,8 +45,8 @@ def test_findings_are_plain_data_too() -> None:
     [
         (reference_fourbar(), [0.0, math.pi]),
         (fourbar(4, 1, 3, 2), [math.pi]),
-        (fourbar(2, 1, 2, 1), [0.0, math.pi]),
-        (fourbar(2, 1, 2, 1, branch=-1), [0.0, math.pi]),
+        (fourbar(2, 1, 2, 1), [math.pi, math.tau]),  # the laws of these start at 1 rad
+        (fourbar(2, 1, 2, 1, branch=-1), [math.pi, math.tau]),
         (fourbar(4, 1, 3.5, 3), []),
     ],
 )

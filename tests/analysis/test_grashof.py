@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import replace
 
@@ -178,3 +179,45 @@ def test_a_slider_crank_is_found_in_every_form(kind: str, offset: float) -> None
     assert named.loop.rod.length == pytest.approx(3.0)  # type: ignore[union-attr]
     assert abs(named.loop.offset) == pytest.approx(offset, abs=1e-12)  # type: ignore[union-attr]
     assert named.grashof.name == "crank turns"
+
+
+def turning_number(points: list[tuple[float, float]]) -> int:
+    """How often the direction turns round along a closed polygon: once, or not at all if its sides cross."""
+    sides = [complex(*b) - complex(*a) for a, b in zip(points, points[1:] + points[:1], strict=True)]
+    turns = [cmath.phase(b / a) for a, b in zip(sides, sides[1:] + sides[:1], strict=True)]
+    return abs(round(sum(turns) / math.tau))
+
+
+def test_four_bars_are_open_or_crossed_as_assembled() -> None:
+    rng = np.random.default_rng(12)
+    seen = set()
+    cases = [(tuple(map(float, rng.uniform(0.8, 2.0, 4))), float(rng.uniform(-3, 3))) for _ in range(24)]
+    cases += [
+        ((4.0, 1.0, 3.5, 3.0), -2.0),
+        ((2.0, 1.0, 2.0, 1.0), 1.0),
+        ((2.0, 2.0, 1.0, 1.0), 1.0),
+        ((1.0, 2.0, 1.5, 1.5), 0.7),
+    ]
+    for lengths, start in cases:
+        for branch in (1, -1):
+            mechanism = fourbar(*lengths, start=start, branch=branch)
+            report = kinfmu.check(mechanism)
+            (named,) = report.loops
+            if report.plan is None:  # the lengths do not close there
+                assert named.assembly == ""
+                continue
+            at = {**report.plan.fixed, **dict(zip(mechanism.coordinate_names, report.plan.anchor.q, strict=True))}
+            points = [place.world(at) for place in named.loop.pins]
+            assert named.assembly == ("open" if turning_number(points) else "crossed")
+            line = next(text for text in str(report).splitlines() if named.grashof.name in text)
+            if named.grashof.shape.endswith("parallelogram"):
+                assert named.grashof.shape == ("parallelogram" if named.assembly == "open" else "antiparallelogram")
+                assert f"change point ({named.grashof.shape}): " in line
+            else:
+                assert f"{named.assembly} as assembled" in line
+            assert named.as_json()["assembly"] == named.assembly
+            seen.add((named.grashof.name, named.grashof.shape, named.assembly))
+    assert {
+        (name, "", assembly) for name in ("crank-rocker", "triple rocker") for assembly in ("open", "crossed")
+    } <= seen
+    assert {("change point", "parallelogram", "open"), ("change point", "antiparallelogram", "crossed")} <= seen

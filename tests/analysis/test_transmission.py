@@ -50,7 +50,7 @@ def test_the_verdict_follows_the_worst_angle() -> None:
     assert only(fourbar(2, 1, 2, 1)).verdict == "locks"
     least, most = (math.degrees(opposite(side, 3, 3.5)) for side in (2, 6))
     assert (
-        f"transmission angle {least:.6g} deg (crank at 0 deg) to {most:.6g} deg (crank at 180 deg): "
+        f"transmission angle {least:.6g} deg (crank at 360 deg) to {most:.6g} deg (crank at 180 deg): "
         "poor (40 deg from 0 and 180 deg is usual)"
     ) in str(kinfmu.check(fourbar(4, 2, 3, 3.5)))
 

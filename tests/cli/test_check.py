@@ -91,7 +91,7 @@ def test_the_matrices_at_sixty_degrees_are_those_of_the_report(command: Command)
 
 def test_assemblies_are_listed_with_the_start_angle_that_chooses_each(command: Command) -> None:
     message = command("check", "double_pendulum", "--assemblies").stdout
-    assert "assemblies  2 at crank = 5 pi/3 (300 deg), distinguished by lower.phi" in message
+    assert "assemblies  2 found at crank = 5 pi/3 (300 deg), distinguished by lower.phi" in message
     assert '              choose it by [bodies.lower] start = { x = -0.491, y = -1, phi = "-172.3 deg" }' in message
     found = json.loads(command("check", "double_pendulum", "--assemblies", "--json").stdout)["assemblies"]
     assert [one["chosen"] for one in found["found"]] == [True, False]
@@ -167,6 +167,8 @@ start = 0
 speed = "1 deg/s"
 """
 _SWING = '[measures.swing]\ntype = "range"\nof = "rocker.phi"\n'
+_PUSH = '[loads.push]\ntype = "force"\nat = "rocker.Q"\nx = 3\ny = 0\n'
+_SPRING = '[loads.bad]\ntype = "spring"\n'
 _PEAK = '[measures.peak]\ntype = "maximum"\nof = "crank.torque"\n'
 
 
@@ -237,6 +239,35 @@ _PEAK = '[measures.peak]\ntype = "maximum"\nof = "crank.torque"\n'
             "[measures.peak]",
             ["range       crank turns all the way", "swing = "],
         ),
+        *(
+            (
+                "[points]",
+                f"{_PUSH}{_SWING}{_PEAK}{bad}[points]",
+                problem,
+                "[loads.bad]",
+                [
+                    "swing = ",
+                    "peak = 3 N m (crank at 90 deg)",
+                    "turn of crank at 0.0174533 rad/s, without [loads.bad]",
+                    "crank.torque: peak ",
+                ],
+            )
+            for bad, problem in (
+                (
+                    '[loads.bad]\ntype = "force"\nat = "rocker.Z"\n',
+                    "[loads.bad] at: body 'rocker' has no point 'Z'; its points: C, Q",
+                ),
+                (
+                    '[loads.bad]\ntype = "spring"\n',
+                    "[loads.bad] needs the key 'between'; keys: between, stiffness, free_length, preload",
+                ),
+                (
+                    f'{_SPRING}between = ["ground.C", "rocker.C"]\nstiffness = 1\nfree_length = 1\n',
+                    "[loads.bad] between: ground.C and rocker.C are in the same place at the start, so the force has "
+                    "no direction; move a point or the start pose",
+                ),
+            )
+        ),
     ],
 )
 def test_what_is_valid_of_a_file_is_reported_before_its_problem(
@@ -304,3 +335,15 @@ def test_the_figure_is_drawn_at_the_pose_asked_for(command: Command, tmp_path: P
     assert refused.exit_code != 0
     assert "--at" in refused.stderr
     assert not (tmp_path / "a.svg").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "kind"),
+    [("[targets.a]", "fit"), ("[unknowns]", "fit"), ("[parameters]", "study"), ('sampling = "sobol"', "study")],
+)
+def test_the_message_on_a_fit_or_study_file_names_its_command(
+    text: str, kind: str, tmp_path: Path, fails: Callable[..., str]
+) -> None:
+    path = tmp_path / "design.toml"
+    path.write_text(f'mechanism = "crank_rocker"\n{text}\n')
+    assert f"this is a {kind} file, not a mechanism file; the command is 'kinfmu {kind}'" in fails("check", path)

@@ -48,3 +48,27 @@ def test_another_word_is_suggested_only_where_its_meaning_is_known() -> None:
     assert {suggestion(word, [meant]) for word, meant in OTHER_WORDS.items()} == {
         f"; did you mean '{meant}'?" for meant in OTHER_WORDS.values()
     }
+
+
+@pytest.mark.parametrize("word", ["ram.X", "RAM.X", "Ram.x"])
+def test_another_case_is_the_nearest_spelling(word: str) -> None:
+    for known in (["ram.x", "ram.y", "ram.vx"], ["ram.y", "ram.z", "ram.x"]):
+        assert suggestion(word, known) == "; did you mean 'ram.x'?"
+
+
+@pytest.mark.parametrize(
+    ("word", "known", "meant"),
+    [
+        ("tol", ("from", "to", "tolerance", "nominal"), "tolerance"),
+        ("Tol", ("from", "to", "tolerance", "nominal"), "tolerance"),
+        ("tol", ("crank.start", "solver.tolerance"), "solver.tolerance"),
+        ("amp", ("amplitude", "frequency"), "amplitude"),
+        ("Couplr.X", ("coupler.x", "coupler.y"), "coupler.x"),
+    ],
+)
+def test_the_beginning_of_a_word_is_taken_for_the_word(word: str, known: tuple[str, ...], meant: str) -> None:
+    assert suggestion(word, known) == f"; did you mean '{meant}'?"
+
+
+def test_the_beginning_of_several_words_is_taken_for_none() -> None:
+    assert suggestion("tol", ["tolerance", "tolerable"]) == ""

@@ -238,7 +238,7 @@ def test_a_guide_that_holds_a_coordinate_moves_with_the_origin() -> None:
     mechanism = Mechanism(
         "slider",
         (Body("ground", {"O": ("far", 0)}), Body("bar", {"P": (0, 0)}, ("far", None, None))),
-        (Coordinate("guide", "bar.P", "x", "far + 1"),),
+        (Coordinate("guide", "bar.P", "x", "far + 1"), Distance("rod", ("ground.O", "bar.P"), 2.0)),
         parameters={"far": 1000.0},
     )
     local, _ = localized(mechanism)

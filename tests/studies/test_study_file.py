@@ -19,6 +19,8 @@ from tests.studies.linkage import linkage, write
 CRANK = 'mechanism = "hoeken.toml"\n[parameters]\ncrank = { from = 15, to = 25 }\n'
 WRONG = {
     "[bodies.crank]": "this is a mechanism file; a study file names it, such as mechanism = 'fourbar.toml'; keys: mech",
+    'mechanism = "hoeken.toml"\n[unknowns]': "this is a fit file, not a study file; the command is 'kinfmu fit'",
+    'mechanism = "hoeken.toml"\nparameters.crank = { tol = 1 }': "tol: unknown key; did you mean 'tolerance'",
     "designs = 4": "mechanism is missing: a mechanism file, such as mechanism = 'fourbar.toml', or a gallery name",
     'mechanism = "hoken.toml"': "cannot be read (No such file or directory)",
     'mechanism = "fourbr"\nparameters.a = { from = 1, to = 2 }': "'fourbr' is not in the gallery; did you mean '",

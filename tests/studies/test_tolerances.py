@@ -8,6 +8,7 @@ import mpmath
 import pytest
 
 import kinfmu
+from kinfmu.mechanism import toml_file
 from kinfmu.readings import PeakAcceleration
 from tests.studies.linkage import linkage, swing
 
@@ -59,6 +60,7 @@ def test_differences_agree_with_the_designs() -> None:
     assert found.nominal.measures["jolt"].method == "differences"
     text = str(found)
     assert "first order" in text.splitlines()[2]
+    assert "warning" not in text
     assert "(by sensitivities)" in text
 
 
@@ -67,3 +69,44 @@ def test_a_study_with_other_variations_has_no_first_order_analysis() -> None:
     found = kinfmu.study(linkage(), mixed, measures="swing", designs=4, workers=1)
     assert (len(found), found.nominal.deviations) == (8, {})
     assert "first order" not in str(found)
+
+
+SLIDER_CRANK = """
+name = "press"
+parameters = { crank = "1 m", rod = "3 m", offset = "%s m" }
+bodies.ground.points = { O = [0, 0], G = [0, "offset"] }
+bodies.crank.points = { O = [0, 0], P = ["crank", 0] }
+bodies.rod = { points = { P = [0, 0], S = ["rod", 0] }, start = { x = 1, phi = "1 deg" } }
+bodies.ram = { points = { S = [0, 0] }, start = { x = 4, y = "offset" } }
+joints.O = { type = "revolute", between = ["ground.O", "crank.O"] }
+joints.P = { type = "revolute", between = ["crank.P", "rod.P"] }
+joints.S = { type = "revolute", between = ["rod.S", "ram.S"] }
+joints.guide = { type = "translational", between = ["ground.G", "ram.S"] }
+drivers.crank = { type = "angle", of = "crank", law = "constant_speed", speed = 1 }
+measures.stroke = { type = "range", of = "ram.x" }
+"""
+
+
+@pytest.mark.parametrize(
+    ("offset", "tolerance", "warns"),
+    [
+        (0.0, 0.3, True),  # stroke = sqrt((r + l)^2 - e^2) - sqrt((l - r)^2 - e^2) is even in e
+        (0.0, 1e-3, True),
+        (0.1, 0.3, True),  # the mean is shifted
+        (1.0, 0.03, False),
+    ],
+)
+def test_a_study_warns_where_first_order_and_samples_disagree(offset: float, tolerance: float, warns: bool) -> None:
+    mechanism = toml_file.parse(SLIDER_CRANK % offset)
+    found = kinfmu.study(mechanism, {"offset": {"tolerance": tolerance}}, measures="stroke", designs=256, workers=1)
+
+    def stroke(e: float) -> float:
+        return math.sqrt(16.0 - e * e) - math.sqrt(4.0 - e * e)
+
+    sampled, first = found.statistics["stroke"], found.nominal.deviation("stroke")
+    slope = offset / math.sqrt(4.0 - offset**2) - offset / math.sqrt(16.0 - offset**2)
+    assert first == pytest.approx(slope * tolerance / 3.0, abs=1e-9)
+    shift = sampled.mean - stroke(offset)
+    disagrees = abs(first - sampled.deviation) > 0.3 * sampled.deviation or abs(shift) > 0.3 * sampled.deviation
+    assert disagrees is warns
+    assert ("warning: stroke is not linear within the tolerances" in str(found)) is warns

@@ -488,6 +488,7 @@ TARGET = 'mechanism = "crank_rocker"\n[targets.t]\n'
     ("text", "message"),
     [
         ("[bodies.crank]", "fit.toml: this is a mechanism file; a fit file names it"),
+        ('mechanism = "fourbar"\n[parameters]', "this is a study file, not a fit file; the command is 'kinfmu study'"),
         ("targetz = 1", "targetz: unknown key; did you mean 'targets'"),
         ("", "mechanism is missing"),
         ('mechanism = "fourba"', "did you mean 'fourbar'"),
