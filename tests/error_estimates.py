@@ -20,12 +20,12 @@ import numpy as np
 
 import kinfmu
 from kinfmu import AngleDriver, ConstantSpeed, Mechanism, SlideDriver
-from kinfmu.drivers import Driver
+from kinfmu.mechanism.drivers import Driver
 from kinfmu.plan import compile_plan
 from kinfmu.run import Run
 from kinfmu.units import read_coordinate
-from tests.gallery import geometry
-from tests.gallery.references import REFERENCES
+from tests.mechanism.gallery import geometry
+from tests.mechanism.gallery.references import REFERENCES
 from tests.power_series import Series, mp
 from tests.test_random_mechanisms import (
     TURN,

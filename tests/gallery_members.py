@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import pytest
 
-from kinfmu import gallery
+from kinfmu.mechanism import gallery
 
 FEW = (  # members that differ most
     "cam_roller",

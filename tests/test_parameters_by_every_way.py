@@ -14,7 +14,7 @@ import kinfmu
 from kinfmu import Mechanism
 from kinfmu.analysis import check
 from kinfmu.errors import FmuError, KinfmuError
-from kinfmu.sweep.continued import continued
+from kinfmu.run.continued import continued
 from tests.fmu.test_parameters import LENGTHS
 from tests.fmu.test_parameters import linkage as settable
 

@@ -20,10 +20,10 @@ from hypothesis import strategies as st
 
 import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, PointOnLine, Revolute, Run, SlideDriver, Translational
-from kinfmu.drivers import Driver
-from kinfmu.joints import Joint
+from kinfmu.mechanism.drivers import Driver
+from kinfmu.mechanism.joints import Joint
 from kinfmu.units import read_coordinate
-from tests.gallery import geometry
+from tests.mechanism.gallery import geometry
 from tests.oracle import mp
 from tests.power_series import Series, sqrt
 

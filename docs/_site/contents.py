@@ -13,7 +13,7 @@ from urllib.parse import unquote
 from fmpy import read_model_description
 
 from _site.links import Page
-from kinfmu import gallery
+from kinfmu.mechanism import gallery
 
 FILES = ("mechanism.toml", "reference.csv", "figure.svg")  # copies of those in the mechanism's folder
 

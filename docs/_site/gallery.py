@@ -9,7 +9,7 @@ from typing import Any
 import kinfmu
 from _site.live import FRAME
 from _site.pages import Pages, table
-from kinfmu import gallery
+from kinfmu.mechanism import gallery
 
 ROWS = 5  # of the reference data on a page
 COLUMNS = 6

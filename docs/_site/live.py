@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from kinfmu import build, gallery
+from kinfmu import build
+from kinfmu.mechanism import gallery
 from kinfmu.page import page
 
 FOLDER = "gallery/live"

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from kinfmu.analysis.assembly_search import IN_VAIN, SEED, TRIES, AssemblySearch
 from kinfmu.analysis.held import started
 from kinfmu.analysis.values import degrees, driver_text
-from kinfmu.equations.assembly import Assembled, find_assembly, start_values
-from kinfmu.equations.closing import CLOSED, close
-from kinfmu.equations.system import FloatArray, System
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import AmbiguousStartError, AssemblyError, KinfmuError, listed
 from kinfmu.mechanism import Mechanism, Start
 from kinfmu.plan import SolvePlan, compile_plan, localized
 from kinfmu.plan.anchor import find_anchor
+from kinfmu.plan.equations.assembly import Assembled, find_assembly, start_values
+from kinfmu.plan.equations.closing import CLOSED, close
+from kinfmu.plan.equations.system import System
 from kinfmu.plan.origin import in_world
 from kinfmu.units import CoordinateName
 

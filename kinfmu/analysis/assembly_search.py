@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 
 from kinfmu.analysis.loops import Place
+from kinfmu.arrays import FloatArray
 from kinfmu.codegen.python import load_model
-from kinfmu.drivers import Driver
-from kinfmu.equations.assembly import SINGULAR
-from kinfmu.equations.closing import CLOSED
-from kinfmu.equations.system import FloatArray
-from kinfmu.joints import Joint
-from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.drivers import Driver
+from kinfmu.mechanism.joints import Joint
 from kinfmu.mechanism.members import texts_of
+from kinfmu.mechanism.quantities.placement import body_of
 from kinfmu.plan import Block, SolvePlan, localized
+from kinfmu.plan.equations.assembly import SINGULAR
+from kinfmu.plan.equations.closing import CLOSED
 from kinfmu.plan.origin import relative_to
 
 IN_VAIN = 30  # times the square of the unknowns: known solutions in a row after which the search of a block ends

@@ -11,13 +11,13 @@ from itertools import pairwise
 import numpy as np
 
 from kinfmu.analysis.driver_path import DriverPath, follow
-from kinfmu.cams import PlacedCam
-from kinfmu.cams.profile import TURN
-from kinfmu.drivers import Driver
-from kinfmu.measures import AngleBetween
+from kinfmu.arrays import FloatArray
 from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.drivers import Driver
+from kinfmu.mechanism.quantities import AngleBetween
+from kinfmu.motion.cams import PlacedCam
+from kinfmu.motion.cams.profile import TURN
 from kinfmu.plan import SolvePlan
-from kinfmu.run import FloatArray
 from kinfmu.solver.python import Pose
 
 _SAME_ANGLE = 1e-7  # [rad]; closer angles are equal

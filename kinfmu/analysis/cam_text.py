@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kinfmu.analysis.cams import CamFindings
 from kinfmu.analysis.values import degrees
-from kinfmu.cams import CamExtreme, Critical, PlacedCam
+from kinfmu.motion.cams import CamExtreme, Critical, PlacedCam
 
 _WIDE = 1e6  # of the distance from the axle; a larger radius of curvature is that of a straight line
 

@@ -14,7 +14,13 @@ from numpy.typing import ArrayLike
 from kinfmu.analysis.cam_driver import CamDriver, cam_driver
 from kinfmu.analysis.driver_path import DriverPath
 from kinfmu.analysis.values import degrees
-from kinfmu.cams import (
+from kinfmu.errors import KinfmuError, MechanismError, RequestError, listed, suggestion
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.joints import CamFlatFace, CamOscillating, CamTranslating
+from kinfmu.mechanism.laws import Harmonic, Law, MotionSequence, Spline
+from kinfmu.mechanism.mechanism import require_mechanism
+from kinfmu.motion.cams import (
     CAM_JOINTS,
     NO_PROFILE,
     CamExtreme,
@@ -26,14 +32,8 @@ from kinfmu.cams import (
     placed_cam,
     pressing_sign,
 )
-from kinfmu.cams.profile import TURN, angles_within, profile_at
-from kinfmu.cams.traced import traced
-from kinfmu.errors import KinfmuError, MechanismError, RequestError, listed, suggestion
-from kinfmu.joints import CamFlatFace, CamOscillating, CamTranslating
-from kinfmu.laws import Harmonic, Law, MotionSequence, Spline
-from kinfmu.mechanism import Mechanism
-from kinfmu.mechanism.body import GROUND_NAME
-from kinfmu.mechanism.mechanism import require_mechanism
+from kinfmu.motion.cams.profile import TURN, angles_within, profile_at
+from kinfmu.motion.cams.traced import traced
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.origin import in_world
 from kinfmu.run.numbers import numbers_of

@@ -13,12 +13,12 @@ from kinfmu.analysis.driver_path import DriverPath
 from kinfmu.analysis.loops import FourBar, Place, SliderCrank
 from kinfmu.analysis.named_loops import NamedLoop
 from kinfmu.analysis.values import law_values
-from kinfmu.equations.system import size_of
 from kinfmu.errors import listed
-from kinfmu.joints import Fixed, Revolute
-from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.joints import Fixed, Revolute
+from kinfmu.mechanism.quantities.placement import body_of
+from kinfmu.plan.equations.system import size_of
 
 TOO_LONG = 50.0  # medians of all links; a link that long is probably in another unit
 TOO_SHORT = 1e-3  # of the shortest neighbour; a link that short is probably in another unit

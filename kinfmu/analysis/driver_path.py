@@ -11,7 +11,7 @@ from itertools import pairwise
 
 from kinfmu.analysis.held import alone
 from kinfmu.codegen.python import load_model
-from kinfmu.measures import DistanceBetween
+from kinfmu.mechanism.quantities import DistanceBetween
 from kinfmu.plan import SolvePlan
 from kinfmu.solver.python import Pose, Solver
 from kinfmu.solver.python.advance import advance

@@ -9,15 +9,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kinfmu.analysis.joint_advice import idle_body, missing_pins, stiff_joints
-from kinfmu.drivers import AngleDriver, CoordinateDriver, Driver, RelativeAngleDriver, SlideDriver
-from kinfmu.equations.closing import motion_samples, null_space
-from kinfmu.equations.part import Part
-from kinfmu.equations.redundancy import Redundancy
-from kinfmu.equations.system import FloatArray, System
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import AssemblyError, KinfmuError, MobilityError, listed
-from kinfmu.joints import Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.drivers import AngleDriver, CoordinateDriver, Driver, RelativeAngleDriver, SlideDriver
+from kinfmu.mechanism.joints import Fixed, PointOnLine, Revolute, Translational
+from kinfmu.plan.equations.closing import motion_samples, null_space
+from kinfmu.plan.equations.part import Part
+from kinfmu.plan.equations.redundancy import Redundancy
+from kinfmu.plan.equations.system import System
 from kinfmu.units import CoordinateName
 
 _SAMPLES = 4  # poses of the motion that the joints allow; a row dependent at all of them is dependent

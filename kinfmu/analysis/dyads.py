@@ -10,8 +10,8 @@ from kinfmu.analysis.driver_path import DriverPath
 from kinfmu.analysis.loops import Dyad, Place, dyads
 from kinfmu.analysis.named_loops import MOST, NamedLoop
 from kinfmu.analysis.transmission import TransmissionRange, dyad_angle
-from kinfmu.equations.redundancy import Redundancy
 from kinfmu.mechanism import Mechanism
+from kinfmu.plan.equations.redundancy import Redundancy
 
 
 @dataclass(frozen=True)

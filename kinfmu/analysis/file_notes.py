@@ -12,22 +12,22 @@ from kinfmu.analysis.driver_path import follow
 from kinfmu.analysis.singular import DriverRange, driver_range
 from kinfmu.analysis.unit_notes import unit_notes
 from kinfmu.analysis.values import LOOKS, degrees, law_values, value_text
-from kinfmu.drivers import AngleDriver, DistanceDriver
-from kinfmu.equations.start_poses import StartValues, is_in_world_coordinates, open_joints_text, start_from_poses
-from kinfmu.equations.system import System
 from kinfmu.errors import KinfmuError, listed
-from kinfmu.joints.cam import Cam, CamOscillating
-from kinfmu.laws import MotionSequence, Spline
-from kinfmu.measures import AngleBetween
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.dimension import Dimension
+from kinfmu.mechanism.drivers import AngleDriver, DistanceDriver
 from kinfmu.mechanism.expression import Expression
+from kinfmu.mechanism.joints.cam import Cam, CamOscillating
+from kinfmu.mechanism.laws import MotionSequence, Spline
 from kinfmu.mechanism.members import NumberPath, path_text
 from kinfmu.mechanism.number import given_unit
 from kinfmu.mechanism.parameters import dimensions_of
+from kinfmu.mechanism.quantities import AngleBetween
 from kinfmu.plan import SolvePlan, compile_plan
-from kinfmu.sweep import solve
+from kinfmu.plan.equations.start_poses import StartValues, is_in_world_coordinates, open_joints_text, start_from_poses
+from kinfmu.plan.equations.system import System
+from kinfmu.run.solve import solve
 from kinfmu.units import PLAUSIBLE_TURN, Quantity, looks_like_degrees
 
 _TABLES = (Spline, MotionSequence)  # laws that keep their last value beyond their end

@@ -13,10 +13,10 @@ from kinfmu.analysis.loading import Loading
 from kinfmu.analysis.measuring import Measurements
 from kinfmu.analysis.named_loops import NamedLoop
 from kinfmu.analysis.singular import DriverRange, SingularPoint
-from kinfmu.equations.redundancy import DependentRow, Redundancy
 from kinfmu.errors import KinfmuError
 from kinfmu.mechanism import Mechanism
 from kinfmu.plan import SolvePlan, determinant_formula
+from kinfmu.plan.equations.redundancy import DependentRow, Redundancy
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
-from kinfmu.drivers import Driver
-from kinfmu.equations.system import FloatArray
-from kinfmu.joints import Held
-from kinfmu.measures import CoordinateOf, PoseQuantity
-from kinfmu.measures.arithmetic import decimal_sum
+from kinfmu.arrays import FloatArray
 from kinfmu.mechanism import Mechanism, Start
+from kinfmu.mechanism.drivers import Driver
+from kinfmu.mechanism.joints import Held
+from kinfmu.mechanism.quantities import CoordinateOf, PoseQuantity
+from kinfmu.mechanism.quantities.arithmetic import decimal_sum
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.origin import in_world
 

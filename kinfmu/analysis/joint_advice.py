@@ -8,13 +8,14 @@ from itertools import combinations
 
 import numpy as np
 
-from kinfmu.equations.closing import null_space
-from kinfmu.equations.redundancy import Redundancy, find_redundancy
-from kinfmu.equations.system import FloatArray, System, placement
-from kinfmu.joints import Fixed, Revolute
-from kinfmu.measures.placement import body_of, point_of
+from kinfmu.arrays import FloatArray
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.joints import Fixed, Revolute
+from kinfmu.mechanism.quantities.placement import body_of, point_of
+from kinfmu.plan.equations.closing import null_space
+from kinfmu.plan.equations.redundancy import Redundancy, find_redundancy
+from kinfmu.plan.equations.system import System, placement
 
 _SAME = 1e-3  # of the size; points of two bodies that are nearer in the start pose are one pin
 _RANK = 1e-3  # of the free directions; a pin that holds less holds nothing new

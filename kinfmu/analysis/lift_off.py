@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from kinfmu.analysis.cams import CamFindings
-from kinfmu.cams import pressing_sign
 from kinfmu.mechanism.force_names import names_of_rows
+from kinfmu.motion.cams import pressing_sign
 from kinfmu.motion.history import History
 from kinfmu.motion.motion import Motion
 from kinfmu.run.axis import TIME

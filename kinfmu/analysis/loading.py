@@ -18,18 +18,19 @@ from kinfmu.analysis.cams import CamFindings
 from kinfmu.analysis.lift_off import LiftOff, lift_offs
 from kinfmu.analysis.measuring import motion_of_check, name_of_run
 from kinfmu.analysis.singular import DriverRange
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import KinfmuError, RequestError
-from kinfmu.joints.cam import Cam
-from kinfmu.laws import Spline
-from kinfmu.loads.following import Following
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.joints.cam import Cam
+from kinfmu.mechanism.laws import Spline
+from kinfmu.mechanism.loads.following import Following
 from kinfmu.motion.motion import Motion, break_places, force_of
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import effort_noun
 from kinfmu.plan.undetermined import shared_reactions, unknown_contacts, why_unknown
-from kinfmu.run import FloatArray, Run
+from kinfmu.run import Run
 from kinfmu.run.axis import TIME
-from kinfmu.sweep import solve
+from kinfmu.run.solve import solve
 from kinfmu.units import METRES, ForceName, Quantity, unit_of
 
 EQUAL = 1e-9  # relative: of two sizes that differ by less, the first is reported

@@ -7,11 +7,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from kinfmu.equations.system import size_of
-from kinfmu.joints import Angle, Coordinate, Distance, PointOnLine, Revolute, Translational
-from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.joints import Angle, Coordinate, Distance, PointOnLine, Revolute, Translational
+from kinfmu.mechanism.quantities.placement import body_of
+from kinfmu.plan.equations.system import size_of
 
 _SAME = 1e-12  # of the size; points of a body closer than this coincide
 _ON_LINE = 1e-9  # [rad]; a point this close to a line is on it

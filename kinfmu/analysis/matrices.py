@@ -11,14 +11,15 @@ import numpy as np
 
 from kinfmu.analysis.singular import DriverRange
 from kinfmu.analysis.values import driver_text
-from kinfmu.equations.assembly import find_assembly
-from kinfmu.equations.closing import close
-from kinfmu.equations.redundancy import Redundancy
-from kinfmu.equations.system import FloatArray, System
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import listed
 from kinfmu.plan import SolvePlan, localized
+from kinfmu.plan.equations.assembly import find_assembly
+from kinfmu.plan.equations.closing import close
+from kinfmu.plan.equations.redundancy import Redundancy
+from kinfmu.plan.equations.system import System
 from kinfmu.plan.origin import relative_to
-from kinfmu.sweep import solve
+from kinfmu.run.solve import solve
 
 SMALL_TURN = math.radians(1.0)  # [rad]; enough to restore the rank near a singular point
 _ZERO = 1e-7  # part of the largest entry; smaller counts as zero: a dead centre, a double root, has half the digits

@@ -12,15 +12,15 @@ import numpy as np
 from kinfmu.analysis.driver_path import follow
 from kinfmu.analysis.singular import DriverRange, driver_range
 from kinfmu.errors import KinfmuError, RequestError
-from kinfmu.laws import ConstantSpeed, ConstantValue, External, Law, Polynomial
-from kinfmu.laws.law import NEARLY
-from kinfmu.loads.following import Following
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.laws import ConstantSpeed, ConstantValue, External, Law, Polynomial
+from kinfmu.mechanism.laws.law import NEARLY
+from kinfmu.mechanism.loads.following import Following
 from kinfmu.motion import MeasuredValue, measure
 from kinfmu.plan import SolvePlan
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
-from kinfmu.sweep import solve
+from kinfmu.run.solve import solve
 
 SAMPLES_PER_TURN = 360
 _MOST_TURNS = 24  # of the law of a load

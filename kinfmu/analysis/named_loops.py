@@ -10,9 +10,9 @@ from kinfmu.analysis.driver_path import DriverPath
 from kinfmu.analysis.grashof import Grashof, four_bar_class, slider_crank_class
 from kinfmu.analysis.loops import FourBar, SliderCrank, named_loops
 from kinfmu.analysis.transmission import TransmissionRange, is_led_by_last, transmission_angle
-from kinfmu.drivers import AngleDriver
-from kinfmu.equations.redundancy import Redundancy
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.drivers import AngleDriver
+from kinfmu.plan.equations.redundancy import Redundancy
 
 MOST = 200  # coordinates; transmission angles of larger mechanisms are not computed
 

@@ -19,13 +19,13 @@ from kinfmu.analysis.named_loops import find_named_loops
 from kinfmu.analysis.singular import driver_range
 from kinfmu.analysis.text import lines
 from kinfmu.display import Displayed
-from kinfmu.equations.redundancy import find_redundancy
-from kinfmu.equations.start_poses import open_joints_text, start_from_poses
-from kinfmu.equations.system import System
 from kinfmu.errors import AssemblyError, InconsistentError, KinfmuError, MechanismError, MobilityError, listed
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.plan import localized, plan_from
+from kinfmu.plan.equations.redundancy import find_redundancy
+from kinfmu.plan.equations.start_poses import open_joints_text, start_from_poses
+from kinfmu.plan.equations.system import System
 
 
 class Report(Findings, Displayed):

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from kinfmu.analysis.driver_path import DriverPath
-from kinfmu.equations.system import System
 from kinfmu.plan import localized
+from kinfmu.plan.equations.system import System
 from kinfmu.plan.origin import relative_to
 from kinfmu.solver.python import Pose
 from kinfmu.solver.python.bridge import Bridge

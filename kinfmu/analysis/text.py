@@ -18,8 +18,8 @@ from kinfmu.analysis.transmission import TransmissionRange
 from kinfmu.analysis.values import degrees, driver_text, multiple_of_pi, value_text
 from kinfmu.errors import listed
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.measures import counted_from
 from kinfmu.motion import MeasuredValue
-from kinfmu.readings import counted_from
 
 _MOST_LOOPS = 8  # in the text; JSON has all
 _END = {

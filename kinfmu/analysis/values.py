@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from kinfmu.drivers import Driver
 from kinfmu.mechanism import RunSettings
+from kinfmu.mechanism.drivers import Driver
 
 LOOKS = 201  # times of a run at which a driver is evaluated
 

@@ -8,10 +8,10 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-from kinfmu import gallery
 from kinfmu.cli.messages import note
 from kinfmu.errors import listed, suggestion
 from kinfmu.files.whole_file import suffix_of
+from kinfmu.mechanism import gallery
 
 
 class ArgumentType(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import click
 
-from kinfmu import gallery
 from kinfmu.cli.arguments import ArgumentType
 from kinfmu.cli.group import main
 from kinfmu.cli.messages import Progress
 from kinfmu.errors import MissingPackageError, listed, suggestion
+from kinfmu.mechanism import gallery
 
-TEXTS: dict[str, tuple[str, tuple[str, ...]]] = {  # module of kinfmu.bench, and the mechanisms it measures
+TEXTS: dict[str, tuple[str, tuple[str, ...]]] = {  # module of benchmarks, and the mechanisms it measures
     "sample": ("solve_sample", ()),
     "sweep": ("native_sweep", ()),
     "designs": ("designs", ()),
@@ -98,7 +98,7 @@ def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None
             _accuracy(mechanisms, given, folder or (Path() if mechanisms else default_folder()))
         else:
             module, mechanism = TEXTS[name]
-            measurement = import_module(f"kinfmu.bench.{module}")  # each needs other packages
+            measurement = import_module(f"benchmarks.{module}")  # each needs other packages
             click.echo(measurement.run(*map(gallery.load, mechanism), **given))
 
 
@@ -110,7 +110,7 @@ def default_folder() -> Path:
 
 def _accuracy(mechanisms: tuple[str, ...], given: dict[str, int], folder: Path) -> None:
     """Measure, print the short tables, write all tables and charts."""
-    from kinfmu.bench import accuracy, charts, page, singular
+    from benchmarks import accuracy, charts, page, singular
 
     mechanisms = mechanisms or accuracy.MECHANISMS
     rounds = given.get("rounds", accuracy.ROUNDS)

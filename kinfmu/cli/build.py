@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kinfmu import gallery
 from kinfmu.cli.arguments import mechanism_argument, names_in, outputs_option
 from kinfmu.cli.group import errors_of, main
 from kinfmu.cli.messages import Progress, note, patience
 from kinfmu.cli.settings import checked_settings, set_option
 from kinfmu.errors import CompilerError, listed
 from kinfmu.files.whole_file import suffix_of
+from kinfmu.mechanism import gallery
 
 if TYPE_CHECKING:
     from kinfmu.mechanism import Mechanism

@@ -8,7 +8,6 @@ from typing import Any
 
 import click
 
-from kinfmu import gallery
 from kinfmu.cli.arguments import STANDARD_OUTPUT
 from kinfmu.cli.group import errors_of
 from kinfmu.cli.pages import mechanism_of
@@ -17,6 +16,7 @@ from kinfmu.cli.settings import checked_settings
 from kinfmu.cli.tables import csv_form
 from kinfmu.errors import RequestError, listed
 from kinfmu.files.whole_file import suffix_of
+from kinfmu.mechanism import gallery
 from kinfmu.units import Quantity
 
 FORMATS = (".csv", ".dxf", ".svg", ".png", ".pdf")

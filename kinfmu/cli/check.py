@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kinfmu import gallery
 from kinfmu.cli.arguments import OutputFile, mechanism_argument
 from kinfmu.cli.group import errors_of, main
 from kinfmu.cli.quantities import driver_value
 from kinfmu.cli.settings import checked_settings, set_option
 from kinfmu.errors import KinfmuError, MechanismError, listed
+from kinfmu.mechanism import gallery
 from kinfmu.mechanism.body import MEASURED_OVER
 
 if TYPE_CHECKING:

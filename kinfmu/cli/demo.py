@@ -9,13 +9,13 @@ from shlex import quote
 
 import numpy as np
 
+from benchmarks.singular_points import parallelogram
 from kinfmu.analysis import check
-from kinfmu.bench.singular_points import parallelogram
 from kinfmu.draw import animate
 from kinfmu.errors import MissingPackageError
 from kinfmu.fmu import build, simulate
-from kinfmu.gallery import load
 from kinfmu.log import write_mcap, write_rrd
+from kinfmu.mechanism.gallery import load
 from kinfmu.run import Run
 from kinfmu.solver.python.status import Status
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kinfmu import gallery
 from kinfmu.cli.arguments import STANDARD_OUTPUT, InputFile, OutputFile, RecordOrMechanism, names_in
 from kinfmu.cli.cams import export_cam
 from kinfmu.cli.group import errors_of, main
@@ -20,6 +19,7 @@ from kinfmu.cli.settings import checked_settings, set_option
 from kinfmu.cli.tables import csv_form, table_options
 from kinfmu.errors import RequestError, listed
 from kinfmu.files.whole_file import suffix_of
+from kinfmu.mechanism import gallery
 
 if TYPE_CHECKING:
     from kinfmu.run import Run

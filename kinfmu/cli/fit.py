@@ -29,9 +29,9 @@ def fit(file: Path, output: Path | None, picture: Path | None, starts: int, seed
     FILE names a mechanism, bounds of its parameters, and targets: a path through points, a function, poses of a body,
     or values of measures. Errors of the targets, constraints, and all local optima found are printed.
     """
-    from kinfmu.gallery import save
-    from kinfmu.synthesis import fit as fitted
-    from kinfmu.synthesis.fit_file import mechanism_file
+    from kinfmu.design.fit import fit as fitted
+    from kinfmu.design.fit.fit_file import mechanism_file
+    from kinfmu.mechanism.gallery import save
 
     if output is not None:
         for own, what in ((file, "the fit file"), (mechanism_file(file), "its mechanism")):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import click
 
-from kinfmu import gallery
 from kinfmu.cli.group import main
+from kinfmu.mechanism import gallery
 
 
 @main.command("list", epilog="Example: kinfmu list")

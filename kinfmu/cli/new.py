@@ -7,11 +7,11 @@ from shlex import quote
 
 import click
 
-from kinfmu import gallery
 from kinfmu.cli.arguments import OutputFile, exists, mechanism_argument
 from kinfmu.cli.group import main
 from kinfmu.errors import KinfmuError
 from kinfmu.files.whole_file import write_whole
+from kinfmu.mechanism import gallery
 
 
 @main.command(epilog="Example: kinfmu new crank_rocker mine.toml")

@@ -22,7 +22,7 @@ def play(mechanism: str, port: int, no_browser: bool) -> None:
     The page follows the file while you edit it; errors in the file are shown in the page. The page saves FMUs, tables,
     drawings and mechanism files with the lengths as set. Only this machine can open the address. Ctrl-C ends it.
     """
-    from kinfmu.player import PlayServer, PlaySource
+    from kinfmu.page.player import PlayServer, PlaySource
 
     with patience():
         source = PlaySource(mechanism)

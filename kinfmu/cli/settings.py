@@ -66,7 +66,7 @@ class Settings:
 
         A note on stderr reports when this fails and the mechanism is assembled from its start poses.
         """
-        from kinfmu.sweep.continued import continued
+        from kinfmu.run.continued import continued
 
         followed = continued(self.written, {**self.parameters, **self.constants})
         if followed.message:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kinfmu import gallery
 from kinfmu.cli.arguments import InputFile, ModelName, OutputFile
 from kinfmu.cli.group import errors_as, errors_of, main, on_interrupt
 from kinfmu.cli.messages import Progress, report
@@ -25,6 +24,7 @@ from kinfmu.cli.settings import (
 )
 from kinfmu.files.temporary_folder import temporary_folder
 from kinfmu.files.whole_file import suffix_of
+from kinfmu.mechanism import gallery
 
 if TYPE_CHECKING:
     from kinfmu.run import Run, Sink

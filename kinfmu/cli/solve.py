@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kinfmu import gallery
 from kinfmu.cli.arguments import OutputFile, mechanism_argument, names_in, outputs_option
 from kinfmu.cli.group import errors_of, main, on_interrupt
 from kinfmu.cli.messages import note, report, warn
@@ -18,10 +17,11 @@ from kinfmu.cli.settings import TOLERANCE, Settings, checked_settings, set_optio
 from kinfmu.cli.tables import csv_form, table_options
 from kinfmu.errors import listed
 from kinfmu.files.whole_file import suffix_of
+from kinfmu.mechanism import gallery
 from kinfmu.units import Quantity, in_turns, looks_like_degrees
 
 if TYPE_CHECKING:
-    from kinfmu.drivers import Driver
+    from kinfmu.mechanism.drivers import Driver
 
 TABLES = (".csv", ".parquet", ".npz")
 RECORD = ".mcap"
@@ -93,8 +93,8 @@ def solve(
     """
     from kinfmu.log import write_mcap, write_table
     from kinfmu.mechanism import RunSettings
-    from kinfmu.sweep import run_times
-    from kinfmu.sweep import solve as solved
+    from kinfmu.run.driving import run_times
+    from kinfmu.run.solve import solve as solved
 
     if times and angle:
         raise click.UsageError("--times and --angle exclude each other")
@@ -173,7 +173,7 @@ def _note_angles(text: str, first: float, last: float, n: int, wrap: bool) -> No
 
 def _warn_of_external(drivers: tuple[Driver, ...]) -> None:
     """Warn of drivers without a law, which time does not move."""
-    from kinfmu.laws import External
+    from kinfmu.mechanism.laws import External
 
     fixed = [driver.name for driver in drivers if isinstance(driver.law, External)]
     if fixed:

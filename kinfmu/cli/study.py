@@ -60,8 +60,8 @@ def study(
     FILE names a mechanism and how its parameters vary (docs/studies.md). Prints a summary and writes a table with a row
     for each design. A study that was ended goes on where it was when the same command is given again.
     """
-    from kinfmu.studies import read_study, run_study
-    from kinfmu.studies.parts import folder_of
+    from kinfmu.design.study import read_study, run_study
+    from kinfmu.design.study.parts import folder_of
 
     if workers is not None and dask not in (None, "local"):
         raise click.UsageError("--workers is for this machine; the Dask cluster has its own")

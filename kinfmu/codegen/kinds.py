@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import NamedTuple
 
-from kinfmu.equations.graph import Graph, Node, reachable, symbols
 from kinfmu.plan import Block
+from kinfmu.plan.equations.graph import Graph, Node, reachable, symbols
 from kinfmu.plan.trace import is_parameter
 from kinfmu.units import CoordinateName, VariableName
 

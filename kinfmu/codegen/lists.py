@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from kinfmu.codegen.kinds import UnitRun, runs_of
-from kinfmu.equations.graph import Node
-from kinfmu.measures import DistanceBetween
+from kinfmu.mechanism.quantities import DistanceBetween
 from kinfmu.plan import Block, SolvePlan
+from kinfmu.plan.equations.graph import Node
 from kinfmu.plan.trace import is_parameter, parameter_symbol
 from kinfmu.units import VariableName
 

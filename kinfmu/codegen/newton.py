@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from kinfmu.codegen.writer import Writer, identifier
-from kinfmu.equations.graph import Node, symbols
 from kinfmu.plan import Block
+from kinfmu.plan.equations.graph import Node, symbols
 
 ROUND_OFF = 4e-16  # residual relative to the size below which more steps gain nothing at regular poses
 SETTLED = 1e-13  # residual from which Newton may stop when it no longer falls fourfold

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 
-from kinfmu.equations.graph import FUNCTIONS, Node
+from kinfmu.plan.equations.graph import FUNCTIONS, Node
 from kinfmu.solver.python.curve import CurveData
 
 _LEVEL = {"+": 1, "-": 1, "neg": 2, "*": 3, "/": 3}  # how strongly operators bind: a weaker operand gets parentheses

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import FigureError
-from kinfmu.run import FloatArray, Run
+from kinfmu.run import Run
 from kinfmu.run.axis import DEGREE, axis_of, rates_per
 from kinfmu.units import degrees_of, unit_of
 

@@ -11,24 +11,25 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.drawing import draw
 from kinfmu.draw.gravity import gravity_in_margin
 from kinfmu.draw.painting import extent, placed, shortest
 from kinfmu.draw.pins import paths, pins
+from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.instant import Instant
+from kinfmu.draw.scene.placing import poses_of, remedy, world
+from kinfmu.draw.scene.shapes import shapes
 from kinfmu.draw.sheet import GREY, PAPER, Sheet, ink
 from kinfmu.draw.video import encoder, mp4
 from kinfmu.draw.writing import figure_style, write_bytes
 from kinfmu.errors import FigureError, MechanismError, listed
 from kinfmu.files.whole_file import suffix_of
-from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
-from kinfmu.run import FloatArray, Run
+from kinfmu.mechanism.quantities.placement import body_of
+from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
-from kinfmu.scene import palette
-from kinfmu.scene.instant import Instant
-from kinfmu.scene.placing import poses_of, remedy, world
-from kinfmu.scene.shapes import shapes
 
 if TYPE_CHECKING:
     from PIL.Image import Image

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinfmu.cams import CamProfile
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.abscissa import degree_ticks
 from kinfmu.draw.chart import SMALL, dress
 from kinfmu.draw.dxf import DXF_UNITS, POINT_STYLE, without_date
 from kinfmu.draw.motion import COLOUR
+from kinfmu.draw.scene import palette
 from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, arc, ink
 from kinfmu.draw.writing import SUFFIXES, write, write_bytes
 from kinfmu.errors import FigureError, MissingPackageError, listed
 from kinfmu.files.whole_file import suffix_of
-from kinfmu.run import FloatArray
-from kinfmu.scene import palette
+from kinfmu.motion.cams import CamProfile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

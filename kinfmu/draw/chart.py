@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
+from kinfmu.draw.scene.palette import Colour
 from kinfmu.draw.sheet import FONT, GREY, INK, ink
-from kinfmu.run import FloatArray
-from kinfmu.scene.palette import Colour
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.chart import SMALL
 from kinfmu.draw.sheet import GREY, ink
 from kinfmu.draw.study_panels import PanelGrid, Quantities, few_ticks, name_axes, sheet_of, titled
-from kinfmu.run import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.abscissa import abscissa, raised
+from kinfmu.draw.scene import palette
 from kinfmu.draw.sheet import ink
 from kinfmu.errors import FigureError, RequestError, suggestion
-from kinfmu.run import FloatArray, Run
-from kinfmu.scene import palette
+from kinfmu.run import Run
 from kinfmu.units import degrees_of
 
 if TYPE_CHECKING:

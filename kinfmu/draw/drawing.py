@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
-from kinfmu.cams import CAM_JOINTS
-from kinfmu.cams.placed import members_of
 from kinfmu.draw.gap import gap_note, gaps
 from kinfmu.draw.gravity import gravity
 from kinfmu.draw.instant import instant, pose_note
@@ -17,17 +15,19 @@ from kinfmu.draw.motion import motion
 from kinfmu.draw.names import Mark, Name, place
 from kinfmu.draw.painting import Painter, extent, placed, shortest
 from kinfmu.draw.pins import paths, pins
+from kinfmu.draw.scene.cams import cam_shapes
+from kinfmu.draw.scene.instant import Instant
+from kinfmu.draw.scene.load_shapes import load_text
+from kinfmu.draw.scene.shape import Shape
+from kinfmu.draw.scene.shapes import shapes
 from kinfmu.draw.sheet import Sheet
 from kinfmu.draw.writing import check_target, write
 from kinfmu.errors import listed
-from kinfmu.joints import Coordinate, Distance, Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.joints import Coordinate, Distance, Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism.mechanism import require_mechanism
-from kinfmu.scene.cams import cam_shapes
-from kinfmu.scene.instant import Instant
-from kinfmu.scene.load_shapes import load_text
-from kinfmu.scene.shape import Shape
-from kinfmu.scene.shapes import shapes
+from kinfmu.motion.cams import CAM_JOINTS
+from kinfmu.motion.cams.placed import members_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

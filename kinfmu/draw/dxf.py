@@ -15,14 +15,14 @@ from kinfmu.draw.animation import placed_run
 from kinfmu.draw.lines import Lines
 from kinfmu.draw.painting import placed
 from kinfmu.draw.pose_at import pose_at
+from kinfmu.draw.scene.instant import Instant
+from kinfmu.draw.scene.shapes import shapes
 from kinfmu.draw.writing import write_bytes
 from kinfmu.errors import FigureError, MissingPackageError
 from kinfmu.files.whole_file import suffix_of
-from kinfmu.measures.placement import body_of
 from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.quantities.placement import body_of
 from kinfmu.run import Run
-from kinfmu.scene.instant import Instant
-from kinfmu.scene.shapes import shapes
 
 DXF_UNITS = {"in": 1, "ft": 2, "mm": 4, "cm": 5, "m": 6, "km": 7, "um": 13}  # $INSUNITS
 _DRAWN = (  # what has true dimensions

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.chart import SMALL, dress
 from kinfmu.draw.drawing import sheet_of
 from kinfmu.draw.instant import instant
 from kinfmu.draw.names import Mark, Name
+from kinfmu.draw.scene.palette import Colour
 from kinfmu.draw.sheet import INCH, Sheet, ink
 from kinfmu.draw.writing import check_target, write
 from kinfmu.mechanism import Mechanism
-from kinfmu.run import FloatArray
-from kinfmu.scene.palette import Colour
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.names import Mark, Name
+from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.instant import Instant
 from kinfmu.draw.sheet import BAR, Sheet
-from kinfmu.run import FloatArray
-from kinfmu.scene import palette
-from kinfmu.scene.instant import Instant
 
 _RED = palette.STATUS[3]
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.names import Name
+from kinfmu.draw.scene.gravity import gravity_direction
 from kinfmu.draw.sheet import GREY, Sheet
 from kinfmu.mechanism import Mechanism
-from kinfmu.run import FloatArray
-from kinfmu.scene.gravity import gravity_direction
 
 _BOX, _LENGTH = 44.0, 26.0  # [pt]; side of the free square, length of the arrow
 _SMALL, _LETTER = 22.0, 8.0  # [pt]; length of the arrow in the margin of an animation, distance of its letter

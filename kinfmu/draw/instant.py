@@ -8,23 +8,25 @@ from typing import Any
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.motion import value_text
-from kinfmu.equations.assembly import find_assembly
-from kinfmu.equations.closing import CLOSED, close
-from kinfmu.equations.part import Part
-from kinfmu.equations.system import System
+from kinfmu.draw.scene.instant import Instant, OpenGap
+from kinfmu.draw.scene.outline import points_of, rim
+from kinfmu.draw.scene.placing import poses_of, world
 from kinfmu.errors import FigureError, KinfmuError, listed
-from kinfmu.joints import Distance, Translational
-from kinfmu.measures.placement import body_of, unit_vector
 from kinfmu.mechanism import Mechanism, Point
 from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.joints import Distance, Translational
+from kinfmu.mechanism.quantities.placement import body_of, unit_vector
 from kinfmu.plan import SolvePlan, compile_plan, localized
+from kinfmu.plan.equations.assembly import find_assembly
+from kinfmu.plan.equations.closing import CLOSED, close
+from kinfmu.plan.equations.part import Part
+from kinfmu.plan.equations.system import System
 from kinfmu.plan.open_loop import OpenLoop
-from kinfmu.run import FloatArray, Run
-from kinfmu.scene.instant import Instant, OpenGap
-from kinfmu.scene.outline import points_of, rim
-from kinfmu.scene.placing import poses_of, world
-from kinfmu.sweep import run_times, solve
+from kinfmu.run import Run
+from kinfmu.run.driving import run_times
+from kinfmu.run.solve import solve
 
 MOST_SAMPLES = 1000  # of the run, in a figure
 _NEAR_RUN = 0.1  # of a driver's range; a start pose further from the run is a rough guess

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from kinfmu.run import FloatArray
+from kinfmu.arrays import FloatArray
 
 _SAME = 1e-9  # of the extent of the drawing; points that are closer are one
 

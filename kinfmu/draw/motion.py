@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.names import Mark, Name
+from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.instant import Instant
 from kinfmu.draw.sheet import Sheet, arc
-from kinfmu.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
-from kinfmu.equations.system import size_of
-from kinfmu.measures.placement import body_of, unit_vector
 from kinfmu.mechanism.body import GROUND_NAME
-from kinfmu.run import FloatArray
-from kinfmu.scene import palette
-from kinfmu.scene.instant import Instant
+from kinfmu.mechanism.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
+from kinfmu.mechanism.quantities.placement import body_of, unit_vector
+from kinfmu.plan.equations.system import size_of
 
 COLOUR: palette.Colour = (185, 28, 28)
 _RADII, _TURN = (19.0, 32.0), math.radians(95.0)  # [pt] and [rad], of a curved arrow; the larger one around torques

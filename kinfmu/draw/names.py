@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
+from kinfmu.draw.scene.palette import Colour
 from kinfmu.draw.sheet import FONT, INK, LINE, Sheet
-from kinfmu.run import FloatArray
-from kinfmu.scene.palette import Colour
 
 _DIRECTIONS = 16  # from an anchor to a place for its name
 _FURTHER = (0.0, 4.0, 9.0, 16.0, 26.0, 38.0)  # [pt], additional distances

@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.abscissa import Abscissa, abscissa, degree_ticks, label_size, labelled, unit_in
 from kinfmu.draw.chart import SMALL, dress, numbers, powers_of_ten
 from kinfmu.draw.curves import LOST, gaps, rows_of
 from kinfmu.draw.polar import radial_scale
+from kinfmu.draw.scene import palette
 from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
 from kinfmu.errors import FigureError
-from kinfmu.run import FloatArray, Run
+from kinfmu.run import Run
 from kinfmu.run.axis import ROUND_OFF, axis_of, shown_range
 from kinfmu.run.channels import chosen_columns
-from kinfmu.scene import palette
 from kinfmu.units import degrees_of
 
 if TYPE_CHECKING:

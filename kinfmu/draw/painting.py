@@ -7,13 +7,13 @@ from itertools import pairwise
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.names import Name
+from kinfmu.draw.scene import details, palette
+from kinfmu.draw.scene.details import box
+from kinfmu.draw.scene.instant import Instant
+from kinfmu.draw.scene.shape import Shape, guides_of_cams
 from kinfmu.draw.sheet import BAR, PAPER, Sheet
-from kinfmu.run import FloatArray
-from kinfmu.scene import details, palette
-from kinfmu.scene.details import box
-from kinfmu.scene.instant import Instant
-from kinfmu.scene.shape import Shape, guides_of_cams
 
 DASHES = (0, (7.0, 2.0, 1.5, 2.0))  # of a pitch circle or curve
 _GREY, _LIGHT_GREY = palette.darker(palette.GROUND), palette.lighter(palette.BAR)  # edge and area without a body

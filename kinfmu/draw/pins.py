@@ -6,18 +6,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.names import Mark, Name
+from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.details import box
+from kinfmu.draw.scene.instant import Instant
+from kinfmu.draw.scene.load_shapes import BETWEEN
+from kinfmu.draw.scene.slides import slides
 from kinfmu.draw.sheet import BAR, INK, PAPER, Sheet
-from kinfmu.drivers import DistanceDriver
-from kinfmu.joints import CamRoller, Distance, Fixed, PointOnLine, Revolute, Translational
-from kinfmu.measures.placement import body_of, point_of
 from kinfmu.mechanism.body import GROUND_NAME
-from kinfmu.run import FloatArray
-from kinfmu.scene import palette
-from kinfmu.scene.details import box
-from kinfmu.scene.instant import Instant
-from kinfmu.scene.load_shapes import BETWEEN
-from kinfmu.scene.slides import slides
+from kinfmu.mechanism.drivers import DistanceDriver
+from kinfmu.mechanism.joints import CamRoller, Distance, Fixed, PointOnLine, Revolute, Translational
+from kinfmu.mechanism.quantities.placement import body_of, point_of
 
 _SAME = 1e-6  # of the size; points that are nearer are one place
 _ORDER = ("loose", "slide", "weld", "pin")  # kinds of places; if one place has several, the last one is drawn

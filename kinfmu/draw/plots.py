@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.abscissa import axis_label, degree_ticks, label_size
 from kinfmu.draw.chart import SMALL, dress, numbers, powers_of_ten
 from kinfmu.draw.curves import LOST, curves, gaps, rows_of
@@ -21,13 +22,13 @@ from kinfmu.draw.overlay import (
     sheet_title,
     values_of,
 )
+from kinfmu.draw.scene import palette
 from kinfmu.draw.sheet import FONT, GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
 from kinfmu.draw.stacks import Panel, Stack, stacks_of
 from kinfmu.draw.writing import check_suffix, check_target, write
 from kinfmu.errors import FigureError, listed
-from kinfmu.run import FloatArray, Run
+from kinfmu.run import Run
 from kinfmu.run.axis import ROUND_OFF, Axis, axis_of, shown_range
-from kinfmu.scene import palette
 from kinfmu.units import CoordinateName, ForceName, SignalName, degrees_of
 
 if TYPE_CHECKING:

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.chart import SMALL
+from kinfmu.draw.scene.palette import Colour
 from kinfmu.draw.sheet import GREY, ink
-from kinfmu.run import FloatArray
-from kinfmu.scene.palette import Colour
 
 _GRID: Colour = (228, 228, 228)
 _ROOM = 0.25  # of the range of the values, between the centre and the least value if that is negative

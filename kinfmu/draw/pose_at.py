@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
+from kinfmu.draw.scene.placing import poses_after, poses_of
 from kinfmu.errors import FigureError
-from kinfmu.laws import External
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
-from kinfmu.run import FloatArray, Run
+from kinfmu.mechanism.laws import External
+from kinfmu.run import Run
 from kinfmu.run.axis import SAMPLE, Axis, axis_of
-from kinfmu.scene.placing import poses_after, poses_of
 
 _SAME = 1e-9  # of the largest value; nearer ones are one: driver values are rounded
 

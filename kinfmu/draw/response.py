@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.sheet import ink
 from kinfmu.draw.study_panels import PanelGrid, Quantities, colour_of, few_ticks, name_axes, sheet_of
-from kinfmu.run import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.chart import SMALL
+from kinfmu.draw.scene import palette
 from kinfmu.draw.sheet import GREY, ink
 from kinfmu.draw.study_panels import PanelGrid, Quantities, colour_of, few_ticks, name_axes, sheet_of
-from kinfmu.run import FloatArray
-from kinfmu.scene import palette
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kinfmu.run import FloatArray
-from kinfmu.scene.palette import Colour, on_white
+from kinfmu.arrays import FloatArray
+from kinfmu.draw.scene.palette import Colour, on_white
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

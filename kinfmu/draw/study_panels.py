@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.chart import SMALL, dress
+from kinfmu.draw.scene import palette
 from kinfmu.draw.sheet import FONT, GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
-from kinfmu.run import FloatArray
-from kinfmu.scene import palette
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

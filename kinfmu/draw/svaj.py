@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.abscissa import Abscissa, abscissa, degree_ticks, labelled
 from kinfmu.draw.chart import SMALL, dress, numbers
 from kinfmu.draw.curves import rows_of
@@ -17,7 +18,7 @@ from kinfmu.draw.writing import check_suffix, write
 from kinfmu.errors import FigureError
 from kinfmu.motion.motion_curve import MotionCurve, motion_curve
 from kinfmu.motion.svaj_table import units_of
-from kinfmu.run import FloatArray, Run
+from kinfmu.run import Run
 from kinfmu.units import degrees_of, unit_of
 
 if TYPE_CHECKING:

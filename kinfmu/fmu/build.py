@@ -14,8 +14,8 @@ from kinfmu.files.temporary_folder import temporary_folder
 from kinfmu.files.whole_file import suffix_of, write_whole
 from kinfmu.fmu.description import FmiVersion
 from kinfmu.fmu.interface import DRIVES, Drive
-from kinfmu.laws import External
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.laws import External
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.version import VERSION
 

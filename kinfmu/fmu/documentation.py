@@ -8,10 +8,10 @@ from html import escape
 from types import MappingProxyType
 
 from kinfmu.analysis.singular import DriverRange
-from kinfmu.drivers import Driver
 from kinfmu.fmu.interface import Interface, Variable
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.fmu.reference import FOLDER, ReferenceResults
+from kinfmu.mechanism.drivers import Driver
 from kinfmu.plan import SolvePlan
 from kinfmu.solver.python.status import Status
 from kinfmu.units import Quantity, unit_of

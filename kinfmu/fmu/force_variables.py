@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from kinfmu.codegen.forces import STAGES
-from kinfmu.equations.graph import Node, symbols
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.fmu.interface import Variable
-from kinfmu.joints import CamFlatFace, CamOscillating, CamRoller, CamTranslating, Joint
 from kinfmu.mechanism import LawConstant, Mechanism
 from kinfmu.mechanism.force_names import external_names
+from kinfmu.mechanism.joints import CamFlatFace, CamOscillating, CamRoller, CamTranslating, Joint
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.equations.graph import Node, symbols
 from kinfmu.plan.forces import ForceSteps, force_names, force_steps
 from kinfmu.plan.reactions import reaction_names_of, reaction_steps
 from kinfmu.plan.shaking import shaking_steps

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from kinfmu.equations.graph import Node, reachable
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.equations.graph import Node, reachable
 from kinfmu.plan.trace import is_parameter
 
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from kinfmu.codegen.python import load_model
-from kinfmu.equations.graph import Node
 from kinfmu.errors import RequestError
 from kinfmu.fmu.torque_variables import effort_names
-from kinfmu.laws import External
-from kinfmu.loads.following import Following
+from kinfmu.mechanism.laws import External
+from kinfmu.mechanism.loads.following import Following
 from kinfmu.mechanism.mechanism import require_masses
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.equations.graph import Node
 from kinfmu.plan.forces import ForceSteps, effort_noun, force_steps
 from kinfmu.plan.led_laws import LedLaws, led_laws
 from kinfmu.plan.mechanics import Mechanics

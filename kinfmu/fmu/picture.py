@@ -9,11 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinfmu.run import FloatArray, Run
-from kinfmu.scene import details, palette
-from kinfmu.scene.placing import world
-from kinfmu.scene.scene import Scene, drawable
-from kinfmu.scene.shape import Shape, guides_of_cams
+from kinfmu.arrays import FloatArray
+from kinfmu.draw.scene import details, palette
+from kinfmu.draw.scene.placing import world
+from kinfmu.draw.scene.scene import Scene, drawable
+from kinfmu.draw.scene.shape import Shape, guides_of_cams
+from kinfmu.run import Run
 
 WIDTH, ICON = 640, 100  # [px]
 _EDGE = 30.0  # [px] around everything

@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import KinfmuError
 from kinfmu.fmu.interface import Interface
-from kinfmu.laws import External
-from kinfmu.run import FloatArray, Run
+from kinfmu.mechanism.laws import External
+from kinfmu.run import Run
 from kinfmu.run.axis import TIME
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ def reference(run: Run, variables: Interface) -> ReferenceResults | None:
 
 def _run(plan: SolvePlan, t: FloatArray) -> Run:
     """Return the run over times t (n,) [s], in which drivers whose law is external swing."""
-    from kinfmu.sweep import Model  # a reader of results needs no planner
+    from kinfmu.run.model import Model
 
     model = Model(plan, "python")
     run = model.solve(t)  # external laws give their start

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from kinfmu.draw.scene.estimates import with_estimates
 from kinfmu.fmu.description import Description
 from kinfmu.fmu.interface import Interface, Variable
 from kinfmu.fmu.layout import UNKNOWN_ERROR
@@ -19,7 +20,6 @@ from kinfmu.run import Event, Run
 from kinfmu.run.channels import absent_columns, is_all_but
 from kinfmu.run.coarse import coarse_samples
 from kinfmu.run.run import Sink
-from kinfmu.scene.estimates import with_estimates
 from kinfmu.solver.python.status import Status
 from kinfmu.units import ForceName, read_inputs
 

@@ -125,7 +125,7 @@ def simulate(
             )
         if wrap or channels is not None or rate is not None or isinstance(inputs, str | Path):
             raise RequestError("wrap, channels, rate and files of inputs are for FMUs, not for a mechanism")
-        from kinfmu.dynamics import torque_driven  # steps of FMUs do not need the planner
+        from kinfmu.motion.torque import torque_driven  # steps of FMUs do not need the planner
 
         run = torque_driven(
             fmu_path,

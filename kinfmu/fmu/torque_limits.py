@@ -3,7 +3,7 @@
 At a limit (a dead centre of a driver) the reduced inertia grows without bound, and u(t) is a parabola that touches the
 limit: steps could cross its top and return on the same branch, where the mechanism itself would not. So every step in
 which a speed changes its sign, or a pose is near a singular one, is searched for a pose at a limit. See
-kinfmu/dynamics/stepping.py.
+kinfmu/motion/torque/stepping.py.
 """
 
 from __future__ import annotations

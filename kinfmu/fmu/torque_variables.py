@@ -12,9 +12,9 @@ from dataclasses import replace
 from kinfmu.codegen.forces import STAGES
 from kinfmu.fmu.force_variables import load_variables
 from kinfmu.fmu.interface import InterfacePart, Variable
-from kinfmu.laws import External
-from kinfmu.loads.following import Following
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.laws import External
+from kinfmu.mechanism.loads.following import Following
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import effort_noun
 from kinfmu.solver.python.law_breaks import LEAST_TOLERANCE, MOST_TOLERANCE, STEP_TOLERANCE

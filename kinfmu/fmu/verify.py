@@ -14,13 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import FmuError, RequestError, listed, suggestion
 from kinfmu.fmu import description, reference
 from kinfmu.fmu.reference import FOLDER, ReferenceResults
 from kinfmu.fmu.simulate import simulate
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, text_in, unpacked
 from kinfmu.mechanism.valid import quoted
-from kinfmu.run import FloatArray
 from kinfmu.units import Quantity, every_unit, spelled
 
 _SAME_TIME = 1e-6  # of a step: hosts sum up time

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import LogError
-from kinfmu.run import FloatArray
 
 HEADER = b"\x00\x01\x00\x00"
 Bytes = NDArray[np.uint8]

@@ -12,6 +12,7 @@ from shlex import quote
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import LogError, listed
 from kinfmu.log.cdr import NANOSECONDS, Template, nanoseconds
 from kinfmu.log.mcap_reader import McapReader
@@ -29,7 +30,7 @@ from kinfmu.log.writing import (
     checksum,
     write_mcap,
 )
-from kinfmu.run import MOST_SAMPLES, Event, FloatArray, Run
+from kinfmu.run import MOST_SAMPLES, Event, Run
 
 
 def read(path: str | Path) -> Run:

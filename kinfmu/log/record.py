@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.draw.scene.estimates import with_estimates
 from kinfmu.errors import LogError
 from kinfmu.log.record_text import lists_of
 from kinfmu.mechanism.valid import quoted
 from kinfmu.run import Event, Run
-from kinfmu.scene.estimates import with_estimates
 from kinfmu.solver.python.status import Status
 
 FORMAT = "2"  # increased when older files can no longer be read the same way

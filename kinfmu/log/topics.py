@@ -9,13 +9,13 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.draw.scene.scene import scene
 from kinfmu.log import cdr, urdf
 from kinfmu.log.cdr import NANOSECONDS, Messages, Template, nanoseconds
 from kinfmu.log.mcap_writer import McapWriter
 from kinfmu.log.record import is_integer, layout, tables
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.run import Event, Run
-from kinfmu.scene.scene import scene
 from kinfmu.units import METRES, CoordinateName
 
 SOURCE = "kinfmu"  # of log messages that are events of the run

@@ -9,13 +9,14 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
+from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.placing import poses_of
+from kinfmu.draw.scene.scene import Scene
+from kinfmu.draw.scene.shape import Shape, die_frame, frames
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.mechanism import Mechanism
-from kinfmu.run import FloatArray, Run
-from kinfmu.scene import palette
-from kinfmu.scene.placing import poses_of
-from kinfmu.scene.scene import Scene
-from kinfmu.scene.shape import Shape, die_frame, frames
+from kinfmu.run import Run
 
 ROOT = "ground"  # the root frame
 _WIDTH, _BLOCK = 0.02, 0.03  # width of links and half length of blocks, as parts of the size

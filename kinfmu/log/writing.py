@@ -24,13 +24,14 @@ from pathlib import Path
 
 import numpy as np
 
+from kinfmu.arrays import IntArray
 from kinfmu.errors import MechanismError
 from kinfmu.log.cdr import NANOSECONDS, nanoseconds, zero_of
 from kinfmu.log.mcap_writer import McapWriter
 from kinfmu.log.record import computed_when_read, description, ending
 from kinfmu.log.target import replacing
 from kinfmu.log.topics import SOURCE, STATUS_SOURCE, JointTopic, LinkTopic, LogTopic, SampleTopic, joint_topics
-from kinfmu.run import Event, IntArray, Run
+from kinfmu.run import Event, Run
 from kinfmu.run.axis import axis_of
 from kinfmu.run.channels import is_all_but, is_drawn, select
 from kinfmu.run.verdict import sentence, status_events, unexplained

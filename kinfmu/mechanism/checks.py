@@ -6,21 +6,21 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
-from kinfmu.drivers import Driver
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.joints import Joint
-from kinfmu.loads import Load
-from kinfmu.measures import PoseQuantity
-from kinfmu.measures.placement import Reference
 from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.mechanism.declared import keys_of
+from kinfmu.mechanism.drivers import Driver
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.force_names import measured_forces
+from kinfmu.mechanism.joints import Joint
+from kinfmu.mechanism.loads import Load
+from kinfmu.mechanism.measures import Reading
+from kinfmu.mechanism.measures.extremes import Maximum, Minimum, Peak, PeakAcceleration, PeakSpeed, Range
 from kinfmu.mechanism.members import Bodies, Members, NumberPath, path_text
 from kinfmu.mechanism.parameters import Parameter
+from kinfmu.mechanism.quantities import PoseQuantity
+from kinfmu.mechanism.quantities.placement import Reference
 from kinfmu.mechanism.valid import check_line, check_name, quoted
-from kinfmu.readings import Reading
-from kinfmu.readings.extremes import Maximum, Minimum, Peak, PeakAcceleration, PeakSpeed, Range
 from kinfmu.units import METRES, CoordinateName, factors
 
 NO_DRIVER = "[drivers] there is no driver: "  # before a measure that needs one

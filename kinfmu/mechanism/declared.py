@@ -12,9 +12,9 @@ from dataclasses import MISSING, fields
 from functools import cache
 from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
-from kinfmu.laws import Law, LawQuantity, Segment
-from kinfmu.measures import PoseQuantity
-from kinfmu.measures.placement import Reference
+from kinfmu.mechanism.laws import Law, LawQuantity, Segment
+from kinfmu.mechanism.quantities import PoseQuantity
+from kinfmu.mechanism.quantities.placement import Reference
 from kinfmu.units import Quantity
 
 Takes = Literal["number", "text", "pair", "truth", "numbers", "points", "segments", "measure", "measured", "law"]

@@ -9,11 +9,11 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism import dimension
 from kinfmu.mechanism.dimension import Dimension, DimensionError
 from kinfmu.mechanism.expression_text import error_at, steps_of
 from kinfmu.mechanism.operations import OPERATIONS, WORDS, ExpressionStep
+from kinfmu.mechanism.quantities.arithmetic import Value
 from kinfmu.mechanism.valid import quoted
 
 T = TypeVar("T")

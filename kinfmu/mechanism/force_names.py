@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
-from kinfmu.drivers import Driver
-from kinfmu.joints import Joint
-from kinfmu.loads import Load
 from kinfmu.mechanism.body import Body
+from kinfmu.mechanism.drivers import Driver
+from kinfmu.mechanism.joints import Joint
+from kinfmu.mechanism.loads import Load
 from kinfmu.units import ForceName, Quantity, force_sizes
 
 _INERTIAS = {("angle", "angle"): "inertia", ("length", "length"): "mass"}

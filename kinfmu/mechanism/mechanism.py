@@ -10,12 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from kinfmu.display import Live
-from kinfmu.drivers import Driver
 from kinfmu.errors import RequestError
-from kinfmu.joints import Joint
-from kinfmu.loads import Load
-from kinfmu.measures.arithmetic import Value
-from kinfmu.measures.placement import body_of
 from kinfmu.mechanism.body import GROUND_NAME, Body, Gravity, RunSettings, read_gravity
 from kinfmu.mechanism.checks import (
     check_header,
@@ -25,13 +20,18 @@ from kinfmu.mechanism.checks import (
     check_readings,
     coordinate_orders,
 )
+from kinfmu.mechanism.drivers import Driver
 from kinfmu.mechanism.expression import Computed, Expression
+from kinfmu.mechanism.joints import Joint
+from kinfmu.mechanism.loads import Load
+from kinfmu.mechanism.measures import Reading
 from kinfmu.mechanism.members import Members, NumberPath, texts_of
 from kinfmu.mechanism.metres import in_metres
 from kinfmu.mechanism.parameters import Parameter, parameter_values
+from kinfmu.mechanism.quantities.arithmetic import Value
+from kinfmu.mechanism.quantities.placement import body_of
 from kinfmu.mechanism.resolve import resolve
 from kinfmu.mechanism.settings import LawConstant, Settable, law_constants, with_law_constants
-from kinfmu.readings import Reading
 from kinfmu.units import OTHER_SPELLINGS, CoordinateName, Quantity
 
 

@@ -7,15 +7,15 @@ from dataclasses import dataclass, fields, replace
 from operator import is_
 from typing import TYPE_CHECKING, Any
 
-from kinfmu.drivers import Driver
-from kinfmu.joints import Joint
-from kinfmu.laws import Law, LawQuantity
-from kinfmu.loads import Load
-from kinfmu.measures import PoseQuantity
-from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.body import RUN_TIMES, Body, Gravity, Point, Start
 from kinfmu.mechanism.declared import keys_of
-from kinfmu.readings import Reading
+from kinfmu.mechanism.drivers import Driver
+from kinfmu.mechanism.joints import Joint
+from kinfmu.mechanism.laws import Law, LawQuantity
+from kinfmu.mechanism.loads import Load
+from kinfmu.mechanism.measures import Reading
+from kinfmu.mechanism.quantities import PoseQuantity
+from kinfmu.mechanism.quantities.arithmetic import Value
 from kinfmu.units import CoordinateName, Quantity, is_of_angle
 
 if TYPE_CHECKING:

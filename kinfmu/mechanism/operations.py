@@ -7,9 +7,9 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import Any, NamedTuple
 
-from kinfmu.measures.arithmetic import Value, atan2, cos, sin, sqrt
 from kinfmu.mechanism import dimension
 from kinfmu.mechanism.dimension import Dimension
+from kinfmu.mechanism.quantities.arithmetic import Value, atan2, cos, sin, sqrt
 
 
 class ExpressionStep(NamedTuple):

@@ -8,12 +8,12 @@ from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
 from kinfmu.errors import MechanismError, listed
-from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.conversion import converted
 from kinfmu.mechanism.dimension import UNKNOWN, Dimension
 from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.number import NumberWithUnit, given_unit, read_number
 from kinfmu.mechanism.operations import WORDS
+from kinfmu.mechanism.quantities.arithmetic import Value
 from kinfmu.mechanism.valid import check_line, check_name, check_number, quoted
 from kinfmu.units import Quantity, every_unit
 

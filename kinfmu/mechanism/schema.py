@@ -9,20 +9,20 @@ import json
 from collections.abc import Iterable
 from typing import Any
 
-from kinfmu.drivers import DRIVERS
-from kinfmu.joints import JOINTS
-from kinfmu.laws import LAWS, RISES, External, Law, LawQuantity, Spline
-from kinfmu.laws.sequence import DWELL
-from kinfmu.loads import LOADS
-from kinfmu.measures import POSE_QUANTITIES
-from kinfmu.measures.placement import Reference
 from kinfmu.mechanism.body import GROUND_NAME, MEASURED_OVER
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
+from kinfmu.mechanism.drivers import DRIVERS
 from kinfmu.mechanism.expression_text import LONGEST
+from kinfmu.mechanism.joints import JOINTS
+from kinfmu.mechanism.laws import LAWS, RISES, External, Law, LawQuantity, Spline
+from kinfmu.mechanism.laws.sequence import DWELL
+from kinfmu.mechanism.loads import LOADS
+from kinfmu.mechanism.measures import READINGS
 from kinfmu.mechanism.number import EXAMPLES
+from kinfmu.mechanism.quantities import POSE_QUANTITIES
+from kinfmu.mechanism.quantities.placement import Reference
 from kinfmu.mechanism.repeats import LARGEST_COUNT, REPEATED
 from kinfmu.mechanism.toml_tables import table_keys
-from kinfmu.readings import READINGS
 from kinfmu.units import METRES, Quantity
 
 Schema = dict[str, Any]

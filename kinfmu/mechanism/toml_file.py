@@ -8,16 +8,17 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from kinfmu.drivers import DRIVERS
 from kinfmu.errors import MechanismError, listed
-from kinfmu.joints import JOINTS
-from kinfmu.laws import LAWS, RISES, External, Law, Segment, Spline
-from kinfmu.loads import LOADS
-from kinfmu.measures import POSE_QUANTITIES, PoseQuantity
 from kinfmu.mechanism.body import MASS_KEYS, RUN_TIMES, Body, Gravity, RunSettings, Start
 from kinfmu.mechanism.declared import REQUIRED, Takes, keys_of
+from kinfmu.mechanism.drivers import DRIVERS
+from kinfmu.mechanism.joints import JOINTS
+from kinfmu.mechanism.laws import LAWS, RISES, External, Law, Segment, Spline
+from kinfmu.mechanism.loads import LOADS
+from kinfmu.mechanism.measures import READINGS, Reading
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.mechanism.parameters import Parameter
+from kinfmu.mechanism.quantities import POSE_QUANTITIES, PoseQuantity
 from kinfmu.mechanism.repeats import COUNTS, REPEAT, expanded
 from kinfmu.mechanism.table_file import read_table
 from kinfmu.mechanism.toml_hints import explained
@@ -33,7 +34,6 @@ from kinfmu.mechanism.toml_tables import (
     text_of,
 )
 from kinfmu.mechanism.valid import check_name, quoted
-from kinfmu.readings import READINGS, Reading
 
 LARGEST_FILE = 4_000_000  # [bytes]; a chain of ten thousand links has less
 DEEPEST_KEY = 50  # parts of a dotted key; the time that the standard library takes grows with their square

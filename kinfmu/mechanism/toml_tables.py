@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.laws import Spline
 from kinfmu.mechanism.declared import keys_of
+from kinfmu.mechanism.laws import Spline
 from kinfmu.mechanism.valid import check_name, quoted
 
 _OWN_KEYS = {  # keys by which files that name a mechanism differ

@@ -7,14 +7,14 @@ from contextlib import suppress
 from typing import Any
 
 from kinfmu.errors import MechanismError
-from kinfmu.laws.sequence import DWELL
-from kinfmu.measures import PoseQuantity
 from kinfmu.mechanism.body import RUN_TIMES
 from kinfmu.mechanism.declared import keys_of
 from kinfmu.mechanism.expression import Computed
+from kinfmu.mechanism.laws.sequence import DWELL
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.mechanism.number import NumberWithUnit, read_number
 from kinfmu.mechanism.parameters import Parameter
+from kinfmu.mechanism.quantities import PoseQuantity
 from kinfmu.units import Quantity, unit_of
 
 

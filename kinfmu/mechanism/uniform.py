@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import combinations, pairwise
 from typing import NamedTuple
 
-from kinfmu.measures.arithmetic import Value, sqrt
+from kinfmu.mechanism.quantities.arithmetic import Value, sqrt
 
 FLAT = 1e-12  # area of corners on a line, of the square of their distance
 

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kinfmu.arrays import FloatArray
 from kinfmu.codegen.python import load_model
-from kinfmu.equations.graph import Node, evaluate, symbols
 from kinfmu.errors import KinfmuError, RequestError, listed
 from kinfmu.mechanism.force_names import measured_forces
+from kinfmu.mechanism.measures import Finding, LowestMargin, PressureAngle, Reading
 from kinfmu.mechanism.settings import LawConstant
 from kinfmu.motion.crowding import is_crowded
 from kinfmu.motion.design_points import dependent_numbers, points_of_designs
@@ -33,18 +34,18 @@ from kinfmu.motion.measure import (
 from kinfmu.motion.motion import Motion
 from kinfmu.motion.needed import QuantityRead, needed
 from kinfmu.motion.quantity_model import quantity_model
-from kinfmu.motion.quintic import FloatArray, use_compiled
+from kinfmu.motion.quintic import use_compiled
 from kinfmu.motion.splitting import has_breaks
+from kinfmu.plan.equations.graph import Node, evaluate, symbols
 from kinfmu.plan.plan import PlanParameter
 from kinfmu.plan.trace import parameter_symbol
-from kinfmu.readings import Finding, LowestMargin, PressureAngle, Reading
 from kinfmu.run import Run
 from kinfmu.run.axis import TIME, axis_for
+from kinfmu.run.designs import Batch, Driving, parts_of, solve_batch, solve_by_library
+from kinfmu.run.driving import column_of, run_times
+from kinfmu.run.model import Model
 from kinfmu.run.numbers import numbers_of
 from kinfmu.solver.python.status import Status
-from kinfmu.sweep import Model
-from kinfmu.sweep.designs import Batch, Driving, parts_of, solve_batch, solve_by_library
-from kinfmu.sweep.driving import column_of, run_times
 from kinfmu.units import CoordinateName, InputName, Quantity, unit_of
 
 SAMPLES_AT_ONCE = 150_000  # of designs that are solved and measured together

@@ -7,12 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinfmu.equations.system import placement
-from kinfmu.joints import CamRoller
-from kinfmu.joints.joint import Joint
-from kinfmu.laws import External, Law
+from kinfmu.arrays import FloatArray
 from kinfmu.mechanism import Mechanism
-from kinfmu.run import FloatArray, Run
+from kinfmu.mechanism.joints import CamRoller
+from kinfmu.mechanism.joints.joint import Joint
+from kinfmu.mechanism.laws import External, Law
+from kinfmu.plan.equations.system import placement
+from kinfmu.run import Run
 from kinfmu.run.axis import TIME
 
 AT_SAMPLE = 1e-6  # of the step between samples; a break that is nearer to a sample is at it

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinfmu.motion.quintic import FloatArray, IntArray
+from kinfmu.arrays import FloatArray, IntArray
 
 _CLOSE = 0.1  # of the mean distance of samples
 _EQUAL = 0.03  # of the largest acceleration; samples that differ by more follow a steep change and are all kept

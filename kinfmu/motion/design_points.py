@@ -6,10 +6,10 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from kinfmu.measures.arithmetic import Value, atan2_like, cos, sin, sqrt
+from kinfmu.arrays import FloatArray
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.parameters import in_order, parameter_values
-from kinfmu.motion.quintic import FloatArray
+from kinfmu.mechanism.quantities.arithmetic import Value, atan2_like, cos, sin, sqrt
 
 sin.register(np.ndarray, np.sin)
 cos.register(np.ndarray, np.cos)

@@ -8,16 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kinfmu.arrays import FloatArray
 from kinfmu.display import Displayed
 from kinfmu.errors import KinfmuError, suggestion
+from kinfmu.mechanism.measures import Reading
 from kinfmu.mechanism.settings import read_tolerance
 from kinfmu.motion.batch_reading import BatchReading
 from kinfmu.processes import require_workers
-from kinfmu.readings import Reading
-from kinfmu.run import Column, FloatArray
+from kinfmu.run import Column
+from kinfmu.run.model import Model
 from kinfmu.run.tables import Tabular
 from kinfmu.solver.python.solver import TOLERANCE
-from kinfmu.sweep import Model
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -101,7 +102,7 @@ def measure_designs(
         model: The model, compiled with the outputs that the measures need, or with all.
         parameters: Arrays (m,) of parameters and law constants by name, one value for each design; numbers, and texts
             such as "30 rpm", hold for all.
-        measures: Measures such as `kinfmu.readings.Range("stroke", of="slider.x")`, or names of those of the mechanism.
+        measures: Measures such as `kinfmu.measures.Range("stroke", of="slider.x")`, or names of those of the mechanism.
             Default: those of the mechanism.
         t: (n,) times [s] for the laws of the file; default: those of the file's run, unless inputs are given.
         workers: Threads of the native engine; the Python engine has one.

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import RequestError
 from kinfmu.motion.history import History
-from kinfmu.motion.quintic import FloatArray
 from kinfmu.run.axis import TIME, HasAxis, axis_of, rates_per
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import RequestError
 from kinfmu.motion.history import History
-from kinfmu.motion.quintic import FloatArray
 
 _SAME = 1e-9  # of the travel of the driver; values closer than this are equal
 

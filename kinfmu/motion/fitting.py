@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.equations.taylor import Taylor
-from kinfmu.measures.arithmetic import sqrt
+from kinfmu.arrays import FloatArray, IntArray
+from kinfmu.mechanism.quantities.arithmetic import sqrt
 from kinfmu.motion.history import History
-from kinfmu.motion.quintic import FloatArray, IntArray
+from kinfmu.plan.equations.taylor import Taylor
 
 _ROUNDS = 5  # of linearizing and exchanging; the line and the circle need two or three
 _EXCHANGES = 60  # per round; each makes the smallest possible distance larger

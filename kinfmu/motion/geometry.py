@@ -15,11 +15,11 @@ import numpy as np
 
 from kinfmu.errors import RequestError
 from kinfmu.mechanism.checks import coordinate_orders
+from kinfmu.mechanism.measures import Reading
 from kinfmu.motion.history import History
 from kinfmu.motion.motion import Motion
-from kinfmu.readings import Reading
 from kinfmu.run import Run
-from kinfmu.sweep import solve
+from kinfmu.run.solve import solve
 
 _SAMPLES = 360  # in a turn, and in every range
 _AT_REST = 1e-12  # of the value of the driver; one that changes by less does not move

@@ -8,8 +8,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.arrays import FloatArray
 from kinfmu.motion.history import History
-from kinfmu.motion.quintic import FloatArray, ranges
+from kinfmu.motion.quintic import ranges
 
 _SAME_POSE = 1e-9  # [rad, sizes]; a motion whose first and last pose differ by less goes round
 _SAME_RATE = 1e-6  # of the largest; the same for rates and accelerations

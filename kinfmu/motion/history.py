@@ -13,10 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.equations.taylor import Taylor
+from kinfmu.arrays import FloatArray, IntArray
 from kinfmu.motion.quintic import (
-    FloatArray,
-    IntArray,
     Rows,
     coefficients,
     derived,
@@ -29,6 +27,7 @@ from kinfmu.motion.quintic import (
     polynomial,
     root,
 )
+from kinfmu.plan.equations.taylor import Taylor
 
 FEWEST = 3  # samples that an estimate of a third derivative needs
 _ROUNDING = 1e-13  # of the range of a quantity

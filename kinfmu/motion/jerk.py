@@ -7,19 +7,20 @@ from typing import Any
 
 import numpy as np
 
-from kinfmu.equations.jets import Jet
-from kinfmu.equations.system import placement
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import RequestError, listed, suggestion
-from kinfmu.joints.cam import Cam
-from kinfmu.joints.cam_flat_face import CamFlatFace
-from kinfmu.joints.cam_roller import CamRoller
-from kinfmu.joints.joint import Joint
-from kinfmu.laws import External
-from kinfmu.measures.placement import Placement
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.joints.cam import Cam
+from kinfmu.mechanism.joints.cam_flat_face import CamFlatFace
+from kinfmu.mechanism.joints.cam_roller import CamRoller
+from kinfmu.mechanism.joints.joint import Joint
+from kinfmu.mechanism.laws import External
+from kinfmu.mechanism.quantities.placement import Placement
 from kinfmu.motion.jet_equations import LEAST_MARGIN, JetEquations, derivative
 from kinfmu.motion.one_sided import OneSided
-from kinfmu.run import FloatArray, Run
+from kinfmu.plan.equations.jets import Jet
+from kinfmu.plan.equations.system import placement
+from kinfmu.run import Run
 from kinfmu.run.axis import TIME
 from kinfmu.solver.python.status import Status
 from kinfmu.units import CoordinateName

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from kinfmu.equations.jets import Jet
-from kinfmu.equations.system import System, placement
-from kinfmu.joints.joint import Joint
+from kinfmu.arrays import FloatArray
 from kinfmu.mechanism import Mechanism
-from kinfmu.run import FloatArray
+from kinfmu.mechanism.joints.joint import Joint
+from kinfmu.plan.equations.jets import Jet
+from kinfmu.plan.equations.system import System, placement
 
 LEAST_MARGIN = 1e-6  # 1 / condition of the scaled Jacobian; below it a third derivative has no digits
 

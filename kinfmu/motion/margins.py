@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import RequestError
-from kinfmu.motion.quintic import FloatArray
 
 
 def lowest(

@@ -9,17 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.arrays import FloatArray
 from kinfmu.display import Displayed
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import measured_forces
+from kinfmu.mechanism.measures import LowestMargin, Reading
+from kinfmu.mechanism.measures.reading import Finding
 from kinfmu.mechanism.valid import quoted
 from kinfmu.motion.geometry import geometry_of
 from kinfmu.motion.motion import Motion
 from kinfmu.motion.needed import needed
-from kinfmu.readings import LowestMargin, Reading
-from kinfmu.readings.reading import Finding
-from kinfmu.run import FloatArray, Run
+from kinfmu.run import Run
 from kinfmu.run.axis import HasAxis, axis_of
 from kinfmu.units import unit_of
 
@@ -77,7 +78,7 @@ def measure(run: Run, measures: Iterable[Reading | str] | None = None) -> Measur
 
     Args:
         run: The motion: samples over time, or over the value of one driver at a constant speed.
-        measures: Measures such as `kinfmu.readings.Range("stroke", of="slider.x")`, or names of those of the mechanism.
+        measures: Measures such as `kinfmu.measures.Range("stroke", of="slider.x")`, or names of those of the mechanism.
             Default: those of the mechanism.
 
     Returns:
@@ -131,7 +132,7 @@ def listed_measures(measures: Iterable[Reading | str] | Reading | str) -> list[R
     found = [measures] if alone else list(measures)  # type: ignore[arg-type]
     for one in found:
         if not isinstance(one, str | Reading):
-            raise RequestError(f"measures: {one!r} is neither a measure such as kinfmu.readings.Range nor a name")
+            raise RequestError(f"measures: {one!r} is neither a measure such as kinfmu.measures.Range nor a name")
     return found  # type: ignore[return-value]
 
 

@@ -10,16 +10,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.equations.system import size_of
-from kinfmu.equations.taylor import Taylor
+from kinfmu.arrays import FloatArray, IntArray
 from kinfmu.errors import RequestError
-from kinfmu.measures import PoseQuantity
-from kinfmu.measures.arithmetic import Value, sqrt
-from kinfmu.measures.placement import GROUND, BodyFrame, Placement, body_of, unit_vector
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.force_names import NEVER_NEGATIVE
 from kinfmu.mechanism.members import kind_of_measured
+from kinfmu.mechanism.quantities import PoseQuantity
+from kinfmu.mechanism.quantities.arithmetic import Value, sqrt
+from kinfmu.mechanism.quantities.placement import GROUND, BodyFrame, Placement, body_of, unit_vector
 from kinfmu.motion.crowding import is_crowded, spread
 from kinfmu.motion.driven_samples import driven_samples
 from kinfmu.motion.driver_values import driven_at, window, within_period
@@ -30,9 +29,10 @@ from kinfmu.motion.margins import lowest
 from kinfmu.motion.needed import Cosine, PathCoordinate, QuantityRead, cosine_between, is_angle, value_of
 from kinfmu.motion.poles import first_pole
 from kinfmu.motion.quantity_names import QuantityNames
-from kinfmu.motion.quintic import FloatArray, IntArray
 from kinfmu.motion.sampled import sampled_history
 from kinfmu.motion.splitting import ORDER, Break, distinct, law_breaks, split_at
+from kinfmu.plan.equations.system import size_of
+from kinfmu.plan.equations.taylor import Taylor
 from kinfmu.run import Run
 from kinfmu.run.axis import TIME
 from kinfmu.units import CoordinateName, Quantity

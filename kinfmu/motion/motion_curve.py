@@ -9,16 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.equations.jets import Jet
-from kinfmu.equations.system import placement
-from kinfmu.joints import CamRoller
-from kinfmu.laws.law import TURN
+from kinfmu.arrays import FloatArray
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.joints import CamRoller
+from kinfmu.mechanism.laws.law import TURN
 from kinfmu.motion.breaks import AT_SAMPLE, FollowedLaw, bracket, breaks_of, followed_laws
 from kinfmu.motion.jerk import motion_of, quantity_table, targets_at
 from kinfmu.motion.jet_equations import LEAST_MARGIN, JetEquations, derivative, with_derivative
 from kinfmu.motion.one_sided import OneSided
-from kinfmu.run import FloatArray, Run
+from kinfmu.plan.equations.jets import Jet
+from kinfmu.plan.equations.system import placement
+from kinfmu.run import Run
 from kinfmu.run.axis import TIME
 from kinfmu.solver.python.status import Status
 

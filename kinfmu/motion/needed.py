@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
-from kinfmu.measures import PoseQuantity
-from kinfmu.measures.arithmetic import Value, sqrt
-from kinfmu.measures.placement import Placement, PointPair, body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.checks import coordinate_orders
+from kinfmu.mechanism.measures import LowestMargin, PressureAngle, Reading, TransmissionAngle
 from kinfmu.mechanism.members import COORDINATES
-from kinfmu.readings import LowestMargin, PressureAngle, Reading, TransmissionAngle
+from kinfmu.mechanism.quantities import PoseQuantity
+from kinfmu.mechanism.quantities.arithmetic import Value, sqrt
+from kinfmu.mechanism.quantities.placement import Placement, PointPair, body_of
 from kinfmu.units import CoordinateName
 
 

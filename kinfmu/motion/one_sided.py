@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from kinfmu.equations.jets import Jet
-from kinfmu.laws import Law
-from kinfmu.laws.law import Constant
-from kinfmu.measures.arithmetic import Value
-from kinfmu.motion.quintic import FloatArray
+from kinfmu.arrays import FloatArray
+from kinfmu.mechanism.laws import Law
+from kinfmu.mechanism.laws.law import Constant
+from kinfmu.mechanism.quantities.arithmetic import Value
+from kinfmu.plan.equations.jets import Jet
 
 
 @dataclass(frozen=True, eq=False)

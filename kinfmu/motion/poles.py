@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.motion.history import History
-from kinfmu.motion.quintic import FloatArray
 
 _SLOW = 1e-6  # of the largest speed; of two quantities that turn back together both are
 _RESTING = 1e-12  # of the largest speed, at a sample

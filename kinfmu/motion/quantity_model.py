@@ -7,15 +7,15 @@ from dataclasses import replace
 from typing import Any
 from weakref import WeakKeyDictionary
 
-from kinfmu.equations.graph import Node, symbols
-from kinfmu.measures.placement import GROUND, BodyFrame, Placement
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.members import COORDINATES
+from kinfmu.mechanism.quantities.placement import GROUND, BodyFrame, Placement
 from kinfmu.motion.needed import QuantityRead, is_angle, value_of
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.equations.graph import Node, symbols
 from kinfmu.plan.plan import MotionNodes
 from kinfmu.plan.trace import is_parameter, parameter_symbol
-from kinfmu.sweep import Model
+from kinfmu.run.model import Model
 from kinfmu.units import CoordinateName
 
 _MOST_KEPT = 8  # of each model

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from kinfmu.arrays import FloatArray, IntArray
+
 Rows = tuple[FloatArray, FloatArray, FloatArray]  # (m, n) values, rates and accelerations of a quantity
 
 _STEPS = 60  # of a root in its interval; Newton needs a few of them, halving at most 53

@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray, IntArray
 from kinfmu.motion.history import History
-from kinfmu.motion.quintic import FloatArray, IntArray
 
 _WIDE, _NARROW = 7, 5  # samples of a polynomial: of degree 6, and of degree 4 to judge it
 _ROUGH = 1e-3  # of the range of 7 samples; where the rates of both polynomials differ by more in a step, it has a kink

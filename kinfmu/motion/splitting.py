@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinfmu.laws.law import Jumps
+from kinfmu.arrays import FloatArray, IntArray
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.laws.law import Jumps
 from kinfmu.motion.history import History
-from kinfmu.motion.quintic import FloatArray, IntArray
 
 ORDER = 5  # derivatives up to this one count: those of the polynomials between samples
 _SAME = 1e-6  # of the distance of samples; a break that is closer to a sample is at it

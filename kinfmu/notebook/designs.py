@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.display import escaped, html_of, page, table
 from kinfmu.motion import DesignMeasures
 from kinfmu.notebook.picture import MOST_ROWS, some
-from kinfmu.run import FloatArray
-from kinfmu.sweep import Designs, Sensitivities
+from kinfmu.run.designs import Designs
+from kinfmu.run.sensitivities import Sensitivities
 
 
 @html_of.register

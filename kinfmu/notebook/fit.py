@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from kinfmu.design.fit import FitResult
+from kinfmu.design.fit.picture import content_of
+from kinfmu.design.fit.text import parameter_rows
 from kinfmu.display import html_of, page, svg_of, table
 from kinfmu.draw.fitted import figure_of
 from kinfmu.draw.writing import svg_text
 from kinfmu.notebook.picture import picture
-from kinfmu.synthesis import FitResult
-from kinfmu.synthesis.picture import content_of
-from kinfmu.synthesis.text import parameter_rows
 
 
 @html_of.register

@@ -11,12 +11,12 @@ from kinfmu.display import html_of, page, svg_of, table, widget_of
 from kinfmu.draw.drawing import sheet_of
 from kinfmu.draw.instant import instant
 from kinfmu.draw.writing import svg_text
-from kinfmu.equations.redundancy import find_redundancy
-from kinfmu.equations.system import System
 from kinfmu.errors import KinfmuError
 from kinfmu.mechanism import Mechanism
 from kinfmu.notebook.picture import picture, some
 from kinfmu.plan import localized, plan_from
+from kinfmu.plan.equations.redundancy import find_redundancy
+from kinfmu.plan.equations.system import System
 
 _LARGEST = 300  # coordinates; mobility and plan of larger mechanisms take seconds
 _KEPT = 8  # drawings
@@ -46,7 +46,7 @@ def live(mechanism: Mechanism) -> Any:
     """Return the live mechanism; None without anywidget and ziglang, and for large ones, whose page takes long."""
     if len(mechanism.coordinate_names) > _LARGEST or not (find_spec("anywidget") and find_spec("ziglang")):
         return None
-    from kinfmu.player import play
+    from kinfmu.page.player import play
 
     return play(mechanism)
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from kinfmu.design.study import StudyResult
+from kinfmu.design.study.figure import figure_of
+from kinfmu.design.study.summary import about, disagreement, failures, measure_rows
 from kinfmu.display import escaped, html_of, page, svg_of, table
 from kinfmu.draw.writing import svg_text
 from kinfmu.notebook.picture import picture
-from kinfmu.studies import StudyResult
-from kinfmu.studies.figure import figure_of
-from kinfmu.studies.summary import about, disagreement, failures, measure_rows
 
 
 @html_of.register

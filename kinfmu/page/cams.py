@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from kinfmu.cams.placed import members_of
-from kinfmu.joints import CamFlatFace, CamRoller, Revolute
-from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.joints import CamFlatFace, CamRoller, Revolute
+from kinfmu.mechanism.quantities.placement import body_of
+from kinfmu.motion.cams.placed import members_of
 from kinfmu.page.dependencies import number_data
 
 CAM_SHAPES = ("cam", "pitch", "face")  # kinds; a cam with one of them is known

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from kinfmu.joints.joint import Joint
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.expression import Expression
+from kinfmu.mechanism.joints.joint import Joint
 from kinfmu.mechanism.members import NumberPath
 
 

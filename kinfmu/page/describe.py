@@ -18,31 +18,31 @@ from kinfmu.analysis.loops import FourBar, Place
 from kinfmu.analysis.measuring import turns_of_cycle
 from kinfmu.analysis.text import contact_text
 from kinfmu.draw.instant import instant
-from kinfmu.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
-from kinfmu.joints import CamFlatFace, CamRoller, Coordinate, Distance, PointOnLine, Translational
-from kinfmu.joints.joint import Joint
-from kinfmu.laws import ConstantValue
-from kinfmu.loads import Following, ForceAlong, ForceAt
-from kinfmu.measures.placement import body_of, unit_vector
+from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.gravity import gravity_direction
+from kinfmu.draw.scene.instant import Instant
+from kinfmu.draw.scene.load_shapes import EFFORT_UNITS, load_text
+from kinfmu.draw.scene.shape import Shape
+from kinfmu.draw.scene.shapes import shapes
+from kinfmu.draw.scene.slides import Slide, slides
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
 from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.force_names import force_names, reaction_names_of
+from kinfmu.mechanism.joints import CamFlatFace, CamRoller, Coordinate, Distance, PointOnLine, Translational
+from kinfmu.mechanism.joints.joint import Joint
+from kinfmu.mechanism.laws import ConstantValue
+from kinfmu.mechanism.loads import Following, ForceAlong, ForceAt
 from kinfmu.mechanism.members import NumberPath
 from kinfmu.mechanism.parameters import Parameter
+from kinfmu.mechanism.quantities.placement import body_of, unit_vector
 from kinfmu.mechanism.toml_text import text
 from kinfmu.page.cams import CAM_SHAPES, cam_data
 from kinfmu.page.dependencies import dependent_points, number_data, parameters_of
 from kinfmu.page.module import PageModule
 from kinfmu.page.opened import AXES, place_text
 from kinfmu.plan.undetermined import undetermined_reactions
-from kinfmu.scene import palette
-from kinfmu.scene.gravity import gravity_direction
-from kinfmu.scene.instant import Instant
-from kinfmu.scene.load_shapes import EFFORT_UNITS, load_text
-from kinfmu.scene.shape import Shape
-from kinfmu.scene.shapes import shapes
-from kinfmu.scene.slides import Slide, slides
 from kinfmu.units import Quantity, unit_of
 from kinfmu.version import VERSION
 

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import KinfmuError, listed
 from kinfmu.mechanism import Mechanism
-from kinfmu.run import FloatArray, Run
+from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
 
 MOST = 400  # samples in a page, first and last among them; between them values are interpolated linearly

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kinfmu.equations.assembly import SINGULAR, Assembled, AssembledStart, closes_nearby
-from kinfmu.equations.closing import branches, close, margin
-from kinfmu.equations.start_poses import StartValues, open_joints_text, start_from_poses
-from kinfmu.equations.system import FloatArray, System
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import AmbiguousStartError, AssemblyError, MobilityError, listed
+from kinfmu.plan.equations.assembly import SINGULAR, Assembled, AssembledStart, closes_nearby
+from kinfmu.plan.equations.closing import branches, close, margin
+from kinfmu.plan.equations.start_poses import StartValues, open_joints_text, start_from_poses
+from kinfmu.plan.equations.system import System
 from kinfmu.plan.open_loop import find_open_loop
 
 

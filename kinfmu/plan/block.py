@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.equations.graph import Node, evaluate, symbols
-from kinfmu.equations.system import Row, System
 from kinfmu.plan.companions import BlockStructure
+from kinfmu.plan.equations.graph import Node, evaluate, symbols
+from kinfmu.plan.equations.system import Row, System
 from kinfmu.plan.origin import FarRows
 from kinfmu.plan.structure import RowTracer, given_value
 from kinfmu.plan.trace import Tracer, is_parameter

@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinfmu.equations.part import Part
-from kinfmu.equations.redundancy import Redundancy
-from kinfmu.equations.system import FloatArray, System
+from kinfmu.arrays import FloatArray
+from kinfmu.plan.equations.part import Part
+from kinfmu.plan.equations.redundancy import Redundancy
+from kinfmu.plan.equations.system import System
 from kinfmu.units import CoordinateName
 
 _POSES = 64  # of the motion at which a block is looked at; with their steps, one turn each way

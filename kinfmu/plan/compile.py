@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
-from kinfmu.drivers import Driver
-from kinfmu.equations.graph import Node, symbols
-from kinfmu.equations.redundancy import Redundancy, find_redundancy
-from kinfmu.equations.system import System
 from kinfmu.errors import RequestError, listed, suggestion
-from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism import Mechanism, Point
+from kinfmu.mechanism.drivers import Driver
+from kinfmu.mechanism.quantities.arithmetic import Value
 from kinfmu.plan.anchor import find_anchor
 from kinfmu.plan.block import Block, TimeDerivatives, build_block
 from kinfmu.plan.conditions import (
@@ -20,6 +17,9 @@ from kinfmu.plan.conditions import (
     refuse_negative_distances,
     refuse_undefined_loads,
 )
+from kinfmu.plan.equations.graph import Node, symbols
+from kinfmu.plan.equations.redundancy import Redundancy, find_redundancy
+from kinfmu.plan.equations.system import System
 from kinfmu.plan.origin import far_rows, localized
 from kinfmu.plan.path_laws import find_path_laws
 from kinfmu.plan.plan import DriverInfo, MotionNodes, PlanParameter, SolvePlan, nodes_of, position_count

@@ -7,19 +7,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kinfmu.equations.assembly import Assembled
-from kinfmu.equations.closing import close, motion_samples, null_space
-from kinfmu.equations.graph import Node
-from kinfmu.equations.part import Part
-from kinfmu.equations.redundancy import Redundancy
-from kinfmu.equations.start_poses import StartValues
-from kinfmu.equations.system import System, placement
 from kinfmu.errors import AssemblyError, InconsistentError, MobilityError, listed
-from kinfmu.joints.joint import Condition
-from kinfmu.measures import DistanceBetween
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.joints.joint import Condition
 from kinfmu.mechanism.members import NumberPath, path_text
+from kinfmu.mechanism.quantities import DistanceBetween
 from kinfmu.plan.anchor import does_not_close
+from kinfmu.plan.equations.assembly import Assembled
+from kinfmu.plan.equations.closing import close, motion_samples, null_space
+from kinfmu.plan.equations.graph import Node
+from kinfmu.plan.equations.part import Part
+from kinfmu.plan.equations.redundancy import Redundancy
+from kinfmu.plan.equations.start_poses import StartValues
+from kinfmu.plan.equations.system import System, placement
 from kinfmu.plan.trace import Tracer
 from kinfmu.units import Quantity
 

@@ -20,10 +20,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from kinfmu.equations.graph import Node
-from kinfmu.joints import CamOscillating, CamTranslating, Joint, Revolute, Translational
-from kinfmu.joints.cam import Cam
-from kinfmu.measures.placement import Placement, body_of
+from kinfmu.mechanism.joints import CamOscillating, CamTranslating, Joint, Revolute, Translational
+from kinfmu.mechanism.joints.cam import Cam
+from kinfmu.mechanism.quantities.placement import Placement, body_of
+from kinfmu.plan.equations.graph import Node
 from kinfmu.plan.mechanics import Mechanics
 from kinfmu.plan.steps import Assignment
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from kinfmu.equations.graph import Node, reachable
 from kinfmu.plan.block import Block
+from kinfmu.plan.equations.graph import Node, reachable
 
 Frequencies = tuple[tuple[str, int], ...]  # angle -> multiple, the argument of a sine or cosine
 _Terms = dict[tuple[str, Frequencies], float]  # ('sin' or 'cos', argument) -> coefficient

@@ -20,11 +20,11 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import NamedTuple
 
-from kinfmu.equations.graph import Graph, Node
-from kinfmu.loads import Load
-from kinfmu.measures.arithmetic import sqrt
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import effort_noun, external_names, force_names
+from kinfmu.mechanism.loads import Load
+from kinfmu.mechanism.quantities.arithmetic import sqrt
+from kinfmu.plan.equations.graph import Graph, Node
 from kinfmu.plan.mechanics import Coefficients, Mechanics
 from kinfmu.plan.plan import SolvePlan
 from kinfmu.plan.steps import Step, needed_steps

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from kinfmu.equations.graph import Node, symbols
-from kinfmu.laws import Law
-from kinfmu.laws.law import TURN, Jumps
-from kinfmu.loads.following import Following
-from kinfmu.measures.arithmetic import Value
-from kinfmu.measures.placement import Placement
+from kinfmu.mechanism.laws import Law
+from kinfmu.mechanism.laws.law import TURN, Jumps
+from kinfmu.mechanism.loads.following import Following
+from kinfmu.mechanism.quantities.arithmetic import Value
+from kinfmu.mechanism.quantities.placement import Placement
+from kinfmu.plan.equations.graph import Node, symbols
 from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.mechanics import Mechanics
 from kinfmu.plan.plan import SolvePlan

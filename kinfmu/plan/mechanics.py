@@ -9,12 +9,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Literal, NamedTuple
 
-from kinfmu.equations.graph import Node
-from kinfmu.loads import Load
-from kinfmu.measures.placement import GROUND, BodyFrame, Placement
 from kinfmu.mechanism.body import GROUND_NAME, Body
+from kinfmu.mechanism.loads import Load
+from kinfmu.mechanism.quantities.placement import GROUND, BodyFrame, Placement
 from kinfmu.mechanism.settings import with_law_constants
 from kinfmu.plan.block import TimeDerivatives
+from kinfmu.plan.equations.graph import Node
 from kinfmu.plan.origin import localized
 from kinfmu.plan.plan import SolvePlan
 from kinfmu.plan.steps import Tracing, derivative_name, law_symbol

@@ -8,13 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinfmu.equations.assembly import in_order
-from kinfmu.equations.closing import CLOSED, close
-from kinfmu.equations.part import Part
-from kinfmu.equations.reach import cannot_close
-from kinfmu.equations.start_poses import StartValues
-from kinfmu.equations.system import FloatArray, Member, System
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import listed
+from kinfmu.plan.equations.assembly import in_order
+from kinfmu.plan.equations.closing import CLOSED, close
+from kinfmu.plan.equations.part import Part
+from kinfmu.plan.equations.reach import cannot_close
+from kinfmu.plan.equations.start_poses import StartValues
+from kinfmu.plan.equations.system import Member, System
 
 _RESTARTS = 12  # random poses of the bodies of a loop from which it may still close
 _LESS_WEIGHT = 100.0  # of the rows of the open joint: the least squares nearly close the others

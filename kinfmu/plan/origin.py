@@ -8,9 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinfmu.equations.system import FloatArray, System, size_of
-from kinfmu.measures.arithmetic import decimal_sum
+from kinfmu.arrays import FloatArray
 from kinfmu.mechanism import Mechanism, Point, Start
+from kinfmu.mechanism.quantities.arithmetic import decimal_sum
+from kinfmu.plan.equations.system import System, size_of
 from kinfmu.units import CoordinateName
 
 FAR = 4.0  # sizes from the world's origin beyond which a mechanism is planned about a ground point of its own

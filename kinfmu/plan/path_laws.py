@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
-from kinfmu.equations.graph import Node, symbols
-from kinfmu.joints import Coupling
-from kinfmu.laws.law import TURN
+from kinfmu.mechanism.joints import Coupling
+from kinfmu.mechanism.laws.law import TURN
 from kinfmu.plan.block import Block, TimeDerivatives
+from kinfmu.plan.equations.graph import Node, symbols
 from kinfmu.plan.trace import Tracer, is_parameter
 from kinfmu.units import CoordinateName
 

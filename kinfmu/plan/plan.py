@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Generic, NamedTuple, TypeVar
 
-from kinfmu.equations.assembly import Assembled
-from kinfmu.equations.graph import Node, evaluate, reachable, symbols
 from kinfmu.mechanism import LawConstant, Mechanism, Point
 from kinfmu.plan.block import Block
 from kinfmu.plan.conditions import PlanCondition
+from kinfmu.plan.equations.assembly import Assembled
+from kinfmu.plan.equations.graph import Node, evaluate, reachable, symbols
 from kinfmu.plan.path_laws import PathLaws
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.units import CoordinateName, InputName, Quantity

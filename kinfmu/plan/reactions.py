@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Container
 
-from kinfmu.equations.graph import Node
-from kinfmu.equations.system import System
 from kinfmu.mechanism.force_names import names_of_rows, reaction_names_of
 from kinfmu.plan.block import Block
 from kinfmu.plan.contacts import carried
+from kinfmu.plan.equations.graph import Node
+from kinfmu.plan.equations.system import System
 from kinfmu.plan.forces import ForceSteps, chosen_steps
 from kinfmu.plan.mechanics import Mechanics
 from kinfmu.plan.origin import localized

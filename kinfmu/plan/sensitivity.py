@@ -16,8 +16,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from kinfmu.equations.graph import Graph, Node
 from kinfmu.mechanism.parameters import parameter_values
+from kinfmu.plan.equations.graph import Graph, Node
 from kinfmu.plan.plan import SolvePlan
 from kinfmu.plan.steps import Step, Tracing, law_symbol, needed_steps
 from kinfmu.plan.trace import parameter_symbol

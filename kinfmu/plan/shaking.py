@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from collections.abc import Container
 
-from kinfmu.equations.graph import Node
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.force_names import shaking_names
+from kinfmu.plan.equations.graph import Node
 from kinfmu.plan.forces import ForceSteps, chosen_steps
 from kinfmu.plan.mechanics import Mechanics
 from kinfmu.plan.plan import SolvePlan

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple, Protocol
 
-from kinfmu.equations.graph import Graph, Node, reachable, symbols
 from kinfmu.plan.block import Block
+from kinfmu.plan.equations.graph import Graph, Node, reachable, symbols
 from kinfmu.plan.plan import SolvePlan
 
 

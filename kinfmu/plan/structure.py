@@ -10,12 +10,13 @@ from collections import ChainMap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from kinfmu.equations.blocks import ordered_blocks
-from kinfmu.equations.graph import Node, symbols
-from kinfmu.equations.redundancy import Redundancy
-from kinfmu.equations.system import FloatArray, System
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import MobilityError, listed
 from kinfmu.plan.companions import BlockStructure, with_companions
+from kinfmu.plan.equations.blocks import ordered_blocks
+from kinfmu.plan.equations.graph import Node, symbols
+from kinfmu.plan.equations.redundancy import Redundancy
+from kinfmu.plan.equations.system import System
 from kinfmu.plan.origin import far_rows
 from kinfmu.plan.trace import Tracer, is_parameter
 from kinfmu.units import CoordinateName

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from kinfmu.drivers import Driver
-from kinfmu.equations.graph import Graph, Node
-from kinfmu.joints import Joint
-from kinfmu.measures.placement import GROUND, BodyFrame, Placement, body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.drivers import Driver
+from kinfmu.mechanism.joints import Joint
+from kinfmu.mechanism.quantities.placement import GROUND, BodyFrame, Placement, body_of
+from kinfmu.plan.equations.graph import Graph, Node
 
 
 class ParameterSymbol(str):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinfmu.equations.closing import motion_samples, null_space
-from kinfmu.equations.part import Part
-from kinfmu.equations.system import FloatArray, System
-from kinfmu.joints.cam import Cam
+from kinfmu.arrays import FloatArray
 from kinfmu.mechanism.force_names import reaction_names_of
+from kinfmu.mechanism.joints.cam import Cam
 from kinfmu.plan.contacts import follower_of, known_contacts, supports
+from kinfmu.plan.equations.closing import motion_samples, null_space
+from kinfmu.plan.equations.part import Part
+from kinfmu.plan.equations.system import System
 from kinfmu.plan.origin import localized
 from kinfmu.plan.plan import SolvePlan
 from kinfmu.units import ForceName

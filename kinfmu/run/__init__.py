@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kinfmu.run.run import MOST_SAMPLES, Event, FloatArray, IntArray, Run, Sink
+from kinfmu.run.run import MOST_SAMPLES, Event, Run, Sink
 from kinfmu.run.tables import Column
 
-__all__ = ["MOST_SAMPLES", "Column", "Event", "FloatArray", "IntArray", "Run", "Sink"]
+__all__ = ["MOST_SAMPLES", "Column", "Event", "Run", "Sink"]

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import listed
 from kinfmu.units import ANGLES, InputName, unit_of
 
-FloatArray = NDArray[np.float64]
 TIME, SAMPLE = "time", "sample"  # axes of runs; the others are names of inputs, such as 'crank_angle'
 DEGREE = ANGLES["deg"]
 _LARGE = 1e9  # [rad]; larger angles stay in radians

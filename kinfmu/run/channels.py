@@ -7,9 +7,10 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray, IntArray
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.run.axis import TIME
-from kinfmu.run.run import FloatArray, IntArray, Run
+from kinfmu.run.run import Run
 from kinfmu.units import CoordinateName, ForceName, SignalName, unit_of
 
 ALWAYS = ("time", "solver.status")  # without them a sample has no meaning

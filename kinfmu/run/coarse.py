@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kinfmu.run.run import FloatArray
+from kinfmu.arrays import FloatArray
 from kinfmu.units import InputName
 
 _MOST_TURN = math.pi / 3.0  # [rad] between samples: six samples a turn

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import RequestError
-from kinfmu.run.run import FloatArray
 
 _DOUBLE = np.dtype(np.float64)
 _NO_NUMBERS: dict[tuple[type, ...], str] = {  # types that numpy makes floats of

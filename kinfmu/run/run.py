@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.arrays import FloatArray, IntArray
 from kinfmu.display import Displayed
 from kinfmu.errors import KinfmuError, listed, suggestion
 from kinfmu.run.axis import TIME, axis_of, rates_per
@@ -23,8 +24,6 @@ from kinfmu.units import CoordinateName, ForceName, InputName, SignalName, read_
 if TYPE_CHECKING:
     from kinfmu.mechanism import Mechanism
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 MOST_SAMPLES = 10_000_000  # a table of them fills the memory of a large machine
 _SHAKING = 3  # columns of shaking force and moment, the last reactions

@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, Start, gallery
+from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, Start
 from kinfmu.analysis.assemblies import Assemblies, find_assemblies
-from kinfmu.equations.start_poses import open_joints, start_from_poses
-from kinfmu.equations.system import System
 from kinfmu.errors import AssemblyError, MobilityError
-from kinfmu.joints import Coordinate, Distance, Translational
+from kinfmu.mechanism import gallery
+from kinfmu.mechanism.joints import Coordinate, Distance, Translational
 from kinfmu.plan import SolvePlan, compile_plan, localized
+from kinfmu.plan.equations.start_poses import open_joints, start_from_poses
+from kinfmu.plan.equations.system import System
 from tests.analysis.linkages import digger, five_bar_arm, pushed_crank
 from tests.gallery_members import mostly_long
 from tests.mechanisms import bar_linkage, five_bar, fourbar, reference_fourbar, six_bar, slider_crank

@@ -10,7 +10,7 @@ import pytest
 
 import kinfmu
 from kinfmu.analysis.matrices import row_reduced
-from kinfmu.gallery.chains import fourbar_chain
+from kinfmu.mechanism.gallery.chains import fourbar_chain
 from tests.mechanisms import bar_as_body, five_bar, fourbar, reference_fourbar, six_bar, slider_crank
 
 

@@ -7,15 +7,15 @@ from dataclasses import replace
 
 import pytest
 
-from kinfmu import gallery
 from kinfmu.analysis import check
 from kinfmu.analysis.file_notes import file_notes
 from kinfmu.analysis.unit_notes import unit_notes
 from kinfmu.errors import MechanismError
-from kinfmu.joints.cam import CamOscillating
-from kinfmu.laws.sequence import MotionSequence, Segment
+from kinfmu.mechanism import gallery
+from kinfmu.mechanism.joints.cam import CamOscillating
+from kinfmu.mechanism.laws.sequence import MotionSequence, Segment
 from kinfmu.mechanism.toml_file import parse
-from kinfmu.sweep.continued import continued
+from kinfmu.run.continued import continued
 from kinfmu.units import METRES
 from tests.mechanism.test_wrong_files import CRANK_ROCKER, DRIVER
 

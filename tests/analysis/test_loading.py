@@ -14,7 +14,7 @@ import pytest
 
 import kinfmu
 from kinfmu.mechanism.toml_file import parse
-from tests.sweep.test_forces import loaded
+from tests.run.test_forces import loaded
 
 ARM = """
 name = "arm"

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 import kinfmu
+from kinfmu.design.fit import MeasureConstraint, MeasureTarget
 from kinfmu.draw.study_panels import Quantities
+from kinfmu.mechanism.measures import counted_from
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text as toml_text
-from kinfmu.readings import counted_from
-from kinfmu.synthesis import MeasureConstraint, MeasureTarget
 
 _MEASURES = """
 [measures.transmission]

@@ -8,10 +8,10 @@ from dataclasses import replace
 import pytest
 
 import kinfmu
+from kinfmu.design.study.definition import define
 from kinfmu.mechanism import toml_text
+from kinfmu.mechanism.measures import Maximum, Minimum, PeakSpeed, Range, TimeRatio
 from kinfmu.mechanism.toml_file import parse
-from kinfmu.readings import Maximum, Minimum, PeakSpeed, Range, TimeRatio
-from kinfmu.studies.definition import define
 
 
 def test_a_driver_that_turns_round_is_measured_over_one_turn_at_its_speed() -> None:

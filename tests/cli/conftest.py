@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
-from kinfmu import gallery
 from kinfmu.cli import main
+from kinfmu.mechanism import gallery
 
 Command = Callable[..., Result]
 

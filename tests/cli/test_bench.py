@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import gallery
-from kinfmu.bench import accuracy, case, chains, crank_rockers, designs, log_files, native_sweep, singular
-from kinfmu.bench.engines import ENGINES, SHIPPED
-from kinfmu.bench.page import PAGE, SETTINGS_PAGE
-from kinfmu.bench.singular_points import POINTS
+from benchmarks import accuracy, case, chains, crank_rockers, designs, log_files, native_sweep, singular
+from benchmarks.engines import ENGINES, SHIPPED
+from benchmarks.page import PAGE, SETTINGS_PAGE
+from benchmarks.singular_points import POINTS
 from kinfmu.cli.bench import ALL, MEASUREMENTS, default_folder
 from kinfmu.codegen.c import compiler
 from kinfmu.errors import CompilerError
+from kinfmu.mechanism import gallery
 from tests import oracle
 from tests.cli.conftest import Command
 
@@ -262,7 +262,7 @@ def test_a_sweep_is_compared_with_the_closed_form(monkeypatch: pytest.MonkeyPatc
     except CompilerError as error:
         pytest.skip(str(error))
     monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
-    monkeypatch.setattr("kinfmu.sweep.library.FLAGS", ("-O1",))
+    monkeypatch.setattr("kinfmu.run.library.FLAGS", ("-O1",))
     monkeypatch.setattr(native_sweep, "FLAGS", ("-O1",))
     table = native_sweep.run(rounds=1, samples=2000, loops=3)
     assert table.splitlines()[2].split()[-1] == "1.00"

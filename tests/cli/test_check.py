@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinfmu import gallery
+from kinfmu.mechanism import gallery
 from tests.cli.conftest import Command
 
 

@@ -17,10 +17,11 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import gallery, log
+from kinfmu import log
 from kinfmu.cli import main
 from kinfmu.cli.group import ORDER
 from kinfmu.fmu.native.platforms import host
+from kinfmu.mechanism import gallery
 from kinfmu.units import CoordinateName
 from tests.cli.conftest import Command, read_csv
 from tests.gallery_members import every_member

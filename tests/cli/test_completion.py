@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from kinfmu import gallery
+from kinfmu.mechanism import gallery
 
 SCRIPT = """
 eval "$(_KINFMU_COMPLETE=bash_source kinfmu)"

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 import kinfmu
-from kinfmu import gallery
 from kinfmu.cli import main
+from kinfmu.mechanism import gallery
 from tests.cli.conftest import Command
 
 FILES = {

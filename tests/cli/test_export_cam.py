@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 
 from kinfmu.cli import main
 from kinfmu.mechanism.toml_text import text as toml_text
-from tests.cams import followers
+from tests.motion.cams import followers
 
 
 def export(*arguments: str) -> Result:

@@ -11,7 +11,7 @@ import pytest
 import kinfmu
 from kinfmu.cli import main
 from tests.cli.conftest import Command
-from tests.studies.linkage import write
+from tests.design.study.linkage import write
 
 NAMES = "|".join(sorted(main.commands))
 HINT = re.compile(rf"kinfmu ((?:{NAMES}) [^;|]*)")

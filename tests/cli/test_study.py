@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 from kinfmu.cli import main
 from tests.cli.test_colours import on_a_terminal
-from tests.studies.linkage import write
+from tests.design.study.linkage import write
 
 GRID = 'mechanism = "hoeken.toml"\nparameters.base = { from = 40, to = 300, count = 3 }\n'
 LONG = 'mechanism = "hoeken.toml"\ndesigns = 5000\nparameters.base = { from = 40, to = 50 }\n'

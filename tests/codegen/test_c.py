@@ -16,13 +16,14 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import AngleDriver, Body, ConstantSpeed, Gear, Mechanism, Revolute, gallery
+from kinfmu import AngleDriver, Body, ConstantSpeed, Gear, Mechanism, Revolute
 from kinfmu.codegen.c import compiler, emit
 from kinfmu.codegen.python import load_model, load_module
 from kinfmu.errors import CompilerError
+from kinfmu.mechanism import gallery
 from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.run import library
 from kinfmu.solver.python import Solver
-from kinfmu.sweep import library
 from tests.fmu.test_parameters import geared, linkage
 from tests.gallery_members import FEW, mostly_long
 from tests.solver.c.native import SAME_SINES, STRICT, numbers

@@ -18,11 +18,11 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import gallery
 from kinfmu.codegen.c import compiler, library_cache
 from kinfmu.errors import CompilerError
+from kinfmu.mechanism import gallery
 from kinfmu.plan import compile_plan
-from kinfmu.sweep.library import Library
+from kinfmu.run.library import Library
 
 SEVEN = {"a.c": "int f(void);\nint f(void) { return 7; }\n"}
 EIGHT = {"a.c": "int f(void);\nint f(void) { return 8; }\n"}
@@ -239,7 +239,7 @@ def test_without_a_place_to_write_one_line_names_it(cache: Path, monkeypatch: py
 
 def test_without_a_place_to_write_auto_takes_the_python_engine(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     unusable(cache, monkeypatch)
-    monkeypatch.setattr(import_module("kinfmu.sweep.model"), "WORTH_COMPILING", 10)
+    monkeypatch.setattr(import_module("kinfmu.run.model"), "WORTH_COMPILING", 10)
     run = kinfmu.solve(kinfmu.load("crank_rocker"), np.linspace(0.0, 1.0, 20), engine="auto")
     assert run.info["engine"] == "python"
     assert (run.status == 0).all()

@@ -10,11 +10,11 @@ import pytest
 
 from kinfmu import Body, Mechanism, load
 from kinfmu.codegen.python import emit, load_model
-from kinfmu.equations.redundancy import find_redundancy
-from kinfmu.equations.reference import solve_reference
-from kinfmu.equations.system import System
-from kinfmu.gallery import chains
+from kinfmu.mechanism.gallery import chains
 from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.plan.equations.redundancy import find_redundancy
+from kinfmu.plan.equations.reference import solve_reference
+from kinfmu.plan.equations.system import System
 from kinfmu.solver.python import Solver, estimate
 from tests.mechanisms import bar_as_body, bar_linkage, five_bar, fourbar, reference_fourbar, six_bar, slider_crank
 

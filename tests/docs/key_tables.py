@@ -6,13 +6,13 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-from kinfmu.drivers import DRIVERS
-from kinfmu.joints import JOINTS
-from kinfmu.laws import LAWS, LawQuantity
-from kinfmu.loads import LOADS
-from kinfmu.measures import POSE_QUANTITIES
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
-from kinfmu.readings import READINGS
+from kinfmu.mechanism.drivers import DRIVERS
+from kinfmu.mechanism.joints import JOINTS
+from kinfmu.mechanism.laws import LAWS, LawQuantity
+from kinfmu.mechanism.loads import LOADS
+from kinfmu.mechanism.measures import READINGS
+from kinfmu.mechanism.quantities import POSE_QUANTITIES
 from kinfmu.units import ANGLES, KINDS, METRES, OTHER_SPELLINGS, SECONDS, Quantity
 
 SHAPES = {

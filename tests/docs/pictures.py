@@ -18,7 +18,7 @@ import kinfmu
 from kinfmu.cli import main
 from kinfmu.draw import figure
 from kinfmu.page import page
-from tests.loads.every_load import every_load
+from tests.mechanism.loads.every_load import every_load
 from tests.page.browser import DESKTOP, PHONE
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from kinfmu.bench.accuracy import MECHANISMS
-from kinfmu.bench.charts import LOOKS, NEAR_SINGULAR, SUFFIXES, WORK_PRECISION
-from kinfmu.bench.engines import ENGINES
-from kinfmu.bench.page import PARTS, SETTINGS_PAGE, begin, end, row_head
-from kinfmu.bench.singular_points import POINTS
+from benchmarks.accuracy import MECHANISMS
+from benchmarks.charts import LOOKS, NEAR_SINGULAR, SUFFIXES, WORK_PRECISION
+from benchmarks.engines import ENGINES
+from benchmarks.page import PARTS, SETTINGS_PAGE, begin, end, row_head
+from benchmarks.singular_points import POINTS
 from kinfmu.cli import main
-from kinfmu.gallery import load
+from kinfmu.mechanism.gallery import load
 from kinfmu.solver.python import Status
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -33,11 +33,11 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
         shutil.copytree(ROOT / folder, copy / folder, ignore=skipped)
     shutil.copy(ROOT / "pyproject.toml", copy)
     joint, export = blocks("python")
-    (named,) = re.findall(r"`kinfmu/joints/(opposed\.py)`:", PAGE)
+    (named,) = re.findall(r"`kinfmu/mechanism/joints/(opposed\.py)`:", PAGE)
     (copy / "kinfmu" / "joints" / named).write_text(joint, encoding="utf-8")
     package = copy / "kinfmu" / "joints" / "__init__.py"
     text = package.read_text(encoding="utf-8")
-    text = text.replace("from kinfmu.joints.rack_and", f"{export}from kinfmu.joints.rack_and", 1)
+    text = text.replace("from kinfmu.mechanism.joints.rack_and", f"{export}from kinfmu.mechanism.joints.rack_and", 1)
     text = text.replace("\n)\n\n__all__", "\n    Opposed,\n)\n\n__all__", 1)
     text = text.replace('    "PointOnLine",\n', '    "Opposed",\n    "PointOnLine",\n', 1)
     assert text.count("Opposed") == 3
@@ -54,7 +54,7 @@ def run(project: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.long
 def test_the_contract_tests_pick_the_new_joint_up_and_pass(project: Path) -> None:
-    done = run(project, "-m", "pytest", "tests/joints/test_contract.py", "-q", "-k", "opposed")
+    done = run(project, "-m", "pytest", "tests/mechanism/joints/test_contract.py", "-q", "-k", "opposed")
     assert done.returncode == 0, done.stdout + done.stderr
     (passed,) = re.findall(r"(\d+) passed", done.stdout)
     assert int(passed) >= 7
@@ -64,7 +64,7 @@ def test_the_mechanism_of_the_page_solves_as_the_page_says(project: Path) -> Non
     (mechanism,) = blocks("toml")
     (project / "vice.toml").write_text(mechanism, encoding="utf-8")
     of_the_tests, *lines = (line for block in page_blocks(PAGE) if block.kind == "commands" for line in commands(block))
-    assert of_the_tests == "scripts/test tests/joints"  # the test above runs those of the joint
+    assert of_the_tests == "scripts/test tests/mechanism/joints"  # the test above runs those of the joint
     for line in lines:
         program, *words = line.split()
         assert program == "kinfmu"

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu.drivers import DRIVERS
 from kinfmu.errors import MechanismError
-from kinfmu.joints import JOINTS
-from kinfmu.laws import LAWS
-from kinfmu.loads import LOADS
 from kinfmu.mechanism import RunSettings
 from kinfmu.mechanism.checks import MOST_BODIES
+from kinfmu.mechanism.drivers import DRIVERS
 from kinfmu.mechanism.expression_text import DEEPEST, LONGEST
+from kinfmu.mechanism.joints import JOINTS
+from kinfmu.mechanism.laws import LAWS
+from kinfmu.mechanism.loads import LOADS
 from kinfmu.mechanism.resolve import MOST_PARAMETERS
 from kinfmu.mechanism.toml_file import LARGEST_FILE, parse
 from kinfmu.mechanism.valid import LARGEST_NUMBER

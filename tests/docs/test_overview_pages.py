@@ -7,8 +7,8 @@ import tomllib
 from pathlib import Path
 
 import kinfmu
-from kinfmu import gallery
 from kinfmu.cli import main
+from kinfmu.mechanism import gallery
 
 ROOT = Path(__file__).parents[2]
 ARCHITECTURE, GALLERY, COMMANDS, README = (

@@ -11,10 +11,10 @@ from click.testing import CliRunner
 from mcap.reader import make_reader
 
 import kinfmu
-from kinfmu import gallery
 from kinfmu.cli import main
 from kinfmu.errors import RequestError
 from kinfmu.log import McapLog, read
+from kinfmu.mechanism import gallery
 from kinfmu.run.channels import absent_columns
 
 PAGE = (gallery.folder().parent / "docs" / "records.md").read_text(encoding="utf-8")

@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 
 import kinfmu
-from kinfmu import gallery
 from kinfmu.cli import main
+from kinfmu.mechanism import gallery
 
 DOCS = Path(__file__).parents[2] / "docs"
 

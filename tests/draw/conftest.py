@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from kinfmu import gallery
 from kinfmu.cli import main
 from kinfmu.draw import figure
+from kinfmu.mechanism import gallery
 
 
 @pytest.fixture

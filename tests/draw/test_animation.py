@@ -12,12 +12,12 @@ import pytest
 import kinfmu
 from kinfmu.draw import animate, animation
 from kinfmu.draw.animation import _film, placed_run
+from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.instant import Instant
+from kinfmu.draw.scene.shapes import shapes
 from kinfmu.errors import FigureError
 from kinfmu.run import Run
-from kinfmu.scene import palette
-from kinfmu.scene.instant import Instant
-from kinfmu.scene.shapes import shapes
-from kinfmu.sweep import run_times
+from kinfmu.run.driving import run_times
 from tests.log.runs import fourbar, with_gap
 
 image = pytest.importorskip("PIL.Image")

@@ -15,19 +15,19 @@ from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, RunSet
 from kinfmu.analysis import cam_profile
 from kinfmu.draw.cam import _figure
 from kinfmu.draw.instant import instant
+from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.cams import CamShape, cam_shapes
+from kinfmu.draw.scene.details import on_face
+from kinfmu.draw.scene.scene import scene
+from kinfmu.draw.scene.shape import Shape, guides_of_cams
 from kinfmu.draw.sheet import ink
 from kinfmu.fmu.picture import picture
-from kinfmu.joints import CamFlatFace, CamOscillating, CamRoller, CamTranslating
-from kinfmu.joints.joint import Joint
-from kinfmu.laws import Harmonic, Law, MotionSequence, Segment, Spline
 from kinfmu.log.urdf import robot_description
-from kinfmu.scene import palette
-from kinfmu.scene.cams import CamShape, cam_shapes
-from kinfmu.scene.details import on_face
-from kinfmu.scene.scene import scene
-from kinfmu.scene.shape import Shape, guides_of_cams
-from tests.cams import followers
-from tests.cams.test_profile import geared
+from kinfmu.mechanism.joints import CamFlatFace, CamOscillating, CamRoller, CamTranslating
+from kinfmu.mechanism.joints.joint import Joint
+from kinfmu.mechanism.laws import Harmonic, Law, MotionSequence, Segment, Spline
+from tests.motion.cams import followers
+from tests.motion.cams.test_profile import geared
 
 QUARTER = 0.5 * math.pi
 RADIUS = 6.0  # of the roller

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from kinfmu import gallery
 from kinfmu.draw import figure
+from kinfmu.mechanism import gallery
 from tests.draw.picture import differences, picture
 from tests.gallery_members import every_member
-from tests.loads.every_load import every_load
+from tests.mechanism.loads.every_load import every_load
 from tests.mechanisms import fourbar
 
 DOCS = Path(__file__).parents[2] / "docs"

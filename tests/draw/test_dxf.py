@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 import kinfmu
-import kinfmu.gallery
+import kinfmu.mechanism.gallery
 from kinfmu.draw import animate, animation, dxf
 from kinfmu.draw.video import encoder, mp4
 from kinfmu.errors import FigureError, MissingPackageError
@@ -188,7 +188,7 @@ slider = { type = "distance", between = ["lever.B", "slider.S"], law = "constant
 """
 
 
-@pytest.mark.parametrize("name", ["bars", *kinfmu.gallery.names()])
+@pytest.mark.parametrize("name", ["bars", *kinfmu.mechanism.gallery.names()])
 def test_no_line_has_length_0_and_none_is_drawn_twice(name: str, tmp_path: Path) -> None:
     """Sides of one layer that lie on one line overlap nowhere; together they are those of the shapes."""
     ezdxf = pytest.importorskip("ezdxf")

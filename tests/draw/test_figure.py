@@ -13,11 +13,11 @@ from xml.etree import ElementTree as ET
 import pytest
 
 import kinfmu
-from kinfmu import Angle, AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, gallery
+from kinfmu import Angle, AngleDriver, Body, ConstantSpeed, Mechanism, Revolute
 from kinfmu.draw import figure
 from kinfmu.draw.instant import instant, pose_note
 from kinfmu.errors import AssemblyError, FigureError, MissingPackageError, RequestError
-from kinfmu.mechanism import toml_file, toml_text
+from kinfmu.mechanism import gallery, toml_file, toml_text
 from tests.gallery_members import every_member
 from tests.mechanisms import fourbar, reference_fourbar
 

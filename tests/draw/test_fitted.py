@@ -11,9 +11,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.transforms import Bbox
 
 import kinfmu
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.fitted import Curve, Fitted, figure_of
 from kinfmu.draw.sheet import INCH
-from kinfmu.run import FloatArray
 
 
 def panels(step: float) -> list[Axes]:

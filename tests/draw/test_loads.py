@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu.arrays import FloatArray
 from kinfmu.draw import animate, animation, figure
 from kinfmu.draw.drawing import sheet_of
 from kinfmu.draw.instant import instant
+from kinfmu.draw.scene import palette
 from kinfmu.draw.sheet import Sheet, ink
 from kinfmu.mechanism import Mechanism
-from kinfmu.run import FloatArray
-from kinfmu.scene import palette
 from tests.draw.picture import picture
 from tests.gallery_members import every_member
-from tests.loads.every_load import every_load, fourbar
+from tests.mechanism.loads.every_load import every_load, fourbar
 
 image = pytest.importorskip("PIL.Image")
 pytest.importorskip("matplotlib")

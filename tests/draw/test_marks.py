@@ -29,13 +29,13 @@ from kinfmu.draw.motion import Length, Push, Turn, motion
 from kinfmu.draw.names import LEADER
 from kinfmu.draw.painting import placed
 from kinfmu.draw.pins import Pin, pins
+from kinfmu.draw.scene.instant import Instant
+from kinfmu.draw.scene.shape import Shape
+from kinfmu.draw.scene.shapes import shapes
+from kinfmu.draw.scene.slides import slides
 from kinfmu.draw.sheet import ink
-from kinfmu.scene.instant import Instant
-from kinfmu.scene.shape import Shape
-from kinfmu.scene.shapes import shapes
-from kinfmu.scene.slides import slides
 from tests.gallery_members import every_member
-from tests.joints.test_mechanisms import crank_and_slider
+from tests.mechanism.joints.test_mechanisms import crank_and_slider
 from tests.mechanisms import fourbar
 
 EDGE = (0.0, 1.5)  # [pt]; that much of a text's box is above and below its letters

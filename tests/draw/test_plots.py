@@ -26,7 +26,7 @@ from kinfmu.run.axis import axis_of
 from kinfmu.run.channels import select
 from kinfmu.units import CoordinateName, ForceName, Quantity
 from tests.log.runs import fourbar, with_gap
-from tests.sweep.test_forces import loaded
+from tests.run.test_forces import loaded
 
 
 @pytest.fixture

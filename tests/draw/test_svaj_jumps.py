@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.svaj import _sheet, driver_axis
 from kinfmu.motion.motion_curve import motion_curve
 from kinfmu.motion.svaj_table import svaj_columns
-from kinfmu.run import FloatArray, Run
-from tests.cams import followers
+from kinfmu.run import Run
+from tests.motion.cams import followers
 
 
 def cam_run(step: float) -> Run:
@@ -50,7 +51,7 @@ def test_the_jerk_of_a_cam_from_a_table_has_no_slopes_at_the_ends_of_its_dwells(
     angle = np.linspace(0.0, 2.0 * math.pi, count + 1)
     lift = 30.0 + 2.0 * np.where(angle < math.pi, 1.0 - np.cos(2.0 * angle), 0.0)
     lift[-1] = lift[0]
-    law = kinfmu.laws.Spline(tuple(zip(angle, lift, strict=True)), "periodic")
+    law = kinfmu.mechanism.laws.Spline(tuple(zip(angle, lift, strict=True)), "periodic")
     mechanism = kinfmu.load("cam_roller")
     joints = tuple(replace(j, law=law) if isinstance(j, kinfmu.CamRoller) else j for j in mechanism.joints)
     run = kinfmu.solve(replace(mechanism, joints=joints), cam_angle=np.linspace(0.0, 2.0 * math.pi, 2 * count + 1))

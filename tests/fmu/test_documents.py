@@ -16,16 +16,16 @@ from click.testing import CliRunner
 
 import kinfmu
 from kinfmu.cli import main
+from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.scene import scene
 from kinfmu.errors import RequestError
 from kinfmu.fmu.documents import documents
 from kinfmu.fmu.interface import Drive
 from kinfmu.fmu.picture import picture
 from kinfmu.fmu.variables import interface
 from kinfmu.plan import compile_plan
-from kinfmu.scene import palette
-from kinfmu.scene.scene import scene
 from tests.fmu.conftest import Build
-from tests.loads.every_load import every_load, fourbar
+from tests.mechanism.loads.every_load import every_load, fourbar
 
 Built = Callable[[str, Drive], Path]
 

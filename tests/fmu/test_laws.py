@@ -26,7 +26,7 @@ from kinfmu import (
 )
 from kinfmu.errors import KinfmuError
 from kinfmu.fmu.build import default_drive
-from kinfmu.laws import Law
+from kinfmu.mechanism.laws import Law
 from tests.fmu.host import DISCARD, OK, Host
 
 SEQUENCE = MotionSequence((Segment("cycloidal", 1.0, 2.0), Segment("dwell", 0.5)), start=0.25, repeat=True)

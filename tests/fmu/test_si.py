@@ -14,11 +14,10 @@ from fmpy.validation import validate_fmu
 from lxml import etree
 
 import kinfmu
-from kinfmu import gallery
 from kinfmu.cli import main
 from kinfmu.fmu import build, simulate, verify
-from kinfmu.gallery.load import folder
-from kinfmu.mechanism import toml_file, toml_text
+from kinfmu.mechanism import gallery, toml_file, toml_text
+from kinfmu.mechanism.gallery.load import folder
 from kinfmu.units import METRES
 from tests.gallery_members import mostly_long
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu.draw.scene.components import component_runs
+from kinfmu.draw.scene.forces import arrows
+from kinfmu.draw.scene.scene import drawable
 from kinfmu.errors import FmuError, KinfmuError, RequestError
 from kinfmu.log import LiveView, McapLog, read, write_mcap, write_rrd
 from kinfmu.log.viewer.card import card
-from kinfmu.scene.components import component_runs
-from kinfmu.scene.forces import arrows
-from kinfmu.scene.scene import drawable
 from kinfmu.units import SignalName
 from tests.fmu.test_drive_example import HOSTS, STOP, example, fmus  # noqa: F401  # fixtures
 

@@ -18,15 +18,15 @@ from fmpy.validation import validate_fmu
 
 import kinfmu
 from kinfmu import Body, Mechanism, Revolute
-from kinfmu.drivers import AngleDriver
 from kinfmu.errors import KinfmuError, RequestError
-from kinfmu.laws import ConstantValue, External, MotionSequence
-from kinfmu.laws.sequence import Segment
-from kinfmu.loads import Damper, ForceAlong, TorqueOn
+from kinfmu.mechanism.drivers import AngleDriver
+from kinfmu.mechanism.laws import ConstantValue, External, MotionSequence
+from kinfmu.mechanism.laws.sequence import Segment
+from kinfmu.mechanism.loads import Damper, ForceAlong, TorqueOn
 from kinfmu.solver.python.status import Status
-from tests.dynamics.test_torque_driven import G, five_bar, heavy, pendulum
 from tests.fmu.host import DISCARD, LAST_SUCCESSFUL_TIME, OK, Host
 from tests.mechanisms import fourbar
+from tests.motion.torque.test_torque_driven import G, five_bar, heavy, pendulum
 
 PUSH = MotionSequence((Segment("dwell", 0.35), Segment("simple_harmonic", 0.1, 4.0), Segment("dwell", 1.0)))
 WINDOW = 0.01  # [s] step of the host

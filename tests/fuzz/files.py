@@ -22,22 +22,22 @@ import numpy as np
 import zstandard
 from click.testing import CliRunner
 
-from kinfmu import gallery
+from kinfmu.design.fit import read_problem
+from kinfmu.design.study import read_study
 from kinfmu.errors import KinfmuError
 from kinfmu.fmu import build, description, simulate
 from kinfmu.fmu.unpacked import DESCRIPTION, MECHANISM, unpacked
 from kinfmu.log import read, record, recover, write_mcap, write_rrd, write_table, writing
 from kinfmu.log.mcap_writer import ZSTD, Opcode
+from kinfmu.mechanism import gallery
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.run import Run
-from kinfmu.studies import read_study
-from kinfmu.sweep import solve
-from kinfmu.synthesis import read_problem
+from kinfmu.run.solve import solve
+from tests.design.study.linkage import TEXT as HOEKEN
 from tests.fuzz.guarded import guarded
 from tests.fuzz.hostile_text import CANARY, hostile
 from tests.fuzz.mechanisms import Find, invoke, judge_refusal
 from tests.fuzz.summary import Summary
-from tests.studies.linkage import TEXT as HOEKEN
 
 QUICK = 3.0  # [s] of the processor for a file of some kilobytes, pictures aside
 ODD_NUMBERS = ("-1", "0", "1e999", "nan", "99999999999999999999", "0x10", "1_0", "", "true", "-0.0", "1e-320", "\u0663")

@@ -12,13 +12,12 @@ from pathlib import Path
 import numpy as np
 from click.testing import CliRunner
 
-from kinfmu import gallery
 from kinfmu.cli import main
 from kinfmu.errors import KinfmuError
-from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism import Mechanism, gallery
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.toml_file import parse
-from kinfmu.sweep import solve
+from kinfmu.run.solve import solve
 from tests.fuzz.generated import faults
 from tests.fuzz.guarded import PATIENCE, failure, guarded
 from tests.fuzz.hostile_text import CANARY, IDENTIFIERS, hostile, toml

@@ -15,7 +15,7 @@ from kinfmu.log import McapLog, read, recover, write_mcap, write_table
 from kinfmu.log.record import description, lists_in
 from kinfmu.run import Run
 from kinfmu.run.channels import select
-from tests.sweep.test_forces import loaded
+from tests.run.test_forces import loaded
 
 EFFORTS = ("crank.torque", "crank.power", "crank.bias_torque", "crank.reduced_inertia")
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu.draw.scene.scene import scene
 from kinfmu.log.urdf import link_poses, robot_description
 from kinfmu.run import Run
-from kinfmu.scene.scene import scene
-from kinfmu.sweep import run_times
+from kinfmu.run.driving import run_times
 from kinfmu.units import METRES
 from tests.draw.test_dxf import with_loads
 from tests.gallery_members import every_member

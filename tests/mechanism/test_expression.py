@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinfmu.equations.graph import Graph, evaluate
-from kinfmu.equations.taylor import Taylor
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism import toml_file
 from kinfmu.mechanism.dimension import Dimension
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.expression_text import DEEPEST, LARGEST_POWER, LONGEST
 from kinfmu.mechanism.number import given_unit, read_number
+from kinfmu.plan.equations.graph import Graph, evaluate
+from kinfmu.plan.equations.taylor import Taylor
 from kinfmu.units import Quantity, spelled
 
 VALUES = {"a": 2.0, "b": -0.75, "long_name_2": 1e3}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from kinfmu.mechanism.toml_file import parse
-from kinfmu.sweep import solve
+from kinfmu.run.solve import solve
 from tests.fuzz.mechanisms import SAMPLES, written
 
 NAMES = {

@@ -20,7 +20,7 @@ from kinfmu import (
     Spline,
 )
 from kinfmu.errors import MechanismError
-from kinfmu.laws import Law
+from kinfmu.mechanism.laws import Law
 from kinfmu.mechanism.toml_file import parse, read
 from kinfmu.mechanism.toml_tables import table_keys
 from kinfmu.mechanism.toml_text import text

@@ -9,15 +9,15 @@ import pytest
 from fmpy import read_model_description
 
 import kinfmu
-from kinfmu.equations.graph import evaluate
-from kinfmu.equations.system import placement
 from kinfmu.errors import KinfmuError, MechanismError, RequestError
 from kinfmu.fmu.description.common import base_unit
-from kinfmu.loads import ForceAt, Spring
 from kinfmu.mechanism import Body, Gravity, Mechanism
+from kinfmu.mechanism.loads import ForceAt, Spring
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text
 from kinfmu.plan import compile_plan
+from kinfmu.plan.equations.graph import evaluate
+from kinfmu.plan.equations.system import placement
 from kinfmu.plan.origin import localized
 from kinfmu.plan.trace import Tracer, parameter_symbol
 from kinfmu.units import KINDS, METRES, POUND_FORCE, Quantity, every_unit, length_power, unit_of

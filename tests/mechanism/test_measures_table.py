@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import gallery
 from kinfmu.errors import MechanismError
-from kinfmu.measures import DistanceBetween
+from kinfmu.mechanism import gallery
+from kinfmu.mechanism.measures import READINGS, PathDistance
+from kinfmu.mechanism.quantities import DistanceBetween
 from kinfmu.mechanism.schema import schema_text
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text
-from kinfmu.readings import READINGS, PathDistance
 
 FILE = (gallery.folder() / "crank_rocker" / "mechanism.toml").read_text(encoding="utf-8")
 TABLES = """

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kinfmu import gallery
-from kinfmu.drivers import AngleDriver
 from kinfmu.errors import MechanismError
-from kinfmu.joints import Coordinate, Distance, Joint, Revolute
-from kinfmu.laws import ConstantSpeed
-from kinfmu.mechanism import Body, Mechanism, Point, RunSettings, Start
+from kinfmu.mechanism import Body, Mechanism, Point, RunSettings, Start, gallery
+from kinfmu.mechanism.drivers import AngleDriver
+from kinfmu.mechanism.joints import Coordinate, Distance, Joint, Revolute
+from kinfmu.mechanism.laws import ConstantSpeed
 from kinfmu.mechanism.valid import LONGEST, quoted
 
 GROUND = Body("ground", {"O": Point(0.0, 0.0)})

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from kinfmu import gallery
 from kinfmu.errors import MechanismError
+from kinfmu.mechanism import gallery
 from kinfmu.mechanism.toml_file import LARGEST_FILE, parse, read
 
 FOURBAR = (gallery.folder() / "fourbar" / "mechanism.toml").read_text(encoding="utf-8")

@@ -9,17 +9,17 @@ from typing import Any
 
 import pytest
 
-from kinfmu.drivers import AngleDriver
-from kinfmu.equations.graph import Graph, evaluate
 from kinfmu.errors import MechanismError, RequestError
-from kinfmu.joints import Coordinate, Distance, Gear, PointOnLine, Revolute, Translational
-from kinfmu.laws import ConstantSpeed
 from kinfmu.mechanism import Body, Mechanism, Parameter, RunSettings
+from kinfmu.mechanism.drivers import AngleDriver
 from kinfmu.mechanism.expression import Expression
+from kinfmu.mechanism.joints import Coordinate, Distance, Gear, PointOnLine, Revolute, Translational
+from kinfmu.mechanism.laws import ConstantSpeed
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text
+from kinfmu.plan.equations.graph import Graph, evaluate
 from kinfmu.plan.origin import localized
-from kinfmu.sweep import solve
+from kinfmu.run.solve import solve
 from kinfmu.units import Quantity
 
 FOURBAR = """
@@ -213,7 +213,7 @@ def test_a_tilted_guide_may_have_a_symbol_for_its_angle() -> None:
     assert mechanism.expressions == {("joints", "guide", "axis"): Expression("tilt")}
     graph = Graph()
     (guide,) = mechanism.at({"tilt": graph.symbol("tilt")}).joints
-    from kinfmu.measures.placement import GROUND, BodyFrame, Placement
+    from kinfmu.mechanism.quantities.placement import GROUND, BodyFrame, Placement
 
     at = Placement({"ground": GROUND, "bar": BodyFrame.of(2.0, 3.0, 0.0)}, mechanism.body_points)
     (row,) = guide.residual(at)

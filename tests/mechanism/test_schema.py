@@ -12,15 +12,15 @@ import pytest
 from click.testing import CliRunner
 from jsonschema import Draft7Validator
 
-from kinfmu import gallery
 from kinfmu.cli import main
-from kinfmu.drivers import DRIVERS
 from kinfmu.errors import MechanismError
-from kinfmu.joints import JOINTS
-from kinfmu.laws import LAWS
-from kinfmu.loads import LOADS
-from kinfmu.measures import POSE_QUANTITIES
+from kinfmu.mechanism import gallery
 from kinfmu.mechanism.declared import REQUIRED, keys_of, summary_of
+from kinfmu.mechanism.drivers import DRIVERS
+from kinfmu.mechanism.joints import JOINTS
+from kinfmu.mechanism.laws import LAWS
+from kinfmu.mechanism.loads import LOADS
+from kinfmu.mechanism.quantities import POSE_QUANTITIES
 from kinfmu.mechanism.schema import schema, schema_text
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text

@@ -14,12 +14,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kinfmu import gallery
-from kinfmu.drivers import AngleDriver
 from kinfmu.errors import MechanismError
-from kinfmu.joints import Coordinate, Distance, Revolute
-from kinfmu.laws import ConstantSpeed
-from kinfmu.mechanism import Body, Mechanism, Parameter, Point, RunSettings, Start, expression
+from kinfmu.mechanism import Body, Mechanism, Parameter, Point, RunSettings, Start, expression, gallery
+from kinfmu.mechanism.drivers import AngleDriver
+from kinfmu.mechanism.joints import Coordinate, Distance, Revolute
+from kinfmu.mechanism.laws import ConstantSpeed
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text
 from kinfmu.units import METRES

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from kinfmu import gallery
 from kinfmu.cli import main
+from kinfmu.mechanism import gallery
 from tests.gallery_members import mostly_long
 
 ROOT = Path(__file__).parents[2]

@@ -10,10 +10,7 @@ import pytest
 from scipy.optimize import brentq
 
 import kinfmu
-from kinfmu.measures import DistanceBetween
-from kinfmu.mechanism.toml_file import parse
-from kinfmu.motion.history import History
-from kinfmu.readings import (
+from kinfmu.mechanism.measures import (
     Dwell,
     Maximum,
     MechanicalAdvantage,
@@ -24,6 +21,9 @@ from kinfmu.readings import (
     Straightness,
     VelocityRatio,
 )
+from kinfmu.mechanism.quantities import DistanceBetween
+from kinfmu.mechanism.toml_file import parse
+from kinfmu.motion.history import History
 
 FMUS = Path(__file__).parents[2] / "fmus"
 TO_Z = DistanceBetween(("ground.Z", "piston.S"))

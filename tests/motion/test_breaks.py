@@ -10,8 +10,8 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import kinfmu
+from kinfmu.mechanism.measures import Maximum, Minimum, PeakAcceleration, PeakSpeed, Range
 from kinfmu.mechanism.toml_file import parse
-from kinfmu.readings import Maximum, Minimum, PeakAcceleration, PeakSpeed, Range
 
 TEXT = """
 name = "tappet"

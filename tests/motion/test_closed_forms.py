@@ -10,14 +10,9 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import kinfmu
-from kinfmu.equations.taylor import Taylor
 from kinfmu.errors import KinfmuError
-from kinfmu.laws import Harmonic
-from kinfmu.measures.arithmetic import cos, sin
-from kinfmu.mechanism.toml_file import parse
-from kinfmu.motion.fitting import Circle, deviation
-from kinfmu.motion.history import History
-from kinfmu.readings import (
+from kinfmu.mechanism.laws import Harmonic
+from kinfmu.mechanism.measures import (
     Dwell,
     Maximum,
     MechanicalAdvantage,
@@ -34,6 +29,11 @@ from kinfmu.readings import (
     TransmissionAngle,
     VelocityRatio,
 )
+from kinfmu.mechanism.quantities.arithmetic import cos, sin
+from kinfmu.mechanism.toml_file import parse
+from kinfmu.motion.fitting import Circle, deviation
+from kinfmu.motion.history import History
+from kinfmu.plan.equations.taylor import Taylor
 
 TURN = np.linspace(0.0, 2.0 * math.pi, 361)
 EXACT = {"rel": 1e-9, "abs": 1e-12}

@@ -9,8 +9,8 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import kinfmu
+from kinfmu.mechanism.measures import Maximum, PeakAcceleration, PeakSpeed, Reading
 from kinfmu.motion.crowding import is_crowded, spread
-from kinfmu.readings import Maximum, PeakAcceleration, PeakSpeed, Reading
 
 READINGS: list[Reading] = [
     PeakSpeed("v", "piston.x"),

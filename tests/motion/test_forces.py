@@ -10,11 +10,11 @@ import pytest
 
 import kinfmu
 from kinfmu.errors import MechanismError
+from kinfmu.mechanism.measures import Maximum, Minimum, Peak, PeakSpeed, Range
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.motion.sampled import sampled_history
-from kinfmu.readings import Maximum, Minimum, Peak, PeakSpeed, Range
 from tests.analysis.test_loading import ARM
-from tests.sweep.test_forces import loaded
+from tests.run.test_forces import loaded
 
 
 def test_extremes_of_a_torque_lie_between_the_samples() -> None:

@@ -10,9 +10,7 @@ import pytest
 
 import kinfmu
 from kinfmu.errors import MechanismError, RequestError
-from kinfmu.measures import AngleBetween, DistanceBetween
-from kinfmu.motion import History, Motion
-from kinfmu.readings import (
+from kinfmu.mechanism.measures import (
     READINGS,
     Dwell,
     LowestMargin,
@@ -26,6 +24,8 @@ from kinfmu.readings import (
     TimeRatio,
     VelocityRatio,
 )
+from kinfmu.mechanism.quantities import AngleBetween, DistanceBetween
+from kinfmu.motion import History, Motion
 
 TURN = np.linspace(0.0, 2.0 * math.pi, 361)
 

@@ -10,11 +10,7 @@ import pytest
 
 import kinfmu
 from kinfmu.errors import KinfmuError, RequestError
-from kinfmu.measures import AngleBetween, DistanceBetween
-from kinfmu.mechanism.toml_file import parse
-from kinfmu.motion import History, quintic
-from kinfmu.motion.quintic import use_compiled
-from kinfmu.readings import (
+from kinfmu.mechanism.measures import (
     READINGS,
     Dwell,
     LowestMargin,
@@ -34,6 +30,10 @@ from kinfmu.readings import (
     TransmissionAngle,
     VelocityRatio,
 )
+from kinfmu.mechanism.quantities import AngleBetween, DistanceBetween
+from kinfmu.mechanism.toml_file import parse
+from kinfmu.motion import History, quintic
+from kinfmu.motion.quintic import use_compiled
 
 TURN = np.linspace(0.0, 2.0 * math.pi, 121)
 CRANK_ROCKER = """

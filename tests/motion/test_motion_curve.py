@@ -11,12 +11,12 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 import kinfmu
-from kinfmu.drivers import Driver
-from kinfmu.laws import Law
+from kinfmu.arrays import FloatArray
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.drivers import Driver
+from kinfmu.mechanism.laws import Law
 from kinfmu.motion.jerk import motion_of
 from kinfmu.motion.motion_curve import MotionCurve, motion_curve
-from kinfmu.run import FloatArray
 from tests.mechanisms import slider_crank
 
 LEVER = """
@@ -110,7 +110,7 @@ def test_limits_of_a_slider_whose_crank_follows_a_table() -> None:
     """x''' = x_1 phi''' + 3 x_2 phi' phi'' + x_3 phi'^3, x_k: derivatives of x = cos phi + sqrt(9 - sin^2 phi)."""
     times, angles = [0.0, 0.3, 0.5, 0.9, 1.4, 2.0], [0.2, 0.5, 1.1, 1.6, 2.4, 2.7]
     mechanism = slider_crank(1.0, 3.0)
-    law = kinfmu.laws.Spline(tuple(zip(times, angles, strict=True)), "natural")
+    law = kinfmu.mechanism.laws.Spline(tuple(zip(times, angles, strict=True)), "natural")
     mechanism = replace(mechanism, drivers=(driver_by(law, mechanism),))
     curve = motion_curve(kinfmu.solve(mechanism, np.linspace(0.0, 2.0, 24)), "slider.x")
     pieces = CubicSpline(times, angles, bc_type="natural").c  # (4, pieces), highest power first
@@ -140,7 +140,7 @@ def has_breaks(mechanism: kinfmu.Mechanism) -> bool:
     return any(law.own_breaks(3).at for law in laws)
 
 
-@pytest.mark.parametrize("name", [name for name in kinfmu.gallery.names() if has_breaks(kinfmu.load(name))])
+@pytest.mark.parametrize("name", [name for name in kinfmu.mechanism.gallery.names() if has_breaks(kinfmu.load(name))])
 def test_limits_agree_with_samples_next_to_the_break(name: str) -> None:
     """1e-6 of a step away from the break, the jerk has hardly changed."""
     mechanism = kinfmu.load(name)
@@ -172,7 +172,7 @@ def test_limits_do_not_depend_on_the_samples() -> None:
 
 
 def test_coinciding_breaks_of_two_laws_count_once(lever: Mechanism) -> None:
-    law = kinfmu.laws.MotionSequence(
+    law = kinfmu.mechanism.laws.MotionSequence(
         (("dwell", 0.1), ("3-4-5", 0.5, math.radians(110.0)), ("dwell", 0.2))  # type: ignore[arg-type]
     )
     lever = replace(lever, drivers=(driver_by(law, lever),))

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu.mechanism.measures import TimeRatio
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.motion.history import History
-from kinfmu.readings import TimeRatio
 
 RATIO = TimeRatio("ratio", "rocker.phi")
 CRANK, ROCKER, BASE = 20.0, 50.0, 40.0

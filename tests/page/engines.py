@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import kinfmu
+from kinfmu.arrays import FloatArray
+from kinfmu.codegen.lanes import lanes
 from kinfmu.page.module import PageModule
-from kinfmu.simd import lanes
 
 SCRIPT = Path(__file__).with_name("run_engines.mjs")
 NODE = shutil.which("node") or ""
@@ -26,7 +26,6 @@ MISSING = [name for name, found in NEEDED.items() if not found]
 needs_node = pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}")
 POSES = 361
 
-FloatArray = NDArray[np.float64]
 Call = Sequence[Any]  # a method of the engine and its arguments
 Driven = tuple[FloatArray, FloatArray, FloatArray]  # (n, d) values, speeds and accelerations of the drivers
 

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from kinfmu.arrays import FloatArray
 from kinfmu.page import page as page_of
-from kinfmu.run import FloatArray
-from tests.loads.every_load import every_load, fourbar
+from tests.mechanism.loads.every_load import every_load, fourbar
 from tests.page.browser import Browser, Opened, browser, needs_browser, text_of
 
 pytestmark = needs_browser

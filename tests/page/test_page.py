@@ -214,7 +214,7 @@ def _light(colour: str) -> float:
 @pytest.mark.parametrize(
     "size", [pytest.param(PHONE, id="phone"), pytest.param(DESKTOP, id="desktop", marks=pytest.mark.long)]
 )
-@pytest.mark.parametrize("name", kinfmu.gallery.names())
+@pytest.mark.parametrize("name", kinfmu.mechanism.gallery.names())
 def test_names_keep_their_places_in_a_turn_and_have_the_contrast_of_wcag_aa(
     chromium: Browser, name: str, size: dict[str, int]
 ) -> None:

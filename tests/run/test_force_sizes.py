@@ -18,7 +18,7 @@ from kinfmu.log.record import description
 from kinfmu.log.table import columns_of, write_table
 from kinfmu.run.channels import select
 from kinfmu.run.tables import csv_lines
-from tests.sweep.test_forces import loaded
+from tests.run.test_forces import loaded
 
 SIZES = ("O.force", "P.force", "S.force", "shaking_force")
 

@@ -15,7 +15,7 @@ import pytest
 import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Distance, Mechanism, PointOnLine, Revolute, Translational
 from kinfmu.codegen.python import load_model
-from kinfmu.joints import Joint
+from kinfmu.mechanism.joints import Joint
 from kinfmu.plan import compile_plan
 from kinfmu.solver.python import Pose, Solver, Status
 from kinfmu.solver.python.trusted_step import trusted_step

@@ -11,7 +11,7 @@ import pytest
 
 from kinfmu import Point
 from kinfmu.codegen.python import load_model
-from kinfmu.gallery.chains import fourbar_chain
+from kinfmu.mechanism.gallery.chains import fourbar_chain
 from kinfmu.plan import compile_plan
 from kinfmu.solver.python import Pose, Solver, Status
 from kinfmu.solver.python import build as building

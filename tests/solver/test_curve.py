@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinfmu.equations.graph import Graph, evaluate
-from kinfmu.equations.taylor import Taylor
-from kinfmu.measures.arithmetic import atan2, curve, floor
+from kinfmu.mechanism.quantities.arithmetic import atan2, curve, floor
+from kinfmu.plan.equations.graph import Graph, evaluate
+from kinfmu.plan.equations.taylor import Taylor
 from kinfmu.solver.python.curve import CurveData
 from kinfmu.solver.python.curve import curve as value
 from tests import power_series

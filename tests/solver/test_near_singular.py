@@ -15,9 +15,9 @@ import pytest
 
 import kinfmu
 from kinfmu import Body
+from kinfmu.arrays import FloatArray
 from kinfmu.codegen.python import load_model
 from kinfmu.plan import compile_plan
-from kinfmu.run import FloatArray
 from kinfmu.solver.python import Pose, Solver, Status
 from tests.fmu.host import OK, Host
 from tests.mechanisms import (

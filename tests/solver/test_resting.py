@@ -12,9 +12,9 @@ import pytest
 
 import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Distance, Mechanism, Revolute, Translational
+from kinfmu.arrays import FloatArray
 from kinfmu.codegen.python import load_model
 from kinfmu.plan import compile_plan
-from kinfmu.run import FloatArray
 from kinfmu.solver.python import Solver
 
 Engine = Literal["python", "native"]

@@ -25,12 +25,12 @@ import pytest
 import kinfmu
 from kinfmu import Designs, Mechanism, Run
 from kinfmu.errors import KinfmuError
-from kinfmu.gallery import names
+from kinfmu.mechanism.gallery import names
 from kinfmu.plan import SolvePlan
 from kinfmu.processes import cores, processes, without_main
+from kinfmu.run import model
+from kinfmu.run.continued import continued
 from kinfmu.solver.python.status import Status
-from kinfmu.sweep import model
-from kinfmu.sweep.continued import continued
 from kinfmu.units import CoordinateName
 from tests.open_lengths import with_open_lengths
 

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from kinfmu import Body, Mechanism, Revolute
-from kinfmu.drivers import Driver
-from kinfmu.joints import Joint
+from kinfmu.mechanism.drivers import Driver
+from kinfmu.mechanism.joints import Joint
 from tests.stress.jets import LONG, Array, Exact, Jet, Numbers, Value, Vector, turned
 from tests.stress.loops import Closing
 

@@ -22,8 +22,8 @@ from kinfmu import (
     SlideDriver,
     Translational,
 )
-from kinfmu.drivers import Driver
-from kinfmu.joints import Joint
+from kinfmu.mechanism.drivers import Driver
+from kinfmu.mechanism.joints import Joint
 from tests.stress.drawn import TURN, Frame, Pose, Sketch, framed, standing, world
 from tests.stress.inverse import driven_at
 from tests.stress.jets import LONG, Array, Exact, Jet, Numbers, Value, Vector, turned

@@ -23,7 +23,7 @@ from scipy.linalg import qr
 
 import kinfmu
 from kinfmu.errors import AmbiguousStartError, InconsistentError, MobilityError
-from kinfmu.gallery import names
+from kinfmu.mechanism.gallery import names
 from kinfmu.mechanism.toml_text import text
 from tests.open_lengths import with_open_lengths
 from tests.power_series import Series, mp, sin_cos

@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 
 import kinfmu
+from kinfmu.design.fit import MeasureTarget
 from kinfmu.errors import KinfmuError
+from kinfmu.mechanism.measures import Range
 from kinfmu.mechanism.toml_file import parse
-from kinfmu.readings import Range
-from kinfmu.synthesis import MeasureTarget
 
 COUPLER = 7850 * 0.1 * 0.02 * 0.008  # [kg]
 STILL = [MeasureTarget(name=name, of=name, value=0) for name in ("swing_x", "swing_y")]
@@ -28,7 +28,7 @@ def test_the_centres_of_mass_that_balance_a_fourbar_are_those_of_the_closed_form
 
 def test_designs_with_a_negative_mass_are_refused_with_the_reason() -> None:
     """The crank's counterweight as an unknown mass, 10 mm behind its axis; the rocker is balanced."""
-    text = (kinfmu.gallery.folder() / "fourbar_loaded" / "mechanism.toml").read_text(encoding="utf-8")
+    text = (kinfmu.mechanism.gallery.folder() / "fourbar_loaded" / "mechanism.toml").read_text(encoding="utf-8")
     text = text.replace("crank_center = 0.0", 'weight = "1 kg"').replace("_center = 20.0", "_center = -11.304")
     text = text.replace('"1.2 kg"', '"weight"').replace('"crank_center"', "-10")
     mechanism = _measured(parse(text, "mechanism.toml"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from kinfmu.gallery import names
+from kinfmu.mechanism.gallery import names
 from tests.stress.designs import faults
 
 DESIGNS = {"elliptic_trammel": 1, "fourbar": 1, "parallel_jaw": 1}  # one that does not close: it is assembled in vain

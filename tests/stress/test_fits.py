@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 import kinfmu
+from kinfmu.design.fit import FunctionTarget, MeasureConstraint, PathTarget
 from kinfmu.mechanism import Parameter, toml_file
-from kinfmu.synthesis import FunctionTarget, MeasureConstraint, PathTarget
-from tests.synthesis.mkh1 import BEST, mkh1
+from tests.design.fit.mkh1 import BEST, mkh1
 
 _WATT = """
 name = "watt_two"
@@ -96,11 +96,11 @@ def test_the_foot_path_of_a_jansen_leg_is_flattened(tmp_path: Path) -> None:
     written = kinfmu.solve(leg, crank_angle=turn)
     low = turn[written["foot.y"] < written["foot.y"].min() + 3.0]  # stance
     stance = np.linspace(low.min(), low.max(), 15)
-    straight = kinfmu.readings.Range("h", of="foot.y", begin=float(stance[0]), end=float(stance[-1]))
-    stride = kinfmu.readings.Range("s", of="foot.x")
+    straight = kinfmu.measures.Range("h", of="foot.y", begin=float(stance[0]), end=float(stance[-1]))
+    stride = kinfmu.measures.Range("s", of="foot.x")
     target = FunctionTarget(name="flat", of="foot.y", points=[(u, 0.0) for u in stance], offset=(-120.0, -60.0))
     bounds = {name: (0.9 * leg.parameters[name].value, 1.1 * leg.parameters[name].value) for name in "abcdefghijk"}
-    lift = kinfmu.readings.Range("l", of="foot.y")
+    lift = kinfmu.measures.Range("l", of="foot.y")
     before = {name: one.value for name, one in kinfmu.measure(written, [straight, stride, lift]).items()}
     keep = [
         MeasureConstraint(name="stride", of=stride, minimum=before["s"]),
@@ -127,7 +127,7 @@ def test_mkh1_to_the_same_optimum_from_other_seeds() -> None:
 
 
 def test_twelve_points_from_a_far_start() -> None:
-    from tests.synthesis.fourbars import closed_form, four_bar
+    from tests.design.fit.fourbars import closed_form, four_bar
 
     known = {"ground": 4.1, "crank": 1.1, "coupler": 3.3, "rocker": 3.2, "px": 1.5, "py": 1.35}
     x, y, *_ = closed_form(np.radians(30.0) * np.arange(12), known)

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from kinfmu.sweep.forces import ForceModel
+from kinfmu.run.forces import ForceModel
 from tests.stress.forces import ENERGY, WRONG, compared
 
 FEW = {

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import Status, gallery
+from kinfmu import Status
+from kinfmu.mechanism import gallery
 from kinfmu.page.module import page_module
 from kinfmu.page.opened import Opened, opened
 from tests.page import test_lengths

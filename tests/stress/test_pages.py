@@ -10,7 +10,7 @@ import pytest
 
 import kinfmu
 from kinfmu import Mechanism
-from kinfmu.gallery.chains import fourbar_chain
+from kinfmu.mechanism.gallery.chains import fourbar_chain
 from kinfmu.page import page
 from tests.page.browser import PHONE, Browser, browser, needs_browser
 
@@ -60,7 +60,7 @@ def opens_and_moves(chromium: Browser, mechanism: Mechanism, largest: int) -> No
         assert np.nanmax(np.abs(columns[name] - run[name])) <= AGREEMENT * scale, name
 
 
-@pytest.mark.parametrize("name", kinfmu.gallery.names())
+@pytest.mark.parametrize("name", kinfmu.mechanism.gallery.names())
 def test_page_of_the_gallery_opens_and_moves(chromium: Browser, name: str) -> None:
     opens_and_moves(chromium, kinfmu.load(name), LARGEST)
 

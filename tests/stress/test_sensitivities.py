@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from kinfmu import Model
-from kinfmu.sweep.sensitivities import Sensitivities
+from kinfmu.run.sensitivities import Sensitivities
 from tests.stress.sensitivities import WRONG, Engine, compared
 
 FEW = {

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from kinfmu import Run
-from kinfmu.equations.system import System
+from kinfmu.plan.equations.system import System
 from tests import oracle
 from tests.stress import families
 from tests.stress.drawn import Drawn, Frame

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from kinfmu.studies import StudyResult, read_study, run_study
-from tests.studies.linkage import write
+from kinfmu.design.study import StudyResult, read_study, run_study
+from tests.design.study.linkage import write
 
 KILLED = """
 mechanism = "hoeken.toml"
@@ -32,7 +32,7 @@ parameters.base = {{ tolerance = "0.3 mm" }}
 """
 MEASURED = """
 import json, resource, sys
-from kinfmu.studies import read_study, run_study
+from kinfmu.design.study import read_study, run_study
 
 result = run_study(read_study("study.toml", engine="native"), "study.parquet", workers=2)
 own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

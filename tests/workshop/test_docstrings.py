@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 import kinfmu
-from kinfmu.drivers import Driver
-from kinfmu.joints import Joint
-from kinfmu.laws import Law
-from kinfmu.loads import Load
-from kinfmu.measures import PoseQuantity
+from kinfmu.mechanism.drivers import Driver
+from kinfmu.mechanism.joints import Joint
+from kinfmu.mechanism.laws import Law
+from kinfmu.mechanism.loads import Load
+from kinfmu.mechanism.quantities import PoseQuantity
 
 PARTS = (Driver, Joint, Law, Load, PoseQuantity)  # users write them; the equations call their methods
 EXPORTED = [getattr(kinfmu, name) for name in kinfmu.__all__]

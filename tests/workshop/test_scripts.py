@@ -159,8 +159,10 @@ def test_arguments_are_passed_on_unchanged_and_the_callers_folder_is_kept(miniat
 
 
 def test_tests_run_in_the_checkout_from_any_folder(miniature: Miniature, tmp_path: Path) -> None:
-    miniature.run("test", "tests/joints", "-k", "revolute", cwd=tmp_path)
-    assert miniature.asked[-1] == "python -m pytest --numprocesses auto --dist loadfile tests/joints -k revolute"
+    miniature.run("test", "tests/mechanism/joints", "-k", "revolute", cwd=tmp_path)
+    assert (
+        miniature.asked[-1] == "python -m pytest --numprocesses auto --dist loadfile tests/mechanism/joints -k revolute"
+    )
     assert miniature.environment.endswith(f"cwd={miniature.root}")
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from kinfmu import gallery
+from kinfmu.mechanism import gallery
 
 CHECKOUT = Path(__file__).parents[2]
 TYPED = ("py.typed", "__init__.pyi")

@@ -15,8 +15,8 @@ from kinfmu.codegen.c.units import Units
 from kinfmu.codegen.kinds import UnitRun
 from kinfmu.codegen.lists import LISTS, Lists
 from kinfmu.codegen.writer import Names, Writer, identifier
-from kinfmu.equations.graph import Node
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.equations.graph import Node
 from kinfmu.plan.path_laws import argument_symbol
 from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.python.continuation import NO_NUMBER

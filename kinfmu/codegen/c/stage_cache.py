@@ -14,7 +14,7 @@ from typing import Protocol
 
 from kinfmu.codegen.kinds import UnitRun
 from kinfmu.codegen.lists import Lists
-from kinfmu.equations.graph import Node
+from kinfmu.plan.equations.graph import Node
 
 
 class Unit(Protocol):

@@ -30,8 +30,8 @@ from kinfmu.codegen.newton import (
     square,
 )
 from kinfmu.codegen.writer import Names, Writer, identifier
-from kinfmu.equations.graph import Node, reachable
 from kinfmu.plan import Block
+from kinfmu.plan.equations.graph import Node, reachable
 from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.python.curve import CurveData
 

@@ -6,8 +6,8 @@ import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from kinfmu.codegen.writer import Writer, identifier
-from kinfmu.equations.graph import Node, reachable, symbols
 from kinfmu.plan import Block
+from kinfmu.plan.equations.graph import Node, reachable, symbols
 
 _OPERATIONS: dict[str, Callable[..., Node]] = {
     "+": operator.add,

@@ -8,8 +8,8 @@ from itertools import accumulate
 from kinfmu.codegen.lists import distance_rows
 from kinfmu.codegen.python.block_code import indented, tupled, unpacking
 from kinfmu.codegen.writer import Names, Writer, identifier
-from kinfmu.equations.graph import Node
 from kinfmu.plan import Block, SolvePlan
+from kinfmu.plan.equations.graph import Node
 from kinfmu.plan.path_laws import argument_symbol
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.solver.python.curve import CurveData

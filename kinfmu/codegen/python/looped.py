@@ -15,8 +15,8 @@ from kinfmu.codegen.python.block_code import indented, tupled
 from kinfmu.codegen.python.header import bound, curve_names, differences, drive, header, law_steps
 from kinfmu.codegen.python.loops import Loops
 from kinfmu.codegen.writer import Names, Writer, identifier
-from kinfmu.equations.graph import Node
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.equations.graph import Node
 
 
 def looped(plan: SolvePlan) -> str:

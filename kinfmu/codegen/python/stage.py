@@ -19,8 +19,8 @@ from kinfmu.codegen.python.block_code import indented, matrix, tupled, unpacking
 from kinfmu.codegen.python.roots import sqrt
 from kinfmu.codegen.python.solutions import solutions
 from kinfmu.codegen.writer import Names, Writer, identifier
-from kinfmu.equations.graph import Node, reachable, symbols
-from kinfmu.measures.arithmetic import floor
+from kinfmu.mechanism.quantities.arithmetic import floor
+from kinfmu.plan.equations.graph import Node, reachable, symbols
 from kinfmu.plan.steps import Assignment, Stage, Step
 from kinfmu.solver.python.curve import CurveData
 from kinfmu.solver.python.curve import curve as curve_value

@@ -19,8 +19,8 @@ from kinfmu.codegen.python.block_code import (
 from kinfmu.codegen.python.definitions import Definitions, UnitSpeed
 from kinfmu.codegen.python.header import bound, curve_names, differences, drive, header, law_steps, places
 from kinfmu.codegen.writer import Names, Writer, identifier
-from kinfmu.equations.graph import Node, reachable, symbols
 from kinfmu.plan import Block, SolvePlan
+from kinfmu.plan.equations.graph import Node, reachable, symbols
 
 _VALUES = "    <values>"  # in place of the statements that unpack `values`, which are known when all stages are written
 _Right = Callable[[Block], tuple[Node, ...]]  # right side of a block's linear solve

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.forces import Arrows
+from kinfmu.draw.scene.scene import Scene
 from kinfmu.log.viewer.linkage import MARGIN, Linkage, send
-from kinfmu.scene import palette
-from kinfmu.scene.forces import Arrows
-from kinfmu.scene.scene import Scene
 
 if TYPE_CHECKING:
     import rerun as rr

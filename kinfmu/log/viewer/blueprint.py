@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from kinfmu.draw.scene.forces import Arrows, arrows
+from kinfmu.draw.scene.scene import Scene
 from kinfmu.log.viewer.linkage import trail_path, trail_time, view_box
 from kinfmu.log.viewer.series import KINDS, ORDERS, Group
 from kinfmu.log.viewer.timeline import Timeline
 from kinfmu.run import Run
 from kinfmu.run.verdict import notable_events
-from kinfmu.scene.forces import Arrows, arrows
-from kinfmu.scene.scene import Scene
 
 if TYPE_CHECKING:
     import rerun.blueprint as rrb

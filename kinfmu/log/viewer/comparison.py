@@ -8,6 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
+from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.scene import drawable
 from kinfmu.errors import LogError, listed
 from kinfmu.log.cdr import nanoseconds
 from kinfmu.log.viewer.blueprint import compared
@@ -30,11 +33,9 @@ from kinfmu.log.viewer.parameters import parameters_apart
 from kinfmu.log.viewer.rerun_file import application, left_out, log_card, log_group, log_status, recording
 from kinfmu.log.viewer.series import Group, groups
 from kinfmu.log.viewer.timeline import Timeline, timeline_of
-from kinfmu.run import FloatArray, Run
+from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
 from kinfmu.run.verdict import sentence
-from kinfmu.scene import palette
-from kinfmu.scene.scene import drawable
 
 MOST_LISTED = 6  # coordinates that a line names
 MOST_PERCENT = 1000  # of a difference; a larger part states only that the value in A is small

@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import LogError
 from kinfmu.log.viewer.reactions import reactions
 from kinfmu.log.viewer.series import Group, efforts, signals
-from kinfmu.run import FloatArray, Run
+from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
 from kinfmu.units import CoordinateName, ForceName, SignalName, unit_of
 

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
+from kinfmu.draw.scene import details, palette
+from kinfmu.draw.scene.scene import Scene
 from kinfmu.log.viewer.labels import detail, places_below
 from kinfmu.mechanism.body import GROUND_NAME
-from kinfmu.run import FloatArray
-from kinfmu.scene import details, palette
-from kinfmu.scene.scene import Scene
 
 if TYPE_CHECKING:
     import rerun as rr

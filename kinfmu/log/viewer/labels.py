@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kinfmu.run import FloatArray
-from kinfmu.scene import details
-from kinfmu.scene.placing import world
-from kinfmu.scene.scene import Scene
-from kinfmu.scene.shape import Shape
+from kinfmu.arrays import FloatArray
+from kinfmu.draw.scene import details
+from kinfmu.draw.scene.placing import world
+from kinfmu.draw.scene.scene import Scene
+from kinfmu.draw.scene.shape import Shape
 
 _SUPPORT = 0.05  # height of a support, as a part of the size
 _WIDTH, _HEIGHT = 600.0, 380.0  # [points] of the view on a usual screen, within its frame

@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.arrays import FloatArray
+from kinfmu.draw.scene import details, palette
+from kinfmu.draw.scene.forces import Arrows
+from kinfmu.draw.scene.scene import Scene
+from kinfmu.draw.scene.shape import Shape, guides_of_cams
 from kinfmu.log.viewer.ground import MOST_NAMES, log_ground
 from kinfmu.log.viewer.labels import detail, shown_names
 from kinfmu.log.viewer.timeline import Timeline
 from kinfmu.mechanism.body import GROUND_NAME
-from kinfmu.run import FloatArray, Run
-from kinfmu.scene import details, palette
-from kinfmu.scene.forces import Arrows
-from kinfmu.scene.scene import Scene
-from kinfmu.scene.shape import Shape, guides_of_cams
+from kinfmu.run import Run
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -18,6 +18,7 @@ from uuid import uuid4
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import LogError
 from kinfmu.log.cdr import nanoseconds
 from kinfmu.log.viewer.arrows import log_arrows
@@ -31,7 +32,7 @@ from kinfmu.log.viewer.package import require_viewer
 from kinfmu.log.viewer.rerun_file import drawn_linkages, left_out, log_card, log_group, log_status
 from kinfmu.log.viewer.series import Group, accuracy, efforts, error_estimates, groups, iterations, margin, signals
 from kinfmu.log.viewer.timeline import timeline_of
-from kinfmu.run import FloatArray, Run
+from kinfmu.run import Run
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
+from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.shape import Shape
 from kinfmu.log.viewer.linkage import Linkage
-from kinfmu.run import FloatArray
-from kinfmu.scene import palette
-from kinfmu.scene.shape import Shape
 
 FORCES = ("force", "force_along", "force_between")  # kinds that the arrows of a run show to scale
 _ORDER = 28.0  # above cylinders, below pins

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
+from kinfmu.draw.scene import palette
 from kinfmu.log.viewer.series import Group
-from kinfmu.run import FloatArray, Run
+from kinfmu.run import Run
 from kinfmu.run.axis import shown_range
-from kinfmu.scene import palette
 from kinfmu.units import Quantity, unit_of
 
 _TITLES = {"force": "joint force", "torque": "joint moment"}

@@ -32,6 +32,9 @@ from zlib import crc32
 
 import numpy as np
 
+from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.components import component_runs
+from kinfmu.draw.scene.scene import drawable
 from kinfmu.errors import LogError
 from kinfmu.files.temporary_folder import temporary_folder
 from kinfmu.log.cdr import nanoseconds
@@ -49,9 +52,6 @@ from kinfmu.log.viewer.timeline import Timeline, timeline_of
 from kinfmu.run import Run
 from kinfmu.run.components import is_of_mechanisms
 from kinfmu.run.verdict import changes, label, notable_events, sentence
-from kinfmu.scene import palette
-from kinfmu.scene.components import component_runs
-from kinfmu.scene.scene import drawable
 from kinfmu.solver.python.status import Status
 
 if TYPE_CHECKING:

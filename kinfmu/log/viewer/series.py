@@ -8,9 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from kinfmu.run import FloatArray, Run
+from kinfmu.arrays import FloatArray
+from kinfmu.draw.scene import palette
+from kinfmu.run import Run
 from kinfmu.run.axis import axis_of, shown_range
-from kinfmu.scene import palette
 from kinfmu.units import ForceName, Quantity, unit_of
 
 ORDERS = ("position", "velocity", "acceleration")

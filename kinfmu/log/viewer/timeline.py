@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import LogError
 from kinfmu.log.cdr import nanoseconds
-from kinfmu.run import FloatArray, Run
+from kinfmu.run import Run
 from kinfmu.run.axis import DEGREE, SAMPLE, axis_of
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ const ANGLES = 360; // points of a curve
 const CLOSED = 1e-6; // of the size, and of a radian: largest gap after a turn
 const ROUNDING = 1e-9; // of the radius of a roller
 const OVERHANG = 0.15; // of the contact's range, by which a flat face is longer on either side
-const ROLLER_GREY = [150, 150, 150]; // as in kinfmu/scene/palette.py
+const ROLLER_GREY = [150, 150, 150]; // as in kinfmu/draw/scene/palette.py
 export const OF_CAMS = ["cam", "pitch", "roller", "face"]; // kinds of shapes
 
 // Return whether a number of a joint is not that of the file.

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from kinfmu import MotionSequence, Spline
-from kinfmu.laws import Cycloidal, Harmonic, Law, SimpleHarmonic
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.laws import Cycloidal, Harmonic, Law, SimpleHarmonic
 from kinfmu.solver.python.status import Status
 from tests.fmu.conftest import Start
 from tests.fmu.host import OK, Host, answer

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu.laws import ConstantSpeed
+from kinfmu.mechanism.laws import ConstantSpeed
 from tests.fmu.host import DISCARD, ERROR, OK, Host, answer
 from tests.fmu.test_torque import MECHANISMS, G
 

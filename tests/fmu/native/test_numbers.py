@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import gallery
 from kinfmu.errors import FmuError
+from kinfmu.mechanism import gallery
 from kinfmu.solver.python.status import Status
 from tests.fmu.conftest import Build
 from tests.fmu.test_parameters import OTHERS, linkage

@@ -21,7 +21,7 @@ from tests.fmu.conftest import Build, Start
 from tests.fmu.host import DISCARD, ERROR, LAST_SUCCESSFUL_TIME, OK, TERMINATED, WARNING, Host, answer
 from tests.fmu.test_parameters import LENGTHS, OTHERS, linkage
 from tests.oracle import Motion, mp
-from tests.sweep.test_sensitivities import Form, exact_derivative
+from tests.run.test_sensitivities import Form, exact_derivative
 
 COUPLER = ("coupler.x", "coupler.vx", "coupler.ax")
 UNIT_INPUTS = ("crank_angle", "crank_speed", "crank_acceleration")

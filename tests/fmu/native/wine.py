@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import kinfmu
-from kinfmu import gallery
 from kinfmu.codegen.c import compiler
 from kinfmu.fmu import description
 from kinfmu.fmu.native.platforms import PLATFORMS, Platform
+from kinfmu.mechanism import gallery
 
 HOST = Path(__file__).with_name("walk.c")
 WINE = ("wine64", "wine", "/usr/lib/wine/wine64")  # Debian keeps it out of the path

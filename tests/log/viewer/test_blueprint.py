@@ -10,7 +10,7 @@ from kinfmu.log.viewer.blueprint import ABREAST, EDGE, NUMBERS, WIDTH, Plot, _ab
 from kinfmu.log.viewer.series import efforts, groups, margin
 from kinfmu.log.viewer.timeline import timeline_of
 from tests.log.runs import fourbar
-from tests.sweep.test_forces import loaded
+from tests.run.test_forces import loaded
 
 pytest.importorskip("rerun")
 WIDEST_LABEL = 50.0  # [points], such as +100 ms

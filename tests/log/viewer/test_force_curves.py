@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 
 import kinfmu
+from kinfmu.draw.scene.scene import drawable
 from kinfmu.log import write_rrd
 from kinfmu.log.viewer.blueprint import Drawn, single
 from kinfmu.log.viewer.linkage import view_box
 from kinfmu.log.viewer.reactions import reactions
 from kinfmu.log.viewer.timeline import timeline_of
 from kinfmu.run import Run
-from kinfmu.scene.scene import drawable
 from tests.log.viewer.test_rerun_file import SCALARS, rows, statics
-from tests.sweep.test_forces import loaded
+from tests.run.test_forces import loaded
 
 
 def test_a_recording_has_curves_of_reactions_with_names_and_arrows_with_a_scale(tmp_path: Path) -> None:

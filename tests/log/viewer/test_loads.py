@@ -9,17 +9,18 @@ import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu.arrays import FloatArray
+from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.placing import world
+from kinfmu.draw.scene.scene import scene
 from kinfmu.log import write_rrd
 from kinfmu.log.viewer.comparison import write_comparison
 from kinfmu.log.viewer.linkage import view_box
 from kinfmu.mechanism.body import Gravity
-from kinfmu.run import FloatArray, Run
-from kinfmu.scene import palette
-from kinfmu.scene.placing import world
-from kinfmu.scene.scene import scene
-from tests.loads.every_load import every_load, fourbar
+from kinfmu.run import Run
 from tests.log.runs import with_gap
 from tests.log.viewer.test_rerun_file import STRIPS, entities, rows, statics, verified
+from tests.mechanism.loads.every_load import every_load, fourbar
 
 TIMES = np.linspace(0.0, 1.0, 11)
 

@@ -20,7 +20,7 @@ from kinfmu.run import Run
 from kinfmu.run.channels import select
 from kinfmu.units import CoordinateName
 from tests.log.runs import KINDS, fourbar, without_samples
-from tests.sweep.test_forces import loaded
+from tests.run.test_forces import loaded
 
 SCALARS, STRIPS = "Scalars:scalars", "LineStrips2D:strips"
 

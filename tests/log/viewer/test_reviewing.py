@@ -13,12 +13,12 @@ from matplotlib.image import imread
 
 import kinfmu
 from kinfmu.cli import main
+from kinfmu.draw.scene import palette
 from kinfmu.errors import LogError, RequestError
 from kinfmu.log import review, write_mcap, write_rrd
 from kinfmu.log.viewer import headless, reviewing
 from kinfmu.log.viewer.timeline import timeline_named, timeline_of
 from kinfmu.run import Run
-from kinfmu.scene import palette
 from tests.log.runs import fourbar
 
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu.draw.scene import palette
 from kinfmu.log.viewer.blueprint import plot
 from kinfmu.log.viewer.series import SMALLEST, accuracy, efforts, error_estimates, groups, margin
 from kinfmu.log.viewer.timeline import timeline_of
 from kinfmu.run import Run
-from kinfmu.scene import palette
 from tests.log.runs import fourbar, with_gap
-from tests.sweep.test_forces import loaded
+from tests.run.test_forces import loaded
 
 
 def test_curves_are_grouped_by_unit(run: Run) -> None:

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import gallery
 from kinfmu.log import write_mcap, write_rrd
 from kinfmu.log.viewer import headless
 from kinfmu.log.viewer.comparison import write_comparison
+from kinfmu.mechanism import gallery
 from kinfmu.run.channels import select
-from kinfmu.sweep import run_times
+from kinfmu.run.driving import run_times
 from tests.gallery_members import mostly_long
 from tests.log.runs import KINDS, fourbar, with_gap
 from tests.log.viewer.test_rerun_file import verified
-from tests.sweep.test_forces import loaded
+from tests.run.test_forces import loaded
 
 MOST_SAMPLES = 60  # of a mechanism of the gallery
 

@@ -1,0 +1,168 @@
+"""The measurements as Markdown, and their places in a page."""
+
+from __future__ import annotations
+
+import math
+import platform
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from benchmarks.accuracy import Measured
+from benchmarks.engine import PREDICTORS, EngineSetting
+from benchmarks.engines import ENGINES
+from benchmarks.singular import DISTANCES, Near
+from kinfmu.errors import KinfmuError
+from kinfmu.mechanism import gallery
+
+PAGE, SETTINGS_PAGE = "accuracy.md", "accuracy-settings.md"
+PARTS = ("conditions", "engines", "singular points")
+SHOWN = (1e-1, 1e-3, 1e-5, 1e-8)  # [rad], of DISTANCES
+
+
+def begin(name: str) -> str:
+    """Return the comment before a generated part of a page."""
+    return f"<!-- generated: {name} -->"
+
+
+def end(name: str) -> str:
+    """Return the comment after a generated part of a page."""
+    return f"<!-- end: {name} -->"
+
+
+def check(folder: Path) -> None:
+    """Raise a KinfmuError if PAGE is in a folder without a place for each generated part."""
+    page = folder / PAGE
+    if page.exists():
+        filled(page.read_text(encoding="utf-8"), dict.fromkeys(PARTS, ""), page)
+
+
+def write(folder: Path, parts: Mapping[str, str], settings: str) -> tuple[Path, ...]:
+    """Fill the generated parts of PAGE in a folder, or make a page of them alone; also write SETTINGS_PAGE."""
+    page, other = folder / PAGE, folder / SETTINGS_PAGE
+    text = page.read_text(encoding="utf-8") if page.exists() else _bare()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        page.write_text(filled(text, parts, page), encoding="utf-8", newline="\n")
+        other.write_text(settings, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise KinfmuError(f"{error.filename}: cannot be written ({error.strerror})") from None
+    return page, other
+
+
+def filled(page: str, parts: Mapping[str, str], path: Path) -> str:
+    """Return the page with its generated parts replaced; raise a KinfmuError if a place for one is missing."""
+    for name, text in parts.items():
+        if page.count(begin(name)) != 1 or page.count(end(name)) != 1:
+            raise KinfmuError(f"{path}: must have {begin(name)} and {end(name)}, once each")
+        before, _, rest = page.partition(begin(name))
+        page = f"{before}{begin(name)}\n\n{text}\n\n{end(name)}{rest.partition(end(name))[2]}"
+    return page
+
+
+def _bare() -> str:
+    places = "\n\n".join(f"{begin(name)}\n{end(name)}" for name in PARTS)
+    return f"# Accuracy\n\n{places}\n"
+
+
+def conditions(rounds: int) -> str:
+    """Return a sentence on the machine and method of the times."""
+    where = f"{_processor()}, Python {platform.python_version()}"
+    return f"Measured on {where}; processor time, median of {rounds} rounds, each of which measures every engine once."
+
+
+def _processor() -> str:
+    """Return the name of the processor."""
+    try:
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+    except OSError:
+        text = ""
+    names = re.findall(r"^model name\s*: (.+)$", text, re.MULTILINE)
+    return names[0] if names else platform.processor() or platform.machine()
+
+
+def parts(measured: Sequence[Measured], near: Sequence[Near], rounds: int) -> dict[str, str]:
+    """Return the generated parts of PAGE by name."""
+    return dict(zip(PARTS, (conditions(rounds), engines_table(measured), singular_table(near)), strict=True))
+
+
+def engines_table(measured: Sequence[Measured]) -> str:
+    """Return a table of every engine in its usual setting, one column a mechanism: time and error."""
+    cases = list(dict.fromkeys(one.case for one in measured))
+    lines = [f"| | {' | '.join(_titled(case) for case in cases)} |", f"|---|{'---|' * len(cases)}"]
+    usual = {(one.engine, one.case): one for one in measured if one.is_usual}
+    for engine in ENGINES:
+        cells = [_cell(usual.get((engine.name, case))) for case in cases]
+        if any(cells):
+            lines.append(f"| {engine.name} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _cell(one: Measured | None) -> str:
+    return f"{duration(one.microseconds.median)} us, {number(one.error)}" if one else ""
+
+
+def _titled(case: str) -> str:
+    return f"[`{case}`](../fmus/{case}/README.md)" if case in gallery.names() else case
+
+
+def settings_page(measured: Sequence[Measured], rounds: int) -> str:
+    """Return a page with every measurement."""
+    parts = [
+        "# Run time against error: every engine in every setting",
+        f"Written by `kinfmu bench`; [accuracy.md](accuracy.md) explains it. {conditions(rounds)} Errors are "
+        "the largest over the samples of a mechanism's reference.csv, relative to each column's largest magnitude.",
+    ]
+    for case in dict.fromkeys(one.case for one in measured):
+        lines = [
+            "| engine | predictor | Newton | stops at | us a sample | quartiles | q | qd | qdd |",
+            f"|{'---|' * 9}",
+        ]
+        lines += [f"| {' | '.join(_row(one))} |" for one in measured if one.case == case]
+        parts += [f"## {gallery.load(case).title}", "\n".join(lines)]
+    return "\n\n".join(parts) + "\n"
+
+
+def _row(one: Measured) -> tuple[str, ...]:
+    of = one.microseconds
+    return (
+        *row_head(one.engine, one.setting, is_usual=one.is_usual),
+        duration(of.median),
+        f"{duration(of.lower)} to {duration(of.upper)}",
+        *map(number, one.errors),
+    )
+
+
+def row_head(engine: str, setting: EngineSetting, *, is_usual: bool) -> tuple[str, str, str, str]:
+    """Return the cells that state what was measured: the usual setting of an engine is bold."""
+    name = f"**{engine}**" if is_usual else engine
+    if engine == "pylinkage":
+        return name, "", "closed forms", ""
+    return name, PREDICTORS[setting.predictor], "chord" if setting.chord else "full", setting.stop
+
+
+def singular_table(near: Sequence[Near]) -> str:
+    """Return tables of the errors of q, qd, qdd toward a singular point, at it and beyond, one line an engine."""
+    shown = [min(range(len(DISTANCES)), key=lambda k: abs(math.log(DISTANCES[k] / d))) for d in SHOWN]
+    heads = [*(f"{d:.0e}" for d in SHOWN), "at it", f"{SHOWN[-1]:.0e} beyond", f"{SHOWN[0]:.0e} beyond", "us a sample"]
+    parts = []
+    for point in dict.fromkeys(one.point for one in near):
+        lines = [f"| {point} | {' | '.join(heads)} |", f"|{'---|' * (len(heads) + 1)}"]
+        for one in (one for one in near if one.point == point):
+            samples = [*(one.before[k] for k in shown), one.at, one.beyond[shown[-1]], one.beyond[shown[0]]]
+            cells = [", ".join(number(float(error)) for error in sample) for sample in samples]
+            lines.append(f"| {one.engine} | {' | '.join(cells)} | {duration(one.microseconds.median)} |")
+        parts.append("\n".join(lines))
+    return "\n\n".join(parts)
+
+
+def duration(microseconds: float) -> str:
+    """Return three digits: '4.52', '45.2', '1610'."""
+    return f"{microseconds:.3g}" if microseconds < 1000.0 else f"{microseconds:.0f}"
+
+
+def number(error: float) -> str:
+    """Return '1e-15', '0', or a dash where there was no number."""
+    if math.isnan(error):
+        return "-"
+    return "0" if error == 0.0 else f"{error:.0e}"

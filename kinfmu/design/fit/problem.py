@@ -1,0 +1,219 @@
+"""FitProblem: a mechanism, its unknowns, what it shall do, and the conditions it shall meet."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from kinfmu.arrays import FloatArray
+from kinfmu.design.fit.argument import Argument, argument_of
+from kinfmu.design.fit.constraints import CONSTRAINTS, Constraint, GrashofConstraint
+from kinfmu.design.fit.lengths import Lengths
+from kinfmu.design.fit.measuring import Measuring, measuring_of
+from kinfmu.design.fit.numbers import Bounds, read_bounds
+from kinfmu.design.fit.sampled import Sampled, TracedPoints, sampled
+from kinfmu.design.fit.targets import TARGETS, MeasureTarget, Target
+from kinfmu.errors import MechanismError, RequestError, listed
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.measures import Reading
+from kinfmu.mechanism.mechanism import require_mechanism
+from kinfmu.mechanism.number import unit_advice
+from kinfmu.mechanism.parameters import NUMBER
+from kinfmu.mechanism.valid import check_name, quoted
+from kinfmu.units import CoordinateName, Quantity
+
+ANGLE = Quantity("angle")
+
+
+@dataclass(frozen=True, eq=False)
+class FitProblem:
+    """Parameters of a mechanism that are to be found, and what they are to bring about.
+
+    Args:
+        mechanism: The mechanism; its parameters as written are the first start.
+        unknowns: Bounds (low, high) of parameters by name, as numbers or text with a unit. Over time also law
+            constants such as 'crank.speed'.
+        targets: What the mechanism shall do.
+        constraints: Conditions it shall meet. Default: none.
+        over: What the samples go by: 'driver' or 'time'. Default: the driver, if there is one only.
+
+    Attributes:
+        argument: What the samples go by.
+        traced: The mechanism with the points of the targets as points of interest.
+        bounds: Bounds of all unknowns as numbers, also of starts and offsets such as 'curve.start'.
+        sampled: Paths, functions and poses in one form.
+        measuring: Measures with values or limits; None: there are none.
+        lengths: Grashof's conditions.
+
+    Raises:
+        MechanismError: A name or a value is invalid; the message states table and key.
+        RequestError: An unknown is not a parameter that can be set.
+
+    """
+
+    mechanism: Mechanism
+    unknowns: Mapping[str, Any]
+    targets: Sequence[Target]
+    constraints: Sequence[Constraint] = ()
+    over: str | None = None
+
+    argument: Argument = field(init=False)
+    traced: Mechanism = field(init=False)
+    bounds: Mapping[str, Bounds] = field(init=False)
+    sampled: tuple[Sampled, ...] = field(init=False)
+    measuring: Measuring | None = field(init=False)
+    lengths: tuple[Lengths, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        require_mechanism(self.mechanism, "fit")
+        names = [*self._names("targets", self.targets, TARGETS)]
+        names += self._names("constraints", self.constraints, CONSTRAINTS)
+        if not self.targets:
+            raise MechanismError("a fit needs targets: write a table such as [targets.curve]")
+        doubled = next((name for k, name in enumerate(names) if name in names[:k]), None)
+        if doubled is not None:
+            raise MechanismError(f"two targets or constraints have the name '{doubled}'")
+        unit, traced = self.mechanism.length_unit, TracedPoints(self.mechanism)
+        argument = argument_of(self.mechanism, self.over)
+        of_points = [CoordinateName(point, axis) for point in self.mechanism.points for axis in "xy"]
+        known: dict[str, CoordinateName] = {name: name for name in (*self.mechanism.coordinate_names, *of_points)}
+        own = [
+            sampled(target, f"[targets.{target.name}]", traced, known, argument, unit)
+            for target in self.targets
+            if not isinstance(target, MeasureTarget)
+        ]
+        bounds = self._parameter_bounds(argument)
+        for prepared in own:
+            bounds |= prepared.free
+        lengths = [
+            Lengths.of(constraint, f"[constraints.{constraint.name}]", self.mechanism)
+            for constraint in self.constraints
+            if isinstance(constraint, GrashofConstraint)
+        ]
+        found = {
+            "argument": argument,
+            "traced": replace(self.mechanism, points=traced.points),
+            "bounds": bounds,
+            "sampled": tuple(own),
+            "measuring": measuring_of(self.mechanism, argument, self.targets, self.constraints),
+            "lengths": tuple(lengths),
+            "targets": tuple(self.targets),
+            "constraints": tuple(self.constraints),
+        }
+        for key, value in found.items():
+            object.__setattr__(self, key, value)
+
+    def __reduce__(self) -> tuple[Callable[..., FitProblem], tuple[Any, ...]]:
+        from kinfmu.mechanism import toml_text
+
+        text = toml_text.text(self.mechanism)
+        return _from_text, (text, dict(self.unknowns), self.targets, self.constraints, self.over)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """The unknowns that are parameters or law constants of the mechanism."""
+        return tuple(self.unknowns)
+
+    def of(self, mechanism: Mechanism) -> FitProblem:
+        """Return the same problem of another mechanism.
+
+        Args:
+            mechanism: A mechanism that has the unknowns and outputs of this problem.
+
+        Returns:
+            The problem, checked anew.
+
+        Raises:
+            MechanismError: An unknown or an output is missing, or a value is invalid.
+
+        """
+        return FitProblem(mechanism, self.unknowns, self.targets, self.constraints, self.over)
+
+    def written(self) -> dict[str, float | None]:
+        """Return the values of the unknowns as written, within their bounds; starts and offsets have none."""
+        settable = self.mechanism.settable
+        values: dict[str, float | None] = dict.fromkeys(self.bounds)
+        for name in self.parameters:
+            setting = settable.constants.get(name) or self.mechanism.parameters[name]
+            values[name] = min(max(float(setting.value), self.bounds[name].low), self.bounds[name].high)
+        return values
+
+    @property
+    def turns(self) -> FloatArray:
+        """(n,) a whole turn as part of the range of each unknown that is an angle; inf for others."""
+        return np.array(
+            [
+                math.tau / (b.high - b.low) if self.quantity(name) == ANGLE else math.inf
+                for name, b in self.bounds.items()
+            ]
+        )
+
+    def quantity(self, name: str) -> Quantity:
+        """Return the quantity of an unknown.
+
+        Args:
+            name: The unknown, such as 'crank', 'crank.speed' or 'curve.start'.
+
+        """
+        if name in self.unknowns:
+            settable = self.mechanism.settable
+            return (settable.constants.get(name) or settable.parameters[name]).quantity or NUMBER
+        own, _, key = name.rpartition(".")
+        sampled = next(one for one in self.sampled if one.name == own)
+        return sampled.argument if key == "start" else Quantity("angle" if sampled.angles[0] else "length")
+
+    def vector(self, z: FloatArray) -> dict[str, float]:
+        """Return the unknowns by name.
+
+        Args:
+            z: (n,) each 0 to 1: part of the range between the bounds of an unknown.
+
+        Returns:
+            Values in the mechanism's unit of length and rad.
+
+        """
+        return {
+            name: b.low + float(part) * (b.high - b.low) for (name, b), part in zip(self.bounds.items(), z, strict=True)
+        }
+
+    @staticmethod
+    def _names(table: str, members: Sequence[Any], classes: Any) -> list[str]:
+        for one in members:
+            if not isinstance(one, classes):
+                kinds = listed(cls.__name__ for cls in classes)
+                raise RequestError(f"{table}: {type(one).__name__} is not one of {kinds}")
+            check_name(f"[{table}]", one.name)
+            over = getattr(one, "over", None)
+            for key, value in (("of", getattr(one, "of", "")), ("over", "" if over is None else over)):
+                if not isinstance(value, str | Reading):
+                    raise MechanismError(f"[{table}.{one.name}] {key} = {quoted(value)} must be a name")
+        return [one.name for one in members]
+
+    def _parameter_bounds(self, argument: Argument) -> dict[str, Bounds]:
+        """Return the bounds of parameters and law constants."""
+        settable = self.mechanism.settable
+        if not self.unknowns:
+            raise MechanismError("a fit needs unknowns: write bounds of parameters in [unknowns], such as a = [20, 50]")
+        bounds = {}
+        for name, value in self.unknowns.items():
+            parameter, constant = self.mechanism.parameters.get(name), settable.constants.get(name)
+            if constant in self.mechanism.law_constants and argument.input:
+                raise RequestError(f"[unknowns] {name} is a law constant, which acts over time: write over = 'time'")
+            if constant is None and (parameter is None or parameter.expression is not None):
+                raise RequestError(f"[unknowns] {settable.unknown(name, settable.names)}")
+            setting: Any = constant or parameter
+            where = f"[unknowns] {name}"
+            with unit_advice(name, setting.value, self.mechanism.length_unit):
+                bounds[name] = read_bounds(where, value, setting.quantity or NUMBER, self.mechanism.length_unit)
+        return bounds
+
+
+def _from_text(text: str, *rest: Any) -> FitProblem:
+    """Return a problem from its mechanism's text: how problems arrive in other processes."""
+    from kinfmu.mechanism import toml_file
+
+    return FitProblem(toml_file.parse(text, "the mechanism of the fit"), *rest)

@@ -1,0 +1,10 @@
+"""Studies: thousands of designs of a mechanism, measured on all cores or on a cluster, and resumed where they ended."""
+
+from __future__ import annotations
+
+from kinfmu.design.study.definition import Study
+from kinfmu.design.study.result import StudyResult
+from kinfmu.design.study.run import run_study, study
+from kinfmu.design.study.study_file import read_study
+
+__all__ = ["Study", "StudyResult", "read_study", "run_study", "study"]

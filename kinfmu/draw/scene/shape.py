@@ -1,0 +1,167 @@
+"""What is drawn of a mechanism, once for figures, recordings and robot descriptions: shapes in moving frames.
+
+A renderer places the frames and paints each kind in its own way. Frames are bodies, 'ground', or those
+of `frames`: bars, cylinders, and the blocks of pins.
+
+    link             a body's points: a closed plate or an open bar; rib: from a plate's corner to a point inside
+    rod, slot        a line of a body on which another body slides, and the part of it in which a pin runs
+    block, die       what slides: a body, or the block of a pin, which can turn; direction: along the line
+    rail, bed        a line of the ground under blocks, and under a rack; direction: into the ground
+    support          a pin of the ground; direction: into the ground
+    cam, pitch       the profile, and the curve of the roller's centre; roller: its circle
+    face             the line of a flat face on a cam; direction: away from the cam, the side on which the body is
+    wheel, spoke     a pitch circle, and a radius that shows its rotation; belt: a straight part of one
+    rack             the pitch line; direction: from the teeth to the back
+    contact          the point where the bodies of a cam, gear or rack touch
+    bar              a joint Distance; barrel, shaft: of a driven distance, at its first and at its second point
+    spring, damper, gas_spring, force_between, force, force_along, torque, torsion_spring, torsion_damper
+                     the symbol of a load of this type: one point, or two; direction: of a force, of a body's x axis
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinfmu.arrays import FloatArray
+from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.placing import world
+from kinfmu.draw.scene.symbols import Strip
+from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.drivers import DistanceDriver, Driver
+from kinfmu.mechanism.joints import Coordinate, Distance, PointOnLine
+from kinfmu.mechanism.joints.joint import Joint
+from kinfmu.mechanism.mechanism import Mechanism
+from kinfmu.mechanism.quantities.placement import body_of
+
+_ROUND = np.linspace(0.0, 2.0 * np.pi, 73)  # [rad], corners of a circle
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A line, area or circle that is fixed in a frame.
+
+    kind: see above; name: of the joint, body or driver it shows; frame: that moves it; points: (k, 2) in the frame;
+    colour: of the body, or grey; is_closed: True for a line that returns to its first point; radius: of a circle about
+    the only point; direction: unit vector (2,), as stated with the kinds. Of loads: strips: the lines of the symbol;
+    other: the frame of the second of two points, else that of the direction.
+    """
+
+    kind: str
+    name: str
+    frame: str
+    points: FloatArray
+    colour: palette.Colour = palette.GROUND
+    is_closed: bool = False
+    radius: float = 0.0
+    direction: FloatArray | None = None
+    strips: tuple[Strip, ...] = ()
+    other: str = ""
+
+    @property
+    def line(self) -> FloatArray:
+        """The polyline (k, 2) in the frame; that of a circle or closed line returns to its first point."""
+        if self.radius:
+            return self.points + self.radius * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
+        return np.vstack([self.points, self.points[:1]]) if self.is_closed else self.points
+
+    @property
+    def extent(self) -> FloatArray:
+        """Some of the points of the line, (at most 25, 2)."""
+        return self.line[:: max(len(self.line) // 24, 1)]
+
+    @property
+    def towards(self) -> FloatArray:
+        """The direction of a kind that has one, (2,)."""
+        if self.direction is None:
+            raise TypeError(f"a shape of kind '{self.kind}' has no direction")
+        return self.direction
+
+    def placed(self, poses: Mapping[str, FloatArray]) -> Shape:
+        """Return the shape in the world; poses: (3,) of all frames."""
+        pose = poses[self.frame]
+        ends = [pose] * len(self.points)
+        if self.other and len(ends) > 1:
+            ends[-1] = poses[self.other]
+        points = np.array([world(end[None], (x, y))[0] for end, (x, y) in zip(ends, self.points, strict=True)])
+        if self.direction is None:
+            return replace(self, points=points.reshape(-1, 2))
+        x, y = self.direction
+        turn = poses[self.other or self.frame][2]
+        direction = world(np.array([[0.0, 0.0, turn]]), (x, y))[0]
+        return replace(self, points=points.reshape(-1, 2), direction=direction)
+
+    def ends(self, poses: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the first point (n, 2) of a load, its angle [rad] and the distance of its ends (n,).
+
+        poses: (n, 3) of all frames.
+        """
+        first, *last = [
+            world(poses[frame], (float(x), float(y)))
+            for frame, (x, y) in zip((self.frame, self.other), self.points, strict=False)
+        ]
+        if last:
+            way = last[0] - first
+            return first, np.arctan2(way[:, 1], way[:, 0]), np.hypot(*way.T)
+        angle = math.atan2(self.towards[1], self.towards[0]) + poses[self.other or self.frame][:, 2]
+        return first, angle, np.zeros(len(first))
+
+
+def guides_of_cams(found: Iterable[Shape]) -> frozenset[str]:
+    """Return the names of the blocks of followers, which are drawn behind their cams.
+
+    In the middle of such a block is often a roller that is smaller than the block.
+    """
+    found = list(found)
+    cams = {shape.name for shape in found if shape.kind == "cam"}
+    followers = {shape.frame for shape in found if shape.kind == "contact" and shape.name in cams}
+    return frozenset(shape.name for shape in found if shape.kind == "block" and shape.frame in followers)
+
+
+def bar_frame(joint: str) -> str:
+    """Return the frame of a bar, which begins at its first point and lies along it."""
+    return f"bar.{joint}"  # names of bodies hold no dot
+
+
+def cylinder_frames(driver: str) -> tuple[str, str]:
+    """Return the frames of a cylinder's barrel and rod, each at its own pin and along the cylinder."""
+    return f"cylinder.{driver}.barrel", f"cylinder.{driver}.rod"
+
+
+def die_frame(joint: str) -> str:
+    """Return the frame of the block of a pin, which moves with the pin and does not turn."""
+    return f"die.{joint}"
+
+
+def frames(poses: Mapping[str, FloatArray], mechanism: Mechanism) -> dict[str, FloatArray]:
+    """Return poses (n, 3) of x, y [length], phi [rad] of all frames, from those of bodies, the ground included."""
+    found, points = dict(poses), mechanism.body_points
+
+    def track(point: str) -> FloatArray:
+        return world(poses[body_of(point)], points[point])
+
+    members: list[Joint | Driver] = [*mechanism.joints, *mechanism.drivers]
+    for member in members:
+        if not poses.keys() >= set(member.bodies()):
+            continue
+        if isinstance(member, Distance | DistanceDriver):
+            a, b = map(track, member.between)
+            angle = np.arctan2(b[:, 1] - a[:, 1], b[:, 0] - a[:, 0])
+            at_a, at_b = np.column_stack([a, angle]), np.column_stack([b, angle])
+            if isinstance(member, Distance):
+                found[bar_frame(member.name)] = at_a
+            else:
+                found |= zip(cylinder_frames(member.name), (at_a, at_b), strict=True)
+        elif isinstance(member, Coordinate):
+            found[die_frame(member.name)] = _upright(track(member.of))
+        elif isinstance(member, PointOnLine) and body_of(member.between[0]) == GROUND_NAME:
+            found[die_frame(member.name)] = _upright(track(member.between[1]))
+    return found
+
+
+def _upright(track: FloatArray) -> FloatArray:
+    """Return poses (n, 3) at points (n, 2) that do not turn, NaN where the points are unknown."""
+    return np.column_stack([track, 0.0 * track[:, 0]])

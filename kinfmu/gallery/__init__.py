@@ -1,7 +1,0 @@
-"""The gallery: mechanisms that come with kinfmu; loading and saving mechanisms."""
-
-from __future__ import annotations
-
-from kinfmu.gallery.load import folder, has, load, names, save
-
-__all__ = ["folder", "has", "load", "names", "save"]

@@ -1,0 +1,100 @@
+"""The contract of a load: the quantities along which it acts, and its effort along each."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from kinfmu.errors import MechanismError
+from kinfmu.mechanism.joints.joint import Condition
+from kinfmu.mechanism.quantities.arithmetic import Value
+from kinfmu.mechanism.quantities.placement import Placement
+from kinfmu.units import InputName
+
+EFFORTS = {"length": "force", "angle": "torque"}  # what acts along a quantity of a kind
+
+
+class Load(ABC):
+    """A force or torque on bodies, other than gravity and drivers.
+
+        Q = sum_k e_k ds_k/dq,   power = sum_k e_k ds_k/dt        (Q: generalized force)
+
+    s_k are quantities of the pose, lengths or angles, and e_k the efforts along them: a force [N] or a torque [N m],
+    positive if it enlarges s_k. A leaf is a frozen dataclass whose first field is `name`; its other fields are the keys
+    of its table in a mechanism file. Its formulas are plain arithmetic without branches on values, so that they serve
+    direct evaluation, derivative tests and generated code.
+    """
+
+    type: ClassVar[str]  # its name in mechanism files
+    is_conservative: ClassVar[bool] = False  # True if its power is minus the change of `energy`
+    required: ClassVar[Mapping[str, str]] = {}  # 'positive' or '0 or more', by the keys of numbers
+    columns: ClassVar[tuple[str, ...]] = ()  # of its effort and of its quantity in results, as nouns and quantities
+    name: str
+
+    @property
+    def needs_direction(self) -> bool:
+        """True if it acts along the line between two points: it has no value where they are in the same place."""
+        return False
+
+    @property
+    def depends_on_origin(self) -> bool:
+        """True if it depends on the place of the mechanism in the world."""
+        return False
+
+    @abstractmethod
+    def bodies(self) -> tuple[str, ...]:
+        """Return the names of the bodies in its formulas, each once, ground included."""
+
+    @abstractmethod
+    def acts_on(self) -> tuple[str, ...]:
+        """Return the names of the bodies on which it acts, ground included."""
+
+    @abstractmethod
+    def measured(self, at: Placement) -> tuple[Value, ...]:
+        """Return the quantities s_k [length, rad]."""
+
+    @abstractmethod
+    def kinds(self) -> tuple[str, ...]:
+        """Return the kind of each quantity, 'length' or 'angle'."""
+
+    @abstractmethod
+    def efforts(self, at: Placement, s: Sequence[Value], sd: Sequence[Value], x: Value) -> tuple[Value, ...]:
+        """Return the efforts [N, N m] along the quantities.
+
+        Args:
+            at: The pose.
+            s: The quantities [m, rad].
+            sd: Their rates [m/s, rad/s].
+            x: Argument of its law or value of its input; unused without either.
+
+        """
+
+    def energy(self, s: Sequence[Value]) -> Value:  # noqa: ARG002  most loads store none
+        """Return the potential energy [J]; s: the quantities [m, rad]."""
+        return 0.0
+
+    def argument(self, at: Placement) -> Value | None:  # noqa: ARG002  most loads have none
+        """Return the argument of its law [length, rad]; None if this is the time, or it has no law."""
+        return None
+
+    def inputs(self) -> tuple[InputName, ...]:
+        """Return the names of the inputs that give its effort, such as `wind_force`; most loads have none."""
+        return ()
+
+    def with_unit(self, length_unit: str) -> Load:  # noqa: ARG002  some loads have lengths
+        """Return the load for a mechanism with this unit of length."""
+        return self
+
+    def check(self) -> None:
+        """Raise a MechanismError for invalid values; numbers are finite and references valid by then."""
+        for key, value, word in self.conditions():
+            if not (value > 0.0 if word == "positive" else value >= 0.0):
+                raise MechanismError(f"[loads.{self.name}] {key} = {float(value)!r} must be {word}")
+
+    def conditions(self) -> tuple[Condition, ...]:
+        """Return the conditions of `check` on numbers; they are tested again when parameters are set at run time."""
+        return tuple(Condition(key, getattr(self, key), word) for key, word in self.required.items())
+
+    def check_start(self, at: Placement) -> None:  # noqa: B027  most loads accept all poses
+        """Raise a MechanismError for a start pose in which it is undefined."""

@@ -1,9 +1,0 @@
-"""Pages in which a mechanism is dragged, with what a page alone cannot do: a server, a widget."""
-
-from __future__ import annotations
-
-from kinfmu.player.server import PlayServer
-from kinfmu.player.source import PlaySource
-from kinfmu.player.widget import play
-
-__all__ = ["PlayServer", "PlaySource", "play"]

@@ -1,0 +1,186 @@
+"""What moves a sweep: times for the laws, or driver values given as inputs."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kinfmu.arrays import FloatArray
+from kinfmu.errors import KinfmuError, RequestError, listed, suggestion
+from kinfmu.mechanism import RunSettings
+from kinfmu.plan import DriverInfo
+from kinfmu.run import MOST_SAMPLES
+from kinfmu.run.engine import Driven
+from kinfmu.run.numbers import numbers_of
+from kinfmu.run.unwrap import unwrap
+
+LARGEST_RATE = 1e100  # of drivers; squares of much larger numbers are infinite
+_LARGEST_KEPT = 1_000_000  # numbers
+_FEW = 50  # numbers that are checked sooner one by one
+_NUMBER = (float, int)
+_DEFAULTS = (0.0, 1.0, 0.0)  # of value (which must be given), speed and acceleration
+
+
+def run_times(run: RunSettings) -> FloatArray:
+    """Return the times of a run.
+
+        t = start + k step <= stop,   k = 0, 1, ...
+
+    Args:
+        run: Start, stop and step [s].
+
+    Returns:
+        The times (n,) [s]; the stop is one of them if a step hits it.
+
+    Raises:
+        KinfmuError: There are more than MOST_SAMPLES of them.
+
+    """
+    if (run.stop - run.start) / run.step > MOST_SAMPLES:
+        raise KinfmuError(
+            f"[run] {run.start:g} to {run.stop:g} s in steps of {run.step:g} s: more than {MOST_SAMPLES} samples"
+        )
+    count = int((run.stop - run.start) / run.step + 1e-6)
+    return run.start + run.step * np.arange(count + 1, dtype=np.float64)
+
+
+def driven_by_inputs(
+    drivers: Sequence[DriverInfo], inputs: Mapping[str, ArrayLike], *, wrap: bool = False, rows: int = 1
+) -> Driven:
+    """Return values, speeds and accelerations of the drivers from inputs by name.
+
+    Args:
+        drivers: The drivers of a plan, which have the inputs.
+        inputs: Arrays (n,) or numbers by name, such as crank_angle [rad]; with designs also (m, n).
+        wrap: Unwrap angles.
+        rows: How many designs there are, the m of inputs (m, n).
+
+    Returns:
+        Values, speeds and accelerations, (n, d) each; (m, n, d) if an input is (m, n).
+
+    Raises:
+        RequestError: An input is unknown, missing or invalid, or the lengths differ.
+
+    """
+    if len(drivers) == len(inputs) == rows == 1 and not wrap and drivers[0].inputs[0] in inputs:
+        (name,) = inputs  # the values of a single driver: a short call is done here
+        column = column_of(name, inputs[name])
+        table = column.reshape(-1, 1).copy()
+        return table, _filled(table.shape, _DEFAULTS[1]), _filled(table.shape, _DEFAULTS[2])
+    known = [name for driver in drivers for name in driver.inputs]
+    for name in inputs:
+        if name not in known:
+            raise RequestError(
+                f"input '{name}' is not known{suggestion(name, known)}; inputs: {listed(known)}; times go by t"
+            )
+    for driver in drivers:
+        if driver.inputs[0] not in inputs:
+            raise RequestError(f"input '{driver.inputs[0]}' is missing; give times or every driver's value")
+    columns = {name: column_of(name, value, rows) for name, value in inputs.items()}
+    if wrap:
+        angles = [driver.inputs[0] for driver in drivers if driver.quantity.kind == "angle"]
+        if not angles:
+            raise RequestError(f"wrap unwraps angles, and no input is one; inputs: {listed(known)}")
+        columns |= {name: np.apply_along_axis(unwrap, -1, columns[name]) for name in angles}
+    lengths = {array.shape[-1] for array in columns.values()}
+    if len(lengths - {1}) > 1:
+        sizes = listed(f"{name} ({array.shape[-1]})" for name, array in columns.items())
+        raise RequestError(f"inputs must have equal lengths or be single numbers: {sizes}")
+    n = next(iter(lengths - {1}), min(lengths, default=1))
+    is_by_design = rows > 1 and any(array.ndim == 2 for array in columns.values())
+    shape = (rows, n) if is_by_design else (n,)
+    for driver in drivers:
+        for name in driver.inputs[1:]:
+            if name in columns:
+                _refuse_huge(name, columns[name])
+    u, ud, udd = (
+        _table([columns.get(driver.inputs[order]) for driver in drivers], shape, default)
+        for order, default in enumerate(_DEFAULTS)
+    )
+    return u, ud, udd
+
+
+def _table(columns: Sequence[FloatArray | None], shape: tuple[int, ...], default: float) -> FloatArray:
+    """Return a table (n, d) or (m, n, d) of columns, of which None are the default.
+
+    Columns are copied: a run reads them later too, when the caller may have changed them.
+    """
+    if all(column is None for column in columns):
+        return _filled((*shape, len(columns)), default)
+    table = np.empty((*shape, len(columns)))
+    for k, column in enumerate(columns):
+        table[..., k] = default if column is None else column
+    return table
+
+
+def _filled(shape: tuple[int, ...], value: float) -> FloatArray:
+    """Return a table of equal numbers; the last ones are kept, because filling them takes as long as solving."""
+    return _constant(shape, value) if math.prod(shape) <= _LARGEST_KEPT else np.full(shape, value)
+
+
+@lru_cache(maxsize=4)
+def _constant(shape: tuple[int, ...], value: float) -> FloatArray:
+    numbers = np.full(shape, value)
+    numbers.flags.writeable = False
+    return numbers
+
+
+def with_constants(drivers: Sequence[DriverInfo], driven: Driven, inputs: Mapping[str, ArrayLike]) -> Driven:
+    """Return the same driver values; tables of single numbers repeat one row, which costs no memory to read."""
+    if not inputs or not len(driven[0]):
+        return driven
+    tables = []
+    for order, table in enumerate(driven):
+        is_constant = all(isinstance(inputs.get(driver.inputs[order], 0.0), _NUMBER) for driver in drivers)
+        if is_constant:  # np.broadcast_to takes 10 us
+            table = np.ndarray(table.shape, float, table, strides=(0, table.strides[1]))
+        tables.append(table)
+    u, ud, udd = tables
+    return u, ud, udd
+
+
+def without_huge_rates(driven: Driven) -> Driven:
+    """Return the driver values; NaN where a law has no value, or has rates whose squares overflow."""
+    u, ud, udd = driven
+    if _is_within(ud, LARGEST_RATE) and _is_within(udd, LARGEST_RATE):
+        return driven
+    has_value = (np.abs(ud) <= LARGEST_RATE) & (np.abs(udd) <= LARGEST_RATE)
+    return np.where(has_value, u, np.nan), ud, udd
+
+
+def column_of(name: str, values: ArrayLike, rows: int = 1) -> FloatArray:
+    """Return finite numbers as an array (n,); with `rows` > 1 also (rows, n).
+
+    Raises:
+        RequestError: They are no finite numbers, or have another shape.
+
+    """
+    array = numbers_of(name, values)
+    if array.ndim == 0:
+        array = array.reshape(1)
+    if array.ndim > 2 or (array.ndim == 2 and (rows == 1 or len(array) != rows)):
+        rule = f"of shape (n,) or ({rows}, n)" if rows > 1 else "one-dimensional"
+        raise RequestError(f"{name} must be {rule}, not of shape {array.shape}")
+    if not _is_within(array, sys.float_info.max):
+        place = np.unravel_index(int(np.argmin(np.isfinite(array))), array.shape)
+        raise RequestError(f"{name}[{', '.join(map(str, place))}] is not a finite number")
+    return array
+
+
+def _refuse_huge(name: str, rates: FloatArray) -> None:
+    """Raise a RequestError for a speed or an acceleration of a driver whose square overflows."""
+    if not _is_within(rates, LARGEST_RATE):
+        *_, sample = place = tuple(np.argwhere(np.abs(rates) > LARGEST_RATE)[0])
+        raise RequestError(f"{name} = {rates[place]:.6g} at sample {sample}: the largest value is {LARGEST_RATE:g}")
+
+
+def _is_within(values: FloatArray, largest: float) -> bool:
+    """Return True if all values are numbers of at most this size; no temporary arrays are made."""
+    if values.size <= _FEW and math.hypot(*values.ravel().tolist()) <= largest:  # NaN stays
+        return True
+    return bool(values.min(initial=0.0) >= -largest and values.max(initial=0.0) <= largest)

@@ -1,0 +1,230 @@
+"""The rows of a study: its designs, and the measures of each."""
+
+from __future__ import annotations
+
+import itertools
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import kstest, qmc
+
+import kinfmu
+from kinfmu.design.study import StudyResult
+from kinfmu.design.study.definition import define
+from kinfmu.design.study.sampling import Sampling
+from kinfmu.design.study.variation import Tolerance, UniformRange
+from kinfmu.errors import MissingPackageError, StudyError
+from kinfmu.mechanism import toml_file
+from kinfmu.mechanism.measures import Minimum, Range
+from tests.design.study.linkage import RANGES, TEXT, linkage, swing
+
+
+def test_measures_are_those_of_the_closed_form_and_of_single_calls() -> None:
+    found = kinfmu.study(linkage(), RANGES, designs=20, seed=3, workers=1)
+    closed = [swing(crank, 50.0, base) for crank, base in zip(found["crank"], found["base"], strict=True)]
+    assert np.abs(found["swing"] - closed).max() < 1e-9
+    angles = np.linspace(0.0, 2.0 * np.pi, 361)
+    model = kinfmu.compile(linkage())
+    for k in (0, 7, 19):
+        run = model.solve(
+            crank_angle=angles, crank_speed=np.pi, parameters={"crank": found["crank"][k], "base": found["base"][k]}
+        )
+        for name, one in kinfmu.measure(run).items():
+            assert found[name][k] == pytest.approx(one.value, rel=1e-11)
+            columns = [f"{name}.at", f"{name}.at2"][: len(one.at)]
+            assert [found[column][k] for column in columns] == pytest.approx(one.at, abs=1e-7)
+
+
+def test_grids_are_combined_with_the_last_one_fastest_and_each_point_with_the_same_samples() -> None:
+    parameters = {
+        "base": {"values": ["40 mm", 45, "5 cm"]},
+        "crank": {"from": 15, "to": 25, "count": 2},
+        "rocker": {"tolerance": "0.1 mm"},
+    }
+    study = define(linkage(), parameters, designs=4)
+    values = study.sampling.values(0, len(study))
+    rows = list(itertools.product([40.0, 45.0, 50.0], [15.0, 25.0], range(4)))
+    assert len(study) == len(rows) == 24
+    assert list(zip(values["base"], values["crank"], strict=True)) == [row[:2] for row in rows]
+    assert np.array_equal(values["rocker"].reshape(6, 4), np.tile(values["rocker"][:4], (6, 1)))
+
+
+@pytest.mark.parametrize("method", ["sobol", "latin_hypercube"])
+def test_the_numbers_of_a_design_do_not_depend_on_the_part_it_is_in(method: str) -> None:
+    variations = (UniformRange("a", "mm", 1.0, 2.0), Tolerance("b", "mm", 3.0, 0.3, "normal", 3.0))
+    sampling = Sampling(variations, method, 1000, 5)
+    whole = sampling.values(0, 1000)
+    for first, count in ((0, 1), (1, 1), (3, 64), (511, 2), (512, 488)):
+        part = Sampling(variations, method, 1000, 5).values(first, count)
+        for name in whole:
+            assert np.array_equal(part[name], whole[name][first : first + count])
+    other = Sampling(variations, method, 1000, 6).values(0, 1000)
+    assert not np.array_equal(other["a"], whole["a"])
+
+
+def test_samples_have_their_distributions_and_fill_the_space_evenly() -> None:
+    variations = (
+        UniformRange("a", "mm", 1.0, 2.0),
+        Tolerance("b", "mm", 3.0, 0.3, "normal", 3.0),
+        Tolerance("c", "mm", 3.0, 0.3, "uniform", 3.0),
+    )
+    for method in ("sobol", "latin_hypercube"):
+        found = Sampling(variations, method, 1024, 1).values(0, 1024)
+        assert kstest(found["a"], "uniform", (1.0, 1.0)).statistic < 2e-3
+        assert kstest(found["b"], "norm", (3.0, 0.1)).statistic < 2e-3
+        assert kstest(found["c"], "uniform", (2.7, 0.6)).statistic < 2e-3
+        assert variations[2].deviation == pytest.approx(found["c"].std(), rel=2e-3)
+        points = np.column_stack([found["a"] - 1.0, (found["c"] - 2.7) / 0.6])
+        evenness = qmc.discrepancy(points)
+        assert evenness < 0.2 * qmc.discrepancy(np.random.default_rng(1).random((1024, 2)))
+
+
+def test_a_design_that_does_not_close_has_no_numbers_and_a_reason() -> None:
+    found = kinfmu.study(linkage(), {"base": {"values": [40, 300, 45]}}, workers=1)
+    assert list(found.failures) == [1]
+    assert np.isfinite(found["swing"]).tolist() == [True, False, True] == found.good().tolist()
+    assert (found["solver.status"] >= 3).tolist() == [False, True, False]
+    assert found.statistics["swing"].missing == 1
+    assert "1 of 3 designs lack a measure, the first is design 1: " in str(found)
+
+
+def test_measures_of_the_call_and_times_and_law_constants() -> None:
+    measures = [Range("height", of="coupler.y"), "swing", Minimum("slowest", of="rocker.omega")]
+    t = np.linspace(0.0, 2.0, 181)
+    found = kinfmu.study(
+        linkage(), {"crank.speed": {"values": ["30 rpm", "60 rpm"]}}, measures=measures, t=t, workers=1
+    )
+    assert found.measures == ("height", "swing", "slowest")
+    assert (found.units["crank.speed"], found.units["slowest"]) == ("rad/s", "rad/s")
+    assert found["slowest"][1] == pytest.approx(2.0 * found["slowest"][0], rel=1e-7)
+
+
+SPEEDS = {"crank.speed": {"from": "60 rpm", "to": "-400 rpm", "count": 4}}
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("varied", ["crank.speed", "crank.start", "w", "crank.speed and crank"])
+def test_every_design_makes_a_cycle_at_its_own_speed_as_check_does(varied: str, engine: str) -> None:
+    mechanism = linkage()
+    grids = {
+        "crank.speed": SPEEDS,
+        "crank.start": {"crank.start": {"values": ["10 deg", "200 deg"]}},
+        "w": {"w": {"values": ["30 rpm", "45 rpm"]}},
+        "crank.speed and crank": {**SPEEDS, "crank": {"values": [20, "21 mm"]}},
+    }[varied]
+    if varied == "w":
+        text = TEXT.replace('speed = "30 rpm"', 'speed = "2*w"')
+        mechanism = toml_file.parse(text.replace('base = "40 mm"', 'base = "40 mm", half = "w/2", w = "15 rpm"'))
+    found = kinfmu.study(mechanism, grids, engine=engine, workers=1)
+    assert len(found) > 1
+    for k in range(len(found)):
+        settings = {name: float(found[name][k]) for name in grids}
+        measured = kinfmu.check(mechanism.with_parameters(settings)).measured
+        assert measured is not None
+        for one in measured.values:
+            assert found[one.name][k] == pytest.approx(one.value, rel=1e-7)
+            columns = [f"{one.name}.at", f"{one.name}.at2"][: len(one.at)]
+            assert [found[column][k] for column in columns] == pytest.approx(one.at, abs=1e-6)
+    assert "one turn of crank at the speed of each design" in str(found)
+
+
+def test_other_law_constants_vary_over_the_run_of_the_file() -> None:
+    text = TEXT.replace('law = "constant_speed", speed = "30 rpm"', 'law = "polynomial", coefficients = [0, 3, 0.5]')
+    mechanism = toml_file.parse(text + "run = { start = 0, stop = 1, step = 0.01 }\n")
+    found = kinfmu.study(mechanism, {"crank.c2": {"values": [0.5, 1.0]}}, workers=1)
+    assert "the run of the file, t = 0 to 1 s" in str(found)
+    for k, value in enumerate(found["crank.c2"]):
+        run = kinfmu.solve(mechanism.with_parameters({"crank.c2": float(value)}))
+        assert found["fastest"][k] == pytest.approx(kinfmu.measure(run)["fastest"].value, rel=1e-9)
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".csv"])
+def test_the_file_says_what_it_was_made_from(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"rows{suffix}"
+    found = kinfmu.study(linkage(), RANGES, designs=8, seed=4, output=path, workers=1)
+    assert sorted(one.name for one in tmp_path.iterdir()) == [path.name, "rows.csv.json"][: 1 + (suffix == ".csv")]
+    again = StudyResult.read(path)
+    assert again.definition == found.definition
+    assert (again.definition["seed"], again.definition["designs"]) == (4, 8)
+    assert again.mechanism.parameters == linkage().parameters
+    assert again.version == kinfmu.VERSION
+    assert (again.units["crank"], again.units["swing"], again.units["swing.at2"]) == ("mm", "rad", "rad")
+    frame = again.to_pandas()
+    assert frame.attrs["units"]["fastest"] == "rad/s"
+    assert frame["design"].tolist() == list(range(8)) == again.to_polars()["design"].to_list()
+    assert np.array_equal(frame["swing"], found["swing"])
+    with pytest.raises(StudyError, match="no column 'swin'; did you mean 'swing'"):
+        again["swin"]
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".csv"])
+def test_a_finished_study_is_not_measured_again(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"rows{suffix}"
+    kinfmu.study(linkage(), RANGES, designs=8, output=path, workers=1)
+    calls: list[int] = []
+    again = kinfmu.study(
+        linkage(), RANGES, designs=8, output=path, workers=1, progress=lambda *done: calls.extend(done)
+    )
+    assert (calls, len(again)) == ([], 8)
+    other = kinfmu.study(linkage(), RANGES, designs=9, output=path, workers=1, restart=True)
+    assert len(other) == 9
+
+
+def test_it_shows_itself_in_notebooks() -> None:
+    found = kinfmu.study(linkage(), {"base": {"from": 40, "to": 50, "count": 3}}, workers=1)
+    page = found._repr_html_()
+    assert page is not None
+    assert page.count("<tr>") == 3
+    assert page.count(">swing<") == 1
+    assert page.count("<img ") == 1
+    picture = found._repr_svg_()
+    assert picture is not None
+    assert "swing [deg]" in picture
+    assert repr(found) == "<Study of hoeken: 3 designs; swing, fastest>"
+
+
+def test_another_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match=r"path = 5 must be the path of a \.parquet or \.csv file"):
+        StudyResult.read(5)  # type: ignore[arg-type]
+    other = tmp_path / "run.parquet"
+    kinfmu.log.write_table(kinfmu.solve(linkage(), crank_angle=[0.0, 0.1]), other)
+    with pytest.raises(StudyError, match="not the results of a study"):
+        StudyResult.read(other)
+    other.write_bytes(b"PAR1")
+    with pytest.raises(StudyError, match="cannot be read"):
+        StudyResult.read(other)
+    table = tmp_path / "rows.csv"
+    with pytest.raises(StudyError, match=r"rows\.csv: cannot be read \(No such file"):
+        StudyResult.read(table)
+    kinfmu.study(linkage(), RANGES, designs=4, output=table, workers=1)
+    table.write_text("design\n0\n")
+    with pytest.raises(StudyError, match=r"rows\.csv: cannot be read \(its columns are others"):
+        StudyResult.read(table)["swing"]
+    table.with_name("rows.csv.json").write_text("[]")
+    with pytest.raises(StudyError, match=r"rows\.csv: not the results of a study: rows\.csv\.json is not about it"):
+        StudyResult.read(table)
+
+
+def test_rows_are_the_same_in_every_format_and_without_pyarrow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given = {"crank": {"values": [20, 200]}, "base": {"from": 40, "to": 50, "count": 2}}  # 200: does not close
+    found = kinfmu.study(linkage(), given, workers=1)
+    files = [kinfmu.study(linkage(), given, output=tmp_path / name, workers=1) for name in ("a.parquet", "a.csv")]
+    for other in files:
+        assert other.units == found.units
+        assert (other.failures, other.first_failure) == (found.failures, found.first_failure)
+        assert other.statistics == found.statistics
+        assert other.to_arrow().schema.equals(found.to_arrow().schema, check_metadata=True)
+        for name, column in found.columns():
+            assert other[name].dtype == column.dtype
+            np.testing.assert_array_equal(other[name], column)
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    again = kinfmu.study(linkage(), given, output=tmp_path / "b.csv", workers=1)
+    assert (tmp_path / "b.csv").read_bytes() == (tmp_path / "a.csv").read_bytes()
+    assert again.to_pandas().shape == (4, len(found.units))
+    for refused in (lambda: kinfmu.study(linkage(), given, output=tmp_path / "b.parquet", workers=1), again.to_arrow):
+        with pytest.raises(MissingPackageError, match="pyarrow"):
+            refused()
+    with pytest.raises(MissingPackageError, match=r"reading Parquet needs pyarrow: pip install 'kinfmu\[parquet\]'"):
+        StudyResult.read(tmp_path / "a.parquet")

@@ -1,0 +1,199 @@
+"""The scene of a run, compared with the closed form of the four-bar."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu.draw.scene.placing import world
+from kinfmu.draw.scene.scene import Scene, drawable
+from kinfmu.run import Run
+from kinfmu.run.driving import run_times
+from tests.log.runs import DEGREE
+
+
+@pytest.fixture
+def fourbar_scene(run: Run) -> Scene:
+    return everything_drawn(run)
+
+
+def everything_drawn(run: Run) -> Scene:
+    found, note = drawable(run)
+    assert found
+    assert not note
+    return found
+
+
+def test_bodies_have_the_poses_of_their_coordinates_and_constants(fourbar_scene: Scene, run: Run) -> None:
+    assert fourbar_scene.bodies == {"crank": 0, "coupler": 1, "rocker": 2}
+    crank, coupler, rocker = (fourbar_scene.frames[body] for body in fourbar_scene.bodies)
+    phi = DEGREE * run.t
+    tip = np.column_stack([np.cos(phi), np.sin(phi)])
+    np.testing.assert_allclose(world(crank, (1.0, 0.0)), tip, atol=1e-15)
+    np.testing.assert_allclose(world(coupler, (-1.0, 0.0)), tip, atol=1e-15)
+    np.testing.assert_allclose(world(rocker, (1.0, 0.0)), tip + np.array([1.0, 0.0]), atol=1e-15)
+
+
+def test_the_bar_keeps_its_length(fourbar_scene: Scene) -> None:
+    (bar,) = (shape for shape in fourbar_scene.shapes if shape.kind == "bar")
+    assert bar.name == "AB"
+    np.testing.assert_array_equal(bar.points, [[0.0, 0.0], [1.0, 0.0]])
+    ends = [world(fourbar_scene.frames[bar.frame], (x, y)) for x, y in bar.points]
+    np.testing.assert_allclose(ends[1], world(fourbar_scene.frames["coupler"], (1.0, 0.0)), atol=1e-14)
+    np.testing.assert_allclose(ends[0], np.tile([2.0, 0.0], (len(ends[0]), 1)), atol=1e-14)
+
+
+def test_supports_are_the_points_of_the_ground_that_joints_use(fourbar_scene: Scene) -> None:
+    found = {name: tuple(at) for name, at in fourbar_scene.supports.items()}
+    assert found == {"O": (0.0, 0.0), "C": (1.0, 0.0), "B": (2.0, 0.0)}
+
+
+def test_a_revolute_joint_is_one_pin_and_a_bar_has_two(fourbar_scene: Scene) -> None:
+    pins = [pin for found in fourbar_scene.pins.values() for pin in found]
+    assert sorted(name for name, _ in pins) == ["AB", "AB", "C", "O", "P", "Q"]
+
+
+def test_the_path_is_the_motion_of_the_point_of_interest(fourbar_scene: Scene, run: Run) -> None:
+    np.testing.assert_allclose(fourbar_scene.paths["A"], np.column_stack([run["A.x"], run["A.y"]]), atol=1e-15)
+
+
+def test_the_bounds_hold_everything(fourbar_scene: Scene) -> None:
+    np.testing.assert_allclose(fourbar_scene.low, [-1.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(fourbar_scene.high, [3.0, 1.0], atol=1e-15)
+
+
+def test_poses_in_a_gap_are_unknown_even_where_coordinates_are_constant(run_with_gap: Run) -> None:
+    found, _ = drawable(run_with_gap)
+    assert found
+    assert np.isnan(found.frames["crank"][100:121]).all()
+    assert np.isfinite(found.high).all()
+
+
+def test_a_body_whose_coordinates_are_not_in_the_run_is_left_out_by_name(run: Run) -> None:
+    found, note = drawable(run.without(["coupler.x", "coupler.y"]))
+    assert found
+    assert [*found.bodies] == ["crank", "rocker"]
+    assert {shape.frame for shape in found.shapes} == {"ground", "crank", "rocker"}
+    assert note == (
+        "Not drawn: coupler (the run does not hold coupler.x, coupler.y); "
+        "keep them: --channels all, or q among its names."
+    )
+
+
+@pytest.mark.parametrize("name", ["crank_rocker", "fourbar", "parallel_jaw", "five_bar", "cam_roller", "excavator"])
+def test_a_run_of_few_outputs_is_drawn_as_one_of_all(name: str) -> None:
+    mechanism = kinfmu.load(name)
+    whole = solved(name)
+    few = whole.names[-1:]
+    for less in (
+        kinfmu.solve(dataclasses.replace(mechanism, coordinates=few), whole.t),
+        kinfmu.solve(mechanism, whole.t, outputs=few),
+    ):
+        assert set(less.outputs) < set(whole.outputs)
+        check_equal_poses(less, whole)
+
+
+def check_equal_poses(run: Run, expected: Run) -> None:
+    """Check that everything of a run is drawn, in the poses of another run."""
+    found, wanted = everything_drawn(run), everything_drawn(expected)
+    assert found.frames.keys() == wanted.frames.keys()
+    for frame, pose in found.frames.items():
+        np.testing.assert_allclose(pose, wanted.frames[frame], atol=1e-9 * wanted.size)
+
+
+def test_a_run_of_few_outputs_is_drawn_with_its_own_parameters() -> None:
+    mechanism = kinfmu.load("jansen_leg")
+    name, value = next((n, 1.02 * float(p.value)) for n, p in mechanism.parameters.items() if p.expression is None)
+    whole = kinfmu.solve(mechanism, [0.0, 0.1], parameters={name: value})
+    few = kinfmu.solve(mechanism, [0.0, 0.1], parameters={name: value}, outputs=whole.names[-1:])
+    of_fmu = dataclasses.replace(
+        few, mechanism_source=mechanism, info={"parameters": f"crank.speed = 1.0, {name} = {value!r}"}
+    )
+    for run in (few, of_fmu):
+        check_equal_poses(run, whole)
+
+
+def test_recomputed_bodies_that_contradict_the_run_are_left_out_with_the_remedy() -> None:
+    run = kinfmu.solve(kinfmu.load("crank_rocker"), [0.0, 0.1], outputs=["rocker.phi"])
+    other = dataclasses.replace(run, values=run.values + 0.1)
+    _, note = drawable(other)
+    assert note.endswith("; name them in [outputs] coordinates, or leave that out.")
+
+
+def test_a_run_without_a_valid_mechanism_is_not_drawn(run: Run) -> None:
+    assert drawable(dataclasses.replace(run, mechanism_source="")) == (
+        None,
+        "Not drawn: the run does not hold its mechanism.",
+    )
+    found, note = drawable(dataclasses.replace(run, mechanism_source="name = ["))
+    assert found is None
+    assert note.startswith("Not drawn: the run's mechanism: not valid TOML")
+
+
+def solved(name: str) -> Run:
+    mechanism = kinfmu.load(name)
+    return kinfmu.solve(mechanism, run_times(mechanism.run)[::4])
+
+
+def drawn(name: str) -> tuple[Scene, Run]:
+    run = solved(name)
+    return everything_drawn(run), run
+
+
+def placed(scene: Scene, frame: str, kind: str) -> np.ndarray:
+    """World coordinates (n, k, 2) of the line of the only shape of a kind in a frame."""
+    (line,) = (shape.line for shape in scene.shapes if (shape.frame, shape.kind) == (frame, kind))
+    return np.stack([world(scene.frames[frame], (x, y)) for x, y in line], axis=1)
+
+
+def test_the_roller_touches_the_cam_over_the_whole_run() -> None:
+    found, _ = drawn("cam_roller")
+    profile, roller = placed(found, "cam", "cam"), placed(found, "lever", "roller")
+    centre = roller[:, :-1].mean(axis=1)
+    radius = np.hypot(*(roller[0, 0] - centre[0]))
+    assert np.isfinite(roller).all()
+    gaps = np.hypot(*np.moveaxis(profile - centre[:, None], 2, 0)).min(axis=1) - radius
+    assert np.abs(gaps).max() < 0.02 * radius  # the profile has a corner each degree
+
+
+def test_wheels_touch_while_they_turn() -> None:
+    found, _ = drawn("geared_five_bar")
+    rims = [placed(found, body, "wheel") for body in [*found.bodies][:2]]
+    centres = [rim[:, :-1].mean(axis=1) for rim in rims]
+    radii = [np.hypot(*(rim[:, 0] - centre).T) for rim, centre in zip(rims, centres, strict=True)]
+    np.testing.assert_allclose(np.hypot(*(centres[1] - centres[0]).T), sum(radii), rtol=1e-9)
+
+
+def test_cylinders_span_their_points_and_hold_their_rods() -> None:
+    found, run = drawn("excavator")
+    barrels, shafts = ([shape for shape in found.shapes if shape.kind == kind] for kind in ("barrel", "shaft"))
+    assert [barrel.name for barrel in barrels] == ["boom_cylinder", "stick_cylinder", "bucket_cylinder"]
+    for barrel, shaft in zip(barrels, shafts, strict=True):
+        start, end = found.frames[barrel.frame], found.frames[shaft.frame]
+        np.testing.assert_array_equal(start[:, 2], end[:, 2])
+        lengths = np.hypot(*(end - start)[:, :2].T)
+        np.testing.assert_allclose(lengths, run[f"{barrel.name}_length"], rtol=1e-12)
+        within = lengths + shaft.points[0, 0]  # where the rod begins, from the barrel's pin
+        assert within.min() > 0.0
+        assert within.max() < barrel.points[1, 0] < lengths.min()
+    assert {"O", "boom_foot"} == set(found.supports)
+
+
+def test_slides_have_rails_blocks_and_slots_but_no_pin_on_their_line() -> None:
+    found, _ = drawn("inverted_slider_crank")
+    kinds = {shape.kind for shape in found.shapes}
+    assert kinds == {"link", "rod", "block", "rail", "support"}
+    assert "way" not in found.supports
+    assert {shape.kind for shape in drawn("scotch_yoke")[0].shapes} >= {"rod", "slot", "block", "rail"}
+
+
+def test_the_block_of_a_pin_on_a_line_of_the_ground_moves_with_the_pin_and_does_not_turn() -> None:
+    found, run = drawn("offset_slider_crank")
+    (die,) = (shape for shape in found.shapes if shape.kind == "die")
+    pose = found.frames[die.frame]
+    np.testing.assert_allclose(pose[:, :2], found.paths["slider"], atol=1e-9)
+    assert not pose[:, 2].any()
+    assert len(pose) == len(run)
