@@ -11,7 +11,7 @@ SHIPPED = ("mechanism.toml", "reference.csv")
 
 
 class BuildWithGallery(build_py):
-    """Also copies the mechanisms, and their references, by which `kinfmu bench` measures errors."""
+    """Also copies the mechanisms, and their references, by which `scripts/bench` measures errors."""
 
     def run(self):
         super().run()

@@ -110,7 +110,7 @@ def settings_page(measured: Sequence[Measured], rounds: int) -> str:
     """Return a page with every measurement."""
     parts = [
         "# Run time against error: every engine in every setting",
-        f"Written by `kinfmu bench`; [accuracy.md](accuracy.md) explains it. {conditions(rounds)} Errors are "
+        f"Written by `scripts/bench`; [accuracy.md](accuracy.md) explains it. {conditions(rounds)} Errors are "
         "the largest over the samples of a mechanism's reference.csv, relative to each column's largest magnitude.",
     ]
     for case in dict.fromkeys(one.case for one in measured):

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kinfmu.arrays import FloatArray
+from kinfmu.cli.demo import parallelogram
 from kinfmu.errors import MissingPackageError
 from kinfmu.mechanism import Mechanism, gallery
 from kinfmu.mechanism.toml_file import parse
@@ -61,14 +61,6 @@ class SingularCase(NamedTuple):
     centre: float  # [rad]
     start: float  # [rad]
     closed_form: Callable[[float], FloatArray]  # (3, m) q, q', q'' at a value of the driver
-
-
-def parallelogram(u: ArrayLike) -> FloatArray:
-    """Return q, q', q'' of FOURBAR in the reference four-bar, (3, ..., 5); u: (...) crank angle."""
-    phi = np.asarray(u, dtype=float)
-    s, c, none, one = np.sin(phi), np.cos(phi), np.zeros_like(phi), np.ones_like(phi)
-    rows = [[phi, 1.0 + c, s, none, phi], [one, -s, c, none, one], [none, -c, -s, none, none]]
-    return np.array([np.stack(row, axis=-1) for row in rows])
 
 
 def _isosceles(u: float) -> FloatArray:

@@ -1,11 +1,11 @@
 """The public names: the package imports each from where it is listed here, when it is first used."""
 
+from kinfmu import design as design
 from kinfmu import draw as draw
 from kinfmu import log as log
 from kinfmu.analysis import Report as Report
 from kinfmu.analysis import cam_profile as cam_profile
 from kinfmu.analysis import check as check
-from kinfmu.design import fit as fit
 from kinfmu.design.fit import FitProblem as FitProblem
 from kinfmu.design.fit import FitResult as FitResult
 from kinfmu.design.fit import fit as fit

@@ -4,7 +4,6 @@ One command per file; importing a file adds its command to the group `main`.
 """
 
 from kinfmu.cli import (  # noqa: F401  for the commands that they add
-    bench,
     build,
     check,
     export,

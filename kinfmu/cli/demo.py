@@ -8,9 +8,10 @@ from pathlib import Path
 from shlex import quote
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from benchmarks.singular_points import parallelogram
 from kinfmu.analysis import check
+from kinfmu.arrays import FloatArray
 from kinfmu.draw import animate
 from kinfmu.errors import MissingPackageError
 from kinfmu.fmu import build, simulate
@@ -44,6 +45,14 @@ def compare_with_report(run: Run) -> tuple[str, bool]:
             cells.append(f"{round(ours, 4) + 0.0:10.4f}{abs(percent):10.4f}")
         lines.append(f"{t:7d}" + "".join(cells))
     return "\n".join(lines), agree
+
+
+def parallelogram(u: ArrayLike) -> FloatArray:
+    """Return q, q', q'' of the reference four-bar's phi1, x2, y2, phi2, phi3, (3, ..., 5); u: (...) crank angle."""
+    phi = np.asarray(u, dtype=float)
+    s, c, none, one = np.sin(phi), np.cos(phi), np.zeros_like(phi), np.ones_like(phi)
+    rows = [[phi, 1.0 + c, s, none, phi], [one, -s, c, none, one], [none, -c, -s, none, none]]
+    return np.array([np.stack(row, axis=-1) for row in rows])
 
 
 def compare_with_closed_form(run: Run) -> tuple[str, bool]:

@@ -31,7 +31,6 @@ ORDER = (
     "export",
     "recover",
     "schema",
-    "bench",
 )
 
 
@@ -45,14 +44,8 @@ class _Command(click.Command):
             raise click.UsageError(one_line(error), ctx) from None
 
 
-class _Group(click.Group):
-    """A group that reports a KinfmuError as one line on stderr with exit status 1."""
-
-    command_class = _Command
-
-    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
-        """Return the commands in the order of work."""
-        return sorted(self.commands, key=ORDER.index)
+class _Program(click.Command):
+    """A program that reports a KinfmuError as one line on stderr with exit status 1."""
 
     def invoke(self, ctx: click.Context) -> Any:
         if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
@@ -66,6 +59,20 @@ class _Group(click.Group):
         except MemoryError:
             click.echo("kinfmu: not enough memory for a mechanism of this size", err=True)
             ctx.exit(1)
+
+
+class ProgramOfOneCommand(_Program, _Command):
+    """A program without further commands."""
+
+
+class _Group(_Program, click.Group):
+    """A program of several commands."""
+
+    command_class = _Command
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
+        """Return the commands in the order of work."""
+        return sorted(self.commands, key=ORDER.index)
 
 
 @contextmanager

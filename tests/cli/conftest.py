@@ -6,6 +6,7 @@ import csv
 from collections.abc import Callable
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
@@ -24,12 +25,18 @@ def read_csv(path: Path) -> dict[str, NDArray[np.float64]]:
 
 
 @pytest.fixture
-def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
+def program_called() -> click.Command:
+    """The program that `command` calls."""
+    return main
+
+
+@pytest.fixture
+def command(program_called: click.Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
     """`command("check", "fourbar")`; an exception that escapes fails the test. The working folder is empty."""
     monkeypatch.chdir(tmp_path)
 
     def run(*arguments: object) -> Result:
-        result = CliRunner().invoke(main, [str(argument) for argument in arguments])
+        result = CliRunner().invoke(program_called, [str(argument) for argument in arguments])
         if result.exception is not None and not isinstance(result.exception, SystemExit):
             raise result.exception
         assert "Traceback" not in result.output

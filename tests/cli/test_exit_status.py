@@ -99,8 +99,6 @@ WRONG_USAGE = [
     ("play forbar", "did you mean 'fourbar'?"),
     ("verify none.fmu", "none.fmu: there is no such file"),
     ("verify short.csv", "short.csv: its name must end in .fmu"),
-    ("bench speed", "'speed' is not a measurement"),
-    ("bench --mechanism forbar", "did you mean 'fourbar'?"),
 ]
 AT_FAULT = [
     ("check broken.toml", "broken.toml: [bodies.crank] ponts: unknown key"),
@@ -175,4 +173,4 @@ def test_a_fault_of_the_mechanism_or_of_the_run_is_reported_with_status_one(
 def test_every_command_that_can_be_at_fault_is_in_the_tables() -> None:
     refused, at_fault = ({arguments.split()[0] for arguments, _ in table} for table in (WRONG_USAGE, AT_FAULT))
     assert refused >= set(main.commands)
-    assert at_fault >= set(main.commands) - {"bench", "list", "new", "schema"}
+    assert at_fault >= set(main.commands) - {"list", "new", "schema"}

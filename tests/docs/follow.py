@@ -33,7 +33,7 @@ NOT_RUN = {  # beginnings of the commands and blocks that no page runs in the te
     "source .venv/bin/activate": "acts on the shell",
     "pip install omsimulator": "downloads a program from a server that is no package registry",
     "python examples/dc_motor/stability.py": "takes a minute; tests/docs/test_coupling_page.py",
-    "kinfmu bench": "measures for minutes; tests/benchmarks runs the parts",
+    "scripts/bench": "measures for minutes; tests/benchmarks runs the parts",
     "kinfmu build mine.toml --fmi 3 --platforms all": "zig compiles for minutes; tests/fmu/native/test_build.py",
     "kinfmu build fourbar --platforms all": "zig compiles for minutes; tests/fmu/native/test_build.py",
     "kinfmu simulate mine.toml --live": "opens the viewer; tests/log/viewer/test_live.py",

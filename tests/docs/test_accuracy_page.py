@@ -23,7 +23,7 @@ ROOT = DOCS.parent
 PAGE = (DOCS / "accuracy.md").read_text(encoding="utf-8")
 SETTINGS = (DOCS / SETTINGS_PAGE).read_text(encoding="utf-8")
 PEERS = ("CasADi", "pylinkage")  # rows of theirs are there if they were installed
-ANEW = "kinfmu bench writes it again"
+ANEW = "scripts/bench writes it again"
 
 
 def part(name: str) -> str:

@@ -155,7 +155,7 @@ def test_arguments_are_passed_on_unchanged_and_the_callers_folder_is_kept(miniat
     assert miniature.asked[-1] == "kinfmu simulate my mechanism.toml --stop 2"
     assert miniature.environment.endswith(f"cwd={tmp_path}")
     miniature.run("bench", "--help", cwd=tmp_path)
-    assert miniature.asked[-1] == "kinfmu bench --help"
+    assert miniature.asked[-1] == "python -m benchmarks --help"
 
 
 def test_tests_run_in_the_checkout_from_any_folder(miniature: Miniature, tmp_path: Path) -> None:

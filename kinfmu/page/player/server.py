@@ -16,9 +16,9 @@ from pathlib import Path
 from types import TracebackType
 from urllib.parse import urlsplit
 
+import kinfmu
 from kinfmu.errors import KinfmuError
 from kinfmu.files.temporary_folder import temporary_folder
-from kinfmu.fmu import build
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.page.player.source import PlaySource
@@ -121,7 +121,7 @@ class PlayServer:
 
         """
         with self._building, temporary_folder() as folder:
-            return build(mechanism, folder, fmi=fmi).read_bytes()
+            return kinfmu.build(mechanism, folder, fmi=fmi).read_bytes()
 
     def save(self, text: str) -> Path:
         """Write a mechanism file next to that of the source, under a name that is not in use, and return its path.

@@ -1,4 +1,4 @@
-"""kinfmu bench: run time against error; cost of a sample, a sweep, a step, a record, an import and chains."""
+"""scripts/bench: run time against error; cost of a sample, a sweep, a step, a record, an import and chains."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from kinfmu.cli.arguments import ArgumentType
-from kinfmu.cli.group import main
+from kinfmu.cli.group import ProgramOfOneCommand
 from kinfmu.cli.messages import Progress
 from kinfmu.errors import MissingPackageError, listed, suggestion
 from kinfmu.mechanism import gallery
@@ -50,7 +50,11 @@ def _with_reference() -> list[str]:
     return [name for name in gallery.names() if (gallery.folder() / name / "reference.csv").is_file()]
 
 
-@main.command(epilog="Example: kinfmu bench sample")
+@click.command(
+    cls=ProgramOfOneCommand,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="Example: scripts/bench sample",
+)
 @click.argument("what", nargs=-1, type=Named("WHAT", "a measurement", lambda: [*MEASUREMENTS, ALL]))
 @click.option(
     "--mechanism",
@@ -68,7 +72,7 @@ def _with_reference() -> list[str]:
     help="Where accuracy writes tables and charts. Default: docs/ of a checkout; the current folder without a checkout "
     "or with --mechanism.",
 )
-def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None, folder: Path | None) -> None:
+def main(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None, folder: Path | None) -> None:
     """Measure kinfmu on this machine, compared with other solvers.
 
     WHAT is one or more of these. Default: accuracy.
@@ -133,3 +137,7 @@ def _accuracy(mechanisms: tuple[str, ...], given: dict[str, int], folder: Path) 
     except MissingPackageError as error:
         click.echo(f"left out: {error}", err=True)
     click.echo(f"\nwritten: {listed(map(str, written))}")
+
+
+if __name__ == "__main__":
+    main(prog_name="scripts/bench")

@@ -1,4 +1,4 @@
-"""kinfmu bench: what is measured, where it is written, and the messages when something is missing or wrong."""
+"""scripts/bench: what is measured, where it is written, and the messages when something is missing or wrong."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ import pytest
 
 import kinfmu
 from benchmarks import accuracy, case, chains, crank_rockers, designs, log_files, native_sweep, singular
+from benchmarks.__main__ import ALL, MEASUREMENTS, default_folder
 from benchmarks.engines import ENGINES, SHIPPED
 from benchmarks.page import PAGE, SETTINGS_PAGE
 from benchmarks.singular_points import POINTS
-from kinfmu.cli.bench import ALL, MEASUREMENTS, default_folder
 from kinfmu.codegen.c import compiler
 from kinfmu.errors import CompilerError
 from kinfmu.mechanism import gallery
 from tests import oracle
-from tests.cli.conftest import Command
+from tests.benchmarks.conftest import Command
 
 QUICK = ["kinfmu", "kinfmu native", "generated Python", "numpy Newton", "scipy fsolve"]
 PICTURES = [f"accuracy-{name}.{kind}" for name in ("singular", "work-precision") for kind in ("png", "svg")]
@@ -38,7 +38,7 @@ def measured() -> tuple[accuracy.Result, tuple[tuple[singular.Near, ...], tuple[
 
 @pytest.fixture
 def once(measured: tuple[object, object], monkeypatch: pytest.MonkeyPatch) -> None:
-    """`kinfmu bench accuracy` takes what was measured before."""
+    """`scripts/bench accuracy` takes what was measured before."""
     monkeypatch.setattr(accuracy, "measure", lambda *_: measured[0])
     monkeypatch.setattr(singular, "measure", lambda *_: measured[1])
 
@@ -67,7 +67,7 @@ def only_what_comes_with_the_tests(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def quick(command: Command, *more: object) -> tuple[str, str]:
     """Output and messages of one round on one mechanism, written into the working folder by default."""
-    result = command("bench", "accuracy", "--mechanism", "slider_crank", "--rounds", 1, *(more or ("-o", ".")))
+    result = command("accuracy", "--mechanism", "slider_crank", "--rounds", 1, *(more or ("-o", ".")))
     assert result.exit_code == 0
     return result.stdout, result.stderr
 
@@ -146,7 +146,7 @@ def test_a_page_of_the_user_keeps_the_text_between_its_tables(command: Command, 
 
 def test_a_page_without_a_place_for_a_table_is_refused(fails: Callable[..., str], tmp_path: Path) -> None:
     (tmp_path / PAGE).write_text("<!-- generated: conditions --><!-- end: conditions -->", encoding="utf-8")
-    message = fails("bench", "accuracy", "-o", ".")
+    message = fails("accuracy", "-o", ".")
     assert message == "accuracy.md: must have <!-- generated: engines --> and <!-- end: engines -->, once each"
 
 
@@ -193,12 +193,12 @@ def test_the_charts_name_every_engine_and_quantity(written: Path) -> None:
 def test_wrong_words_are_refused_with_what_would_be_right(
     arguments: tuple[str, ...], message: str, refuses: Callable[..., str], tmp_path: Path
 ) -> None:
-    assert refuses("bench", *arguments).startswith(message)
+    assert refuses(*arguments).startswith(message)
     assert not list(tmp_path.iterdir())
 
 
 def test_the_help_has_a_line_for_every_measurement(command: Command) -> None:
-    printed = command("bench", "--help").stdout
+    printed = command("--help").stdout
     assert re.findall(r"^  (\w+) {2,}[\w`]", printed, re.MULTILINE) == [*MEASUREMENTS, ALL]
 
 
@@ -212,7 +212,7 @@ def test_the_help_has_a_line_for_every_measurement(command: Command) -> None:
     ],
 )
 def test_a_measurement_prints_a_table_of_what_it_compares(what: str, lines: list[str], command: Command) -> None:
-    result = command("bench", what, "--rounds", 2)
+    result = command(what, "--rounds", 2)
     assert result.exit_code == 0
     head, *rows = result.stdout.splitlines()
     assert head
@@ -290,7 +290,7 @@ def test_the_closed_form_by_hand_is_right(monkeypatch: pytest.MonkeyPatch, tmp_p
 @pytest.mark.long
 def test_chains_report_the_exponent(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(chains, "LOOPS", (1, 2, 3, 4))
-    stdout = command("bench", "chains", "--rounds", 2).stdout
+    stdout = command("chains", "--rounds", 2).stdout
     assert [line.split()[0] for line in stdout.splitlines()[2:6]] == ["1", "2", "3", "4"]
     assert re.search(r"exponent from 2 to 4 loops, round by round: -?\d+\.\d{3} \(", stdout)
 
