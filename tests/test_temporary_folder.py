@@ -10,7 +10,7 @@ from typing import NoReturn
 
 import pytest
 
-from kinfmu.files.temporary_folder import temporary_folder
+from kinfmu.files import temporary_folder
 
 
 def filled(folder: Path) -> Path:

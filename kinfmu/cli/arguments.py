@@ -10,7 +10,7 @@ from click.shell_completion import CompletionItem
 
 from kinfmu.cli.messages import note
 from kinfmu.errors import listed, suggestion
-from kinfmu.files.whole_file import suffix_of
+from kinfmu.files import suffix_of
 from kinfmu.mechanism import gallery
 
 

@@ -13,7 +13,7 @@ from kinfmu.cli.group import errors_of, main
 from kinfmu.cli.messages import Progress, note, patience
 from kinfmu.cli.settings import checked_settings, set_option
 from kinfmu.errors import CompilerError, listed
-from kinfmu.files.whole_file import suffix_of
+from kinfmu.files import suffix_of
 from kinfmu.mechanism import gallery
 
 if TYPE_CHECKING:

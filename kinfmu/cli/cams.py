@@ -15,7 +15,7 @@ from kinfmu.cli.quantities import driver_value
 from kinfmu.cli.settings import checked_settings
 from kinfmu.cli.tables import csv_form
 from kinfmu.errors import RequestError, listed
-from kinfmu.files.whole_file import suffix_of
+from kinfmu.files import suffix_of
 from kinfmu.mechanism import gallery
 from kinfmu.units import Quantity
 

@@ -18,7 +18,7 @@ from kinfmu.cli.quantities import on_axis
 from kinfmu.cli.settings import checked_settings, set_option
 from kinfmu.cli.tables import csv_form, table_options
 from kinfmu.errors import RequestError, listed
-from kinfmu.files.whole_file import suffix_of
+from kinfmu.files import suffix_of
 from kinfmu.mechanism import gallery
 
 if TYPE_CHECKING:

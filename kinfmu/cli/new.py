@@ -10,7 +10,7 @@ import click
 from kinfmu.cli.arguments import OutputFile, exists, mechanism_argument
 from kinfmu.cli.group import main
 from kinfmu.errors import KinfmuError
-from kinfmu.files.whole_file import write_whole
+from kinfmu.files import write_whole
 from kinfmu.mechanism import gallery
 
 

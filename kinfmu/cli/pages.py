@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from kinfmu.cli.messages import patience
 from kinfmu.errors import KinfmuError
-from kinfmu.files.whole_file import write_whole
+from kinfmu.files import write_whole
 
 if TYPE_CHECKING:
     from kinfmu.mechanism import Mechanism

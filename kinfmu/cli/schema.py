@@ -9,7 +9,7 @@ import click
 from kinfmu.cli.arguments import OutputFile
 from kinfmu.cli.group import main
 from kinfmu.errors import KinfmuError
-from kinfmu.files.whole_file import write_whole
+from kinfmu.files import write_whole
 
 
 @main.command(epilog="Example: kinfmu schema -o mechanism.schema.json")

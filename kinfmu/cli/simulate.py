@@ -22,8 +22,7 @@ from kinfmu.cli.settings import (
     checked_settings,
     set_option,
 )
-from kinfmu.files.temporary_folder import temporary_folder
-from kinfmu.files.whole_file import suffix_of
+from kinfmu.files import suffix_of, temporary_folder
 from kinfmu.mechanism import gallery
 
 if TYPE_CHECKING:

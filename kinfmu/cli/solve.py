@@ -16,7 +16,7 @@ from kinfmu.cli.quantities import RangeArgument, driver_value, is_bare
 from kinfmu.cli.settings import TOLERANCE, Settings, checked_settings, set_option, tolerance_of
 from kinfmu.cli.tables import csv_form, table_options
 from kinfmu.errors import listed
-from kinfmu.files.whole_file import suffix_of
+from kinfmu.files import suffix_of
 from kinfmu.mechanism import gallery
 from kinfmu.units import Quantity, in_turns, looks_like_degrees
 

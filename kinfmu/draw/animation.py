@@ -24,7 +24,7 @@ from kinfmu.draw.sheet import GREY, PAPER, Sheet, ink
 from kinfmu.draw.video import encoder, mp4
 from kinfmu.draw.writing import figure_style, write_bytes
 from kinfmu.errors import FigureError, MechanismError, listed
-from kinfmu.files.whole_file import suffix_of
+from kinfmu.files import suffix_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.quantities.placement import body_of

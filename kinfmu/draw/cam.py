@@ -18,7 +18,7 @@ from kinfmu.draw.scene import palette
 from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, arc, ink
 from kinfmu.draw.writing import SUFFIXES, write, write_bytes
 from kinfmu.errors import FigureError, MissingPackageError, listed
-from kinfmu.files.whole_file import suffix_of
+from kinfmu.files import suffix_of
 from kinfmu.motion.cams import CamProfile
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from kinfmu.draw.scene.instant import Instant
 from kinfmu.draw.scene.shapes import shapes
 from kinfmu.draw.writing import write_bytes
 from kinfmu.errors import FigureError, MissingPackageError
-from kinfmu.files.whole_file import suffix_of
+from kinfmu.files import suffix_of
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.quantities.placement import body_of
 from kinfmu.run import Run

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinfmu.errors import FigureError, MissingPackageError
-from kinfmu.files.temporary_folder import temporary_folder
+from kinfmu.files import temporary_folder
 
 if TYPE_CHECKING:
     from PIL.Image import Image

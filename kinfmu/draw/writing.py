@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinfmu.errors import FigureError, MissingPackageError, listed
-from kinfmu.files.whole_file import suffix_of, write_whole
+from kinfmu.files import suffix_of, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

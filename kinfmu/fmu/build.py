@@ -10,8 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from kinfmu.errors import CompilerError, FmuError, RequestError, listed, suggestion
-from kinfmu.files.temporary_folder import temporary_folder
-from kinfmu.files.whole_file import suffix_of, write_whole
+from kinfmu.files import suffix_of, temporary_folder, write_whole
 from kinfmu.fmu.description import FmiVersion
 from kinfmu.fmu.interface import DRIVES, Drive
 from kinfmu.mechanism import Mechanism

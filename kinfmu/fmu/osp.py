@@ -13,7 +13,7 @@ from xml.etree import ElementTree as ET
 from xml.etree.ElementTree import Element, SubElement
 
 from kinfmu.errors import FmuError
-from kinfmu.files.whole_file import write_whole
+from kinfmu.files import write_whole
 from kinfmu.fmu import description
 from kinfmu.fmu.description.common import base_unit
 from kinfmu.fmu.interface import Interface, Variable

@@ -6,7 +6,7 @@ import zipfile
 from pathlib import Path
 
 from kinfmu.errors import FmuError
-from kinfmu.files.whole_file import write_whole
+from kinfmu.files import write_whole
 from kinfmu.fmu.archive import zipped
 
 PLACE = "documentation/play.html"

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from kinfmu.errors import FmuError
-from kinfmu.files.temporary_folder import temporary_folder
+from kinfmu.files import temporary_folder
 from kinfmu.mechanism.toml_file import LARGEST_FILE
 from kinfmu.mechanism.valid import quoted
 

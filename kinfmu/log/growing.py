@@ -9,7 +9,7 @@ from io import FileIO
 from pathlib import Path
 from shlex import quote
 
-from kinfmu.files.whole_file import lock_for_writing
+from kinfmu.files import lock_for_writing
 from kinfmu.log.cdr import zero_of
 from kinfmu.log.target import check_writable, replacing, target_of, write_error
 from kinfmu.log.writing import Content

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kinfmu.errors import LogError, MissingPackageError, listed
-from kinfmu.files.whole_file import suffix_of
+from kinfmu.files import suffix_of
 from kinfmu.log.record import description, ending
 from kinfmu.log.target import replacing
 from kinfmu.run import Column, Run

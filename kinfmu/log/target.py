@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from kinfmu.errors import LogError
-from kinfmu.files.whole_file import check_is_free, hidden_sibling, make_folder, remove_folders, replacement
+from kinfmu.files import check_is_free, hidden_sibling, make_folder, remove_folders, replacement
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinfmu.files.whole_file import suffix_of
+from kinfmu.files import suffix_of
 from kinfmu.log import write_mcap
 from tests.cli.conftest import Command
 from tests.log.runs import fourbar

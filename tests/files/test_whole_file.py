@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from kinfmu.files import whole_file
-from kinfmu.files.whole_file import replacement, write_whole
+from kinfmu import files as whole_file
+from kinfmu.files import replacement, write_whole
 
 
 def test_a_failure_leaves_the_older_file_and_nothing_else(tmp_path: Path) -> None:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from kinfmu import files as whole_file
 from kinfmu.errors import LogError
-from kinfmu.files import whole_file
 from kinfmu.log import McapLog, read, recover, write_mcap
 from kinfmu.run import Run
 from tests.log.runs import without_samples

@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu import notebook as shown_mechanism
 from kinfmu.draw import figure
 from kinfmu.mechanism.measures import Maximum, Range
-from kinfmu.notebook import mechanism as shown_mechanism
 from kinfmu.run.verdict import sentence
 from tests.log.runs import fourbar, with_gap
 from tests.mechanisms import fourbar as fourbar_of

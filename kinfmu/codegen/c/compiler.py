@@ -23,7 +23,7 @@ from pathlib import Path
 
 from kinfmu.codegen.c import library_cache
 from kinfmu.errors import CompilerError
-from kinfmu.files.temporary_folder import temporary_folder
+from kinfmu.files import temporary_folder
 
 RUNTIME = Path(__file__).parents[2] / "solver" / "c"
 MODEL = ("kinfmu.h", "curve.h", "sincos.h", "position.c", "linear.c", "curve.c")  # what a model needs of the run time

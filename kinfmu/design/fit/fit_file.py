@@ -11,7 +11,7 @@ from kinfmu.design.fit.constraints import CONSTRAINTS
 from kinfmu.design.fit.problem import FitProblem
 from kinfmu.design.fit.targets import TARGETS, FunctionTarget, PathTarget
 from kinfmu.errors import MechanismError, RequestError, listed
-from kinfmu.files.whole_file import suffix_of
+from kinfmu.files import suffix_of
 from kinfmu.mechanism.gallery.load import load_named_in
 from kinfmu.mechanism.table_file import read_table
 from kinfmu.mechanism.toml_file import document_of, text_in

@@ -12,7 +12,7 @@ from typing import Any
 
 from kinfmu.design.study.definition import Study
 from kinfmu.errors import KinfmuError, StudyError
-from kinfmu.files.whole_file import BeingWrittenError, check_is_free, lock_for_writing, make_folder, replacement
+from kinfmu.files import BeingWrittenError, check_is_free, lock_for_writing, make_folder, replacement
 
 SUFFIX = ".parts"
 _MANIFEST = "study.json"

@@ -33,8 +33,7 @@ from kinfmu.design.study.table import (
 )
 from kinfmu.design.study.workers import results
 from kinfmu.errors import MechanismError, RequestError, StudyError, listed
-from kinfmu.files.temporary_folder import temporary_folder
-from kinfmu.files.whole_file import replacement, suffix_of
+from kinfmu.files import replacement, suffix_of, temporary_folder
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.measures import Reading
 from kinfmu.processes import cores, require_workers

@@ -36,7 +36,7 @@ from kinfmu.draw.scene import palette
 from kinfmu.draw.scene.components import component_runs
 from kinfmu.draw.scene.scene import drawable
 from kinfmu.errors import LogError
-from kinfmu.files.temporary_folder import temporary_folder
+from kinfmu.files import temporary_folder
 from kinfmu.log.cdr import nanoseconds
 from kinfmu.log.target import replacing
 from kinfmu.log.viewer.arrows import log_arrows

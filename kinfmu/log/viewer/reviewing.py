@@ -11,8 +11,7 @@ from tempfile import TemporaryFile
 from typing import TYPE_CHECKING
 
 from kinfmu.errors import LogError, RequestError
-from kinfmu.files.temporary_folder import temporary_folder
-from kinfmu.files.whole_file import suffix_of
+from kinfmu.files import suffix_of, temporary_folder
 from kinfmu.log.reading import read
 from kinfmu.log.target import replacing
 from kinfmu.log.viewer.headless import Cursor, CursorOn, executable, last_error, shoot

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from kinfmu.errors import MechanismError, RequestError, listed, suggestion
-from kinfmu.files.whole_file import suffix_of, write_whole
+from kinfmu.files import suffix_of, write_whole
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.gallery.chains import CHAINS, chain
 from kinfmu.mechanism.toml_file import read

@@ -12,7 +12,7 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.errors import KinfmuError, MechanismError, RequestError
-from kinfmu.files.whole_file import write_whole
+from kinfmu.files import write_whole
 from kinfmu.mechanism.joints import CamFlatFace, CamRoller
 from kinfmu.motion.cams.placed import PlacedCam
 from kinfmu.motion.cams.traced import ComplexArray, Traced, traced

@@ -18,7 +18,7 @@ from urllib.parse import urlsplit
 
 import kinfmu
 from kinfmu.errors import KinfmuError
-from kinfmu.files.temporary_folder import temporary_folder
+from kinfmu.files import temporary_folder
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.page.player.source import PlaySource

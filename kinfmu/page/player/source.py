@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from kinfmu.errors import AssemblyError, KinfmuError, MechanismError, RequestError
-from kinfmu.files.whole_file import suffix_of
+from kinfmu.files import suffix_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.gallery import load
 from kinfmu.page import page

@@ -7,8 +7,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
 
 
 class Ordered(NamedTuple):
@@ -28,6 +26,9 @@ def ordered_blocks(meets: Sequence[Sequence[int]], column_count: int) -> Ordered
 
     meets: the columns that each row meets. Ties go to the earlier row, so that equal input gives equal order.
     """
+    from scipy.sparse import csr_matrix  # here, since few commands need it and it takes long to import
+    from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
+
     row_number = np.repeat(np.arange(len(meets)), [len(columns) for columns in meets])
     column = np.array([k for columns in meets for k in columns], dtype=int)
     incidence = csr_matrix((np.ones(len(column)), (row_number, column)), shape=(len(meets), column_count))

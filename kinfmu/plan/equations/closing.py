@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from kinfmu.arrays import FloatArray
 from kinfmu.plan.equations.part import Part
@@ -224,6 +223,8 @@ def dependent_rows(gradients: FloatArray) -> dict[int, list[int]]:
             triangle[:count, count], triangle[count, count] = parts, length
             independent.append(index)
         else:
+            from scipy.linalg import solve_triangular  # here, since few mechanisms need it
+
             weights = solve_triangular(triangle[:count, :count], parts)
             dependent[index] = [
                 row for row, weight in zip(independent, weights, strict=True) if abs(weight) > _DEPENDENT

@@ -1,11 +1,14 @@
-"""Files that appear whole or not at all: written next to the target under a hidden name, then renamed; suffixes.
+"""Files that are written completely or not at all, suffixes of their names, and temporary folders.
 
-Missing folders of a target are made, and removed again if the file is not written.
+A file is written next to its target under a hidden name, then renamed. Missing folders of a target are made, and
+removed again if the file is not written.
 """
 
 from __future__ import annotations
 
 import os
+import shutil
+import tempfile
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -136,3 +139,20 @@ def _alone_in(folder: Path) -> Iterator[None]:
 def suffix_of(path: str | PurePath) -> str:
     """Return '.mcap' for 'run.mcap' and for 'RUN.MCAP', '' for a name without a suffix."""
     return PurePath(path).suffix.lower()
+
+
+@contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """Yield a folder that is removed at the end, as far as the system lets it be.
+
+    A signal that ends the process in order, as an exception, may come while the folder is removed; it is removed then
+    all the same.
+    """
+    folder = Path(tempfile.mkdtemp(prefix="kinfmu_"))
+    try:
+        yield folder
+    finally:
+        try:
+            shutil.rmtree(folder, ignore_errors=True)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)

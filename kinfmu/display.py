@@ -1,13 +1,13 @@
-"""The methods by which notebooks ask a value for its picture and its table."""
+"""Values that show themselves in notebooks; their tables as HTML and as text."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable, Sequence
 from functools import singledispatch
+from html import escape
 from importlib import import_module
 from typing import Any
-
-from kinfmu.display.html import escaped
 
 _MAKERS = "kinfmu.notebook"  # by name: it knows the classes, which know only this package
 
@@ -83,3 +83,62 @@ def _widget(value: object) -> Any:
 
 def _reason(error: Exception) -> str:
     return str(error) or type(error).__name__
+
+
+_TABLE = "margin: 0 0 1em 0"  # tables may follow each other
+_CELL = "text-align: left; vertical-align: top; white-space: pre-wrap"
+_NUMBER = "text-align: right; vertical-align: top"
+
+
+def escaped(text: object) -> str:
+    """Return text for HTML."""
+    return escape(str(text))
+
+
+def table(rows: Iterable[Sequence[object]], header: Sequence[str] = ()) -> str:
+    """Return a table. Text is escaped; floats are shown with six digits, on the right.
+
+    Args:
+        rows: Cells of each row.
+        header: Names of the columns. Default: none; the first column then names the rows.
+
+    Returns:
+        The HTML.
+
+    """
+    lines = [f"<tr>{''.join(_cell('th', name) for name in header)}</tr>"] if header else []
+    for row in rows:
+        kinds = ["td" if header or number else "th" for number in range(len(row))]
+        lines.append(f"<tr>{''.join(_cell(kind, value) for kind, value in zip(kinds, row, strict=True))}</tr>")
+    return f'<table style="{_TABLE}">{"".join(lines)}</table>'
+
+
+def page(title: str, *parts: str) -> str:
+    """Return a title above parts that are HTML; empty parts are left out."""
+    return f"<div><p><strong>{escaped(title)}</strong></p>{''.join(part for part in parts if part)}</div>"
+
+
+def _cell(kind: str, value: object) -> str:
+    is_number = isinstance(value, int | float)
+    text = f"{value:.6g}" if isinstance(value, float) else str(value)
+    return f'<{kind} style="{_NUMBER if is_number else _CELL}">{escaped(text)}</{kind}>'
+
+
+def aligned(rows: Sequence[Sequence[str]], left: int = 0, indent: str = "  ") -> list[str]:
+    """Return rows as lines whose columns are as wide as their cells.
+
+    Args:
+        rows: Cells of each row.
+        left: Number of columns that are aligned to the left; the others are aligned to the right.
+        indent: Begin of each line.
+
+    """
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = []
+    for row in rows:
+        cells = [
+            cell.ljust(width) if k < left else cell.rjust(width)
+            for k, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        lines.append(indent + "  ".join(cells).rstrip())
+    return lines

@@ -1,0 +1,319 @@
+"""What notebooks show of mechanisms, runs, reports, designs, sensitivities, studies and fits: pictures and tables."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import lru_cache
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+
+from kinfmu.analysis import Report
+from kinfmu.analysis.text import findings, measured_text, title
+from kinfmu.arrays import FloatArray
+from kinfmu.design.fit import FitResult
+from kinfmu.design.fit.picture import content_of
+from kinfmu.design.fit.text import parameter_rows
+from kinfmu.design.study import StudyResult
+from kinfmu.design.study.figure import figure_of
+from kinfmu.design.study.summary import about, disagreement, failures, measure_rows
+from kinfmu.display import escaped, html_of, page, svg_of, table, widget_of
+from kinfmu.draw import fitted
+from kinfmu.draw.drawing import sheet_of
+from kinfmu.draw.instant import instant
+from kinfmu.draw.overview import overview, shown_outputs
+from kinfmu.draw.writing import svg_text
+from kinfmu.errors import KinfmuError
+from kinfmu.mechanism import Mechanism
+from kinfmu.motion import DesignMeasures, MeasuredValues
+from kinfmu.plan import localized, plan_from
+from kinfmu.plan.equations.redundancy import find_redundancy
+from kinfmu.plan.equations.system import System
+from kinfmu.run import Run
+from kinfmu.run.axis import axis_of
+from kinfmu.run.designs import Designs
+from kinfmu.run.sensitivities import Sensitivities
+from kinfmu.run.verdict import notable_events, sentence
+from kinfmu.units import CoordinateName
+
+_LARGEST = 300  # coordinates; mobility and plan of larger mechanisms take seconds
+_KEPT = 8  # drawings
+
+
+@html_of.register
+def mechanism_html(mechanism: Mechanism) -> str:
+    """Return the drawing of a mechanism, or the reason why there is none, and the table of its parts."""
+    title = f"{mechanism.name}: {mechanism.title}" if mechanism.title else mechanism.name
+    return page(title, picture(lambda: drawing(mechanism), f"Drawing of {title}"), table(_parts(mechanism)))
+
+
+@svg_of.register
+def drawing(mechanism: Mechanism) -> str:
+    """Return the drawing of a mechanism as SVG.
+
+    Raises:
+        MissingPackageError: matplotlib is not installed.
+        AssemblyError: The mechanism does not close.
+
+    """
+    return _drawing(mechanism)
+
+
+@widget_of.register
+def live(mechanism: Mechanism) -> Any:
+    """Return the live mechanism; None without anywidget and ziglang, and for large ones, whose page takes long."""
+    if len(mechanism.coordinate_names) > _LARGEST or not (find_spec("anywidget") and find_spec("ziglang")):
+        return None
+    from kinfmu.page.player import play
+
+    return play(mechanism)
+
+
+@lru_cache(maxsize=_KEPT)
+def _drawing(mechanism: Mechanism) -> str:
+    return svg_text("this picture", lambda: sheet_of(instant(mechanism)).figure)
+
+
+def _parts(mechanism: Mechanism) -> Iterator[tuple[str, str]]:
+    """Yield what is counted, and its names."""
+    yield "moving bodies", f"{len(mechanism.moving_bodies)}: {some([body.name for body in mechanism.moving_bodies])}"
+    kinds: dict[str, list[str]] = {}
+    for joint in mechanism.joints:
+        kinds.setdefault(joint.type, []).append(joint.name)
+    yield "joints", "\n".join(f"{len(names)} {kind}: {some(names)}" for kind, names in kinds.items()) or "0"
+    drivers = [f"{driver.name}: {driver.type}, {driver.law.type}" for driver in mechanism.drivers]
+    yield "drivers", "\n".join(drivers) or "0"
+    if mechanism.points:
+        yield "points of interest", some([f"{name} = {point}" for name, point in mechanism.points.items()])
+    if mechanism.parameters:
+        values = [f"{name} = {parameter.value:.6g}" for name, parameter in mechanism.parameters.items()]
+        yield "parameters", some(values)
+    yield "unit of length", mechanism.length_unit
+    if len(mechanism.coordinate_names) <= _LARGEST:
+        yield from _mobility(mechanism)
+
+
+def _mobility(mechanism: Mechanism) -> Iterator[tuple[str, str]]:
+    """Yield the mobility, redundant joints, and the problem that prevents solving."""
+    local, origin = localized(mechanism)
+    system = System(local)
+    redundancy = find_redundancy(system)
+    yield "mobility", str(redundancy.mobility)
+    if redundancy.redundant:
+        yield "redundant", ", ".join(dict.fromkeys(row.row.owner for row in redundancy.redundant))
+    try:
+        plan_from(mechanism, system, origin, redundancy)
+    except KinfmuError as problem:
+        yield "problem", str(problem)
+
+
+_MOST_EVENTS = 5
+
+
+@html_of.register
+def run_html(run: Run) -> str:
+    """Return the verdict, the plot and the tables of a run."""
+    title = run.info.get("title") or run.info.get("name") or "run"
+    verdict = f"<p>{escaped('; '.join(filter(None, (axis_of(run).range(), sentence(run)))))}</p>"
+    shown = picture(lambda: plot(run), f"Plot of {title}") if len(run) and shown_outputs(run) else ""
+    return page(title, verdict, shown, _events(run), _column_ranges(run))
+
+
+@svg_of.register
+def plot(run: Run) -> str:
+    """Return the plot of a run's outputs, with a panel for each unit, as SVG.
+
+    Raises:
+        MissingPackageError: matplotlib is not installed.
+
+    """
+    return svg_text("this picture", lambda: overview(run))
+
+
+def _events(run: Run) -> str:
+    """Return the first events as a table; '' without events."""
+    events, axis = notable_events(run), axis_of(run)
+    rows = [(axis.place(event.t), event.level, event.text) for event in events[:_MOST_EVENTS]]
+    if len(events) > _MOST_EVENTS:
+        rows.append(("", "", f"and {len(events) - _MOST_EVENTS} more"))
+    return table(rows, ("at", "level", "event")) if rows else ""
+
+
+def _column_ranges(run: Run) -> str:
+    """Return the ranges of the outputs as a table."""
+    names = shown_outputs(run)
+    rows: list[Sequence[object]] = [(name, *_range(run, name)) for name in names[:MOST_ROWS]]
+    if len(names) > MOST_ROWS:
+        rows.append((f"and {len(names) - MOST_ROWS} more", "", "", "", ""))
+    return table(rows, ("output", "unit", "first", "smallest", "largest"))
+
+
+def _range(run: Run, name: CoordinateName) -> Iterator[object]:
+    """Yield the unit, and the first, smallest and largest value of the samples that hold numbers."""
+    values = run[name][run.good]
+    yield "rad" if name.is_angle else run.length_unit
+    yield from ([float(values[0]), float(np.min(values)), float(np.max(values))] if len(values) else ["none"] * 3)
+
+
+@html_of.register
+def report_html(report: Report) -> str:
+    """Return the findings as a table of subjects and texts."""
+    return page(title(report.mechanism), table(findings(report)))
+
+
+@html_of.register
+def measures_html(values: MeasuredValues) -> str:
+    """Return the values of measures as a table; of one without a value the reason."""
+    rows = [(value.name, value.type, value.reason or measured_text(value)) for value in values.values()]
+    return page("Measures", table(rows, ("measure", "type", "value")))
+
+
+@html_of.register
+def designs_html(designs: Designs) -> str:
+    """Return the ranges of the outputs over all designs, and the first designs with gaps with their reasons."""
+    count, samples = designs.status.shape
+    whole = int(designs.good.all(axis=1).sum())
+    return page(
+        f"{count} designs at {samples} samples, {whole} of them without gaps",
+        table(_ranges(designs.parameters), ("parameter", "smallest", "largest")),
+        table(_outputs(designs), ("output", "unit", "smallest", "largest")),
+        table(_gaps(designs), ("design", "samples without numbers", "reason")) if designs.reasons else "",
+    )
+
+
+@html_of.register
+def design_measures_html(designs: DesignMeasures) -> str:
+    """Return the ranges of the parameters and measures, and the first designs without a value with their reasons."""
+    units = designs.units
+    measures = [(name, units.get(str(name), ""), *ends) for name, *ends in _ranges(designs.values)]
+    reasons = [*list(designs.reasons.items())[:MOST_ROWS], *_more(len(designs.reasons), 2)]
+    return page(
+        f"{len(designs)} designs, {int(designs.good.sum())} of them with all measures",
+        table(_ranges(designs.parameters), ("parameter", "smallest", "largest")),
+        table(measures, ("measure", "unit", "smallest", "largest")),
+        table(reasons, ("design", "reason")) if reasons else "",
+    )
+
+
+def _ranges(columns: Mapping[str, FloatArray]) -> list[Sequence[object]]:
+    """Return the range of each of the first columns, of the numbers that are finite."""
+    rows: list[Sequence[object]] = []
+    for name, values in list(columns.items())[:MOST_ROWS]:
+        known = values[np.isfinite(values)]
+        rows.append((name, *((float(known.min()), float(known.max())) if len(known) else ("none", "none"))))
+    return [*rows, *_more(len(columns), 3)]
+
+
+def _outputs(designs: Designs) -> list[Sequence[object]]:
+    """Return the range of each output over all designs and samples that hold numbers."""
+    rows: list[Sequence[object]] = []
+    for k, name in enumerate(designs.outputs[:MOST_ROWS]):
+        values = designs.values[:, :, k][designs.good]
+        ends = (float(values.min()), float(values.max())) if len(values) else ("none", "none")
+        rows.append((name, "rad" if name.is_angle else "length", *ends))
+    return [*rows, *_more(len(designs.outputs), 4)]
+
+
+def _gaps(designs: Designs) -> list[Sequence[object]]:
+    lost = (~designs.good).sum(axis=1)
+    rows = [(number, int(lost[number]), reason) for number, reason in designs.reasons.items()]
+    return [*rows[:MOST_ROWS], *_more(len(rows), 3)]
+
+
+@html_of.register
+def sensitivities_html(found: Sensitivities) -> str:
+    """Return the largest magnitude of each derivative of a position over the samples."""
+    known = found.values_by[np.isfinite(found.values_by).all(axis=(1, 2))]
+    parameters, refused = found.parameters[:MOST_ROWS], found.refused
+    rows: list[Sequence[object]] = []
+    for k, name in enumerate(found.outputs[:MOST_ROWS]):
+        largest = np.abs(known[:, k, : len(parameters)]).max(axis=0, initial=0.0)
+        rows.append((name, *(float(value) for value in largest)))
+    left_out = found.parameters[MOST_ROWS:]
+    return page(
+        f"Largest |derivative| of positions over {len(known)} of {len(found.t)} samples",
+        table([*rows, *_more(len(found.outputs), len(parameters) + 1)], ("output", *(f"by {p}" for p in parameters))),
+        f"<p>not shown: {escaped(some(list(left_out)))}</p>" if left_out else "",
+        table(refused.items(), ("parameter", "why it cannot change alone")) if refused else "",
+    )
+
+
+def _more(count: int, columns: int) -> list[Sequence[object]]:
+    """Return a last row with the number of rows that a table leaves out."""
+    return [(f"and {count - MOST_ROWS} more", *[""] * (columns - 1))] if count > MOST_ROWS else []
+
+
+@html_of.register
+def study_html(result: StudyResult) -> str:
+    """Return the summary, the picture, a warning and the first failure of a study."""
+    header, *rows = measure_rows(result)
+    texts = [f"<p>{escaped(text)}</p>" for text in (disagreement(result), failures(result)) if text]
+    shown = picture(lambda: study_svg(result), f"Picture of the study of {result.mechanism.name}")
+    return page(about(result), table(rows, header), shown, *texts)
+
+
+@svg_of.register
+def study_svg(result: StudyResult) -> str:
+    """Return the picture of a study as SVG.
+
+    Raises:
+        MissingPackageError: matplotlib is not installed.
+        FigureError: There are too many parameters and measures for one picture.
+
+    """
+    return svg_text("this picture", lambda: figure_of(result, result.measures))
+
+
+@html_of.register
+def fit_html(result: FitResult) -> str:
+    """Return the picture of a fit, its unknowns, and the errors of its targets and constraints."""
+    errors = []
+    for one in result.errors:
+        unit, factor = one.display[0]
+        errors.append((one.name, one.type, one.rms / factor, one.largest / factor, unit))
+    constraints = [(one.name, "holds" if one.holds else "violated", one.text) for one in result.constraints]
+    return page(
+        f"{result.mechanism.name}: sum of squares {result.squares:.6g}, rms residual {result.rms:.6g}",
+        picture(lambda: fit_svg(result), f"Picture of the fit of {result.mechanism.name}"),
+        table(parameter_rows(result), ("unknown", "value", "unit", "bounds", "")),
+        table(errors, ("target", "type", "rms error", "largest error", "unit")),
+        table(constraints, ("constraint", "", "value")) if constraints else "",
+    )
+
+
+@svg_of.register
+def fit_svg(result: FitResult) -> str:
+    """Return the picture of a fit as SVG.
+
+    Raises:
+        MissingPackageError: matplotlib is not installed.
+
+    """
+    return svg_text("this picture", lambda: fitted.figure_of(content_of(result)))
+
+
+MOST = 24  # names in a cell
+MOST_ROWS = 12  # of a table
+
+
+def picture(draw: Callable[[], str], alternative: str) -> str:
+    """Return the SVG text of `draw` as an image, which styles of the page do not change; of an error the reason.
+
+    Args:
+        draw: Returns the SVG.
+        alternative: Text for readers who do not see the image.
+
+    """
+    try:
+        image = b64encode(draw().encode()).decode()
+    except KinfmuError as reason:
+        return f"<p>{escaped(reason)}</p>"
+    return f'<p><img alt="{escaped(alternative)}" style="max-width: 100%" src="data:image/svg+xml;base64,{image}"></p>'
+
+
+def some(names: list[str]) -> str:
+    """Return names separated by commas; of many, the first and the number of others."""
+    more = f" and {len(names) - MOST} more" if len(names) > MOST else ""
+    return ", ".join(names[:MOST]) + more
