@@ -24,8 +24,8 @@ def test_the_architecture_lists_every_package() -> None:
 
 def test_the_architecture_lists_every_module_outside_packages() -> None:
     modules = {path.name for path in (ROOT / "kinfmu").glob("*.py")} - {"__init__.py", "__main__.py"}
-    rows = [line for line in ARCHITECTURE.splitlines() if line.startswith("| `kinfmu/")]
-    assert set(re.findall(r"(\w+\.py)`", " ".join(rows))) == modules
+    listed = ARCHITECTURE.partition("\n## Other folders")[0]
+    assert modules <= set(re.findall(r"(\w+\.py)`", listed))
 
 
 def test_the_architecture_lists_packages_in_the_order_of_imports() -> None:
