@@ -5,36 +5,35 @@ from __future__ import annotations
 import inspect
 from collections import defaultdict
 from importlib import import_module
+from operator import attrgetter
 from pathlib import Path
 
 import kinfmu
-from _site.docstrings import DECLARING
+from _site.docstrings import declares_keys
 from _site.pages import Pages
 from kinfmu.run.tables import Tabular
 
-GROUPS = {  # the package of a public name, as the stub imports it: title of its page, what it is for
+GROUPS = {  # the package, or part of `mechanism`, from which the stub imports a name: title of its page, what it is for
     "gallery": ("Loading and saving", "Mechanisms by the name of a gallery entry or a file."),
     "mechanism": ("Mechanisms", "What you write: bodies, points, start poses, parameters."),
     "joints": ("Joints", "Constraints between bodies; `Mechanism` takes a list of them."),
     "drivers": ("Drivers", "A measured quantity that follows a law of time."),
     "laws": ("Laws", "How one quantity follows another: of drivers over time, of cams and couplings over an angle."),
     "loads": ("Loads", "Forces and torques on bodies."),
-    "measures": ("Quantities of a pose", "What is held, driven, coupled or measured."),
-    "readings": ("Measures of a motion", "Numbers read off a motion, which `[measures]` of a file declares."),
+    "quantities": ("Quantities of a pose", "What is held, driven, coupled or measured."),
+    "measures": ("Measures of a motion", "Numbers read off a motion, which `[measures]` of a file declares."),
     "analysis": ("Checking", "The report of a mechanism: mobility, redundant rows, range, singular points."),
-    "sweep": ("Solving", "Many samples of a mechanism, and of thousands of designs."),
-    "run": ("Runs", "The motion of a mechanism at many samples, and where it is sent while it is computed."),
+    "run": ("Solving", "Many samples of a mechanism, and of thousands of designs; the run that holds them."),
     "solver": ("Status of a sample", "The quality of a sample."),
     "motion": ("Measuring", "Measures of one motion and of designs."),
-    "player": ("The page", "A mechanism that is dragged in a notebook."),
-    "studies": ("Studies", "Many designs by grids, samples and tolerances."),
-    "synthesis": ("Fitting", "Parameters for a task."),
+    "page": ("The page", "A mechanism that is dragged in a notebook."),
+    "design": ("Studies and fits", "Many designs by grids, samples and tolerances; parameters for a task."),
     "fmu": ("FMUs", "Building and stepping them."),
     "log": ("Records", "Files of runs, in `kinfmu.log`."),
     "draw": ("Pictures", "Figures, plots and animations, in `kinfmu.draw`."),
     "errors": ("Exceptions", "All are a `KinfmuError`, with the data of their message as attributes."),
 }
-MODULES = {"draw", "log", "readings", "synthesis"}  # public as modules: all their names
+MODULES = {"design", "draw", "log", "measures"}  # public as modules: all their names
 
 
 def write(pages: Pages) -> None:
@@ -60,9 +59,9 @@ def _names() -> dict[str, list[str]]:
     found: dict[str, list[str]] = defaultdict(list)
     homes = {name: home for name, home in kinfmu._HOME.items() if name not in MODULES}
     for name, home in homes.items():
-        found[home.split(".")[1]].append(f"kinfmu.{name}")
+        found[group_of(home)].append(f"kinfmu.{name}")
     for module in sorted(MODULES):
-        public = import_module(f"kinfmu.{module}").__all__
+        public = getattr(kinfmu, module).__all__
         found[module] += [f"kinfmu.{module}.{name}" for name in public if name not in homes and name != name.upper()]
     errors = import_module("kinfmu.errors")
     found["errors"] += [
@@ -73,11 +72,16 @@ def _names() -> dict[str, list[str]]:
     return found
 
 
+def group_of(module: str) -> str:
+    """Return the group of a module: its package, or the part of `kinfmu.mechanism` that it belongs to."""
+    _, package, *inner = module.split(".")
+    return inner[0] if package == "mechanism" and inner and inner[0] in GROUPS else package
+
+
 def _directive(name: str) -> str:
-    module, _, last = name.rpartition(".")
-    thing = getattr(import_module(module), last)
+    thing = attrgetter(name.removeprefix("kinfmu."))(kinfmu)
     if inspect.isclass(thing):
-        members = "" if thing.__module__.split(".")[1] in DECLARING else "   :members:\n"
+        members = "" if declares_keys(thing) else "   :members:\n"
         members += "   :inherited-members:\n" if issubclass(thing, Tabular) else ""
         return f".. autoclass:: {name}\n{members}\n"
     return f".. autofunction:: {name}\n\n" if callable(thing) else f".. autodata:: {name}\n\n"

@@ -8,7 +8,7 @@ from typing import Any
 
 from kinfmu.mechanism.declared import keys_of
 
-DECLARING = {"joints", "drivers", "laws", "loads", "measures", "readings"}  # packages whose classes declare keys
+DECLARING = {"joints", "drivers", "laws", "loads", "quantities", "measures"}  # in `mechanism`: classes declare keys
 
 
 def prepared(_app: Any, _what: str, _name: str, thing: Any, _options: Any, lines: list[str]) -> None:
@@ -30,8 +30,13 @@ def _with_literal_blocks(lines: list[str]) -> list[str]:
     return result
 
 
+def declares_keys(cls: type) -> bool:
+    """Return True for joints, drivers, laws, loads, quantities and measures."""
+    return not DECLARING.isdisjoint(cls.__module__.split(".")[1:3])
+
+
 def _parameters(cls: type) -> list[str]:
     """Return the declared keys of a joint, driver, law, load or measure as parameters; none for other classes."""
-    if not is_dataclass(cls) or cls.__module__.split(".")[1] not in DECLARING:
+    if not is_dataclass(cls) or not declares_keys(cls):
         return []
     return ["", *(f":param {key.name}: {key.meaning}" for key in keys_of(cls)), ""]

@@ -203,7 +203,7 @@ def test_arguments_of_a_call_are_refused_likewise() -> None:
         (
             {"crank": {"values": [20]}},
             {"measures": [5]},
-            "measures: 5 is neither a measure such as kinfmu.read",
+            "measures: 5 is neither a measure such as kinfmu.meas",
         ),
         ({"crank": {"values": [20]}}, {"output": 5}, "output = 5 must be the path of a file, .parquet, .csv"),
     ],

@@ -57,7 +57,7 @@ def test_the_reference_holds_samples_of_the_run_and_every_output(name: str, memb
     efforts = [name for name in run.force_names if name.noun in {"torque", "force"}]
     assert sorted(forces) == sorted([*efforts, *run.reaction_names, "kinetic_energy"] if asked.has_forces else [])
     assert 15 <= len(asked.reference) <= 25
-    grid = kinfmu.run.run_times(asked.mechanism.run)
+    grid = kinfmu.run.driving.run_times(asked.mechanism.run)
     assert set(asked.times) <= set(grid.tolist())
 
 
