@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from benchmarks.accuracy import Measured
 from benchmarks.singular import DISTANCES, Near
 from kinfmu.draw.chart import LIGHT, SMALL, Look, dress, named
-from kinfmu.draw.scene.palette import BODIES, GROUND, Colour, darker
+from kinfmu.draw.scene.palette import BODIES, GROUND, LOAD, Colour, darker
 from kinfmu.draw.sheet import GREY, INCH, ink
 from kinfmu.draw.writing import write
 from kinfmu.mechanism import gallery
@@ -43,6 +43,7 @@ LOOKS = {  # of the engines
     "kinfmu native": Look(darker(BODIES[4]), 2.2, "D"),
     "generated Python": Look(BODIES[0]),
     "pylinkage": Look(GROUND, 1.4, "s"),
+    "kimech": Look(LOAD, 1.4, "s"),
     "CasADi": Look(BODIES[3]),
     "scipy fsolve": Look(BODIES[2]),
     "numpy Newton": Look(BODIES[1], 1.4, "s"),

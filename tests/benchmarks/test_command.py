@@ -23,6 +23,7 @@ from tests import oracle
 from tests.benchmarks.conftest import Command
 
 QUICK = ["kinfmu", "kinfmu native", "generated Python", "numpy Newton", "scipy fsolve"]
+PEERS = ("casadi", "pylinkage", "kimech")
 PICTURES = [f"accuracy-{name}.{kind}" for name in ("singular", "work-precision") for kind in ("png", "svg")]
 
 
@@ -31,7 +32,7 @@ def measured() -> tuple[accuracy.Result, tuple[tuple[singular.Near, ...], tuple[
     """What is measured on one mechanism in one round by the quick engines."""
     engines = [engine for engine in ENGINES if engine.name != "readable reference"]
     with pytest.MonkeyPatch.context() as patch:
-        for package in ("casadi", "pylinkage"):
+        for package in PEERS:
             patch.setitem(sys.modules, package, None)
         return accuracy.measure(["slider_crank"], 1, engines=engines), singular.measure(1, engines=engines)
 
@@ -60,8 +61,8 @@ def pages() -> list[Path]:
 
 @pytest.fixture(autouse=True)
 def only_what_comes_with_the_tests(monkeypatch: pytest.MonkeyPatch) -> None:
-    """CasADi and pylinkage count as not installed, whether they are or not."""
-    for package in ("casadi", "pylinkage"):
+    """The packages of PEERS count as not installed, whether they are or not."""
+    for package in PEERS:
         monkeypatch.setitem(sys.modules, package, None)
 
 
@@ -92,6 +93,7 @@ def test_tables_and_charts_are_written_in_the_requested_folder(
     assert set(re.findall(r"there/([\w.-]+)", message)) == set(files)
     assert stderr.splitlines() == [
         "left out: CasADi is not installed: pip install 'kinfmu[bench]'",
+        "left out: kimech is not installed: pip install 'kinfmu[bench]'",
     ]
     page = (tmp_path / "there" / PAGE).read_text(encoding="utf-8")
     for part in ("engines", "singular points", "conditions"):

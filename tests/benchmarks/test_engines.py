@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks import singular
 from benchmarks.accuracy import largest, prepared
-from benchmarks.case import Case, of_gallery
+from benchmarks.case import Case, along_driver, of_gallery
 from benchmarks.charts import LOOKS
 from benchmarks.engine import BenchEngine, EngineSetting
 from benchmarks.engines import (
@@ -18,6 +18,7 @@ from benchmarks.engines import (
     ENGINES,
     FSOLVE,
     GENERATED,
+    KIMECH,
     NATIVE,
     NUMPY_NEWTON,
     PYLINKAGE,
@@ -26,11 +27,28 @@ from benchmarks.engines import (
 )
 from benchmarks.singular_points import POINTS, exact_fourbar
 from kinfmu.errors import CompilerError, MissingPackageError
+from kinfmu.mechanism.toml_file import parse
+from kinfmu.plan import compile_plan
 from kinfmu.plan.equations.reference import solve_reference
 from tests.oracle import follow, fourbar, largest_error, reference_fourbar, slider_crank
 from tests.power_series import Series, cos, sin
 
 ROUND_OFF = 5e-13  # relative to a column's largest magnitude
+KIMECH_CLOSES = 1e-9  # relative: the residual that kimech accepts
+
+BAR_FOURBAR = """
+name = "bar_fourbar"
+[bodies]
+ground = { points = { O = [0, 0], C = [40, 0] } }
+crank = { points = { O = [0, 0], P = [20, 0] } }
+coupler = { points = { P = [0, 0], Q = [50, 0] }, start = { x = 20, phi = "78 deg" } }
+[joints]
+O = { type = "revolute", between = ["ground.O", "crank.O"] }
+P = { type = "revolute", between = ["crank.P", "coupler.P"] }
+rocker = { type = "distance", between = ["ground.C", "coupler.Q"], length = 50 }
+[drivers]
+crank = { type = "angle", of = "crank", law = "constant_speed", start = 0, speed = 1 }
+"""
 
 
 @pytest.fixture(scope="module", params=["slider_crank", "excavator"])
@@ -51,22 +69,23 @@ def test_fsolve_is_as_good_as_its_tolerance(case: Case) -> None:
     assert fine <= rough <= 1e-2
 
 
-PEERS = [(CASADI, "casadi"), (PYLINKAGE, "pylinkage")]
+PEERS = [(CASADI, "casadi", 1e-11), (PYLINKAGE, "pylinkage", 1e-11), (KIMECH, "kimech", KIMECH_CLOSES)]
 
 
-@pytest.mark.parametrize(("engine", "package"), PEERS, ids=["casadi", "pylinkage"])
-def test_peers_agree_where_they_are_installed(engine: BenchEngine, package: str) -> None:
+@pytest.mark.parametrize(("engine", "package", "within"), PEERS, ids=["casadi", "pylinkage", "kimech"])
+def test_peers_agree_where_they_are_installed(engine: BenchEngine, package: str, within: float) -> None:
     pytest.importorskip(package)
     jansen = of_gallery("jansen_leg")
     absent: dict[str, None] = {}
     sampler = prepared(engine, jansen, engine.usual, absent)
     assert sampler is not None
     assert not absent
-    assert max(largest(jansen, sampler)) <= 1e-11
+    assert max(largest(jansen, sampler)) <= within
 
 
 @pytest.mark.parametrize(
-    ("engine", "package", "name"), [(CASADI, "casadi", "CasADi"), (PYLINKAGE, "pylinkage", "pylinkage")]
+    ("engine", "package", "name"),
+    [(CASADI, "casadi", "CasADi"), (PYLINKAGE, "pylinkage", "pylinkage"), (KIMECH, "kimech", "kimech")],
 )
 def test_a_peer_that_is_not_installed_is_reported_in_one_line(
     engine: BenchEngine, package: str, name: str, monkeypatch: pytest.MonkeyPatch
@@ -94,6 +113,44 @@ def test_without_a_compiler_the_native_engine_is_reported_in_one_line(monkeypatc
 
 def test_pylinkage_is_not_asked_for_what_it_cannot_state(case: Case) -> None:
     assert PYLINKAGE.sampler(case, PYLINKAGE.usual) is None
+
+
+def test_kimech_agrees_on_slides_and_on_driven_distances(case: Case) -> None:
+    pytest.importorskip("kimech")
+    sampler = KIMECH.sampler(case, KIMECH.usual)
+    assert sampler is not None
+    assert max(largest(case, sampler)) <= KIMECH_CLOSES
+
+
+def test_kimech_agrees_on_a_distance_kept_by_a_bar() -> None:
+    pytest.importorskip("kimech")
+    u = np.linspace(0.0, 6.0, 31).tolist()
+    exact = [table[:, :2] for table in fourbar(40, 20, 50, 50, u)]  # crank.phi, coupler.phi
+    plan = compile_plan(parse(BAR_FOURBAR, "bar_fourbar"), ("crank.phi", "coupler.x", "coupler.y", "coupler.phi"))
+    bar = along_driver("bar_fourbar", plan, u, range(len(u)), lambda _: np.zeros((3, 4)))
+    sampler = KIMECH.sampler(bar, KIMECH.usual)
+    assert sampler is not None
+    rows = np.array(sampler(len(u))).reshape(-1, 3, 4)
+    for order, table in enumerate(exact):
+        assert largest_error(rows[:, order, [0, 3]], table, modulo_turns=order == 0) <= KIMECH_CLOSES
+
+
+@pytest.mark.parametrize("name", ["fourbar", "cam_roller"])  # a redundant constraint; a cam
+def test_kimech_is_not_asked_for_what_it_refuses(name: str) -> None:
+    pytest.importorskip("kimech")
+    assert KIMECH.sampler(of_gallery(name), KIMECH.usual) is None
+
+
+def test_a_sample_that_kimech_refuses_is_a_gap_and_those_after_it_are_solved() -> None:
+    pytest.importorskip("kimech")
+    equal = singular.case_of(POINTS[2])
+    sampler = KIMECH.sampler(equal, KIMECH.usual)
+    assert sampler is not None
+    errors = equal.errors(sampler(len(equal.t)))
+    at = len(singular.DISTANCES)
+    assert np.isnan(errors[at]).all()
+    assert max(errors[0].max(), errors[-1].max()) <= KIMECH_CLOSES
+    assert np.array_equal(equal.errors(sampler(len(equal.t))), errors, equal_nan=True)
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])

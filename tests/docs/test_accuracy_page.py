@@ -22,7 +22,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 ROOT = DOCS.parent
 PAGE = (DOCS / "accuracy.md").read_text(encoding="utf-8")
 SETTINGS = (DOCS / SETTINGS_PAGE).read_text(encoding="utf-8")
-PEERS = ("CasADi", "pylinkage")  # rows of theirs are there if they were installed
+PEERS = ("CasADi", "pylinkage", "kimech")  # rows of theirs are there if they were installed
 ANEW = "scripts/bench writes it again"
 
 
