@@ -55,6 +55,7 @@ MOST_NUMBERS = 400  # of a file that its page can change: the C code of more is 
 _IMPORT = re.compile(r"^import .*\n", re.MULTILINE)
 _EXPORT = re.compile(r"^export ", re.MULTILINE)
 _COMMENT = re.compile(r"^ *//.*\n", re.MULTILINE)  # a line of its own
+_INDENT = re.compile(r"^ +", re.MULTILINE)  # a tenth of a page; no text of the scripts goes over lines
 
 
 def page(
@@ -123,8 +124,9 @@ def page(
 
 
 def _script(name: str) -> str:
-    """Return a module of web/ as a part of one script: without comments, imports, and the word export."""
-    return _EXPORT.sub("", _IMPORT.sub("", _COMMENT.sub("", (_WEB / f"{name}.js").read_text("utf-8"))))
+    """Return a module of web/ as a part of one script: without comments, indentation, imports, and the word export."""
+    text = _COMMENT.sub("", (_WEB / f"{name}.js").read_text("utf-8"))
+    return _INDENT.sub("", _EXPORT.sub("", _IMPORT.sub("", text)))
 
 
 def _filled(text: str, values: Mapping[str, str]) -> str:
