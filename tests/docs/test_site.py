@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import runpy
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -162,3 +163,17 @@ def test_the_site_is_checked_when_it_is_built() -> None:
     script = (DOCS.parent / "scripts" / "docs").read_text(encoding="utf-8")
     assert "docs/_site/links.py docs/_build" in script
     assert "-m _site.contents docs/_build" in script
+
+
+def test_quotes_in_the_api_are_those_of_code(tmp_path: Path) -> None:
+    pytest.importorskip("myst_parser")
+    names = "".join(f".. autofunction:: kinfmu.{name}\n" for name in ("solve", "measure", "fit", "build", "simulate"))
+    (tmp_path / "index.rst").write_text(f"API\n===\n\n{names}", "utf-8")
+    plain = "myst_parser,sphinx.ext.autodoc,sphinx.ext.napoleon,sphinx.ext.mathjax"
+    settings = (f"extensions={plain}", "html_math_renderer=mathjax", "html_theme=basic")
+    options = [part for setting in settings for part in ("-D", setting)]
+    command = [sys.executable, "-m", "sphinx", "-q", "-c", str(DOCS), *options, str(tmp_path), str(tmp_path / "out")]
+    subprocess.run(command, check=True, capture_output=True)
+    text = (tmp_path / "out" / "index.html").read_text("utf-8")
+    assert "'crank.speed'" in text or "&quot;crank.speed&quot;" in text or '"crank.speed"' in text
+    assert not set("\u2018\u2019\u201c\u201d") & set(text)

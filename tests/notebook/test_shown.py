@@ -17,11 +17,14 @@ import pytest
 
 import kinfmu
 from kinfmu import notebook as shown_mechanism
+from kinfmu.display import page as html_page
+from kinfmu.display import table
 from kinfmu.draw import figure
 from kinfmu.mechanism.measures import Maximum, Range
 from kinfmu.run.verdict import sentence
 from tests.log.runs import fourbar, with_gap
 from tests.mechanisms import fourbar as fourbar_of
+from tests.page.browser import browser, needs_browser
 
 IMAGE = "data:image/svg+xml;base64,"
 TURN = np.linspace(0.0, 2.0 * np.pi, 61)
@@ -223,3 +226,12 @@ def test_every_class_that_shows_itself_has_html() -> None:
     }  # fmt: skip
     for cls in classes:
         assert html_of.dispatch(cls) is not html_of.dispatch(object), cls
+
+
+@needs_browser
+def test_tables_that_follow_each_other_do_not_touch(tmp_path: Path) -> None:
+    shown = html_page("fit", table([("a", 1.0)], ("unknown", "value")), table([("b", 2.0)], ("target", "error")))
+    with browser(tmp_path) as chromium, chromium.tab() as opened:
+        opened.tab.set_content(f"<style>table {{ margin: 0 }}</style>{shown}")  # as Jupyter has it
+        first, second = (opened.tab.locator("table").nth(k).bounding_box() for k in range(2))
+    assert second["y"] - first["y"] - first["height"] >= 8.0
