@@ -36,10 +36,11 @@ def test_the_message_states_the_cure(call: Callable[[], Any]) -> None:
 def test_a_fit_states_the_cure_too(tmp_path: Any) -> None:
     from kinfmu.mechanism.toml_text import text
 
-    (tmp_path / "mine.toml").write_text(text(MECHANISM), encoding="utf-8")
+    swing = '[measures.swing]\ntype = "range"\nof = "rocker.phi"\n'
+    (tmp_path / "mine.toml").write_text(f"{text(MECHANISM)}\n{swing}", encoding="utf-8")
     (tmp_path / "fit.toml").write_text(
         'mechanism = "mine.toml"\n[unknowns]\nsize = ["1000 mm", "1500 mm"]\n[targets.swing]\ntype = "measure"\n'
-        'of = { type = "range", of = "rocker.phi" }\nvalue = 1.0\n',
+        'of = "swing"\nvalue = 1.0\n',
         encoding="utf-8",
     )
     with pytest.raises(KinfmuError, match=r'size = "1\.25 m"$'):

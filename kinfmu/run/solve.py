@@ -84,7 +84,7 @@ def solve(
         model = kept_model(mechanism, chosen, tuple(derived), engine)
     run = model.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, anew=anew, out=out, **inputs)
     for driver in model.plan.drivers if inputs and not wrap else ():
-        if driver.quantity.kind == "angle":
+        if driver.quantity.kind == "angle" and driver.inputs[0] in inputs:
             _warn_of_degrees(driver.inputs[0], inputs[driver.inputs[0]])
     return run
 

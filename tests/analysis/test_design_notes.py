@@ -119,6 +119,8 @@ def test_pivots_in_another_unit_are_named_where_the_mechanism_does_not_close() -
     )
     assert "does not close" in str(report.problem)
     assert report.notes == (
+        "[bodies.ground] points.C: 0.04 is 0.04 mm, about a thousandth of the other lengths (20 to 90 mm); "
+        "write '0.04 m' if intended",
         "ground.O and ground.C are 0.04 mm apart, the bodies there at least 20 mm long: are their points in another "
         "unit?",
     )

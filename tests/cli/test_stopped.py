@@ -33,7 +33,7 @@ def test_simulate_that_is_stopped_while_the_recording_is_written_says_where_the_
     assert len(log.read(tmp_path / "run.mcap")) == 181
 
 
-@pytest.mark.parametrize("early", ["kinfmu.run.solve", "kinfmu.log.write_table"])
+@pytest.mark.parametrize("early", ["kinfmu.run.solve.solve", "kinfmu.log.write_table"])
 def test_solve_that_is_stopped_says_that_nothing_was_written(
     early: str, fails: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -34,8 +34,8 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copy(ROOT / "pyproject.toml", copy)
     joint, export = blocks("python")
     (named,) = re.findall(r"`kinfmu/mechanism/joints/(opposed\.py)`:", PAGE)
-    (copy / "kinfmu" / "joints" / named).write_text(joint, encoding="utf-8")
-    package = copy / "kinfmu" / "joints" / "__init__.py"
+    (copy / "kinfmu" / "mechanism" / "joints" / named).write_text(joint, encoding="utf-8")
+    package = copy / "kinfmu" / "mechanism" / "joints" / "__init__.py"
     text = package.read_text(encoding="utf-8")
     text = text.replace("from kinfmu.mechanism.joints.rack_and", f"{export}from kinfmu.mechanism.joints.rack_and", 1)
     text = text.replace("\n)\n\n__all__", "\n    Opposed,\n)\n\n__all__", 1)

@@ -17,12 +17,12 @@ import pytest
 import kinfmu
 from kinfmu.errors import CompilerError
 from kinfmu.log import write_mcap
-from tests.cli.conftest import Command, command, fails, refuses
+from tests.cli.conftest import Command, command, fails, program_called, refuses
 from tests.page.browser import CHROMIUM, browser
 
 pytest.importorskip("ziglang", reason="pages are compiled by zig")
 DATA = re.compile(r'id="data">([^<]*)<')
-__all__ = ["command", "fails", "refuses"]  # fixtures
+__all__ = ["command", "fails", "program_called", "refuses"]  # fixtures
 
 
 def data_of(page: Path) -> dict[str, Any]:
