@@ -8,8 +8,9 @@ from time import process_time
 import numpy as np
 
 from benchmarks.rounds import in_turn, spread, table
-from benchmarks.singular_points import FOURBAR, parallelogram
+from benchmarks.singular_points import FOURBAR
 from kinfmu.arrays import FloatArray
+from kinfmu.cli.demo import parallelogram
 from kinfmu.codegen.python import load_model
 from kinfmu.mechanism.gallery import load
 from kinfmu.plan import compile_plan

@@ -124,7 +124,7 @@ class Study:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Hash of the definition, the mechanism and the version: equal ones give equal rows."""
+        """Hash of the definition, the mechanism and the version; equal ones give equal rows."""
         content = json.dumps(self.definition, sort_keys=True)
         return hashlib.sha256("\n".join((VERSION, content, self.mechanism_text)).encode()).hexdigest()
 
