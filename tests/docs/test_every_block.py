@@ -106,6 +106,8 @@ def test_pages_with_a_test_of_their_own_have_it() -> None:
         assert name in (Path(__file__).parent / test).read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("name", FOLLOWED)
+@pytest.mark.parametrize(
+    "name", [name if name == "README.md" else pytest.param(name, marks=pytest.mark.long) for name in FOLLOWED]
+)
 def test_the_commands_and_the_python_of_a_page_run(name: str, tmp_path: Path) -> None:
     follow(name, tmp_path)

@@ -15,6 +15,7 @@ import kinfmu.page
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text as toml_text
 from kinfmu.run.axis import shown_range
+from tests.gallery_members import every_member
 from tests.page.browser import DESKTOP, PHONE, Browser, browser, needs_browser, text_of
 
 pytestmark = needs_browser
@@ -214,7 +215,7 @@ def _light(colour: str) -> float:
 @pytest.mark.parametrize(
     "size", [pytest.param(PHONE, id="phone"), pytest.param(DESKTOP, id="desktop", marks=pytest.mark.long)]
 )
-@pytest.mark.parametrize("name", kinfmu.mechanism.gallery.names())
+@every_member
 def test_names_keep_their_places_in_a_turn_and_have_the_contrast_of_wcag_aa(
     chromium: Browser, name: str, size: dict[str, int]
 ) -> None:
