@@ -199,11 +199,6 @@ class System:
         """Return the unit of a row's gap."""
         return "rad" if row.kind == "angle" else self.mechanism.length_unit
 
-    def relative_gaps(self, phi: ArrayLike) -> FloatArray:
-        """Return the absolute gaps, lengths over the mechanism's size, (joint rows,)."""
-        sizes = [1.0 if row.kind == "angle" else self.size for row in self.rows[: self.joint_row_count]]
-        return np.asarray(np.abs(self.gaps(phi)) / np.array(sizes), dtype=float)
-
 
 def placement(mechanism: Mechanism, q: Sequence[Any]) -> Placement:
     """Return the poses of the bodies from all coordinates q, in any arithmetic."""
