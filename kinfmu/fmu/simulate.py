@@ -95,8 +95,8 @@ def simulate(
         state: With a mechanism, or its FMU built with drive="torque": initial values and speeds, such as
             {"crank_angle": 0.5, "crank_speed": 2.0} [rad, rad/s]. Default: those of the laws at the start.
         tolerance: In the same cases: error of a step, relative, and absolute in rad and sizes. Default: 1e-9.
-        method: With a mechanism: 'DOP853' or, for stiff springs and dampers, 'Radau', of scipy.integrate. Default:
-            'DOP853'.
+        method: With a mechanism: 'DOP853', the pair of Dormand and Prince of order 8, or, for stiff springs and
+            dampers, 'Radau', of scipy.integrate. Default: 'DOP853'.
         wrap: True: angles among the inputs that jump by a turn, such as from 2 pi to 0, are unwrapped. False: such a
             jump is a turn back.
         channels: Channels to record of every sample, such as ["q", "qd"] or ["-error", "-margin"]: see
