@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from kinfmu.errors import FmuError
-from kinfmu.fmu.samples import ERROR, PERIOD, Samples
-from kinfmu.fmu.slaves import LoadedSlave
+from kinfmu.fmu.host.samples import ERROR, PERIOD, Samples
+from kinfmu.fmu.host.slaves import LoadedSlave
 from kinfmu.run import Event, Run
 from kinfmu.run.channels import absent_columns
 from kinfmu.run.run import Sink

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from kinfmu.errors import FmuError, MissingPackageError
 from kinfmu.fmu.description import Description
-from kinfmu.fmu.row_call import WARNING, RowCall, StepCall
+from kinfmu.fmu.host.row_call import WARNING, RowCall, StepCall
 
 DISCARD = 2  # fmi2Discard and fmi3Discard
 Log = Callable[[int, str], None]  # status and text of a message

@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kinfmu.errors import FmuError, MissingPackageError, RequestError, listed, suggestion
-from kinfmu.fmu.fmu_settings import as_set
-from kinfmu.fmu.input_table import InputTable, table_of, times
-from kinfmu.fmu.interruption import Interruption
-from kinfmu.fmu.samples import DISCARD, ERROR, Samples
-from kinfmu.fmu.slaves import LoadedSlave, slave
-from kinfmu.fmu.system.exchange import check_exchange, exchange_of, ordered
-from kinfmu.fmu.system.ports import Port
-from kinfmu.fmu.system.samples import SystemSamples
-from kinfmu.fmu.system.slave import AnySlave, foreign_slave
-from kinfmu.fmu.system.structure import STRUCTURE, Component, SystemStructure, of_fmu, of_ssp
+from kinfmu.fmu.host.any_slave import AnySlave, foreign_slave
+from kinfmu.fmu.host.exchange import check_exchange, exchange_of, ordered
+from kinfmu.fmu.host.input_table import InputTable, table_of, times
+from kinfmu.fmu.host.interruption import Interruption
+from kinfmu.fmu.host.ports import Port
+from kinfmu.fmu.host.samples import DISCARD, ERROR, Samples
+from kinfmu.fmu.host.settings import as_set
+from kinfmu.fmu.host.slaves import LoadedSlave, slave
+from kinfmu.fmu.host.structure import STRUCTURE, Component, SystemStructure, of_fmu, of_ssp
+from kinfmu.fmu.host.system_samples import SystemSamples
 from kinfmu.fmu.unpacked import unpacked
 from kinfmu.mechanism import Mechanism, toml_file, toml_text
 from kinfmu.run import Event, Run
