@@ -15,7 +15,7 @@ def press(*_: object, **__: object) -> NoReturn:
     raise KeyboardInterrupt
 
 
-@pytest.mark.parametrize("early", ["kinfmu.fmu.build", "kinfmu.fmu.host.simulate"])
+@pytest.mark.parametrize("early", ["kinfmu.fmu.build", "kinfmu.fmu.simulate"])
 def test_simulate_that_is_stopped_before_the_first_sample_says_that_nothing_was_kept(
     early: str, fails: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
