@@ -1,7 +1,7 @@
-"""Simulate an FMU through fmpy's low-level calls, and return its samples as a Run.
+"""Simulate an FMU, a system or a mechanism: what `kinfmu.simulate` is given decides.
 
-fmpy's own `simulate_fmu` records the outputs of u(t - h) at t, and ends without a message if a step is discarded. This
-loop sets at t_k, gets, records, then steps.
+fmpy's own `simulate_fmu` records the outputs of u(t - h) at t, and ends without a message if a step is discarded. FMUs
+are stepped here through fmpy's low-level calls: set at t_k, get, record, then step.
 """
 
 from __future__ import annotations
@@ -9,33 +9,19 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from zipfile import BadZipFile, ZipFile
 
-import numpy as np
-
-from kinfmu.errors import FmuError, RequestError, listed
-from kinfmu.fmu import description
-from kinfmu.fmu.estimated_rates import Rates
-from kinfmu.fmu.host.input_table import InputTable, input_notes, input_table, times, undriven
-from kinfmu.fmu.host.interruption import Interruption
-from kinfmu.fmu.host.samples import DISCARD, ERROR, Samples
-from kinfmu.fmu.host.settings import as_set, fmu_settings
-from kinfmu.fmu.host.slaves import LoadedSlave, slave
-from kinfmu.fmu.host.system import simulate_system
-from kinfmu.fmu.interface import Interface
-from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, MECHANISM, text_in, unpacked
-from kinfmu.mechanism import Mechanism, toml_file
+from kinfmu.errors import RequestError
+from kinfmu.fmu.host.input_table import times
+from kinfmu.fmu.host.own import simulate_own
+from kinfmu.fmu.host.system import simulate_foreign, simulate_ssp
+from kinfmu.fmu.unpacked import DESCRIPTION, MECHANISM
+from kinfmu.mechanism import Mechanism
 from kinfmu.run import Run
-from kinfmu.run.channels import kept_samples
 from kinfmu.run.run import Sink
-from kinfmu.solver.python.status import Status
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 BEGINNING = 4096  # bytes of a model description that hold the attributes of its first tag
-INTEGRATOR_TOLERANCE = "integrator.tolerance"  # of an FMU that owns the motion of its drivers
 
 
 def simulate(
@@ -125,11 +111,10 @@ def simulate(
             )
         if wrap or channels is not None or rate is not None or isinstance(inputs, str | Path):
             raise RequestError("wrap, channels, rate and files of inputs are for FMUs, not for a mechanism")
-        from kinfmu.motion.torque import torque_driven  # steps of FMUs do not need the planner
-
-        run = torque_driven(
+        return _simulate_mechanism(
             fmu_path,
-            times(fmu_path.run, start, stop, fmu_path.run.step if step is None else step),
+            (start, stop, step),
+            sink,
             inputs=inputs,
             state=state,
             parameters=parameters,
@@ -137,82 +122,26 @@ def simulate(
             method=method,
             progress=progress,
         )
-        if sink is not None:
-            sink.begin(run.part(slice(0, 0)))
-            sink.add(run)
-            sink.end(run, "")
-        return run
-    only = {"drive": drive, "state": state, "tolerance": tolerance}
-    own = [name for name, value in only.items() if value is not None]
     if method is not None:
         raise RequestError(f"method: for a mechanism driven by torques, not for FMU {fmu_path}")
     path = Path(fmu_path)
-    if not is_own(path):
-        if wrap:
-            raise RequestError("wrap is for FMUs of kinfmu")
-        return simulate_system(
-            path,
-            start=start,
-            stop=stop,
-            step=step,
-            inputs=inputs,
-            parameters=parameters or {},
-            channels=channels,
-            rate=rate,
-            sink=sink,
-            progress=progress,
-            exchange=exchange,
-        )
-    interrupted = Interruption()
-    try:
-        with unpacked(path) as folder:
-            xml = text_in(path, folder, DESCRIPTION, LARGEST_DESCRIPTION)
-            about = description.read(xml.encode(), str(path))
-            interface = about.interface
-            if own and (not interface.part("states") or drive not in (None, "torque")):
-                raise RequestError(
-                    f"{listed(own)}: for a mechanism driven by torques, or its FMU, not for FMU {fmu_path}"
-                )
-            given = dict(parameters or {}) | dict(state or {})
-            given |= {} if tolerance is None else {INTEGRATOR_TOLERANCE: tolerance}
-            if wrap and inputs is None:
-                raise RequestError("wrap unwraps angles among the inputs, and no inputs are given")
-            table = None if inputs is None else input_table(inputs, interface, wrap=wrap)
-            experiment = interface.experiment
-            t = times(table or experiment, start, stop, experiment.step if step is None else step)
-            rows = np.empty((len(t), 0)) if table is None else table.at(t)
-            kept = kept_samples(t, rate)
-            mechanism = toml_file.parse(text_in(path, folder, MECHANISM), f"{path}: {MECHANISM}")
-            try:
-                drives = table is not None and any(v.name in table.names for v in interface.part("inputs"))
-                settings = fmu_settings(interface, mechanism.settable, given, has_inputs=drives)
-            except RequestError as error:
-                raise RequestError(f"{path}: {error}") from None
-            mechanism = as_set(mechanism, settings)
-            samples = Samples(about, len(kept), settings=settings, mechanism=mechanism, model_description=xml)
-            if interface.part("inputs") and not _time_drives(interface, settings):
-                samples.extend(undriven(interface, table, float(t[0])))
-            if table is not None:
-                samples.extend(input_notes(interface, table, start, stop))
-            with interrupted:
-                with slave(about, folder, samples.log) as one:
-                    _initialize(one, settings, t, samples.first_error)
-                    samples.read_fixed(one)
-                    if interrupted:
-                        raise KeyboardInterrupt
-                    computes = _computes_estimates(interface, settings, table, rows[0])
-                    samples.begin(one, channels, sink, computes_estimates=computes)
-                    try:
-                        driven = [] if table is None else [one.references[name] for name in table.names]
-                        _step_through(one, samples, t, kept, driven, rows, progress, interrupted.came)
-                    except BaseException as failure:
-                        samples.end(str(failure) or type(failure).__name__)
-                        raise
-                if rate is None:
-                    samples.note_coarse()
-                return samples.end()
-    finally:
-        interrupted.deliver()
+    common: dict[str, Any] = {
+        "start": start,
+        "stop": stop,
+        "step": step,
+        "inputs": inputs,
+        "parameters": parameters or {},
+        "channels": channels,
+        "rate": rate,
+        "sink": sink,
+        "progress": progress,
+    }
+    if is_own(path):
+        return simulate_own(path, drive=drive, state=state, tolerance=tolerance, wrap=wrap, **common)
+    if wrap:
+        raise RequestError("wrap is for FMUs of kinfmu")
+    simulate_others = simulate_ssp if path.suffix.lower() == ".ssp" else simulate_foreign
+    return simulate_others(path, exchange=exchange, **common)
 
 
 def is_own(path: Path) -> bool:
@@ -229,94 +158,20 @@ def is_own(path: Path) -> bool:
         return True
 
 
-def _time_drives(interface: Interface, parameters: Mapping[str, float | bool | str]) -> bool:
-    return any(bool(parameters.get(switch.name, switch.start)) for switch in interface.part("drive"))
+def _simulate_mechanism(
+    mechanism: Mechanism,
+    span: tuple[float | None, float | None, float | None],
+    sink: Sink | None,
+    **arguments: Any,
+) -> Run:
+    """Integrate the motion of a mechanism under torques, and pass the run to the sink as a whole."""
+    from kinfmu.motion.torque import torque_driven  # steps of FMUs do not need the planner
 
-
-def _initialize(
-    slave: LoadedSlave,
-    parameters: Mapping[str, float | bool | str],
-    t: NDArray[np.float64],
-    complaint: Callable[[], str],
-) -> None:
-    """Set the parameters and initialize; raise an FmuError for refused parameters and for those with no solution.
-
-    FMUs of the python flavour cannot return Error here: their messages of level error count.
-    """
-    from fmpy.fmi1 import FMICallException
-
-    try:
-        for name, value in parameters.items():
-            if isinstance(value, bool):
-                slave.set_boolean(slave.references[name], value)
-            elif isinstance(value, str):
-                slave.set_enumeration(slave.references[name], Rates[value.upper()])
-            else:
-                slave.set([slave.references[name]], [value])
-        slave.initialize(float(t[0]))
-    except FMICallException as failure:
-        raise FmuError(complaint() or str(failure)) from None
-    if complaint():
-        raise FmuError(complaint())
-
-
-def _computes_estimates(
-    interface: Interface,
-    settings: Mapping[str, float | bool | str],
-    table: InputTable | None,
-    first: NDArray[np.float64],
-) -> bool:
-    """Return True if margins and errors follow from the driver values: errors of estimated rates do not.
-
-    first: inputs at the first sample.
-    """
-    if interface.part("states") or _time_drives(interface, settings):
-        return True
-    given = set() if table is None else {name for name, value in zip(table.names, first, strict=True) if value}
-    rates = {variable.name for k, variable in enumerate(interface.part("inputs")) if k % 3}
-    mode = settings.get("rates", "auto")
-    return mode == "wired" or (mode == "auto" and rates <= given)
-
-
-def _step_through(
-    slave: LoadedSlave,
-    samples: Samples,
-    t: NDArray[np.float64],
-    kept: NDArray[np.int64],
-    inputs: list[int],
-    rows: NDArray[np.float64],
-    progress: Callable[[int, int], None] | None,
-    signals: list[int],
-) -> None:
-    """Run the loop: set at t_k, get, record if the sample is kept or holds no numbers, step.
-
-    kept: indices of samples to record; inputs: value references of the k inputs to set; rows: (n, k) their values;
-    signals: those that came, which end the run.
-    """
-    kept_at = np.zeros(len(t), bool)
-    kept_at[kept] = True
-    is_kept: Any = kept_at.data
-    times = t.data  # items of a memoryview are Python numbers, which are faster
-    last = len(t) - 1
-    set_inputs = slave.setter(inputs, rows) if inputs else None
-    for k, time in enumerate(times):
-        samples.now = time
-        if signals and k:
-            samples.log(ERROR, f"at t = {time:g} s: interrupted; the run ends here")
-            return
-        if set_inputs:
-            set_inputs(k)
-        good = samples.read(time, slave, is_kept=is_kept[k])
-        if progress is not None:
-            progress(k + 1, len(t))
-        if not good:
-            samples.log(DISCARD, f"at t = {time:g} s: {slave.message()}")
-            return
-        if k == last:
-            return
-        end = times[k + 1]
-        samples.now = time if inputs else end  # messages of a step are about its inputs, or the time it goes to
-        if not slave.step(time, end - time):
-            if slave.counts()[0] > Status.BRIDGED:  # the step goes to an unreachable pose
-                samples.read(end, slave)
-            return
+    start, stop, step = span
+    t = times(mechanism.run, start, stop, mechanism.run.step if step is None else step)
+    run = torque_driven(mechanism, t, **arguments)
+    if sink is not None:
+        sink.begin(run.part(slice(0, 0)))
+        sink.add(run)
+        sink.end(run, "")
+    return run
