@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks.rounds import in_turn, spread, table
 from kinfmu.errors import CompilerError, MissingPackageError
 from kinfmu.fmu.build import FLAVOURS, build
-from kinfmu.fmu.simulate import simulate
+from kinfmu.fmu.host.simulate import simulate
 from kinfmu.log import McapLog, read, write_mcap, write_rrd
 from kinfmu.log.cdr import nanoseconds
 from kinfmu.log.record import computed_when_read, layout, tables

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from kinfmu.fmu.build import build
-from kinfmu.fmu.simulate import simulate
+from kinfmu.fmu.host.simulate import simulate
 from kinfmu.fmu.verify import verify
 
 __all__ = ["build", "simulate", "verify"]

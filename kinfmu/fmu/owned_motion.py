@@ -6,17 +6,15 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from kinfmu.codegen.python import load_model
-from kinfmu.errors import RequestError
-from kinfmu.fmu.torque_variables import effort_names
 from kinfmu.mechanism.laws import External
 from kinfmu.mechanism.loads.following import Following
 from kinfmu.mechanism.mechanism import require_masses
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.efforts import effort_inputs, inertia_steps
 from kinfmu.plan.equations.graph import Node
-from kinfmu.plan.forces import ForceSteps, effort_noun, force_steps
+from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.led_laws import LedLaws, led_laws
 from kinfmu.plan.mechanics import Mechanics
-from kinfmu.units import METRES
 
 
 class OwnedMotion(NamedTuple):
@@ -43,25 +41,10 @@ def owned_motion(plan: SolvePlan) -> tuple[SolvePlan, OwnedMotion]:
     """
     mechanism = plan.mechanism
     require_masses(mechanism)
-    inputs = [*effort_names(plan), *(name for load in mechanism.loads for name in load.inputs())]
-    doubled = [name for name in inputs if inputs.count(name) > 1]
-    if doubled:
-        raise RequestError(f"'{doubled[0]}' is an input of a driver and of a load; rename one of them")
+    effort_inputs(plan)
     u, ud, _ = load_model(plan).drive(mechanism.run.start, tuple(constant.value for constant in plan.law_constants))
     starts = tuple(float(x) for pair in zip(u, ud, strict=True) for x in pair)
-    return replace(plan, jumps=_jumps_of_loads(plan)), OwnedMotion(_inertia(plan), led_laws(plan), starts)
-
-
-def _inertia(plan: SolvePlan) -> ForceSteps:
-    drivers = plan.drivers
-    wanted = [f"{driver.name}.bias_{effort_noun(driver.quantity.kind)}" for driver in drivers]
-    for k, driver in enumerate(drivers):
-        wanted.append(f"{driver.name}.reduced_inertia")
-        wanted += [f"{driver.name}.reduced_inertia.{other.name}" for other in drivers[k + 1 :]]
-    steps = force_steps(plan, wanted, coefficients="given")
-    results = {str(name): (name, node) for name, node in zip(steps.names, steps.results, strict=True)}
-    names, nodes = zip(*(results[name] for name in wanted), strict=True)
-    return ForceSteps(steps.steps, names, list(nodes))
+    return replace(plan, jumps=_jumps_of_loads(plan)), OwnedMotion(inertia_steps(plan), led_laws(plan), starts)
 
 
 def _jumps_of_loads(plan: SolvePlan) -> tuple[tuple[Node, Node], ...]:
@@ -73,9 +56,3 @@ def _jumps_of_loads(plan: SolvePlan) -> tuple[tuple[Node, Node], ...]:
             jumps = load.law.jumps(**{key: constant.value for key, constant in load.law.constants().items()})
             found += [(mechanics.graph.lift(at), mechanics.graph.lift(jumps.period)) for at in jumps.at]
     return tuple(found)
-
-
-def units_in_si(plan: SolvePlan) -> tuple[float, ...]:
-    """Return the units of the drivers in SI units."""
-    metre = METRES[plan.mechanism.length_unit]
-    return tuple(metre if driver.quantity.kind == "length" else 1.0 for driver in plan.drivers)

@@ -36,10 +36,11 @@ from kinfmu.fmu.archive import digest, token, zipped
 from kinfmu.fmu.documents import Documents
 from kinfmu.fmu.interface import Drive, Interface
 from kinfmu.fmu.licence import licence
-from kinfmu.fmu.owned_motion import OwnedMotion, units_in_si
+from kinfmu.fmu.owned_motion import OwnedMotion
 from kinfmu.fmu.variables import interface
 from kinfmu.mechanism import toml_text
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.efforts import units_in_si
 from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.meeting import distance_steps, meeting_messages
 
@@ -56,7 +57,7 @@ CAPABILITIES = {
 RUN_TIME = ("slave.py", "slave_settings.py", "slave_outputs.py", "layout.py", "estimated_rates.py")  # of this package
 BASE_CLASS = ("_version.py", "default_experiment.py", "enums.py", "fmi2slave.py", "logmsg.py", "variables.py")
 WITH_FORCES = ("force_slave.py",)
-WITH_EFFORTS = ("equation_of_motion.py", "torque_limits.py", "torque_steps.py", "torque_slave.py", "dormand_prince.py")
+WITH_EFFORTS = ("torque_slave.py",)
 PARTS_WITH_START = (
     *("inputs", "constants", "parameters", "tolerance", "fixed", "drive", "rate_source", "loads"),
     *("states", "efforts"),
@@ -144,6 +145,7 @@ def archive(
         contents["kinfmu/solver/jumps.py"] = emit_jumps(plan).encode()
         laws = f"{emit_forces(plan, owned.laws.steps)}\n\nCOUNTS = {owned.laws.counts!r}\n"
         contents["kinfmu/solver/laws.py"] = laws.encode()
+        contents |= _modules("kinfmu.solver.python.torque", "kinfmu/solver/torque")
     else:
         del contents["kinfmu/solver/law_breaks.py"]
     added = (*(WITH_FORCES if stages else ()), *(WITH_EFFORTS if owned else ()))
@@ -159,8 +161,7 @@ def _contents(
     """Return every file by path in the FMU, still under the names `kinfmu` and `pythonfmu` and without a token."""
     import pythonfmu
 
-    solver, fmu = files("kinfmu.solver.python"), files("kinfmu.fmu")
-    base = files(pythonfmu)
+    fmu, base = files("kinfmu.fmu"), files(pythonfmu)
     contents = {
         "modelDescription.xml": _description(variables, version, guid=""),
         "resources/mechanism.toml": toml_text.text(plan.mechanism).encode(),
@@ -171,11 +172,18 @@ def _contents(
         "kinfmu_slave.py": _entry(variables, "", in_si, meets=meets).encode(),
     }
     contents |= {f"kinfmu/fmu/{name}": fmu.joinpath(name).read_bytes() for name in RUN_TIME}
-    contents |= {f"kinfmu/solver/{f.name}": f.read_bytes() for f in solver.iterdir() if f.name.endswith(".py")}
+    contents |= _modules("kinfmu.solver.python", "kinfmu/solver")
     contents |= {f"kinfmu/pythonfmu/{name}": base.joinpath(name).read_bytes() for name in BASE_CLASS}
     contents |= {f"binaries/{name}": data for name, data in _binaries(variables.name).items()}
     contents |= _documents()
     return dict(sorted(contents.items()))
+
+
+def _modules(package: str, folder: str) -> dict[str, bytes]:
+    """Return the modules of a package by path in the FMU."""
+    return {
+        f"{folder}/{file.name}": file.read_bytes() for file in files(package).iterdir() if file.name.endswith(".py")
+    }
 
 
 def _documents() -> dict[str, bytes]:

@@ -14,16 +14,14 @@ from typing import Any, ClassVar
 
 from pythonfmu.enums import Fmi2Status
 
-from kinfmu.fmu.equation_of_motion import EquationOfMotion, Given
 from kinfmu.fmu.estimated_rates import LARGEST
 from kinfmu.fmu.force_slave import ForceSlave
 from kinfmu.fmu.layout import Numbers
 from kinfmu.fmu.slave import as_numbers
-from kinfmu.fmu.torque_limits import Ended
-from kinfmu.fmu.torque_steps import EmittedLaws, TorqueSteps
 from kinfmu.solver.python import Pose, Status
 from kinfmu.solver.python.law_breaks import LEAST_TOLERANCE, MOST_TOLERANCE
 from kinfmu.solver.python.pose import failed
+from kinfmu.solver.python.torque import Course, DormandPrince, Ended, EquationOfMotion, Given, Laws, TorqueSteps
 
 _UNDETERMINED = "the reduced inertia is singular, or a number is not finite"
 
@@ -67,7 +65,8 @@ class TorqueSlave(ForceSlave):
             found = self._found(pose)
             if found is None:
                 ud = tuple(self._inputs[1::3])
-                driver = self.model.DRIVERS[self._equation.massless(self._solver, pose, self._time, ud, self._given())]
+                massless = self._equation.massless(self._solver, pose, self._time, ud, self._given())
+                driver = self.model.DRIVERS[massless[0] if massless else 0]
                 self._refuse(
                     "initialization",
                     f"fails: driver {driver}: its reduced inertia is 0, so that efforts do not determine its motion; "
@@ -109,22 +108,23 @@ class TorqueSlave(ForceSlave):
             self.log(f"at t = {t:g} s: {_UNDETERMINED}", Fmi2Status.discard)
             return False
         self._commit_at(pose, t, h, found)
-        steps = TorqueSteps(
-            self._equation,
-            self._solver,
-            self._given(),
-            EmittedLaws(self.law_counts, self.laws),
-            tolerance=self._integrator_tolerance,
-            size=self._step_size,
-        )
-        ud = tuple(self._inputs[1::3])
+        given, ud = self._given(), tuple(self._inputs[1::3])
+
+        def accelerations(at: float, pose: Pose, ud: Numbers) -> Numbers | None:
+            return self._equation.accelerations(self._solver, pose, at, ud, given)
+
+        def law_numbers(pose: Pose) -> Numbers:
+            return self.laws(0.0, pose.u, (), (), pose.z, (), (), (), given.loads, given.parameters)
+
+        integrator = DormandPrince(self._integrator_tolerance, self._step_size)
+        steps = TorqueSteps(Course(self._solver, accelerations), integrator, Laws(self.law_counts, law_numbers))
         at = steps.run(pose, ud, t, t + h, type(self).jumps(self._loads, self._parameters))
         if steps.ended is not None:
             self._forget()
             self._set_ended(steps.ended)
             return self._discard(self._requested(), steps.ended.t)
         if at is not None:  # else the step has no length
-            self._step_size = steps.size if steps.size < math.inf else 0.0
+            self._step_size = integrator.size if integrator.size < math.inf else 0.0
             d = len(ud)
             self._inputs[0::3], self._inputs[1::3] = at.y[:d], at.y[d:]
             pose = at.pose

@@ -16,6 +16,7 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.laws import External
 from kinfmu.mechanism.loads.following import Following
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.efforts import effort_names
 from kinfmu.plan.forces import effort_noun
 from kinfmu.solver.python.law_breaks import LEAST_TOLERANCE, MOST_TOLERANCE, STEP_TOLERANCE
 from kinfmu.units import Quantity, unit_of
@@ -36,11 +37,6 @@ INTEGRATOR_TOLERANCE = Variable(
 _LEFT_OUT = ("driven", "drive", "rate_source")
 _GONE = ("driven_by_time", "rates")
 _WORDS = (("", "state"), ("rate of ", "state"), ("acceleration of ", "of the efforts"))
-
-
-def effort_names(plan: SolvePlan) -> list[str]:
-    """Return the names of the inputs for the efforts of the drivers, such as 'crank_torque'."""
-    return [f"{driver.name}_{effort_noun(driver.quantity.kind)}" for driver in plan.drivers]
 
 
 def depends_on_time(mechanism: Mechanism) -> bool:

@@ -17,8 +17,8 @@ import numpy as np
 from kinfmu.arrays import FloatArray
 from kinfmu.errors import FmuError, RequestError, listed, suggestion
 from kinfmu.fmu import description, reference
+from kinfmu.fmu.host.simulate import simulate
 from kinfmu.fmu.reference import FOLDER, ReferenceResults
-from kinfmu.fmu.simulate import simulate
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, text_in, unpacked
 from kinfmu.mechanism.valid import quoted
 from kinfmu.units import Quantity, every_unit, spelled

@@ -13,7 +13,7 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 
 from kinfmu.fmu import description
-from kinfmu.fmu.slaves import fmi2_callbacks
+from kinfmu.fmu.host.slaves import fmi2_callbacks
 
 OK, WARNING, DISCARD, ERROR = range(4)
 TERMINATED, LAST_SUCCESSFUL_TIME = 3, 2

@@ -14,9 +14,10 @@ import pytest
 
 import kinfmu
 from kinfmu.errors import KinfmuError
-from kinfmu.fmu import description, input_table
+from kinfmu.fmu import description
 from kinfmu.fmu import unpacked as unpacking
 from kinfmu.fmu.description.description import MOST_TAGS
+from kinfmu.fmu.host import input_table
 from kinfmu.fmu.unpacked import DESCRIPTION, MECHANISM, unpacked
 
 FLIPS = 150

@@ -170,7 +170,7 @@ def test_pieces_for_a_sink_have_estimates(fourbar: Path, monkeypatch: pytest.Mon
 
         def end(self, run: Run, reason: str) -> None: ...
 
-    monkeypatch.setattr("kinfmu.fmu.samples.PIECE", 8 * 1024)
+    monkeypatch.setattr("kinfmu.fmu.host.samples.PIECE", 8 * 1024)
     sink = Pieces()
     run = simulate(fourbar, step=1.0, sink=sink)
     assert len(sink.found) > 3

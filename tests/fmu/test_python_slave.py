@@ -141,7 +141,7 @@ def test_percent_signs_and_hashes_in_messages_are_doubled(start: Start) -> None:
 
 
 def test_the_callbacks_of_kinfmu_undo_the_doubling(start: Start) -> None:
-    from kinfmu.fmu.slaves import fmi2_callbacks
+    from kinfmu.fmu.host.slaves import fmi2_callbacks
 
     heard: list[tuple[int, str]] = []
     host = start()

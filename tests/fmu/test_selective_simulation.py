@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from kinfmu.errors import RequestError
 from kinfmu.fmu import simulate
-from kinfmu.fmu.samples import PIECE
-from kinfmu.fmu.slaves import Slave2
+from kinfmu.fmu.host.samples import PIECE
+from kinfmu.fmu.host.slaves import Slave2
 from kinfmu.run import Run
 from kinfmu.solver.python.status import Status
 

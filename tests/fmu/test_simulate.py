@@ -14,7 +14,7 @@ import pytest
 
 from kinfmu.errors import FmuError, RequestError
 from kinfmu.fmu import simulate
-from kinfmu.fmu.samples import Samples
+from kinfmu.fmu.host.samples import Samples
 from kinfmu.run import Run
 from kinfmu.solver.python.status import Status
 

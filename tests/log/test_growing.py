@@ -203,7 +203,7 @@ def test_a_file_without_a_run_cannot_be_recovered(run: Run, tmp_path: Path) -> N
 KILLED = """
 import os, signal, sys
 import kinfmu
-from kinfmu.fmu import samples
+from kinfmu.fmu.host import samples
 from kinfmu.log import McapLog
 
 samples.PIECE = 64 * 1024

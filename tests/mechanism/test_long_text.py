@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 
 from kinfmu.errors import MechanismError
-from kinfmu.fmu import input_table
+from kinfmu.fmu.host import input_table
 from kinfmu.mechanism import number, table_file, toml_file
 from kinfmu.mechanism.toml_file import DEEPEST_KEY, parse
 from kinfmu.units import Quantity

@@ -53,7 +53,7 @@ def test_building_and_stepping_an_fmu_loads_nothing_to_log_with(tmp_path: Path) 
         "run = kinfmu.simulate(fmu, stop=1.0); assert len(run) == 2"
     )
     loaded = loaded_by(statement)
-    assert {"kinfmu.fmu.simulate", "fmpy"} <= loaded
+    assert {"kinfmu.fmu.host.simulate", "fmpy"} <= loaded
     assert loaded & LOGGING == set()
     assert not [name for name in loaded if name.startswith("kinfmu.log")]
 

@@ -9,24 +9,22 @@ z are the unknowns of all blocks, zd and zdd their derivatives in time; slopes a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from kinfmu.codegen.forces import ARGUMENTS, places_of_symbols
 from kinfmu.codegen.python.block_code import indented, matrix, tupled
-from kinfmu.codegen.python.stage import given_symbols, has_roots, stage_curves, stage_lines
+from kinfmu.codegen.python.stage import OF_NUMBERS, given_symbols, has_roots, stage_curves, stage_lines
 from kinfmu.codegen.writer import identifier
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.steps import LinearSolve
+from kinfmu.solver.python.curve import CurveData
 
 
 def emit_forces(plan: SolvePlan, steps: ForceSteps) -> str:
     """Return the source text; linear systems of three and more unknowns are left to the module `solutions`."""
-    places, given, curves = places_of_symbols(plan), given_symbols(steps), stage_curves(steps)
-    lines, found = stage_lines(steps, given, curves, _solve)
-    values = iter(found)
-    results = ["0.0" if node.constant == 0.0 else next(values) for node in steps.results]
+    curves = stage_curves(steps)
     return "\n".join(
         [
             f'"""Forces of {plan.mechanism.name}: generated from its mechanism, not to be edited."""',
@@ -40,14 +38,33 @@ def emit_forces(plan: SolvePlan, steps: ForceSteps) -> str:
             *(f"{name} = {data!r}" for data, name in curves.items()),
             "",
             "",
-            f"def forces({', '.join(ARGUMENTS)}):",
-            '    """FORCES of one sample, in SI units."""',
-            *(f"    {identifier(name)} = {places[name]}" for name in given if identifier(name) != places[name]),
-            *indented(lines),
-            f"    return {tupled(results)}",
+            *_function(plan, steps, curves),
             "",
         ]
     )
+
+
+def load_forces(plan: SolvePlan, steps: ForceSteps) -> Callable[..., tuple[float, ...]]:
+    """Return the function of the source, compiled."""
+    curves = stage_curves(steps)
+    namespace = OF_NUMBERS | {name: data for data, name in curves.items()}
+    exec("\n".join(_function(plan, steps, curves)), namespace)  # noqa: S102  our own generated source
+    forces: Callable[..., tuple[float, ...]] = namespace["forces"]
+    return forces
+
+
+def _function(plan: SolvePlan, steps: ForceSteps, curves: Mapping[CurveData, str]) -> list[str]:
+    places, given = places_of_symbols(plan), given_symbols(steps)
+    lines, expressions = stage_lines(steps, given, curves, _solve)
+    values = iter(expressions)
+    results = ["0.0" if node.constant == 0.0 else next(values) for node in steps.results]
+    return [
+        f"def forces({', '.join(ARGUMENTS)}):",
+        '    """FORCES of one sample, in SI units."""',
+        *(f"    {identifier(name)} = {places[name]}" for name in given if identifier(name) != places[name]),
+        *indented(lines),
+        f"    return {tupled(results)}",
+    ]
 
 
 def solves(steps: ForceSteps) -> bool:

@@ -79,7 +79,7 @@ def load_stage(steps: Stage) -> CompiledStage:
         return fill
 
     few = FEW if all(isinstance(step, Assignment) for step in steps.steps) else FEW_WITH_SOLVES
-    return CompiledStage(given, steps, text, function(_OF_NUMBERS), function(_OF_ARRAYS), few)
+    return CompiledStage(given, steps, text, function(OF_NUMBERS), function(_OF_ARRAYS), few)
 
 
 def given_symbols(steps: Stage) -> tuple[str, ...]:
@@ -197,7 +197,7 @@ def _curve_of_arrays(data: CurveData, order: int, x: Any) -> Any:
     return np.array([curve_value(data, order, value) for value in np.atleast_1d(x).tolist()])
 
 
-_OF_NUMBERS: dict[str, Any] = {
+OF_NUMBERS: dict[str, Any] = {
     "sin": math.sin,
     "cos": math.cos,
     "sqrt": sqrt,

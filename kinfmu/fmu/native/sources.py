@@ -17,16 +17,16 @@ from kinfmu.codegen.forces import STAGES, places_of_symbols
 from kinfmu.codegen.python.forces import solves
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.errors import MissingPackageError
-from kinfmu.fmu import dormand_prince as pair
 from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.layout import UNKNOWN_ERROR
-from kinfmu.fmu.owned_motion import units_in_si
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.efforts import units_in_si
 from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.led_laws import LedLaws
 from kinfmu.plan.meeting import distance_steps, meeting_messages
 from kinfmu.plan.trace import parameter_symbol
+from kinfmu.solver.python.torque import dormand_prince as pair
 
 RUNTIME = Path(__file__).with_name("runtime")
 _NO_VARIABLE = "0xfffffffeu"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,18 +30,18 @@ class Efforts(NamedTuple):
     by_name: Mapping[str, Effort]
     jumps: tuple[float, ...]
 
-    def at(self, t: float, state: State) -> list[float]:
+    def at(self, t: float, state: State) -> tuple[float, ...]:
         """Return all efforts [N, N m].
 
         Raises:
             RequestError: One is not a finite number.
 
         """
-        found = [effort(t, state) for effort in self.by_name.values()]
-        if not np.isfinite(found).all():
-            name, value = next((n, v) for n, v in zip(self.by_name, found, strict=True) if not np.isfinite(v))
-            raise RequestError(f"{name} = {value} at t = {t:g} s must be a finite number")
-        return found
+        efforts = tuple([effort(t, state) for effort in self.by_name.values()])
+        for name, value in zip(self.by_name, efforts, strict=True):
+            if not isfinite(value):
+                raise RequestError(f"{name} = {value} at t = {t:g} s must be a finite number")
+        return efforts
 
 
 def read_efforts(known: Sequence[str], given: Mapping[str, Any], span: tuple[float, float]) -> Efforts:

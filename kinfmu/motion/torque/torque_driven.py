@@ -14,10 +14,9 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_masses
 from kinfmu.mechanism.valid import is_number, quoted
 from kinfmu.motion.torque.efforts import Efforts, jumps_of_loads, read_efforts
-from kinfmu.motion.torque.equation import EquationOfMotion
-from kinfmu.motion.torque.stepping import METHODS, Sample, Stepper
+from kinfmu.motion.torque.integrated import METHODS, IntegratedMotion, Sample
 from kinfmu.plan import SolvePlan, compile_plan
-from kinfmu.plan.forces import effort_noun
+from kinfmu.plan.efforts import effort_inputs
 from kinfmu.run import Event, Run
 from kinfmu.run.axis import TIME
 from kinfmu.run.coarse import coarse_samples
@@ -65,7 +64,7 @@ def torque_driven(
 
     """
     tolerance = STEP_TOLERANCE if tolerance is None else tolerance
-    method = METHODS[0] if method is None else method
+    method = "DOP853" if method is None else method
     if not (is_number(tolerance) and LEAST_TOLERANCE <= tolerance <= MOST_TOLERANCE):
         raise RequestError(f"tolerance = {quoted(tolerance)} must be {LEAST_TOLERANCE:g} to {MOST_TOLERANCE:g}")
     if method not in METHODS:
@@ -74,16 +73,13 @@ def torque_driven(
     changed = continued(mechanism, parameters or {})
     plan = compile_plan(changed.mechanism, None, [])
     ends = (float(times[0]), float(times[-1]))
-    efforts = read_efforts(_effort_names(plan), inputs or {}, ends)
-    equation = EquationOfMotion(force_plan(plan), efforts)
+    efforts = read_efforts(effort_inputs(plan), inputs or {}, ends)
+    jumps = sorted({*efforts.jumps, *jumps_of_loads(changed.mechanism.loads, ends)})
+    efforts = efforts._replace(jumps=tuple(jumps))
     u, ud = _initial_state(plan, ends[0], state or {})
-    if equation.follow(u) is None and equation.failed is not None:
-        raise RequestError(f"the initial state: {equation.failed.message}")
-    equation.require_inertia(ends[0], ud)
-    jumps = tuple(sorted({*efforts.jumps, *jumps_of_loads(changed.mechanism.loads, ends)}))
-    stepper = Stepper(equation, ud, times, jumps, tolerance=float(tolerance), method=method)
+    motion = IntegratedMotion(force_plan(plan), efforts, tolerance=float(tolerance), method=method)
     samples = []
-    for sample in stepper.samples():
+    for sample in motion.samples(u, ud, times.tolist()):
         samples.append(sample)
         if progress is not None:
             progress(len(samples), len(times))
@@ -91,12 +87,12 @@ def torque_driven(
     coarse = coarse_samples(*_motion(plan, samples))
     if coarse:
         events.append(Event(ends[0], "info", coarse))
-    if stepper.end is not None:
-        end = stepper.end
-        samples.append(Sample(end.t, end.u, end.ud, (0.0,) * len(end.u)))
-        events.append(Event(end.t, "error", f"at t = {end.t:.9g} s the motion ends at a limit: {end.message}"))
-    run = _run(Model(plan), samples, efforts, tuple(events), ended=stepper.end is not None)
-    about = {"drive": "torque", "method": method, "tolerance": repr(float(tolerance)), "steps": str(stepper.steps)}
+    limit = motion.limit
+    if limit is not None:
+        samples.append(Sample(limit.t, limit.u, motion.speeds, (0.0,) * len(u)))
+        events.append(Event(limit.t, "error", f"at t = {limit.t:.9g} s {limit.message}"))
+    run = _run(Model(plan), samples, efforts, tuple(events), ended=limit is not None)
+    about = {"drive": "torque", "method": method, "tolerance": repr(float(tolerance)), "steps": str(motion.step_count)}
     return run.replaced(info={**run.info, **about})
 
 
@@ -104,16 +100,6 @@ def _motion(plan: SolvePlan, samples: list[Sample]) -> tuple[FloatArray, list[In
     """Return the times (n,), the names (d,) of the drivers' values, their values and their speeds (n, d)."""
     t, u, ud = (np.array([sample[k] for sample in samples]) for k in range(3))
     return t, [driver.inputs[0] for driver in plan.drivers], u, ud
-
-
-def _effort_names(plan: SolvePlan) -> list[str]:
-    """Return the names of all efforts: crank_torque for the drivers, then the inputs of loads."""
-    names = [f"{driver.name}_{effort_noun(driver.quantity.kind)}" for driver in plan.drivers]
-    names += [name for load in plan.mechanism.loads for name in load.inputs()]
-    doubled = [name for name in names if names.count(name) > 1]
-    if doubled:
-        raise RequestError(f"'{doubled[0]}' is an input of a driver and of a load; rename one of them")
-    return names
 
 
 def _initial_state(plan: SolvePlan, start: float, given: Mapping[str, float]) -> tuple[Vector, Vector]:

@@ -459,7 +459,7 @@ def _instantiate(
 def test_wrong_token_gives_null_and_a_message(library: Any, token: bytes | None) -> None:
     from fmpy.fmi3 import fmi3LogMessageCallback
 
-    from kinfmu.fmu.slaves import fmi2_callbacks
+    from kinfmu.fmu.host.slaves import fmi2_callbacks
 
     dll, host = library
     logged: list[tuple[int, str]] = []

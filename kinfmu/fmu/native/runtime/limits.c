@@ -1,4 +1,4 @@
-/* Limits of the drivers, which end a motion under efforts. See kinfmu/motion/torque/stepping.py.
+/* Limits of the drivers, which end a motion under efforts. See kinfmu/solver/python/torque/limits.py.
  *
  * At a limit (a dead centre of a driver) the reduced inertia grows without bound, and u(t) is a parabola that touches the
  * limit: steps could cross its top and return on the same branch, where the mechanism itself would not. So every step in which

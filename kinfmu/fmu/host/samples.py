@@ -11,9 +11,9 @@ import numpy as np
 
 from kinfmu.draw.scene.estimates import with_estimates
 from kinfmu.fmu.description import Description
+from kinfmu.fmu.host.slaves import LoadedSlave
 from kinfmu.fmu.interface import Interface, Variable
 from kinfmu.fmu.layout import UNKNOWN_ERROR
-from kinfmu.fmu.slaves import LoadedSlave
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import force_names, reaction_names_of
 from kinfmu.run import Event, Run
@@ -124,6 +124,7 @@ class Samples:
                 them, they are not read from the FMU, but computed when they are read from the run.
 
         """
+        self._slave = slave
         run = self._run(slice(0, 0))
         self._absent = absent_columns(run, channels)
         self._computes_estimates = (
@@ -147,15 +148,23 @@ class Samples:
             self._full_at, self._due = self._piece, perf_counter() + PERIOD
             sink.begin(self._run(slice(0, 0)))
 
-    def read(self, t: float, slave: LoadedSlave, *, is_kept: bool = True) -> bool:
+    def is_unreachable(self) -> bool:
+        """Return whether the FMU is asked for an unreachable pose."""
+        return self._slave.counts()[0] > LAST_GOOD
+
+    def message(self) -> str:
+        """Return the FMU's message about its pose."""
+        return self._slave.message()
+
+    def read(self, t: float, *, is_kept: bool) -> bool:
         """Read a sample, if it is to be kept; return False if it holds no numbers except the driver values."""
-        status, iterations = slave.counts()
+        status, iterations = self._slave.counts()
         good = status <= LAST_GOOD
         row = self._size
         if not good:
             self._reals[row] = np.nan
             if self._drivers:
-                self._reals[row, self._drivers] = slave.get(self._references_of_drivers)
+                self._reals[row, self._drivers] = self._slave.get(self._references_of_drivers)
         elif not is_kept:
             if perf_counter() > self._due:
                 self._pass_on()

@@ -13,7 +13,7 @@ from xml.etree import ElementTree as ET
 from kinfmu.errors import FmuError, listed, suggestion
 from kinfmu.fmu import description
 from kinfmu.fmu.description import Description
-from kinfmu.fmu.system.ports import Port, ports_of, read_description, unlogged
+from kinfmu.fmu.host.ports import Port, ports_of, read_description, unlogged
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, MECHANISM, text_in, unpacked
 from kinfmu.mechanism import RunSettings
 from kinfmu.mechanism.valid import quoted

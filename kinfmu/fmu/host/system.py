@@ -6,28 +6,28 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kinfmu.errors import FmuError, MissingPackageError, RequestError, listed, suggestion
-from kinfmu.fmu.fmu_settings import as_set
-from kinfmu.fmu.input_table import InputTable, table_of, times
-from kinfmu.fmu.interruption import Interruption
-from kinfmu.fmu.samples import DISCARD, ERROR, Samples
-from kinfmu.fmu.slaves import LoadedSlave, slave
-from kinfmu.fmu.system.exchange import check_exchange, exchange_of, ordered
-from kinfmu.fmu.system.ports import Port
-from kinfmu.fmu.system.samples import SystemSamples
-from kinfmu.fmu.system.slave import AnySlave, foreign_slave
-from kinfmu.fmu.system.structure import STRUCTURE, Component, SystemStructure, of_fmu, of_ssp
+from kinfmu.fmu.host.any_slave import AnySlave, foreign_slave
+from kinfmu.fmu.host.exchange import check_exchange, exchange_of, ordered
+from kinfmu.fmu.host.input_table import InputTable, table_of, times
+from kinfmu.fmu.host.interruption import Interruption
+from kinfmu.fmu.host.ports import Port
+from kinfmu.fmu.host.samples import DISCARD, ERROR, Samples
+from kinfmu.fmu.host.settings import as_set
+from kinfmu.fmu.host.slaves import LoadedSlave, slave
+from kinfmu.fmu.host.stepping import step_through
+from kinfmu.fmu.host.structure import STRUCTURE, Component, SystemStructure, of_fmu, of_ssp
+from kinfmu.fmu.host.system_samples import SystemSamples
 from kinfmu.fmu.unpacked import unpacked
 from kinfmu.mechanism import Mechanism, toml_file, toml_text
 from kinfmu.run import Event, Run
 from kinfmu.run.channels import kept_samples
 from kinfmu.run.components import mechanism_info
 from kinfmu.run.run import Sink
-from kinfmu.solver.python.status import Status
 from kinfmu.units import SignalName
 
 if TYPE_CHECKING:
@@ -36,8 +36,21 @@ if TYPE_CHECKING:
 RESERVED = ("time",)  # names of columns that every run has
 
 
-def simulate_system(
+def simulate_foreign(path: Path, **arguments: Any) -> Run:
+    """Step an FMU of another tool, a system of one component; arguments and errors as in kinfmu.simulate."""
+    return _simulate(path, lambda opened: of_fmu(path, opened.enter_context(unpacked(path))), **arguments)
+
+
+def simulate_ssp(path: Path, **arguments: Any) -> Run:
+    """Step the FMUs of an SSP; arguments and errors as in kinfmu.simulate."""
+    return _simulate(
+        path, lambda opened: of_ssp(path, opened.enter_context(unpacked(path, STRUCTURE)), opened), **arguments
+    )
+
+
+def _simulate(
     path: Path,
+    open_system: Callable[[ExitStack], SystemStructure],
     *,
     start: float | None,
     stop: float | None,
@@ -50,7 +63,6 @@ def simulate_system(
     progress: Callable[[int, int], None] | None,
     exchange: str,
 ) -> Run:
-    """Step an .ssp, or an FMU that is not kinfmu's; arguments and errors as in kinfmu.simulate."""
     check_exchange(exchange)
     try:
         import fmpy  # noqa: F401  # only to see if it is installed
@@ -59,9 +71,7 @@ def simulate_system(
     interrupted = Interruption()
     try:
         with ExitStack() as opened:
-            is_ssp = path.suffix.lower() == ".ssp"
-            folder = opened.enter_context(unpacked(path, STRUCTURE) if is_ssp else unpacked(path))
-            system = of_ssp(path, folder, opened) if is_ssp else of_fmu(path, folder)
+            system = open_system(opened)
             table = None if inputs is None else table_of(inputs, _units(system))
             span = table or system.experiment
             if stop is None and math.isnan(span.stop):
@@ -161,7 +171,11 @@ def _run(
         for end, port in system.inputs[name]
     ]
 
+    place = 0  # of the sample
+
     def exchange_at(k: int) -> None:
+        nonlocal place
+        place = k
         for column, set_input in set_inputs:
             set_input([float(rows[k, column])])
         exchanged()
@@ -187,56 +201,25 @@ def _run(
         raise KeyboardInterrupt
     readers = [slaves[one.name].getter(one.of("output")) for one in others]
     columns = [] if table is None else [table.names.index(name) for name in driven]
-    place = [0]
-    readers.append(lambda: [float(rows[place[0], column]) for column in columns])
+    readers.append(lambda: [float(rows[place, column]) for column in columns])
     samples.begin(readers, loaded, channels, sink)
+
+    def step(time: float, size: float) -> bool:
+        for one in slaves.values():
+            if not one.step(time, size):
+                if not samples.is_unreachable():
+                    samples.log(DISCARD, f"at t = {time:g} s: {one.name} ends the run: it does not step further")
+                return False
+        return True
+
     try:
-        _step_through(slaves, samples, t, kept, exchange_at, loaded, place, progress, interrupted.came)
+        step_through(samples, t, kept, exchange_at, step, progress, interrupted.came)
     except FmuError as failure:
         samples.log(ERROR, f"at t = {samples.now:g} s: {failure}")
     except BaseException as failure:
         samples.end(str(failure) or type(failure).__name__)
         raise
     return samples.end()
-
-
-def _step_through(
-    slaves: Mapping[str, AnySlave],
-    samples: SystemSamples,
-    t: NDArray[np.float64],
-    kept: NDArray[np.int64],
-    exchange_at: Callable[[int], None],
-    loaded: LoadedSlave | None,
-    place: list[int],
-    progress: Callable[[int, int], None] | None,
-    signals: list[int],
-) -> None:
-    """Run the loop: exchange at t_k, record, step all FMUs."""
-    kept_at = np.zeros(len(t), bool)
-    kept_at[kept] = True
-    for k, time in enumerate(t.tolist()):
-        samples.now, place[0] = time, k
-        if signals and k:
-            samples.log(ERROR, f"at t = {time:g} s: interrupted; the run ends here")
-            return
-        exchange_at(k)
-        good = samples.read(time, is_kept=bool(kept_at[k]))
-        if progress is not None:
-            progress(k + 1, len(t))
-        if not good:
-            samples.log(DISCARD, f"at t = {time:g} s: {loaded.message() if loaded else ''}")
-            return
-        if k == len(t) - 1:
-            return
-        end = float(t[k + 1])
-        for one in slaves.values():
-            if not one.step(time, end - time):
-                if loaded is not None and loaded.counts()[0] > Status.BRIDGED:  # it goes to an unreachable pose
-                    samples.now = end
-                    samples.read(end, is_kept=True)
-                else:
-                    samples.log(DISCARD, f"at t = {time:g} s: {one.name} ends the run: it does not step further")
-                return
 
 
 def _column(one: Component, port: Port) -> str:

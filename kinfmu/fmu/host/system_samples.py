@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from kinfmu.errors import FmuError
-from kinfmu.fmu.samples import ERROR, PERIOD, Samples
-from kinfmu.fmu.slaves import LoadedSlave
+from kinfmu.fmu.host.samples import ERROR, PERIOD, Samples
+from kinfmu.fmu.host.slaves import LoadedSlave
 from kinfmu.run import Event, Run
 from kinfmu.run.channels import absent_columns
 from kinfmu.run.run import Sink
@@ -89,7 +89,7 @@ class SystemSamples:
             RequestError: A channel is unknown.
 
         """
-        self._readers, self._slave, self._sink = readers, slave, sink
+        self._readers, self._sink = readers, sink
         if self._main and slave:
             self._main.begin(slave, None, _Joined(self, channels))
         else:
@@ -106,13 +106,21 @@ class SystemSamples:
             raise FmuError(f"two columns of the run would be named '{twice[0]}'; rename a component of the system")
         self._absent = absent_columns(run, channels)
 
+    def is_unreachable(self) -> bool:
+        """Return whether the mechanism, if there is one, is asked for an unreachable pose."""
+        return self._main is not None and self._main.is_unreachable()
+
+    def message(self) -> str:
+        """Return the message of the mechanism's FMU about its pose, '' without one."""
+        return self._main.message() if self._main else ""
+
     def read(self, t: float, *, is_kept: bool) -> bool:
         """Read a sample, if it is to be kept; return False if the mechanism has no numbers there."""
-        row = self._size
+        self.now, row = t, self._size
         self._t[row], self._signals[row] = t, [value for read in self._readers for value in read()]
         self._size = row + 1  # the mechanism's samples may pass on a piece while they are read
-        if self._main and self._slave:
-            good = self._main.read(t, self._slave, is_kept=is_kept)
+        if self._main:
+            good = self._main.read(t, is_kept=is_kept)
             self._size = row + (is_kept or not good)
             return good
         self._size = row + is_kept

@@ -1,9 +1,8 @@
-"""Limits of the drivers, which end a motion under efforts. The FMU has a copy: standard library only.
+"""Limits of the drivers, which end a motion under efforts.
 
 At a limit (a dead centre of a driver) the reduced inertia grows without bound, and u(t) is a parabola that touches the
 limit: steps could cross its top and return on the same branch, where the mechanism itself would not. So every step in
-which a speed changes its sign, or a pose is near a singular one, is searched for a pose at a limit. See
-kinfmu/motion/torque/stepping.py.
+which a speed changes its sign, or a pose is near a singular one, is searched for a pose at a limit.
 """
 
 from __future__ import annotations
@@ -12,9 +11,10 @@ from collections.abc import Callable
 from math import inf, sqrt
 from typing import NamedTuple
 
-from kinfmu.fmu.layout import Numbers
-from kinfmu.solver.python import Pose, Solver
-from kinfmu.solver.python.hermite import Hermite
+from ..hermite import Hermite
+from ..pose import Pose, Vector
+from ..solver import Solver
+from .equation_of_motion import StepEnd
 
 NEAR = 0.5  # determinant below which steps of several drivers are searched
 DIPS = 0.3  # of the determinants at both ends of a step: a smaller one between may be a limit
@@ -29,20 +29,11 @@ ERRORS = 10.0  # tolerances by which the turning point may miss the limit
 BEYOND = (1e-6, 1e-4, 1e-2, 0.3)  # [rad, sizes] past a limit, where the solver states why it is one
 
 
-class StepEnd(NamedTuple):
-    """One end of a step: time, values and speeds of the drivers, their derivatives, and the pose."""
-
-    t: float
-    y: Numbers
-    f: Numbers
-    pose: Pose
-
-
 class Ended(NamedTuple):
     """Where a motion ends before its time, and the status and the reason of poses past it."""
 
     t: float
-    u: Numbers
+    u: Vector
     status: int
     message: str
 
@@ -55,7 +46,7 @@ class Suspicion(NamedTuple):
     touches: bool
 
 
-def limit_past(solver: Solver, t: float, pose: Pose, ud: Numbers) -> Ended | None:
+def limit_past(solver: Solver, t: float, pose: Pose, ud: Vector) -> Ended | None:
     """Return the end of a motion at a pose with speeds ud, if the poses past it are not reached."""
     reach = solver.model.REACH
     largest = max([abs(v) / one for v, one in zip(ud, reach, strict=True)]) or 1.0
@@ -81,7 +72,7 @@ def time_to_rest(end: StepEnd) -> float:
 
 
 def suspicion(
-    before: StepEnd, after: StepEnd, follow: Callable[[Numbers], Pose | None], tolerance: float
+    before: StepEnd, after: StepEnd, follow: Callable[[Vector], Pose | None], tolerance: float
 ) -> Suspicion | None:
     """Return the place of a step that may be a limit; None: the step contains none."""
     d = len(before.y) // 2
@@ -113,7 +104,7 @@ def _turning(curve: Hermite, before: StepEnd, after: StepEnd) -> float:
     return 0.5 * (low + high)
 
 
-def _singular(curves: list[Hermite], first: float, last: float, follow: Callable[[Numbers], Pose | None]) -> float:
+def _singular(curves: list[Hermite], first: float, last: float, follow: Callable[[Vector], Pose | None]) -> float:
     """Return the time of the smallest determinant within a step."""
 
     def margin(t: float) -> float:

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby
 
 from kinfmu.errors import RequestError, listed
-from kinfmu.fmu.system.slave import AnySlave
-from kinfmu.fmu.system.structure import Connection
+from kinfmu.fmu.host.any_slave import AnySlave
+from kinfmu.fmu.host.structure import Connection
 from kinfmu.mechanism.valid import quoted
 
 ORDERED, JACOBI = "ordered", "jacobi"

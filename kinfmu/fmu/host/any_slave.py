@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from kinfmu.errors import FmuError
-from kinfmu.fmu.slaves import DISCARD, Log, fmi2_callbacks, free
-from kinfmu.fmu.system.ports import Port
+from kinfmu.fmu.host.ports import Port
+from kinfmu.fmu.host.slaves import DISCARD, Log, fmi2_callbacks, free
 
 Getter = Callable[[], list[float]]
 Setter = Callable[[Sequence[float]], None]

@@ -1,0 +1,80 @@
+"""The loop that steps an FMU or a system of FMUs: set at t_k, record, step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from kinfmu.fmu.host.samples import DISCARD, ERROR
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+class Recorded(Protocol):
+    """The samples of what is stepped; now: time of its messages [s]."""
+
+    now: float
+
+    def log(self, status: int, text: str) -> None:
+        """Store a message at the current time."""
+
+    def read(self, t: float, *, is_kept: bool) -> bool:
+        """Read a sample, if it is to be kept; return False if it holds no numbers."""
+
+    def is_unreachable(self) -> bool:
+        """Return whether the mechanism is asked for an unreachable pose."""
+
+    def message(self) -> str:
+        """Return why it is unreachable."""
+
+
+def step_through(
+    samples: Recorded,
+    t: NDArray[np.float64],
+    kept: NDArray[np.int64],
+    set_inputs: Callable[[int], None] | None,
+    step: Callable[[float, float], bool],
+    progress: Callable[[int, int], None] | None,
+    signals: list[int],
+) -> None:
+    """Run the loop: set at t_k, get, record if the sample is kept or holds no numbers, step.
+
+    Args:
+        samples: Samples.
+        t: (n,) times [s].
+        kept: Indices of samples to record.
+        set_inputs: Sets the inputs of a sample. None: there are none.
+        step: Steps from a time by a step [s]; False if that is discarded.
+        progress: Called with (samples done, number of samples).
+        signals: Those that came, which end the run.
+
+    """
+    kept_at = np.zeros(len(t), bool)
+    kept_at[kept] = True
+    is_kept: Any = kept_at.data
+    times = t.data  # items of a memoryview are Python numbers, which are faster
+    last = len(t) - 1
+    for k, time in enumerate(times):
+        samples.now = time
+        if signals and k:
+            samples.log(ERROR, f"at t = {time:g} s: interrupted; the run ends here")
+            return
+        if set_inputs:
+            set_inputs(k)
+        good = samples.read(time, is_kept=is_kept[k])
+        if progress is not None:
+            progress(k + 1, len(t))
+        if not good:
+            samples.log(DISCARD, f"at t = {time:g} s: {samples.message()}")
+            return
+        if k == last:
+            return
+        end = times[k + 1]
+        samples.now = time if set_inputs else end  # messages of a step are about its inputs, or the time it goes to
+        if not step(time, end - time):
+            if samples.is_unreachable():  # the step goes to an unreachable pose
+                samples.read(end, is_kept=True)
+            return
