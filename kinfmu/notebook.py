@@ -21,9 +21,9 @@ from kinfmu.design.study.figure import figure_of
 from kinfmu.design.study.summary import about, disagreement, failures, measure_rows
 from kinfmu.display import escaped, html_of, page, svg_of, table, widget_of
 from kinfmu.draw import fitted
+from kinfmu.draw.curves import overview, shown_outputs
 from kinfmu.draw.drawing import sheet_of
 from kinfmu.draw.instant import instant
-from kinfmu.draw.overview import overview, shown_outputs
 from kinfmu.draw.writing import svg_text
 from kinfmu.errors import KinfmuError
 from kinfmu.mechanism import Mechanism

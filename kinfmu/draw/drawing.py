@@ -8,16 +8,13 @@ from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
-from kinfmu.draw.gap import gap_note, gaps
-from kinfmu.draw.gravity import gravity
 from kinfmu.draw.instant import instant, pose_note
-from kinfmu.draw.motion import motion
+from kinfmu.draw.marks import gap_note, gaps, gravity, motion, paths, pins
 from kinfmu.draw.names import Mark, Name, place
 from kinfmu.draw.painting import Painter, extent, placed, shortest
-from kinfmu.draw.pins import paths, pins
-from kinfmu.draw.scene.cams import cam_shapes
 from kinfmu.draw.scene.instant import Instant
-from kinfmu.draw.scene.load_shapes import load_text
+from kinfmu.draw.scene.joints import cam_shapes
+from kinfmu.draw.scene.loads import load_text
 from kinfmu.draw.scene.shape import Shape
 from kinfmu.draw.scene.shapes import shapes
 from kinfmu.draw.sheet import Sheet

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.abscissa import axis_label, degree_ticks, label_size
-from kinfmu.draw.chart import SMALL, dress, numbers, powers_of_ten
+from kinfmu.draw.chart import SMALL, axis_label, degree_ticks, dress, label_size, numbers, powers_of_ten
 from kinfmu.draw.curves import LOST, curves, gaps, rows_of
 from kinfmu.draw.overlay import (
     LEAST,

@@ -9,7 +9,7 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.joints import CamFlatFace, CamRoller, Revolute
 from kinfmu.mechanism.quantities.placement import body_of
 from kinfmu.motion.cams.placed import members_of
-from kinfmu.page.dependencies import number_data
+from kinfmu.page.opened import number_data
 
 CAM_SHAPES = ("cam", "pitch", "face")  # kinds; a cam with one of them is known
 

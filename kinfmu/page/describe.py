@@ -19,12 +19,11 @@ from kinfmu.analysis.measuring import turns_of_cycle
 from kinfmu.analysis.text import contact_text
 from kinfmu.draw.instant import instant
 from kinfmu.draw.scene import palette
-from kinfmu.draw.scene.gravity import gravity_direction
-from kinfmu.draw.scene.instant import Instant
-from kinfmu.draw.scene.load_shapes import EFFORT_UNITS, load_text
+from kinfmu.draw.scene.instant import Instant, gravity_direction
+from kinfmu.draw.scene.joints import Slide, slides
+from kinfmu.draw.scene.loads import EFFORT_UNITS, load_text
 from kinfmu.draw.scene.shape import Shape
 from kinfmu.draw.scene.shapes import shapes
-from kinfmu.draw.scene.slides import Slide, slides
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
@@ -39,9 +38,8 @@ from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.quantities.placement import body_of, unit_vector
 from kinfmu.mechanism.toml_text import text
 from kinfmu.page.cams import CAM_SHAPES, cam_data
-from kinfmu.page.dependencies import dependent_points, number_data, parameters_of
 from kinfmu.page.module import PageModule
-from kinfmu.page.opened import AXES, place_text
+from kinfmu.page.opened import AXES, dependent_points, number_data, parameters_of, place_text
 from kinfmu.plan.undetermined import undetermined_reactions
 from kinfmu.units import Quantity, unit_of
 from kinfmu.version import VERSION

@@ -17,7 +17,8 @@ import zstandard
 
 from kinfmu.draw import animate
 from kinfmu.errors import FigureError, LogError
-from kinfmu.log import mcap_reader, read, record, record_text, recover, write_mcap, writing
+from kinfmu.log import mcap_reader, read, record, recover, write_mcap, writing
+from kinfmu.log import record as record_text
 from kinfmu.log.mcap_writer import MESSAGE, ZSTD, Opcode
 from kinfmu.log.viewer.series import groups
 from kinfmu.run import Run

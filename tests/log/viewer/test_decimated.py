@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from kinfmu.log import write_rrd
-from kinfmu.log.viewer import decimated as module
+from kinfmu.log.viewer import timeline as module
 from kinfmu.log.viewer.comparison import write_comparison
-from kinfmu.log.viewer.decimated import decimated
+from kinfmu.log.viewer.timeline import decimated
 from kinfmu.run import Run
 from tests.log.runs import fourbar, with_gap
 from tests.log.viewer.test_rerun_file import SCALARS, documents, rows
