@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.drawing import draw
+from kinfmu.draw.drawing import draw, extent, placed, shortest
 from kinfmu.draw.marks import gravity_in_margin, paths, pins
-from kinfmu.draw.painting import extent, placed, shortest
 from kinfmu.draw.scene import palette
 from kinfmu.draw.scene.instant import Instant
 from kinfmu.draw.scene.placing import poses_of, remedy, world

@@ -23,6 +23,7 @@ LIGHT: Colour = (228, 228, 228)
 SMALL = 8.0  # [pt]
 _PLAIN = (-2, 5)  # powers of ten of the largest number from which and below which axes have plain numbers
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_DEGREES = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0, 360.0, 720.0, 1440.0)  # steps of ticks
 
 
 class Look(NamedTuple):
@@ -88,9 +89,6 @@ def named(axes: Axes, at: tuple[float, float], text: str, colour: Colour, **wher
         zorder=10.0,
         **where,
     )
-
-
-_DEGREES = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0, 360.0, 720.0, 1440.0)  # steps of ticks
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 LOST: palette.Colour = (246, 222, 222)
 _BINS = 1500  # of a long run; each shows its least and its greatest value
+MOST_CURVES = 4  # of a panel
+WIDTH, HEIGHT = 4.4, 2.4  # [in] of a panel
 
 
 def curves(axes: Axes, run: Run, columns: Sequence[str] = (), x: str = "", *, degrees: bool = False) -> Axes:
@@ -94,10 +96,6 @@ def gaps(run: Run, values: FloatArray) -> list[tuple[float, float]]:
         (float(values[max(begin - 1, 0)]), float(values[min(end, last)]))
         for begin, end in zip(turns[::2], turns[1::2], strict=True)
     ]
-
-
-MOST_CURVES = 4  # of a panel
-WIDTH, HEIGHT = 4.4, 2.4  # [in] of a panel
 
 
 def overview(run: Run) -> Figure:

@@ -14,7 +14,7 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.draw.animation import placed_run
-from kinfmu.draw.painting import placed
+from kinfmu.draw.drawing import placed
 from kinfmu.draw.scene.instant import Instant
 from kinfmu.draw.scene.placing import poses_after, poses_of
 from kinfmu.draw.scene.shapes import shapes
@@ -34,6 +34,8 @@ _DRAWN = (  # what has true dimensions
     *("cam", "pitch", "roller"),
 )
 POINT_STYLE = 34  # $PDMODE: a cross in a circle
+_SAME_VALUE = 1e-9  # of the largest value; nearer ones are one: driver values are rounded
+_SAME_POINT = 1e-9  # of the extent of the drawing; points that are closer are one
 
 
 def dxf(run: Run, path: str | Path, at: float | None = None) -> None:
@@ -113,9 +115,6 @@ def without_date(ezdxf: Any) -> Iterator[None]:
         ezdxf.options.write_fixed_meta_data_for_testing = before
 
 
-_SAME_VALUE = 1e-9  # of the largest value; nearer ones are one: driver values are rounded
-
-
 def pose_at(run: Run, mechanism: Mechanism, at: float, path: Path) -> dict[str, FloatArray]:
     """Return poses (1, 3) by body and for the ground.
 
@@ -175,9 +174,6 @@ def _driver_values(run: Run, mechanism: Mechanism, axis: Axis, at: float, row: i
         else:
             known = table if np.isfinite(table).all() else table[:, :1]
             yield float(BPoly.from_derivatives(t, known)(at))
-
-
-_SAME_POINT = 1e-9  # of the extent of the drawing; points that are closer are one
 
 
 class Lines:

@@ -25,6 +25,18 @@ from kinfmu.plan.equations.system import size_of
 
 _SAME = 1e-6  # of the size; points that are nearer are one place
 _ORDER = ("loose", "slide", "weld", "pin")  # kinds of places; if one place has several, the last one is drawn
+COLOUR: palette.Colour = (185, 28, 28)
+_RADII, _TURN = (19.0, 32.0), math.radians(95.0)  # [pt] and [rad], of a curved arrow; the larger one around torques
+_PUSH, _DISTANCE = 30.0, 13.0  # [pt]; length of a straight arrow, and its distance from its point
+_HEAD = np.array([7.0, 2.8])  # [pt], length and half width of the head
+_STROKE = 1.4  # [pt]
+_TRIES = 12  # places for an arrow that are compared
+_RED = palette.STATUS[3]
+_BOX, _LENGTH = 44.0, 26.0  # [pt]; side of the free square, length of the arrow
+_SMALL, _LETTER = 22.0, 8.0  # [pt]; length of the arrow in the margin of an animation, distance of its letter
+_CORNERS = ((0.0, 1.0), (0.0, 0.0), (1.0, 0.0), (1.0, 1.0))  # of the sheet; the note is in the last one
+_EDGE, _BELOW_NOTE = 4.0, 14.0  # [pt] from the edge of the sheet
+_GRAVITY_HEAD = np.array([6.0, 2.4])  # [pt]
 
 
 @dataclass(eq=False)
@@ -151,14 +163,6 @@ def _pin(place: _Place) -> Pin:
         points = []
     texts = dict.fromkeys([*(place.joints or points), *place.interest])
     return Pin(place.at, kind, ", ".join(texts), next(iter(place.interest.values()), None))
-
-
-COLOUR: palette.Colour = (185, 28, 28)
-_RADII, _TURN = (19.0, 32.0), math.radians(95.0)  # [pt] and [rad], of a curved arrow; the larger one around torques
-_PUSH, _DISTANCE = 30.0, 13.0  # [pt]; length of a straight arrow, and its distance from its point
-_HEAD = np.array([7.0, 2.8])  # [pt], length and half width of the head
-_STROKE = 1.4  # [pt]
-_TRIES = 12  # places for an arrow that are compared
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,9 +297,6 @@ def _arrow(
     sheet.line([tip, base + across, base - across], 0.4, colour, closed=True, fill=colour, matters=matters)
 
 
-_RED = palette.STATUS[3]
-
-
 @dataclass(frozen=True, eq=False)
 class GapMark(Mark):
     """A gap between two points: ends (2, 2), and its name."""
@@ -324,13 +325,6 @@ def gap_note(shown: Instant) -> str:
     """Return a sentence on the gap of a mechanism that does not close; '' for one that does."""
     gap = shown.open_gap
     return "" if gap is None else f"does not close: {gap.text} at {gap.joint}"
-
-
-_BOX, _LENGTH = 44.0, 26.0  # [pt]; side of the free square, length of the arrow
-_SMALL, _LETTER = 22.0, 8.0  # [pt]; length of the arrow in the margin of an animation, distance of its letter
-_CORNERS = ((0.0, 1.0), (0.0, 0.0), (1.0, 0.0), (1.0, 1.0))  # of the sheet; the note is in the last one
-_EDGE, _BELOW_NOTE = 4.0, 14.0  # [pt] from the edge of the sheet
-_GRAVITY_HEAD = np.array([6.0, 2.4])  # [pt]
 
 
 def gravity(sheet: Sheet, mechanism: Mechanism) -> list[Name]:

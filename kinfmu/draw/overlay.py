@@ -51,6 +51,10 @@ _EDGE = 8.0  # [pt] around the title
 _WIDE, _NARROW = 3.6, 1.2  # [pt], curves of the first of two runs and of the second one or of a single one
 LOGARITHMIC = ("solver.residual", "solver.margin", "solver.error_", "watch.")  # columns on a scale of powers of ten
 LEAST = 1e-18  # smallest value on such a scale: zeros have no logarithm
+_GRID: Colour = (228, 228, 228)
+_ROOM = 0.25  # of the range of the values, between the centre and the least value if that is negative
+_INNERMOST = 0.15  # of the radius; numbers nearer to the centre would be on one another
+_PLACES = np.radians(np.arange(11.25, 360.0, 22.5))  # of the numbers, between the lines of the grid
 
 
 @dataclass(frozen=True, eq=False)
@@ -350,12 +354,6 @@ def values_of(run: Run, column: str) -> FloatArray:
     if column in run.input_names or column in ("time", "solver.status", "solver.iterations"):
         return values
     return np.where(run.good, values, np.nan)
-
-
-_GRID: Colour = (228, 228, 228)
-_ROOM = 0.25  # of the range of the values, between the centre and the least value if that is negative
-_INNERMOST = 0.15  # of the radius; numbers nearer to the centre would be on one another
-_PLACES = np.radians(np.arange(11.25, 360.0, 22.5))  # of the numbers, between the lines of the grid
 
 
 def radial_scale(axes: Any, curves: Sequence[tuple[FloatArray, FloatArray]]) -> float:

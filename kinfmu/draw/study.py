@@ -19,6 +19,19 @@ if TYPE_CHECKING:
 
 
 EDGE = 8.0  # [pt] around the title
+MOST_COLUMNS = 10  # of a matrix that can be read
+MOST_DOTS = 4000  # of a panel
+FAILED: palette.Colour = (200, 40, 40)  # designs that lack a measure
+_BINS = 30
+_EDGE = 0.05  # of the range of a column, between its ends and those of the axis
+_CROSS: dict[str, Any] = {"s": 6.0, "linewidths": 0.6, "marker": "x"}
+_LEVELS = 12
+_ABREAST = 2
+_SCALE_WIDTH = 10.0  # [pt], width of a scale of colours
+WIDTH, HEIGHT = 210.0, 170.0  # [pt]
+_MARKED = 40  # designs up to which each has a dot
+MOST_BARS = 10  # of a measure
+_BAR = 14.0  # [pt], of a bar with its gap
 
 
 class Quantities(NamedTuple):
@@ -100,14 +113,6 @@ def few_ticks(axes: Axes, x: int | None, y: int | None) -> None:
         axes.locator_params(axis="x", nbins=x)
     if y is not None:
         axes.locator_params(axis="y", nbins=y)
-
-
-MOST_COLUMNS = 10  # of a matrix that can be read
-MOST_DOTS = 4000  # of a panel
-FAILED: palette.Colour = (200, 40, 40)  # designs that lack a measure
-_BINS = 30
-_EDGE = 0.05  # of the range of a column, between its ends and those of the axis
-_CROSS: dict[str, Any] = {"s": 6.0, "linewidths": 0.6, "marker": "x"}
 
 
 def scatter_matrix(parameters: Sequence[Quantities], measures: Sequence[Quantities], title: str) -> Figure:
@@ -203,12 +208,6 @@ def _name_failed(made: Figure, failed: int, count: int) -> None:
     made.legend([cross], [text], loc="lower left", fontsize=SMALL, frameon=False, labelcolor=ink(GREY))
 
 
-_LEVELS = 12
-_ABREAST = 2
-_SCALE_WIDTH = 10.0  # [pt], width of a scale of colours
-WIDTH, HEIGHT = 210.0, 170.0  # [pt]
-
-
 def contours(x: Quantities, y: Quantities, measures: Sequence[Quantities], title: str) -> Figure:
     """Return a figure of measures over a grid of two parameters; designs without a value stay white.
 
@@ -270,9 +269,6 @@ def _ends(values: FloatArray) -> tuple[float, float]:
     return (low, high) if low < high else (low - 0.5, high + 0.5)
 
 
-_MARKED = 40  # designs up to which each has a dot
-
-
 def response(over: Quantities, measures: Sequence[Quantities], title: str) -> Figure:
     """Return a figure of measures over a parameter; designs without a value are gaps.
 
@@ -307,10 +303,6 @@ def _span(values: FloatArray) -> tuple[float, float]:
     low, high = float(values.min()), float(values.max())
     edge = 0.02 * (high - low) or 0.5
     return low - edge, high + edge
-
-
-MOST_BARS = 10  # of a measure
-_BAR = 14.0  # [pt], of a bar with its gap
 
 
 class Contributed(NamedTuple):

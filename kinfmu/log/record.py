@@ -40,6 +40,11 @@ _TABLES = (
 
 _ESTIMATED = ("margin", "error")  # tables that follow from mechanism and driver values
 _OPTIONAL = ("forces", "reactions", "signals")  # None in a run that has none
+Layout = Sequence[tuple[str, list[int] | None]]  # tables by name, and which of their columns, all if None
+MOST_COLUMNS = 500_000  # three times those of the largest mechanism
+ESTIMATES = ("solver.margin", "solver.error_q", "solver.error_qd", "solver.error_qdd")
+LEVELS = ("info", "warning", "error")
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,199}(?:\.[a-z]{1,5})?")
 
 
 def computed_when_read(run: Run) -> frozenset[str]:
@@ -92,9 +97,6 @@ def lists_in(texts: Mapping[str, str]) -> dict[str, Any]:
 def is_integer(table: str) -> bool:
     """Return True for tables of int64; the others hold float64."""
     return table in _INTEGERS
-
-
-Layout = Sequence[tuple[str, list[int] | None]]  # tables by name, and which of their columns, all if None
 
 
 def layout(run: Run) -> Layout:
@@ -201,12 +203,6 @@ def _fill(run: Run, blocks: Sequence[NDArray[np.uint64]]) -> None:
         for table, target, source in moves:
             table[row : row + len(block), target] = block[:, source]
         row += len(block)
-
-
-MOST_COLUMNS = 500_000  # three times those of the largest mechanism
-ESTIMATES = ("solver.margin", "solver.error_q", "solver.error_qd", "solver.error_qdd")
-LEVELS = ("info", "warning", "error")
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,199}(?:\.[a-z]{1,5})?")
 
 
 def lists_of(texts: Mapping[str, str]) -> dict[str, Any]:

@@ -29,7 +29,7 @@ from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
 from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.force_names import force_names, reaction_names_of
-from kinfmu.mechanism.joints import CamFlatFace, CamRoller, Coordinate, Distance, PointOnLine, Translational
+from kinfmu.mechanism.joints import CamFlatFace, CamRoller, Coordinate, Distance, PointOnLine, Revolute, Translational
 from kinfmu.mechanism.joints.joint import Joint
 from kinfmu.mechanism.laws import ConstantValue
 from kinfmu.mechanism.loads import Following, ForceAlong, ForceAt
@@ -37,7 +37,7 @@ from kinfmu.mechanism.members import NumberPath
 from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.quantities.placement import body_of, unit_vector
 from kinfmu.mechanism.toml_text import text
-from kinfmu.page.cams import CAM_SHAPES, cam_data
+from kinfmu.motion.cams.placed import members_of
 from kinfmu.page.module import PageModule
 from kinfmu.page.opened import AXES, dependent_points, number_data, parameters_of, place_text
 from kinfmu.plan.undetermined import undetermined_reactions
@@ -47,6 +47,7 @@ from kinfmu.version import VERSION
 _DIGITS = 7  # of numbers that are only drawn
 _NOT_DRAWN = ("rib", "contact")  # the page finds corners and ribs of a link from its points
 _ON_LINES = ("rail", "bed", "slot", "rod", "block", "die")
+CAM_SHAPES = ("cam", "pitch", "face")  # kinds; a cam with one of them is known
 
 
 def describe(mechanism: Mechanism, report: Report) -> dict[str, Any]:
@@ -402,3 +403,29 @@ def _loops(report: Report, numbers: Mapping[str, int]) -> Any:
             angle = one.transmission[0]
             found = {"driver": angle.driver, "coupler": angle.coupler, "output": angle.output}
             yield found | {"pins": pins} | ({} if one.dyad.direction is None else {"direction": one.dyad.direction})
+
+
+def cam_data(mechanism: Mechanism, joint: Any, numbers: Mapping[str, int]) -> dict[str, Any]:
+    """Return a cam: its bodies and points, and the bodies and joints whose numbers determine its curve.
+
+    Args:
+        mechanism: The mechanism.
+        joint: A joint of a cam whose contact is known.
+        numbers: The numbers of points, by 'body.point'.
+
+    """
+    cam, follower, touching = members_of(joint)
+    if touching is None:
+        raise TypeError(f"the contact of cam '{joint.name}' is unknown")
+    found: dict[str, Any] = {"name": joint.name, "body": cam, "follower": follower, "point": numbers[touching]}
+    for key in ("roller_radius", "normal"):
+        value = getattr(joint, key, None)
+        if value is not None:
+            found[key] = number_data(mechanism, ("joints", joint.name, key), float(value))
+    if isinstance(joint, CamRoller | CamFlatFace):  # the file has the curve
+        return found | {"centre": numbers[joint.between[0]], "bodies": [], "joints": [joint.name]}
+    bodies = joint.bodies()
+    among = [one for one in mechanism.joints if {*one.bodies()} <= {*bodies}]
+    axle = next(one for one in among if isinstance(one, Revolute) and {*one.bodies()} == {cam, joint.holder()})
+    own = next(point for point in axle.between if body_of(point) == cam)
+    return found | {"centre": numbers[own], "bodies": list(bodies), "joints": [one.name for one in among]}

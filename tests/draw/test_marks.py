@@ -23,11 +23,10 @@ from kinfmu import (
     Translational,
     load,
 )
-from kinfmu.draw.drawing import sheet_of
+from kinfmu.draw.drawing import placed, sheet_of
 from kinfmu.draw.instant import instant
 from kinfmu.draw.marks import Length, Pin, Push, Turn, motion, pins
 from kinfmu.draw.names import LEADER
-from kinfmu.draw.painting import placed
 from kinfmu.draw.scene.instant import Instant
 from kinfmu.draw.scene.joints import slides
 from kinfmu.draw.scene.shape import Shape

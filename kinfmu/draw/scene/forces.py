@@ -38,6 +38,7 @@ from kinfmu.units import METRES
 
 LONGEST = 0.3  # length of the longest arrow, as a part of the linkage's size
 _STEPS = (5.0, 2.0, 1.0)  # first digits of the force in the legend
+MOST_SAMPLES = 5000  # at which a load is evaluated; of longer runs the nearest of these is shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,9 +154,6 @@ def contact_force(
 
 def _pairs(points: ComplexArray) -> FloatArray:
     return np.column_stack([points.real, points.imag])
-
-
-MOST_SAMPLES = 5000  # at which a load is evaluated; of longer runs the nearest of these is shown
 
 
 def load_forces(run: Run, mechanism: Mechanism, scene: Scene) -> Iterator[tuple[str, FloatArray, FloatArray]]:

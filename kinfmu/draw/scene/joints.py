@@ -22,6 +22,12 @@ from kinfmu.motion.cams.critical import cut_depths
 from kinfmu.motion.cams.placed import members_of
 from kinfmu.motion.cams.traced import ComplexArray, given_curve, traced
 
+_BELT = 0.3  # of the distance of the axles: radius of a belt's larger pulley, since files state only the ratio
+_BEYOND = 0.35  # of the pinion's radius, additional length at both ends of a rack
+_ANGLES = np.linspace(0.0, 2.0 * np.pi, 361)[:-1]  # [rad], points of a curve
+_TOUCH = 1e-9  # of the radius; deeper cuts are more than rounding
+_OVERHANG = 0.15  # of the contact's range, by which a flat face is longer on either side
+
 
 @dataclass(frozen=True, eq=False)
 class Slide:
@@ -112,10 +118,6 @@ def racks_of(shown: Instant) -> set[str]:
     return {body_of(joint.between[1]) for joint in joints if isinstance(joint, RackAndPinion)}
 
 
-_BELT = 0.3  # of the distance of the axles: radius of a belt's larger pulley, since files state only the ratio
-_BEYOND = 0.35  # of the pinion's radius, additional length at both ends of a rack
-
-
 def wheels(shown: Instant) -> Iterator[Shape]:
     """Yield gears, pulleys, belts and racks, in the world as drawn, whose axles are pinned on their carrier."""
     for joint in shown.joints:
@@ -183,11 +185,6 @@ def _wheel(shown: Instant, joint: str, body: str, centre: FloatArray, radius: fl
     end = centre + radius * np.array([np.cos(angle), np.sin(angle)])
     yield Shape("wheel", joint, body, centre[None], colour, radius=radius)
     yield Shape("spoke", joint, body, np.array([centre, end]), colour)
-
-
-_ANGLES = np.linspace(0.0, 2.0 * np.pi, 361)[:-1]  # [rad], points of a curve
-_TOUCH = 1e-9  # of the radius; deeper cuts are more than rounding
-_OVERHANG = 0.15  # of the contact's range, by which a flat face is longer on either side
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,6 +47,13 @@ _DASHPOT = (14.0, 21.0)  # radii of a torsion damper's cup
 _CUP_ANGLES, _ROD_ANGLES, _STEM = (100.0, 215.0), (150.0, 20.0), 0.5  # [deg], and of the stem behind the cup [rad]
 _STEP = math.radians(15.0)  # between the corners of an arc
 _APART = 3.0  # between two symbols about one pin
+_Ring = Callable[[float], tuple[Strip, ...]]  # the lines of a symbol about a pin, from what is added to its radii
+BETWEEN = (Spring, Damper, GasSpring, ForceBetween)  # classes of loads between two points
+_SAME = 1e-6  # of the size; pins that are nearer are one place
+_ARGUMENTS = 200  # of a law, in which its largest effort is looked for
+_BARREL, _OF_SHORTEST = 0.62, 0.92  # length of a barrel: of the usual length, and at most of the shortest one
+EFFORT_UNITS = {"force": "N", "torque": "N m"}
+_TURNS, _FEWEST_MOST = 18.0, (4, 14)  # of a spring as long as the mechanism; limits of other springs
 
 
 def spring(turns: int, off: float = 0.0) -> tuple[Strip, ...]:
@@ -191,14 +198,7 @@ def _line(
     return Strip(np.array(list(points), dtype=float), is_area, is_solid)
 
 
-_Ring = Callable[[float], tuple[Strip, ...]]  # the lines of a symbol about a pin, from what is added to its radii
-BETWEEN = (Spring, Damper, GasSpring, ForceBetween)  # classes of loads between two points
 _TORSION: dict[type[Load], _Ring] = {TorsionSpring: spiral, TorsionDamper: dashpot}
-_SAME = 1e-6  # of the size; pins that are nearer are one place
-_ARGUMENTS = 200  # of a law, in which its largest effort is looked for
-_BARREL, _OF_SHORTEST = 0.62, 0.92  # length of a barrel: of the usual length, and at most of the shortest one
-EFFORT_UNITS = {"force": "N", "torque": "N m"}
-_TURNS, _FEWEST_MOST = 18.0, (4, 14)  # of a spring as long as the mechanism; limits of other springs
 
 
 def load_shapes(shown: Instant, box: FloatArray) -> Iterator[Shape]:

@@ -20,6 +20,12 @@ from kinfmu.units import Quantity, factors
 MOST_EVENTS = 12  # listed on the card; the log has all
 _WORDS = {"generation_tool": "FMU made by", "parameters": "parameters set"}
 _UNSHOWN = ("title", "token")  # only programs need the token; the record has it
+_SETTINGS = "parameters"  # of the info of an FMU's run: what was set, 'crank = 22.0, crank_speed = 1.0'
+_TEXTS = ("name", "title", "token", "engine", "generation_tool", _SETTINGS)  # of a run's info, which are no parameters
+_NONE = "-"
+_USUAL = {Quantity("angle"): "deg", Quantity("angle", 1): "rpm"}  # of people, where a record has rad and rad/s
+_DIGITS = (6, 9, 12, 15, 17)
+_ROUNDING = 1e-14  # relative; closer numbers are equal
 
 
 def card(run: Run, note: str = "") -> str:
@@ -75,14 +81,6 @@ def _table(heading: str, entries: Mapping[str, str]) -> list[str]:
 def plain(text: str) -> str:
     """Return text escaped for Markdown, on one line."""
     return re.sub(r"([\\`*_|<>\[\]#])", r"\\\1", " ".join(text.split()))
-
-
-_SETTINGS = "parameters"  # of the info of an FMU's run: what was set, 'crank = 22.0, crank_speed = 1.0'
-_TEXTS = ("name", "title", "token", "engine", "generation_tool", _SETTINGS)  # of a run's info, which are no parameters
-_NONE = "-"
-_USUAL = {Quantity("angle"): "deg", Quantity("angle", 1): "rpm"}  # of people, where a record has rad and rad/s
-_DIGITS = (6, 9, 12, 15, 17)
-_ROUNDING = 1e-14  # relative; closer numbers are equal
 
 
 class _Setting(NamedTuple):

@@ -30,6 +30,7 @@ from kinfmu.units import CoordinateName, ForceName, SignalName, unit_of
 MOST_LISTED = 6  # coordinates that a line names
 MOST_PERCENT = 1000  # of a difference; a larger part states only that the value in A is small
 MOST_ROWS = 10  # efforts of the card's table
+SAME = 1e-9  # of the largest value, a billionth; smaller differences are not visible
 
 
 class _Look(NamedTuple):
@@ -225,9 +226,6 @@ def _differ(run: Run) -> str:
 def _largest(column: FloatArray) -> str:
     known = np.abs(column[np.isfinite(column)])
     return f"{known.max():.2g}" if len(known) else "-"
-
-
-SAME = 1e-9  # of the largest value, a billionth; smaller differences are not visible
 
 
 class Apart(NamedTuple):

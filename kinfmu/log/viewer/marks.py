@@ -28,6 +28,15 @@ _WIDTH, _HEIGHT = 600.0, 380.0  # [points] of the view on a usual screen, within
 _LETTER, _EDGE, _LINE = 6.5, 8.0, 17.0  # [points]; of a name: width of a letter, margin, height
 _SAMPLES = 40  # poses that are compared
 _OFTEN = 0.35  # of them; of two names that cover each other in more poses only one is shown
+_GRAVITY = 0.07  # of the size: length of the arrow of gravity
+MOST_NAMES = 12  # more names would hide the linkage; they show when pointed at
+FORCES = ("force", "force_along", "force_between")  # kinds that the arrows of a run show to scale
+_LOAD_ORDER = 28.0  # above cylinders, below pins
+_LOAD_RADIUS = 0.9  # of lines [points of the screen]
+_JOINT = (185, 28, 28)
+_ARROW_ORDER = 50.0  # above the linkage
+_PLACES, _LOWEST_PART = 9, 0.2  # places of the legend; part of the size above the lowest point, in which names matter
+_ARROW_RADIUS = 0.004  # as a part of the scene's size, however thin its links are
 
 
 def detail(scene: Scene) -> float:
@@ -90,10 +99,6 @@ def _covers(scene: Scene, a: FloatArray, b: FloatArray, first: str, second: str)
     apart = np.abs(a - b) * dots(scene)
     width = 0.5 * _LETTER * (len(first) + len(second)) + _EDGE
     return np.asarray((apart[:, 0] < width) & (apart[:, 1] < _LINE), float)
-
-
-_GRAVITY = 0.07  # of the size: length of the arrow of gravity
-MOST_NAMES = 12  # more names would hide the linkage; they show when pointed at
 
 
 def log_ground(rec: rr.RecordingStream, root: str, scene: Scene, pin: float) -> None:
@@ -162,11 +167,6 @@ def _log_gravity(rec: rr.RecordingStream, entity: str, scene: Scene, along: Floa
     rec.log(f"{entity}/name", name, static=True)
 
 
-FORCES = ("force", "force_along", "force_between")  # kinds that the arrows of a run show to scale
-_LOAD_ORDER = 28.0  # above cylinders, below pins
-_LOAD_RADIUS = 0.9  # of lines [points of the screen]
-
-
 class _Part(NamedTuple):
     """Lines of a symbol that move together: pose (n, 3), stretch along it (n,), lines (k, 2) in this frame."""
 
@@ -212,12 +212,6 @@ def _parts(load: Shape, linkage: Linkage) -> Iterator[_Part]:
     for name, lines in found.items():
         at, _, stretch = poses[name]
         yield _Part(name, np.column_stack([at, angle]), stretch, lines)
-
-
-_JOINT = (185, 28, 28)
-_ARROW_ORDER = 50.0  # above the linkage
-_PLACES, _LOWEST_PART = 9, 0.2  # places of the legend; part of the size above the lowest point, in which names matter
-_ARROW_RADIUS = 0.004  # as a part of the scene's size, however thin its links are
 
 
 def legend_start(scene: Scene, length: float) -> float:

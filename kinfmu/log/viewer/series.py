@@ -18,6 +18,12 @@ ORDERS = ("position", "velocity", "acceleration")
 KINDS = ("angle", "length")
 SAME = 1e-9  # difference of two curves that look the same, of the largest value
 SMALLEST = 1e-17  # drawn in place of 0 on a logarithmic axis; smaller than round-off
+_TITLES = {"force": "joint force", "torque": "joint moment"}
+_SHAKING = "shaking_"
+_OUTLIERS = (
+    99.0  # percent of the samples that the axis shows at least: forces may grow without bound at singular points
+)
+_BEYOND = 4.0  # an axis that shows all samples is at most so many times longer
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,14 +213,6 @@ def _colours(run: Run) -> dict[str, palette.Colour]:
             owners.append(name.owner)
     plain = {name: palette.body(owners.index(name.owner)) for name in run.outputs}
     return {name: palette.lighter(colour) if name.axis == "y" else colour for name, colour in plain.items()}
-
-
-_TITLES = {"force": "joint force", "torque": "joint moment"}
-_SHAKING = "shaking_"
-_OUTLIERS = (
-    99.0  # percent of the samples that the axis shows at least: forces may grow without bound at singular points
-)
-_BEYOND = 4.0  # an axis that shows all samples is at most so many times longer
 
 
 def reactions(run: Run) -> list[Group]:

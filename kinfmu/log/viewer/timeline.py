@@ -26,6 +26,7 @@ FINEST = 9  # decimals of a value
 _LOST = 0.01  # part of the smallest step between samples that rounding may move one
 _MOST = 2.0**31  # the largest of the whole numbers
 _OF_DRIVER = re.compile(r"(?P<driver>.+) \[(?:0\.(?P<decimals>0*1) )?(?P<unit>[a-z]+)\]")  # 'crank [0.1 deg]'
+MOST_ROWS = 200_000  # of a recording; the viewer is slow with more
 
 
 @dataclass(frozen=True)
@@ -130,9 +131,6 @@ def send(
     for start in range(0, len(t), ROWS):
         rows = slice(start, start + ROWS)
         rec.send_columns(path, [timeline.column(t[rows])], columns(rows))
-
-
-MOST_ROWS = 200_000  # of a recording; the viewer is slow with more
 
 
 def decimated(run: Run, most: int | None = None) -> Run:
