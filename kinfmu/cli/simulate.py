@@ -96,7 +96,7 @@ def simulate(
     """
     from kinfmu.fmu import simulate as simulated
     from kinfmu.log import LiveView, McapLog, write_rrd
-    from kinfmu.log.viewer import INSTALL, has_viewer, require_viewer
+    from kinfmu.log.viewer.package import INSTALL, has_viewer, require_viewer
     from kinfmu.run.channels import is_drawn
 
     if wrap and inputs is None:

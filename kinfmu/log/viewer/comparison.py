@@ -14,11 +14,11 @@ from kinfmu.draw.scene import palette
 from kinfmu.draw.scene.scene import drawable
 from kinfmu.errors import LogError, listed
 from kinfmu.log.cdr import nanoseconds
-from kinfmu.log.viewer import require_viewer
 from kinfmu.log.viewer.blueprint import compared
 from kinfmu.log.viewer.card import parameters_apart, plain
 from kinfmu.log.viewer.linkage import Linkage
 from kinfmu.log.viewer.marks import log_loads
+from kinfmu.log.viewer.package import require_viewer
 from kinfmu.log.viewer.rerun_file import application, left_out, log_card, log_group, log_status, recording
 from kinfmu.log.viewer.series import Group, efforts, groups, reactions, signals
 from kinfmu.log.viewer.timeline import Timeline, decimated, timeline_of

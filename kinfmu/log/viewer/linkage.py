@@ -15,7 +15,7 @@ from kinfmu.draw.scene import details, palette
 from kinfmu.draw.scene.forces import Arrows
 from kinfmu.draw.scene.scene import Scene
 from kinfmu.draw.scene.shape import Shape, guides_of_cams
-from kinfmu.log.viewer.marks import MARGIN, MOST_NAMES, detail, log_ground, shown_names
+from kinfmu.log.viewer.ground import MARGIN, MOST_NAMES, detail, log_ground, shown_names
 from kinfmu.log.viewer.timeline import Timeline, send
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import Run

@@ -39,11 +39,11 @@ from kinfmu.errors import LogError
 from kinfmu.files import temporary_folder
 from kinfmu.log.cdr import nanoseconds
 from kinfmu.log.target import replacing
-from kinfmu.log.viewer import require_viewer
 from kinfmu.log.viewer.blueprint import Drawn, single
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.linkage import APPLICATION, Linkage
 from kinfmu.log.viewer.marks import log_arrows, log_loads
+from kinfmu.log.viewer.package import require_viewer
 from kinfmu.log.viewer.series import (
     Group,
     accuracy,

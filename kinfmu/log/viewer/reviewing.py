@@ -14,8 +14,8 @@ from kinfmu.errors import LogError, RequestError
 from kinfmu.files import suffix_of, temporary_folder
 from kinfmu.log.reading import read
 from kinfmu.log.target import replacing
-from kinfmu.log.viewer import require_viewer
 from kinfmu.log.viewer.headless import Cursor, CursorOn, executable, last_error, shoot
+from kinfmu.log.viewer.package import require_viewer
 from kinfmu.log.viewer.rerun_file import write_rrd
 from kinfmu.log.viewer.timeline import Timeline, timeline_named, timeline_of
 from kinfmu.run.axis import axis_of
