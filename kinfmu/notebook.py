@@ -58,7 +58,7 @@ def drawing(mechanism: Mechanism) -> str:
         AssemblyError: The mechanism does not close.
 
     """
-    return _drawing(mechanism)
+    return svg_text("this picture", lambda: sheet_of(instant(mechanism)).figure)
 
 
 @widget_of.register
@@ -72,10 +72,6 @@ def live(mechanism: Mechanism) -> Any:
 
 
 @lru_cache(maxsize=_KEPT)
-def _drawing(mechanism: Mechanism) -> str:
-    return svg_text("this picture", lambda: sheet_of(instant(mechanism)).figure)
-
-
 def _parts(mechanism: Mechanism) -> Iterator[tuple[str, str]]:
     """Yield what is counted, and its names."""
     yield "moving bodies", f"{len(mechanism.moving_bodies)}: {some([body.name for body in mechanism.moving_bodies])}"

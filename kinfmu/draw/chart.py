@@ -48,6 +48,13 @@ def dress(axes: Axes, title: str) -> None:
     axes.set_title(title, fontsize=FONT + 1.0, loc="left", color=ink(INK), parse_math=False)
 
 
+def span(values: FloatArray, edge: float) -> tuple[float, float]:
+    """Return the ends of an axis for values (n,); edge: part of their range that it is longer on either side."""
+    low, high = float(values.min()), float(values.max())
+    more = edge * (high - low) or 0.5
+    return low - more, high + more
+
+
 def powers_of_ten(axes: Axes, values: FloatArray) -> None:
     """Give axes a vertical scale of whole powers of ten around positive values."""
     known = values[np.isfinite(values)]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.chart import SMALL, dress
+from kinfmu.draw.chart import SMALL, dress, span
 from kinfmu.draw.scene import palette
 from kinfmu.draw.sheet import FONT, GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
 
@@ -295,14 +295,8 @@ def response_into(axes: Axes, over: Quantities, measure: Quantities, place: int 
     marker = "o" if len(order) <= _MARKED else ""
     look: dict[str, Any] = {"color": ink(colour_of(place)), "linewidth": 1.4, "marker": marker, "markersize": 3.0}
     axes.plot(over.values[order], measure.values[order], **look)
-    axes.set_xlim(*_span(over.values))
+    axes.set_xlim(*span(over.values, 0.02))
     name_axes(axes, over.label, measure.label)
-
-
-def _span(values: FloatArray) -> tuple[float, float]:
-    low, high = float(values.min()), float(values.max())
-    edge = 0.02 * (high - low) or 0.5
-    return low - edge, high + edge
 
 
 class Contributed(NamedTuple):

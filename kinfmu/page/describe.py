@@ -83,7 +83,7 @@ def describe(mechanism: Mechanism, report: Report) -> dict[str, Any]:
             {"body": body_of(name), "name": name.partition(".")[2], "x": float(x), "y": float(y)}
             for name, (x, y) in mechanism.body_points.items()
         ],
-        "joints": [_joint(joint, numbers) | _numbers(mechanism, joint) for joint in mechanism.joints],
+        "joints": [_joint(mechanism, joint, numbers) for joint in mechanism.joints],
         "drivers": [_driver(driver, shown, report, numbers) for driver in mechanism.drivers],
         "interest": [
             {"name": name, "point": numbers[point], "colour": list(palette.body(len(bodies) - 1 + k))}
@@ -163,12 +163,6 @@ def _parameter(
     }
 
 
-def _numbers(mechanism: Mechanism, joint: Joint) -> dict[str, Any]:
-    """Return the parameters on which numbers of a joint depend; nothing if there are none."""
-    names = parameters_of(mechanism, joint)
-    return {"numbers": names} if names else {}
-
-
 def _line(shape: Shape, slide: Slide | None, numbers: Mapping[str, int]) -> dict[str, Any]:
     """Return for a shape of a slide its holder, its sliding point, and a point of its line if that has a name."""
     if slide is None or shape.kind not in _ON_LINES or (shape.kind == "rail" and slide.holder != GROUND_NAME):
@@ -222,8 +216,8 @@ def written_file(mechanism: Mechanism, module: PageModule, places: Mapping[str, 
     return text(written)
 
 
-def _joint(joint: Joint, numbers: Mapping[str, int]) -> dict[str, Any]:
-    """Return a joint with the numbers of its points and the direction of its slide in the first body's frame."""
+def _joint(mechanism: Mechanism, joint: Joint, numbers: Mapping[str, int]) -> dict[str, Any]:
+    """Return a joint with the numbers of its points, its parameters, and its slide in the first body's frame."""
     found: dict[str, Any] = {"name": joint.name, "type": joint.type}
     points = getattr(joint, "between", ()) if not hasattr(joint, "of") else (joint.of,)
     if all(point in numbers for point in points):
@@ -232,7 +226,8 @@ def _joint(joint: Joint, numbers: Mapping[str, int]) -> dict[str, Any]:
         found["axis"] = float(joint.axis)
     if isinstance(joint, Coordinate):
         found["across"] = joint.axis
-    return found
+    names = parameters_of(mechanism, joint)
+    return found | ({"numbers": names} if names else {})
 
 
 def _driver(driver: Driver, shown: Instant, report: Report, numbers: Mapping[str, int]) -> dict[str, Any]:
