@@ -22,7 +22,7 @@ from kinfmu.log import McapLog, read, write_mcap, write_rrd
 from kinfmu.log.cdr import nanoseconds
 from kinfmu.log.record import computed_when_read, layout, tables
 from kinfmu.log.topics import sample_template
-from kinfmu.log.viewer.decimated import MOST_ROWS
+from kinfmu.log.viewer.timeline import MOST_ROWS
 from kinfmu.mechanism.gallery import load
 from kinfmu.run import Run
 from kinfmu.run.solve import solve

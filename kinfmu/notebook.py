@@ -21,9 +21,9 @@ from kinfmu.design.study.figure import figure_of
 from kinfmu.design.study.summary import about, disagreement, failures, measure_rows
 from kinfmu.display import escaped, html_of, page, svg_of, table, widget_of
 from kinfmu.draw import fitted
+from kinfmu.draw.curves import overview, shown_outputs
 from kinfmu.draw.drawing import sheet_of
 from kinfmu.draw.instant import instant
-from kinfmu.draw.overview import overview, shown_outputs
 from kinfmu.draw.writing import svg_text
 from kinfmu.errors import KinfmuError
 from kinfmu.mechanism import Mechanism
@@ -58,7 +58,7 @@ def drawing(mechanism: Mechanism) -> str:
         AssemblyError: The mechanism does not close.
 
     """
-    return _drawing(mechanism)
+    return svg_text("this picture", lambda: sheet_of(instant(mechanism)).figure)
 
 
 @widget_of.register
@@ -72,10 +72,6 @@ def live(mechanism: Mechanism) -> Any:
 
 
 @lru_cache(maxsize=_KEPT)
-def _drawing(mechanism: Mechanism) -> str:
-    return svg_text("this picture", lambda: sheet_of(instant(mechanism)).figure)
-
-
 def _parts(mechanism: Mechanism) -> Iterator[tuple[str, str]]:
     """Yield what is counted, and its names."""
     yield "moving bodies", f"{len(mechanism.moving_bodies)}: {some([body.name for body in mechanism.moving_bodies])}"

@@ -1,9 +1,12 @@
-"""animate(): the linkage of a run as a GIF animation or an MP4 video."""
+"""animate(): the linkage of a run as a GIF animation or, by the program ffmpeg, as an MP4 video."""
 
 from __future__ import annotations
 
+import contextlib
 import io
 import math
+import shutil
+import subprocess
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -12,19 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.drawing import draw
-from kinfmu.draw.gravity import gravity_in_margin
-from kinfmu.draw.painting import extent, placed, shortest
-from kinfmu.draw.pins import paths, pins
+from kinfmu.draw.drawing import draw, extent, placed, shortest
+from kinfmu.draw.marks import gravity_in_margin, paths, pins
 from kinfmu.draw.scene import palette
 from kinfmu.draw.scene.instant import Instant
 from kinfmu.draw.scene.placing import poses_of, remedy, world
 from kinfmu.draw.scene.shapes import shapes
 from kinfmu.draw.sheet import GREY, PAPER, Sheet, ink
-from kinfmu.draw.video import encoder, mp4
 from kinfmu.draw.writing import figure_style, write_bytes
-from kinfmu.errors import FigureError, MechanismError, listed
-from kinfmu.files import suffix_of
+from kinfmu.errors import FigureError, MechanismError, MissingPackageError, listed
+from kinfmu.files import suffix_of, temporary_folder
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.quantities.placement import body_of
@@ -33,6 +33,7 @@ from kinfmu.run.axis import axis_of
 
 if TYPE_CHECKING:
     from PIL.Image import Image
+
 
 SUFFIXES = (".gif", ".mp4")
 DOTS_PER_INCH = 80.0  # about 600 pixels across
@@ -267,3 +268,40 @@ def _nearest(colours: NDArray[np.int64]) -> NDArray[np.uint8]:
     red, green, blue = np.meshgrid(shades, shades, shades, indexing="ij")
     apart = sum((part[..., None] - colours[:, k]) ** 2 for k, part in enumerate((red, green, blue)))
     return np.asarray(np.argmin(apart, axis=-1), np.uint8)
+
+
+def encoder(path: Path) -> str:
+    """Return the path of ffmpeg; MissingPackageError about `path` if it is not installed."""
+    found = shutil.which("ffmpeg")
+    if found is None:
+        raise MissingPackageError(
+            f"{path}: an MP4 needs the program ffmpeg, which is not found; install it (Debian, Ubuntu: apt-get "
+            "install ffmpeg), or write a .gif"
+        )
+    return found
+
+
+def mp4(images: Sequence[Image], seconds: float, path: Path) -> bytes:
+    """Return pictures of one size as an MP4 (H.264) that lasts `seconds`; FigureError if ffmpeg fails.
+
+    The size is rounded up to even numbers of pixels, which the format needs. Equal pictures give equal bytes with the
+    same version of ffmpeg.
+    """
+    width, height = images[0].size
+    with temporary_folder() as folder:
+        made = folder / "video.mp4"
+        command = [
+            encoder(path), "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
+            "-r", f"{len(images) / seconds:.6f}", "-i", "-", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white",
+            "-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-fflags", "+bitexact", str(made),
+        ]  # fmt: skip
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as running:  # noqa: S603  of the PATH
+            if running.stdin:
+                with contextlib.suppress(OSError):  # it ended early, and states why
+                    for image in images:
+                        running.stdin.write(image.tobytes())
+            _, errors = running.communicate()
+        if running.returncode or not made.exists():
+            *_, why = ["no reason given", *errors.decode(errors="replace").split("\n")[:1]]
+            raise FigureError(f"{path}: ffmpeg failed: {why or 'no reason given'}")
+        return made.read_bytes()

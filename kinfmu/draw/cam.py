@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.abscissa import degree_ticks
-from kinfmu.draw.chart import SMALL, dress
+from kinfmu.draw.chart import SMALL, degree_ticks, dress
 from kinfmu.draw.dxf import DXF_UNITS, POINT_STYLE, without_date
-from kinfmu.draw.motion import COLOUR
+from kinfmu.draw.marks import COLOUR
 from kinfmu.draw.scene import palette
 from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, arc, ink
 from kinfmu.draw.writing import SUFFIXES, write, write_bytes

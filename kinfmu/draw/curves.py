@@ -1,4 +1,4 @@
-"""Curves of a run: columns over its axis in Axes of matplotlib, with gaps where samples have no numbers."""
+"""Curves of a run in Axes of matplotlib, with gaps for samples without numbers; overview(): its outputs."""
 
 from __future__ import annotations
 
@@ -11,18 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.abscissa import abscissa, raised
+from kinfmu.draw.chart import abscissa, dress, raised
 from kinfmu.draw.scene import palette
 from kinfmu.draw.sheet import ink
 from kinfmu.errors import FigureError, RequestError, suggestion
 from kinfmu.run import Run
-from kinfmu.units import degrees_of
+from kinfmu.units import CoordinateName, degrees_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 
 LOST: palette.Colour = (246, 222, 222)
 _BINS = 1500  # of a long run; each shows its least and its greatest value
+MOST_CURVES = 4  # of a panel
+WIDTH, HEIGHT = 4.4, 2.4  # [in] of a panel
 
 
 def curves(axes: Axes, run: Run, columns: Sequence[str] = (), x: str = "", *, degrees: bool = False) -> Axes:
@@ -92,3 +96,28 @@ def gaps(run: Run, values: FloatArray) -> list[tuple[float, float]]:
         (float(values[max(begin - 1, 0)]), float(values[min(end, last)]))
         for begin, end in zip(turns[::2], turns[1::2], strict=True)
     ]
+
+
+def overview(run: Run) -> Figure:
+    """Return a figure of the first outputs of a run with samples, with a panel for each unit; needs matplotlib."""
+    from matplotlib.figure import Figure
+
+    by_unit = [[name for name in shown_outputs(run) if name.is_angle == is_angle] for is_angle in (False, True)]
+    panels = [names for names in by_unit if names]
+    figure = Figure(figsize=(WIDTH * max(len(panels), 1), HEIGHT), layout="constrained", facecolor="white")
+    for index, names in enumerate(panels, start=1):
+        axes = figure.add_subplot(1, len(panels), index)
+        curves(axes, run, names[:MOST_CURVES])
+        dress(axes, "")
+        axes.set_ylabel("rad" if names[0].is_angle else run.length_unit)
+        more = f"and {len(names) - MOST_CURVES} more" if len(names) > MOST_CURVES else None
+        axes.legend(
+            title=more, fontsize=7.0, title_fontsize=7.0, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0)
+        )
+    return figure
+
+
+def shown_outputs(run: Run) -> list[CoordinateName]:
+    """Return the outputs that a run holds, points of interest first."""
+    outputs = [*run.outputs[run.coordinate_count :], *run.names]
+    return [name for name in outputs if name not in run.absent]

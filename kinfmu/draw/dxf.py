@@ -6,23 +6,27 @@ import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.draw.animation import placed_run
-from kinfmu.draw.lines import Lines
-from kinfmu.draw.painting import placed
-from kinfmu.draw.pose_at import pose_at
+from kinfmu.draw.drawing import placed
 from kinfmu.draw.scene.instant import Instant
+from kinfmu.draw.scene.placing import poses_after, poses_of
 from kinfmu.draw.scene.shapes import shapes
 from kinfmu.draw.writing import write_bytes
 from kinfmu.errors import FigureError, MissingPackageError
 from kinfmu.files import suffix_of
+from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.laws import External
 from kinfmu.mechanism.quantities.placement import body_of
 from kinfmu.run import Run
+from kinfmu.run.axis import SAMPLE, Axis, axis_of
 
 DXF_UNITS = {"in": 1, "ft": 2, "mm": 4, "cm": 5, "m": 6, "km": 7, "um": 13}  # $INSUNITS
 _DRAWN = (  # what has true dimensions
@@ -30,6 +34,8 @@ _DRAWN = (  # what has true dimensions
     *("cam", "pitch", "roller"),
 )
 POINT_STYLE = 34  # $PDMODE: a cross in a circle
+_SAME_VALUE = 1e-9  # of the largest value; nearer ones are one: driver values are rounded
+_SAME_POINT = 1e-9  # of the extent of the drawing; points that are closer are one
 
 
 def dxf(run: Run, path: str | Path, at: float | None = None) -> None:
@@ -107,3 +113,108 @@ def without_date(ezdxf: Any) -> Iterator[None]:
         yield
     finally:
         ezdxf.options.write_fixed_meta_data_for_testing = before
+
+
+def pose_at(run: Run, mechanism: Mechanism, at: float, path: Path) -> dict[str, FloatArray]:
+    """Return poses (1, 3) by body and for the ground.
+
+    Args:
+        run: The run, with a sample at least.
+        mechanism: Its mechanism.
+        at: Value on the axis of the run, in the unit of `axis_of`.
+        path: The file to draw, for messages.
+
+    Raises:
+        FigureError: The value is outside the run, in a gap, or its pose cannot be solved.
+
+    """
+    axis = axis_of(run)
+    asked = f"at t = {at:g} s" if axis.is_time else f"at {axis.name} = {at:.9g} {axis.unit}".rstrip()
+    distance = (axis.values - at) * (1.0 if axis.values[-1] >= axis.values[0] else -1.0)  # ascending
+    same = _SAME_VALUE * float(np.abs(axis.values).max())
+    if distance[0] > same or distance[-1] < -same:
+        raise FigureError(f"{path}: {asked} is outside the run, {axis.range()}")
+    there = np.flatnonzero(np.abs(axis.values - at) <= same)
+    after = int(there[-1]) if len(there) else int(np.argmax(distance > 0.0))
+    before = after if len(there) else after - 1
+    if not run.good[[before, after]].all():
+        raise FigureError(f"{path}: the run has no numbers {asked}")
+    ground = {GROUND_NAME: np.zeros((1, 3))}
+    if len(there):
+        return {body: pose[[after]] for body, pose in poses_of(run, mechanism)[0].items()} | ground
+    found = None
+    if run.axis != SAMPLE:
+        found = poses_after(run, mechanism, before, [*_driver_values(run, mechanism, axis, at, before)])
+    if found is None:
+        raise FigureError(
+            f"{path}: {asked} is between two samples, and its pose cannot be solved from them; samples: "
+            f"{axis.values[before]:.9g} and {axis.values[after]:.9g}"
+        )
+    return found | ground
+
+
+def _driver_values(run: Run, mechanism: Mechanism, axis: Axis, at: float, row: int) -> Iterator[float]:
+    """Yield the value of each driver at a value of the axis between `row` and the next sample.
+
+    Over time it is that of the law if the run follows it there, else of a polynomial through values, speeds and
+    accelerations; over a driver it is that on the axis, and the others are at rest.
+    """
+    from scipy.interpolate import BPoly
+
+    ends = [row, row + 1]
+    for k, name in enumerate(run.input_names[::3]):
+        table = run.inputs[ends, 3 * k : 3 * k + 3]
+        if not axis.is_time:
+            yield at * axis.factor if name == run.axis else float(table[0, 0])
+            continue
+        law = mechanism.drivers[k].law
+        t = run.t[ends]
+        if not isinstance(law, External) and np.allclose([law.at(one) for one in t], table[:, 0], 1e-9, 1e-9):
+            yield float(law.at(at))
+        else:
+            known = table if np.isfinite(table).all() else table[:, :1]
+            yield float(BPoly.from_derivatives(t, known)(at))
+
+
+class Lines:
+    """The straight lines of a layer.
+
+    Args:
+        extent: Of the drawing.
+
+    """
+
+    def __init__(self, extent: float) -> None:
+        self._near = _SAME_POINT * extent
+        self._drawn: list[tuple[FloatArray, FloatArray]] = []
+
+    def new(self, points: FloatArray, *, is_closed: bool) -> Iterator[tuple[FloatArray, bool]]:
+        """Yield the parts of a polyline (n, 2) that are not drawn yet, each with whether it is closed."""
+        ends = np.concatenate([points, points[:1]]) if is_closed and len(points) > 2 else points
+        ends = ends[np.append(True, np.hypot(*np.diff(ends, axis=0).T) > self._near)]
+        parts = []
+        for a, b in pairwise(ends):
+            parts.append(self._open_parts(a, b))
+            self._drawn.append((a, b))
+        if parts and all(part == [(0.0, 1.0)] for part in parts):
+            closes = is_closed and len(parts) > 2
+            yield (ends[:-1] if closes else ends), closes
+            return
+        for (a, b), own in zip(pairwise(ends), parts, strict=True):
+            for low, high in own:
+                yield np.array([a + low * (b - a), a + high * (b - a)]), False
+
+    def _open_parts(self, a: FloatArray, b: FloatArray) -> list[tuple[float, float]]:
+        """Return the parts of the line from a to b, as parts of it, that no drawn line covers."""
+        along = b - a
+        length = float(np.hypot(*along))
+        least = self._near / length
+        drawn = np.array(self._drawn).reshape(-1, 2, 2) - a  # (k, 2, 2)
+        across = np.abs(drawn[..., 0] * along[1] - drawn[..., 1] * along[0]).max(axis=1, initial=0.0) / length
+        covered = np.sort(drawn[across <= self._near] @ along / length**2, axis=1)
+        found, begin = [], 0.0
+        for low, high in sorted((low, high) for low, high in covered.tolist() if high > least and low < 1.0 - least):
+            if low > begin + least:
+                found.append((begin, low))
+            begin = max(begin, high)
+        return found if begin >= 1.0 - least else [*found, (begin, 1.0)]

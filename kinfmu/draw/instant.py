@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.motion import value_text
+from kinfmu.draw.marks import value_text
 from kinfmu.draw.scene.instant import Instant, OpenGap
-from kinfmu.draw.scene.outline import points_of, rim
 from kinfmu.draw.scene.placing import poses_of, world
+from kinfmu.draw.scene.shape import points_of, rim
 from kinfmu.errors import FigureError, KinfmuError, listed
 from kinfmu.mechanism import Mechanism, Point
 from kinfmu.mechanism.body import GROUND_NAME

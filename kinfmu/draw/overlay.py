@@ -9,11 +9,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.abscissa import Abscissa, abscissa, degree_ticks, label_size, labelled, unit_in
-from kinfmu.draw.chart import SMALL, dress, numbers, powers_of_ten
+from kinfmu.draw.chart import (
+    SMALL,
+    Abscissa,
+    abscissa,
+    degree_ticks,
+    dress,
+    label_size,
+    labelled,
+    numbers,
+    powers_of_ten,
+    unit_in,
+)
 from kinfmu.draw.curves import LOST, gaps, rows_of
-from kinfmu.draw.polar import radial_scale
 from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.palette import Colour
 from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
 from kinfmu.errors import FigureError
 from kinfmu.run import Run
@@ -24,6 +34,7 @@ from kinfmu.units import degrees_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
 
 MOST_PANELS = 8  # more make a sheet too large to print
 MOST_CURVES = 18  # of a panel: so many colours differ
@@ -40,6 +51,10 @@ _EDGE = 8.0  # [pt] around the title
 _WIDE, _NARROW = 3.6, 1.2  # [pt], curves of the first of two runs and of the second one or of a single one
 LOGARITHMIC = ("solver.residual", "solver.margin", "solver.error_", "watch.")  # columns on a scale of powers of ten
 LEAST = 1e-18  # smallest value on such a scale: zeros have no logarithm
+_GRID: Colour = (228, 228, 228)
+_ROOM = 0.25  # of the range of the values, between the centre and the least value if that is negative
+_INNERMOST = 0.15  # of the radius; numbers nearer to the centre would be on one another
+_PLACES = np.radians(np.arange(11.25, 360.0, 22.5))  # of the numbers, between the lines of the grid
 
 
 @dataclass(frozen=True, eq=False)
@@ -339,3 +354,37 @@ def values_of(run: Run, column: str) -> FloatArray:
     if column in run.input_names or column in ("time", "solver.status", "solver.iterations"):
         return values
     return np.where(run.good, values, np.nan)
+
+
+def radial_scale(axes: Any, curves: Sequence[tuple[FloatArray, FloatArray]]) -> float:
+    """Give polar axes their scale for curves (angles [rad], values), and return the value of the centre.
+
+    That is 0; if there are negative values it lies below them, and a circle shows 0.
+    """
+    from matplotlib.ticker import MaxNLocator
+
+    grey = ink(GREY)
+    axes.tick_params(labelsize=SMALL, labelcolor=grey)
+    axes.grid(linewidth=0.5, color=ink(_GRID))
+    axes.spines["polar"].set(linewidth=0.6, color=grey)
+    known = np.concatenate([values[np.isfinite(values)] for _, values in curves])
+    if not len(known):
+        return 0.0
+    low, high = float(known.min()), float(known.max())
+    size = (high - min(low, 0.0)) or abs(high) or 1.0
+    centre = 0.0 if low >= 0.0 else low - _ROOM * size
+    top = high + 0.05 * (high - centre)
+    axes.set_rlim(centre, top)
+    ticks = np.asarray(MaxNLocator(5).tick_values(centre, top))
+    ticks = ticks[(ticks > centre + _INNERMOST * (top - centre)) & (ticks < top)]
+    axes.set_yticks(ticks)
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value + 0.0:.4g}".replace("-", "\N{MINUS SIGN}"))
+    if low < 0.0:
+        around = np.linspace(0.0, 2.0 * np.pi, 181)
+        axes.plot(around, np.zeros(len(around)), linewidth=0.9, color=grey, label="_", zorder=2.05)  # over the grid
+    drawn = np.concatenate([(values - centre) * np.exp(1j * angles) for angles, values in curves])
+    drawn = drawn[np.isfinite(drawn)]
+    spots = (ticks[:, None] - centre) * np.exp(1j * _PLACES)  # (ticks, places)
+    apart = np.abs(spots[:, :, None] - drawn[None, None, :: max(len(drawn) // 500, 1)]).min(axis=(0, 2))
+    axes.set_rlabel_position(float(np.degrees(_PLACES[int(np.argmax(np.round(apart / size, 6)))])))
+    return centre

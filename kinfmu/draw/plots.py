@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.abscissa import axis_label, degree_ticks, label_size
-from kinfmu.draw.chart import SMALL, dress, numbers, powers_of_ten
+from kinfmu.draw.chart import SMALL, axis_label, degree_ticks, dress, label_size, numbers, powers_of_ten, span
 from kinfmu.draw.curves import LOST, curves, gaps, rows_of
 from kinfmu.draw.overlay import (
     LEAST,
@@ -225,7 +224,7 @@ def _panel(axes: Axes, runs: Sequence[Run], panel: Panel, *, degrees: bool) -> N
         axes.plot(axis_of(run).values[rows], shown[rows], **look)
     dress(axes, "")
     run, axis, known = runs[0], axis_of(runs[0]), np.concatenate(everything)
-    axes.set_xlim(*_span(np.concatenate([axis_of(one).values for one in runs])))
+    axes.set_xlim(*span(np.concatenate([axis_of(one).values for one in runs]), 0.01))
     if axis.unit == "deg":
         degree_ticks(axes, 6)
     if is_log:
@@ -272,9 +271,3 @@ def _usual(run: Run, axis: Axis, panel: Panel) -> float:
         like = run.values[run.good][:, [other.is_angle == name.is_angle for other in run.outputs]]
     size = float(np.max(np.abs(like), initial=0.0, where=np.isfinite(like)))
     return size if isinstance(name, ForceName) else size / (axis.span or 1.0) ** panel.order
-
-
-def _span(t: FloatArray) -> tuple[float, float]:
-    first, last = float(t.min()), float(t.max())
-    edge = 0.01 * (last - first) or 0.5
-    return first - edge, last + edge

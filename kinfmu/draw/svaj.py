@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.abscissa import Abscissa, abscissa, degree_ticks, labelled
-from kinfmu.draw.chart import SMALL, dress, numbers
+from kinfmu.draw.chart import SMALL, Abscissa, abscissa, degree_ticks, dress, labelled, numbers
 from kinfmu.draw.curves import rows_of
 from kinfmu.draw.overlay import curve_colour, range_of, sheet_title
 from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines

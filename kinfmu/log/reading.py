@@ -16,8 +16,7 @@ from kinfmu.arrays import FloatArray
 from kinfmu.errors import LogError, listed
 from kinfmu.log.cdr import NANOSECONDS, Template, nanoseconds
 from kinfmu.log.mcap_reader import McapReader
-from kinfmu.log.record import lists_in, run_of
-from kinfmu.log.record_text import events_of, samples_of, whole_number
+from kinfmu.log.record import events_of, lists_in, run_of, samples_of, whole_number
 from kinfmu.log.topics import LOG_TOPIC, SAMPLE_TOPIC, event_in, sample_template
 from kinfmu.log.writing import (
     ABOUT,

@@ -19,18 +19,17 @@ from kinfmu.analysis.measuring import turns_of_cycle
 from kinfmu.analysis.text import contact_text
 from kinfmu.draw.instant import instant
 from kinfmu.draw.scene import palette
-from kinfmu.draw.scene.gravity import gravity_direction
-from kinfmu.draw.scene.instant import Instant
-from kinfmu.draw.scene.load_shapes import EFFORT_UNITS, load_text
+from kinfmu.draw.scene.instant import Instant, gravity_direction
+from kinfmu.draw.scene.joints import Slide, slides
+from kinfmu.draw.scene.loads import EFFORT_UNITS, load_text
 from kinfmu.draw.scene.shape import Shape
 from kinfmu.draw.scene.shapes import shapes
-from kinfmu.draw.scene.slides import Slide, slides
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
 from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.force_names import force_names, reaction_names_of
-from kinfmu.mechanism.joints import CamFlatFace, CamRoller, Coordinate, Distance, PointOnLine, Translational
+from kinfmu.mechanism.joints import CamFlatFace, CamRoller, Coordinate, Distance, PointOnLine, Revolute, Translational
 from kinfmu.mechanism.joints.joint import Joint
 from kinfmu.mechanism.laws import ConstantValue
 from kinfmu.mechanism.loads import Following, ForceAlong, ForceAt
@@ -38,10 +37,9 @@ from kinfmu.mechanism.members import NumberPath
 from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.quantities.placement import body_of, unit_vector
 from kinfmu.mechanism.toml_text import text
-from kinfmu.page.cams import CAM_SHAPES, cam_data
-from kinfmu.page.dependencies import dependent_points, number_data, parameters_of
+from kinfmu.motion.cams.placed import members_of
 from kinfmu.page.module import PageModule
-from kinfmu.page.opened import AXES, place_text
+from kinfmu.page.opened import AXES, dependent_points, number_data, parameters_of, place_text
 from kinfmu.plan.undetermined import undetermined_reactions
 from kinfmu.units import Quantity, unit_of
 from kinfmu.version import VERSION
@@ -49,6 +47,7 @@ from kinfmu.version import VERSION
 _DIGITS = 7  # of numbers that are only drawn
 _NOT_DRAWN = ("rib", "contact")  # the page finds corners and ribs of a link from its points
 _ON_LINES = ("rail", "bed", "slot", "rod", "block", "die")
+CAM_SHAPES = ("cam", "pitch", "face")  # kinds; a cam with one of them is known
 
 
 def describe(mechanism: Mechanism, report: Report) -> dict[str, Any]:
@@ -84,7 +83,7 @@ def describe(mechanism: Mechanism, report: Report) -> dict[str, Any]:
             {"body": body_of(name), "name": name.partition(".")[2], "x": float(x), "y": float(y)}
             for name, (x, y) in mechanism.body_points.items()
         ],
-        "joints": [_joint(joint, numbers) | _numbers(mechanism, joint) for joint in mechanism.joints],
+        "joints": [_joint(mechanism, joint, numbers) for joint in mechanism.joints],
         "drivers": [_driver(driver, shown, report, numbers) for driver in mechanism.drivers],
         "interest": [
             {"name": name, "point": numbers[point], "colour": list(palette.body(len(bodies) - 1 + k))}
@@ -164,12 +163,6 @@ def _parameter(
     }
 
 
-def _numbers(mechanism: Mechanism, joint: Joint) -> dict[str, Any]:
-    """Return the parameters on which numbers of a joint depend; nothing if there are none."""
-    names = parameters_of(mechanism, joint)
-    return {"numbers": names} if names else {}
-
-
 def _line(shape: Shape, slide: Slide | None, numbers: Mapping[str, int]) -> dict[str, Any]:
     """Return for a shape of a slide its holder, its sliding point, and a point of its line if that has a name."""
     if slide is None or shape.kind not in _ON_LINES or (shape.kind == "rail" and slide.holder != GROUND_NAME):
@@ -223,8 +216,8 @@ def written_file(mechanism: Mechanism, module: PageModule, places: Mapping[str, 
     return text(written)
 
 
-def _joint(joint: Joint, numbers: Mapping[str, int]) -> dict[str, Any]:
-    """Return a joint with the numbers of its points and the direction of its slide in the first body's frame."""
+def _joint(mechanism: Mechanism, joint: Joint, numbers: Mapping[str, int]) -> dict[str, Any]:
+    """Return a joint with the numbers of its points, its parameters, and its slide in the first body's frame."""
     found: dict[str, Any] = {"name": joint.name, "type": joint.type}
     points = getattr(joint, "between", ()) if not hasattr(joint, "of") else (joint.of,)
     if all(point in numbers for point in points):
@@ -233,7 +226,8 @@ def _joint(joint: Joint, numbers: Mapping[str, int]) -> dict[str, Any]:
         found["axis"] = float(joint.axis)
     if isinstance(joint, Coordinate):
         found["across"] = joint.axis
-    return found
+    names = parameters_of(mechanism, joint)
+    return found | ({"numbers": names} if names else {})
 
 
 def _driver(driver: Driver, shown: Instant, report: Report, numbers: Mapping[str, int]) -> dict[str, Any]:
@@ -404,3 +398,29 @@ def _loops(report: Report, numbers: Mapping[str, int]) -> Any:
             angle = one.transmission[0]
             found = {"driver": angle.driver, "coupler": angle.coupler, "output": angle.output}
             yield found | {"pins": pins} | ({} if one.dyad.direction is None else {"direction": one.dyad.direction})
+
+
+def cam_data(mechanism: Mechanism, joint: Any, numbers: Mapping[str, int]) -> dict[str, Any]:
+    """Return a cam: its bodies and points, and the bodies and joints whose numbers determine its curve.
+
+    Args:
+        mechanism: The mechanism.
+        joint: A joint of a cam whose contact is known.
+        numbers: The numbers of points, by 'body.point'.
+
+    """
+    cam, follower, touching = members_of(joint)
+    if touching is None:
+        raise TypeError(f"the contact of cam '{joint.name}' is unknown")
+    found: dict[str, Any] = {"name": joint.name, "body": cam, "follower": follower, "point": numbers[touching]}
+    for key in ("roller_radius", "normal"):
+        value = getattr(joint, key, None)
+        if value is not None:
+            found[key] = number_data(mechanism, ("joints", joint.name, key), float(value))
+    if isinstance(joint, CamRoller | CamFlatFace):  # the file has the curve
+        return found | {"centre": numbers[joint.between[0]], "bodies": [], "joints": [joint.name]}
+    bodies = joint.bodies()
+    among = [one for one in mechanism.joints if {*one.bodies()} <= {*bodies}]
+    axle = next(one for one in among if isinstance(one, Revolute) and {*one.bodies()} == {cam, joint.holder()})
+    own = next(point for point in axle.between if body_of(point) == cam)
+    return found | {"centre": numbers[own], "bodies": list(bodies), "joints": [one.name for one in among]}

@@ -6,7 +6,7 @@ import numpy as np
 
 import kinfmu
 from kinfmu.design.fit import MeasureConstraint, MeasureTarget
-from kinfmu.draw.study_panels import Quantities
+from kinfmu.draw.study import Quantities
 from kinfmu.mechanism.measures import counted_from
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text as toml_text

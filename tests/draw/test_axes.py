@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 import kinfmu
 from kinfmu.draw import figure, plot
-from kinfmu.draw.abscissa import unit_in
+from kinfmu.draw.chart import unit_in
 from kinfmu.draw.drawing import sheet_of
 from kinfmu.draw.instant import instant
 from kinfmu.draw.writing import figure_style

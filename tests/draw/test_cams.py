@@ -16,8 +16,8 @@ from kinfmu.analysis import cam_profile
 from kinfmu.draw.cam import _figure
 from kinfmu.draw.instant import instant
 from kinfmu.draw.scene import palette
-from kinfmu.draw.scene.cams import CamShape, cam_shapes
 from kinfmu.draw.scene.details import on_face
+from kinfmu.draw.scene.joints import CamShape, cam_shapes
 from kinfmu.draw.scene.scene import scene
 from kinfmu.draw.scene.shape import Shape, guides_of_cams
 from kinfmu.draw.sheet import ink

@@ -16,7 +16,7 @@ from PIL import Image
 import kinfmu
 import kinfmu.mechanism.gallery
 from kinfmu.draw import animate, animation, dxf
-from kinfmu.draw.video import encoder, mp4
+from kinfmu.draw.animation import encoder, mp4
 from kinfmu.errors import FigureError, MissingPackageError
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.run.axis import axis_of

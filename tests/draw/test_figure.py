@@ -7,15 +7,21 @@ import struct
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import kinfmu
 from kinfmu import Angle, AngleDriver, Body, ConstantSpeed, Mechanism, Revolute
 from kinfmu.draw import figure
+from kinfmu.draw.drawing import placed, sheet_of
 from kinfmu.draw.instant import instant, pose_note
+from kinfmu.draw.scene.shapes import shapes
+from kinfmu.draw.sheet import BAR
 from kinfmu.errors import AssemblyError, FigureError, MissingPackageError, RequestError
 from kinfmu.mechanism import gallery, toml_file, toml_text
 from tests.gallery_members import every_member
@@ -46,6 +52,27 @@ def test_a_mechanism_of_the_gallery_is_drawn_with_all_its_names(
         assert f"{driver.name} = " in texts
     for point in mechanism.points:
         assert point in words
+
+
+@every_member
+def test_names_are_above_all_lines_and_off_the_links_bars_and_cylinders(name: str) -> None:
+    shown = instant(gallery.load(name))
+    sheet = sheet_of(shown)
+    canvas = FigureCanvasAgg(sheet.figure)
+    canvas.draw()  # type: ignore[no-untyped-call]  # matplotlib has no types here
+    point = sheet.figure.dpi / 72.0
+    half = (0.5 * BAR * sheet.fine - 1.5) * point  # of a bar, whose edge a name may touch
+    names = [text for text in sheet.axes.texts if text.get_transform() != sheet.axes.transAxes]
+    assert min(text.get_zorder() for text in names) > max(patch.get_zorder() for patch in sheet.axes.patches)
+    for shape in placed(shown, shapes(shown)):
+        if shape.kind not in ("link", "bar", "rod", "barrel"):
+            continue
+        for a, b in pairwise(sheet.axes.transData.transform(shape.line)):
+            dots = a + np.linspace(0.0, 1.0, 300)[:, None] * (b - a)
+            for text in names:
+                box = text.get_window_extent().get_points()
+                apart = np.maximum(np.maximum(box[0] - dots, dots - box[1]), 0.0)
+                assert np.hypot(*apart.T).min() > half, f"{text.get_text()} is on {shape.name}"
 
 
 @pytest.mark.parametrize("suffix", [".svg", ".png"])

@@ -23,16 +23,14 @@ from kinfmu import (
     Translational,
     load,
 )
-from kinfmu.draw.drawing import sheet_of
+from kinfmu.draw.drawing import placed, sheet_of
 from kinfmu.draw.instant import instant
-from kinfmu.draw.motion import Length, Push, Turn, motion
+from kinfmu.draw.marks import Length, Pin, Push, Turn, motion, pins
 from kinfmu.draw.names import LEADER
-from kinfmu.draw.painting import placed
-from kinfmu.draw.pins import Pin, pins
 from kinfmu.draw.scene.instant import Instant
+from kinfmu.draw.scene.joints import slides
 from kinfmu.draw.scene.shape import Shape
 from kinfmu.draw.scene.shapes import shapes
-from kinfmu.draw.scene.slides import slides
 from kinfmu.draw.sheet import ink
 from tests.gallery_members import every_member
 from tests.mechanism.joints.test_mechanisms import crank_and_slider

@@ -14,8 +14,7 @@ from matplotlib.figure import Figure
 
 import kinfmu
 from kinfmu.draw import plot
-from kinfmu.draw.abscissa import axis_label, degree_ticks, label_size
-from kinfmu.draw.chart import numbers
+from kinfmu.draw.chart import axis_label, degree_ticks, label_size, numbers
 from kinfmu.draw.curves import gaps, rows_of
 from kinfmu.draw.overlay import overlay, overlay_sheet
 from kinfmu.draw.plots import _sheet, _shown

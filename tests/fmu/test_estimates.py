@@ -15,7 +15,7 @@ from kinfmu import AngleDriver, Body, ConstantSpeed, Distance, Mechanism, Revolu
 from kinfmu.fmu import build, simulate
 from kinfmu.fmu.build import FLAVOURS
 from kinfmu.log import McapLog, read
-from kinfmu.log.record_text import ESTIMATES
+from kinfmu.log.record import ESTIMATES
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.plan import compile_plan
 from kinfmu.run import Run

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu.draw.scene.components import component_runs
+from kinfmu.draw.scene.completed import component_runs
 from kinfmu.draw.scene.forces import arrows
 from kinfmu.draw.scene.scene import drawable
 from kinfmu.errors import FmuError, KinfmuError, RequestError

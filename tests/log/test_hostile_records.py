@@ -17,7 +17,7 @@ import zstandard
 
 from kinfmu.draw import animate
 from kinfmu.errors import FigureError, LogError
-from kinfmu.log import mcap_reader, read, record, record_text, recover, write_mcap, writing
+from kinfmu.log import mcap_reader, read, record, recover, write_mcap, writing
 from kinfmu.log.mcap_writer import MESSAGE, ZSTD, Opcode
 from kinfmu.log.viewer.series import groups
 from kinfmu.run import Run
@@ -107,7 +107,7 @@ def test_a_million_names_are_refused_at_once(run: Run, tmp_path: Path, key: str)
     names = json.dumps([f"a{k}.x" for k in range(NAMES)])
     path = with_texts(run, tmp_path / "a.mcap", {key: names})
     began = time.process_time()
-    message = f"{key} of the record: {NAMES} entries; {record_text.MOST_COLUMNS} at most"
+    message = f"{key} of the record: {NAMES} entries; {record.MOST_COLUMNS} at most"
     assert line_of(path) == message
     assert time.process_time() - began < 5.0
 

@@ -121,7 +121,7 @@ def test_rows_in_messages_are_joints_and_drivers(chromium: Browser) -> None:
         "redundant row C.x does not close": "joint C does not close",
         "where rows C.x, C.y are dependent": "where the equations of joint C are dependent",
     }
-    code = (Path(kinfmu.page.__file__).parent / "web" / "messages.js").read_text("utf-8").replace("export ", "")
+    code = (Path(kinfmu.page.__file__).parent / "web" / "numbers.js").read_text("utf-8").replace("export ", "")
     with chromium.tab() as page:
         for text, wanted in stated.items():
             assert page.tab.evaluate(f"text => {{ {code}; return ofJoints(text, ['lift']); }}", text) == wanted

@@ -9,11 +9,19 @@ import numpy as np
 
 from kinfmu.design.study.rows import StudyRows
 from kinfmu.draw.chart import dress
-from kinfmu.draw.contours import contours, contours_into
-from kinfmu.draw.contributions import Contributed, contributions, contributions_into
-from kinfmu.draw.response import response, response_into
-from kinfmu.draw.scatter import MOST_COLUMNS, scatter_into, scatter_matrix
-from kinfmu.draw.study_panels import Quantities
+from kinfmu.draw.study import (
+    MOST_COLUMNS,
+    Contributed,
+    Quantities,
+    contours,
+    contours_into,
+    contributions,
+    contributions_into,
+    response,
+    response_into,
+    scatter_into,
+    scatter_matrix,
+)
 from kinfmu.draw.writing import check_suffix, check_target, write
 from kinfmu.errors import FigureError, StudyError, listed, suggestion
 from kinfmu.mechanism.measures import counted_from

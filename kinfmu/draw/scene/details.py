@@ -10,9 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.scene.outline import FLAT
-from kinfmu.draw.scene.shape import Shape
-from kinfmu.draw.scene.symbols import Strip
+from kinfmu.draw.scene.shape import FLAT, Shape, Strip
 
 BLOCK, BLOCK_WIDTH = 11.0, 7.0  # half length and half width of a block
 SUPPORT = 13.0  # height of a support

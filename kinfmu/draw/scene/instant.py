@@ -109,3 +109,11 @@ class Instant:
         poses = {name: BodyFrame.of(*pose[0].tolist()) for name, pose in self.poses.items()}
         (found,) = (one for one in self.mechanism.drivers if one.name == driver)
         return float(found.measured().value(Placement(poses, self.body_points)))
+
+
+def gravity_direction(mechanism: Mechanism) -> FloatArray | None:
+    """Return the unit vector (2,) of gravity in the world; None without gravity or without bodies with masses."""
+    pull = np.array(mechanism.gravity or (0.0, 0.0), dtype=float)
+    if not pull.any() or not any(body.mass for body in mechanism.moving_bodies):
+        return None
+    return np.asarray(pull / np.hypot(*pull))

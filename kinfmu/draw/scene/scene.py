@@ -9,11 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.scene.gravity import gravity_direction
-from kinfmu.draw.scene.instant import Instant
-from kinfmu.draw.scene.outline import pins_of
+from kinfmu.draw.scene.instant import Instant, gravity_direction
 from kinfmu.draw.scene.placing import poses_of, remedy, world
-from kinfmu.draw.scene.shape import Shape, frames
+from kinfmu.draw.scene.shape import Shape, frames, pins_of
 from kinfmu.draw.scene.shapes import shapes
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism.body import GROUND_NAME

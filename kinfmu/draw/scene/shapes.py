@@ -9,13 +9,10 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.draw.scene import palette
-from kinfmu.draw.scene.cams import cam_shapes
 from kinfmu.draw.scene.instant import Instant
-from kinfmu.draw.scene.load_shapes import BETWEEN, lengths_between, load_shapes
-from kinfmu.draw.scene.outline import points_of, ribs, rim
-from kinfmu.draw.scene.shape import Shape, bar_frame, cylinder_frames, die_frame
-from kinfmu.draw.scene.slides import Slide, place, racks_of, rods, slides
-from kinfmu.draw.scene.wheels import wheels
+from kinfmu.draw.scene.joints import Slide, cam_shapes, place, racks_of, rods, slides, wheels
+from kinfmu.draw.scene.loads import BETWEEN, lengths_between, load_shapes
+from kinfmu.draw.scene.shape import Shape, bar_frame, cylinder_frames, die_frame, points_of, ribs, rim
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.drivers import DistanceDriver, Driver
 from kinfmu.mechanism.joints import CamRoller, Distance, Fixed, PointOnLine, Revolute

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kinfmu.draw.scene.estimates import with_estimates
+from kinfmu.draw.scene.completed import with_estimates
 from kinfmu.fmu.description import Description
 from kinfmu.fmu.host.slaves import LoadedSlave
 from kinfmu.fmu.interface import Interface, Variable

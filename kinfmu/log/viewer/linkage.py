@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,16 +15,14 @@ from kinfmu.draw.scene import details, palette
 from kinfmu.draw.scene.forces import Arrows
 from kinfmu.draw.scene.scene import Scene
 from kinfmu.draw.scene.shape import Shape, guides_of_cams
-from kinfmu.log.viewer.ground import MOST_NAMES, log_ground
-from kinfmu.log.viewer.labels import detail, shown_names
-from kinfmu.log.viewer.timeline import Timeline
+from kinfmu.log.viewer.ground import MARGIN, MOST_NAMES, detail, log_ground, shown_names
+from kinfmu.log.viewer.timeline import Timeline, send
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import Run
 
 if TYPE_CHECKING:
     import rerun as rr
 
-MARGIN = 0.12  # around the linkage, as a part of its size
 TRAIL = 0.5  # length of the trail behind a point, as a part of the linkage's size
 LONGEST_TRAIL = 0.2  # of the run's time
 _TRAIL_PIECES = 1500  # of a path over the whole run
@@ -32,7 +30,6 @@ _PIN, _POINT = 0.012, 0.015  # radii, as parts of the size
 _TIP = 0.03  # around the tips of arrows, as a part of the size
 _SUPPORT_NAMES = 0.04  # additional margin below, for the names of supports
 APPLICATION = "kinfmu"
-ROWS = 4096  # larger blocks are slower and take more memory
 
 
 class _Paint(NamedTuple):
@@ -60,19 +57,6 @@ _PAINT = {
     "shaft": _Paint(0.006, 26.0),
     "barrel": _Paint(0.0176, 27.0),
 }
-
-
-def send(
-    rec: rr.RecordingStream,
-    path: str,
-    timeline: Timeline,
-    t: FloatArray,
-    columns: Callable[[slice], Iterable[rr.ComponentColumn]],
-) -> None:
-    """Send rows at times t (n,) of the timeline to the entity `path`; columns(rows): the columns of a slice of rows."""
-    for start in range(0, len(t), ROWS):
-        rows = slice(start, start + ROWS)
-        rec.send_columns(path, [timeline.column(t[rows])], columns(rows))
 
 
 def view_box(scene: Scene, forces: Arrows | None = None) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -21,17 +21,15 @@ import numpy as np
 from kinfmu.arrays import FloatArray
 from kinfmu.errors import LogError
 from kinfmu.log.cdr import nanoseconds
-from kinfmu.log.viewer.arrows import log_arrows
 from kinfmu.log.viewer.blueprint import Drawn, single
 from kinfmu.log.viewer.card import card
-from kinfmu.log.viewer.decimated import decimated
 from kinfmu.log.viewer.headless import executable, last_error
 from kinfmu.log.viewer.linkage import APPLICATION, Linkage
-from kinfmu.log.viewer.loads import FORCES, log_loads
+from kinfmu.log.viewer.marks import FORCES, log_arrows, log_loads
 from kinfmu.log.viewer.package import require_viewer
 from kinfmu.log.viewer.rerun_file import drawn_linkages, left_out, log_card, log_group, log_status
 from kinfmu.log.viewer.series import Group, accuracy, efforts, error_estimates, groups, iterations, margin, signals
-from kinfmu.log.viewer.timeline import timeline_of
+from kinfmu.log.viewer.timeline import decimated, timeline_of
 from kinfmu.run import Run
 
 if TYPE_CHECKING:

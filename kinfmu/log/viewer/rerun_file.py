@@ -33,22 +33,29 @@ from zlib import crc32
 import numpy as np
 
 from kinfmu.draw.scene import palette
-from kinfmu.draw.scene.components import component_runs
+from kinfmu.draw.scene.completed import component_runs
 from kinfmu.draw.scene.scene import drawable
 from kinfmu.errors import LogError
 from kinfmu.files import temporary_folder
 from kinfmu.log.cdr import nanoseconds
 from kinfmu.log.target import replacing
-from kinfmu.log.viewer.arrows import log_arrows
 from kinfmu.log.viewer.blueprint import Drawn, single
 from kinfmu.log.viewer.card import card
-from kinfmu.log.viewer.decimated import decimated
-from kinfmu.log.viewer.linkage import APPLICATION, Linkage, send
-from kinfmu.log.viewer.loads import log_loads
+from kinfmu.log.viewer.linkage import APPLICATION, Linkage
+from kinfmu.log.viewer.marks import log_arrows, log_loads
 from kinfmu.log.viewer.package import require_viewer
-from kinfmu.log.viewer.reactions import reactions
-from kinfmu.log.viewer.series import Group, accuracy, efforts, error_estimates, groups, iterations, margin, signals
-from kinfmu.log.viewer.timeline import Timeline, timeline_of
+from kinfmu.log.viewer.series import (
+    Group,
+    accuracy,
+    efforts,
+    error_estimates,
+    groups,
+    iterations,
+    margin,
+    reactions,
+    signals,
+)
+from kinfmu.log.viewer.timeline import Timeline, decimated, send, timeline_of
 from kinfmu.run import Run
 from kinfmu.run.components import is_of_mechanisms
 from kinfmu.run.verdict import changes, label, notable_events, sentence

@@ -1,14 +1,15 @@
-"""The timeline of a recording: time, or whole numbers of a part of the driver's unit for runs that have no time."""
+"""The rows of a recording: its timeline, fewer samples of long runs, and how they are sent."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kinfmu.arrays import FloatArray
 from kinfmu.errors import LogError
@@ -19,10 +20,13 @@ from kinfmu.run.axis import DEGREE, SAMPLE, axis_of
 if TYPE_CHECKING:
     import rerun as rr
 
+
+ROWS = 4096  # larger blocks are slower and take more memory
 FINEST = 9  # decimals of a value
 _LOST = 0.01  # part of the smallest step between samples that rounding may move one
 _MOST = 2.0**31  # the largest of the whole numbers
 _OF_DRIVER = re.compile(r"(?P<driver>.+) \[(?:0\.(?P<decimals>0*1) )?(?P<unit>[a-z]+)\]")  # 'crank [0.1 deg]'
+MOST_ROWS = 200_000  # of a recording; the viewer is slow with more
 
 
 @dataclass(frozen=True)
@@ -114,3 +118,42 @@ def _decimals(values: FloatArray) -> int:
         if lost <= _LOST * least or largest * 10 ** (decimals + 1) > _MOST:
             return decimals
     return FINEST
+
+
+def send(
+    rec: rr.RecordingStream,
+    path: str,
+    timeline: Timeline,
+    t: FloatArray,
+    columns: Callable[[slice], Iterable[rr.ComponentColumn]],
+) -> None:
+    """Send rows at times t (n,) of the timeline to the entity `path`; columns(rows): the columns of a slice of rows."""
+    for start in range(0, len(t), ROWS):
+        rows = slice(start, start + ROWS)
+        rec.send_columns(path, [timeline.column(t[rows])], columns(rows))
+
+
+def decimated(run: Run, most: int | None = None) -> Run:
+    """Return the run itself if it has at most `most` samples, else evenly spaced ones and the important ones between.
+
+    most: default MOST_ROWS. Important are the first and last sample of every gap and the numbers next to it, and the
+    least and greatest value of each column, so that no peak is lost. The MCAP record keeps every sample.
+    """
+    most = MOST_ROWS if most is None else most
+    if len(run) <= most:
+        return run
+    rows = np.union1d(np.arange(0, len(run), -(-len(run) // most)), _indispensable(run))
+    return run.part(rows, events=run.events)
+
+
+def _indispensable(run: Run) -> NDArray[np.int64]:
+    """Return the samples that must not be left out."""
+    found = [0, len(run) - 1]
+    turns = np.flatnonzero(np.diff(run.good.astype(int)))
+    found += [*turns.tolist(), *(turns + 1).tolist()]
+    for column in run.columns():
+        known = np.flatnonzero(np.isfinite(column.values))
+        if len(known):
+            values = column.values[known]
+            found += [int(known[np.argmin(values)]), int(known[np.argmax(values)])]
+    return np.array(found)

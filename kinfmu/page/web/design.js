@@ -1,4 +1,4 @@
-// The design: values of parameters, locks, undo and redo, the address of the page.
+// Values as set, what can be undone, and the address of the page that holds them: a link is a design.
 
 const MOST_STEPS = 200; // that can be undone
 
@@ -115,4 +115,39 @@ export class Design {
 
 function same(a, b) {
     return a.size === b.size && [...a].every(([name, value]) => b.get(name) === value);
+}
+
+const LATER = 300; // [ms] after the last move
+
+export class Address {
+    constructor(page) {
+        this.page = page;
+        window.addEventListener("hashchange", () => {
+            if (location.hash === this.written) return;
+            page.motion.blocked = "";
+            this.read();
+            page.reshape();
+        });
+    }
+
+    // Take the design of the address; state names that this mechanism does not have.
+    read() {
+        const ignored = this.page.design.read(location.hash);
+        if (ignored.length) this.page.hint(`The address names what this mechanism does not have: ${ignored.join(", ")}`);
+    }
+
+    write() {
+        const fragment = this.page.design.fragment();
+        this.written = fragment;
+        try {
+            history.replaceState(null, "", fragment || location.pathname + location.search);
+        } catch {
+            location.hash = fragment;
+        }
+    }
+
+    writeSoon() {
+        clearTimeout(this.writing);
+        this.writing = setTimeout(() => this.write(), LATER);
+    }
 }

@@ -1,12 +1,11 @@
 // The drawing of a linkage: shapes, pins, names, curves, arrows, marks.
 
-import { edgeOf, fillOf, GREY, inkOf, paleOf } from "./colours.js";
+import { edgeOf, fillOf, GREY, inkOf, paleOf, widthOf } from "./pen.js";
 import { distance, distanceToSegment, isSlim, outline, placed } from "./geometry.js";
 import { gravity, loads } from "./loads.js";
 import { marks } from "./marks.js";
 import { Names } from "./names.js";
 import { grouped, niceStep, number } from "./numbers.js";
-import { widthOf } from "./pen.js";
 import { BUTTONS } from "./view.js";
 
 // Draw a pose; show: what is switched on; view: from the plane to pixels; spots: of names in the frames before. Returns the

@@ -1,7 +1,6 @@
 // Files to take away: the mechanism with its lengths as set, tables, drawings, and the command that builds the FMU.
 
-import { SvgPen } from "./pen.js";
-import { THEMES } from "./colours.js";
+import { SvgPen, THEMES } from "./pen.js";
 import { draw } from "./drawing.js";
 import { Spots } from "./names.js";
 import { quantities, sampled } from "./plots.js";

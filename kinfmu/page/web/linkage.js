@@ -1,12 +1,11 @@
 // The mechanism that moves: engines, the pose that is shown, curves and ranges, quantities of the pose.
 
-import { comesTo, partingOf } from "./branches.js";
+import { changePointsOf, comesTo, partingOf, rangesOf } from "./ranges.js";
 import { isGood } from "./engine.js";
 import { CAMS, axlesOf, formsOf } from "./forms.js";
 import { TURN, placed } from "./geometry.js";
 import { dialOf } from "./marks.js";
 import { grouped } from "./numbers.js";
-import { changePointsOf, rangesOf } from "./ranges.js";
 
 const CURVE = 720; // points of a coupler curve
 const BOX = 73; // poses that decide what fits into the view

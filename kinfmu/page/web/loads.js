@@ -1,7 +1,7 @@
 // Symbols of loads, as the scene has them: springs, dampers, forces and torques; the direction of gravity.
 
 import { valueOf } from "./cams.js";
-import { css, edgeOf, GREY } from "./colours.js";
+import { css, edgeOf, GREY } from "./pen.js";
 import { distance } from "./geometry.js";
 import { number } from "./numbers.js";
 import { BUTTONS } from "./view.js";

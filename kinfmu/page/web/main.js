@@ -1,22 +1,17 @@
 // The page: one mechanism, its drawing, the hand on the drawing, motion over time, panels.
 
-import { Address } from "./address.js";
-import { arrows } from "./arrows.js";
-import { THEMES } from "./colours.js";
-import { Design } from "./design.js";
+import { Address, Design } from "./design.js";
+import { arrows } from "./marks.js";
+import { CanvasPen, THEMES } from "./pen.js";
 import { draw, foresee } from "./drawing.js";
 import { $, breakable, element } from "./elements.js";
 import { Engine, unpacked } from "./engine.js";
-import { Frames } from "./frames.js";
-import { Hand } from "./hand.js";
-import { keyboard } from "./keyboard.js";
+import { Frames, Motion } from "./motion.js";
+import { Hand, keyboard } from "./hand.js";
 import { Linkage } from "./linkage.js";
-import { ofJoints } from "./messages.js";
-import { Motion } from "./motion.js";
-import { withStop } from "./numbers.js";
+import { ofJoints, withStop } from "./numbers.js";
 import { PATIENCE, Spots } from "./names.js";
 import { filesPanel, Plots, showPanel } from "./panels.js";
-import { CanvasPen } from "./pen.js";
 import { Transport } from "./transport.js";
 import { Values } from "./values.js";
 import { View } from "./view.js";

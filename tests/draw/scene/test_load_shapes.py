@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 import kinfmu
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.scene import details, symbols
+from kinfmu.draw.scene import details
+from kinfmu.draw.scene import loads as symbols
 from kinfmu.draw.scene.instant import Instant
-from kinfmu.draw.scene.load_shapes import load_text
+from kinfmu.draw.scene.loads import load_text
 from kinfmu.draw.scene.placing import poses_of, world
 from kinfmu.draw.scene.scene import Scene, scene
 from kinfmu.draw.scene.shape import Shape

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kinfmu.draw.scene.outline import ribs, rim
+from kinfmu.draw.scene.shape import ribs, rim
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from kinfmu.log import write_rrd
-from kinfmu.log.viewer import decimated as module
+from kinfmu.log.viewer import timeline
 from kinfmu.log.viewer.comparison import write_comparison
-from kinfmu.log.viewer.decimated import decimated
+from kinfmu.log.viewer.timeline import decimated
 from kinfmu.run import Run
 from tests.log.runs import fourbar, with_gap
 from tests.log.viewer.test_rerun_file import SCALARS, documents, rows
@@ -44,7 +44,7 @@ def test_peaks_are_kept(long_run: Run) -> None:
 def test_a_recording_states_what_it_leaves_out_and_holds_all_events(
     long_run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "MOST_ROWS", 100)
+    monkeypatch.setattr(timeline, "MOST_ROWS", 100)
     write_rrd(long_run, tmp_path / "run.rrd")
     angles = rows(tmp_path / "run.rrd", "/position/angle", SCALARS)
     assert 100 <= len(angles) < 150

@@ -13,7 +13,7 @@ from kinfmu.draw.scene.scene import drawable
 from kinfmu.log import write_rrd
 from kinfmu.log.viewer.blueprint import Drawn, single
 from kinfmu.log.viewer.linkage import view_box
-from kinfmu.log.viewer.reactions import reactions
+from kinfmu.log.viewer.series import reactions
 from kinfmu.log.viewer.timeline import timeline_of
 from kinfmu.run import Run
 from tests.log.viewer.test_rerun_file import SCALARS, rows, statics

@@ -12,9 +12,9 @@ from kinfmu import Mechanism
 from kinfmu.draw.scene.forces import arrows
 from kinfmu.draw.scene.scene import Scene, drawable, scene
 from kinfmu.log import write_rrd
-from kinfmu.log.viewer.arrows import legend_start
 from kinfmu.log.viewer.card import card
-from kinfmu.log.viewer.labels import dots, places_below, shown_names
+from kinfmu.log.viewer.ground import dots, places_below, shown_names
+from kinfmu.log.viewer.marks import legend_start
 from kinfmu.mechanism.toml_file import parse
 from tests.gallery_members import every_member
 from tests.log.viewer.test_rerun_file import statics

@@ -12,8 +12,8 @@ import kinfmu
 from kinfmu import Run
 from kinfmu.cli import main
 from kinfmu.log import read
+from kinfmu.log.viewer.card import parameters_apart
 from kinfmu.log.viewer.comparison import write_comparison
-from kinfmu.log.viewer.parameters import parameters_apart
 from kinfmu.run.components import mechanism_info
 from tests.log.viewer.test_rerun_file import documents
 

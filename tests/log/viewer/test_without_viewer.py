@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
-
-import pytest
 
 from kinfmu.log import read
 
@@ -16,17 +15,23 @@ BASE = (  # a process in which the packages of the extras cannot be imported
 INSTALL = "needs the Rerun viewer: pip install 'kinfmu[viewer]'"
 
 
-def kinfmu(folder: Path, *arguments: str) -> tuple[int, str, str]:
-    """Return exit status, output and errors of a command."""
-    code = f"{BASE}from kinfmu.cli import main; main(prog_name='kinfmu')"
+def outcomes(folder: Path, *commands: str) -> list[tuple[int, str, str]]:
+    """Return exit status, output and errors of commands, which run one after another in one process."""
+    code = f"""{BASE}
+import json
+from click.testing import CliRunner
+from kinfmu.cli import main
+results = [CliRunner().invoke(main, command.split(), prog_name="kinfmu") for command in sys.argv[1:]]
+print(json.dumps([(one.exit_code, one.stdout, one.stderr) for one in results]))
+"""
     done = subprocess.run(
-        [sys.executable, "-c", code, *arguments], cwd=folder, capture_output=True, text=True, check=False
+        [sys.executable, "-c", code, *commands], cwd=folder, capture_output=True, text=True, check=True
     )
-    return done.returncode, done.stdout, done.stderr
+    return [tuple(outcome) for outcome in json.loads(done.stdout)]
 
 
 def test_simulate_writes_the_record_alone_and_reports_it(tmp_path: Path) -> None:
-    status, out, err = kinfmu(tmp_path, "simulate", "fourbar", "--stop", "3")
+    ((status, out, err),) = outcomes(tmp_path, "simulate fourbar --stop 3")
     assert (status, err) == (0, "")
     first, second = out.splitlines()
     assert first.endswith("; written to logs/fourbar.mcap")
@@ -34,29 +39,28 @@ def test_simulate_writes_the_record_alone_and_reports_it(tmp_path: Path) -> None
     assert [path.name for path in (tmp_path / "logs").iterdir()] == ["fourbar.mcap"]
     assert len(read(tmp_path / "logs" / "fourbar.mcap")) == 4
     (tmp_path / "logs" / "fourbar.rrd").write_bytes(b"older")
-    status, out, err = kinfmu(tmp_path, "simulate", "fourbar", "--stop", "2")
-    assert (status, err) == (0, "")
-    assert out.splitlines()[1] == f"no recording, which {INSTALL}; logs/fourbar.rrd is of an older run"
-    status, out, err = kinfmu(tmp_path, "simulate", "fourbar", "--stop", "2", "--channels", "none")
-    assert (status, err, len(out.splitlines())) == (0, "", 1)
-    for name in ("run.csv", "run.parquet"):
-        assert kinfmu(tmp_path, "export", "logs/fourbar.mcap", "-o", name) == (0, f"written: {name}\n", "")
+    tables = ("run.csv", "run.parquet")
+    again, without, *exports = outcomes(
+        tmp_path,
+        "simulate fourbar --stop 2",
+        "simulate fourbar --stop 2 --channels none",
+        *(f"export logs/fourbar.mcap -o {name}" for name in tables),
+    )
+    assert (again[0], again[2]) == (0, "")
+    assert again[1].splitlines()[1] == f"no recording, which {INSTALL}; logs/fourbar.rrd is of an older run"
+    assert (without[0], without[2], len(without[1].splitlines())) == (0, "", 1)
+    assert exports == [(0, f"written: {name}\n", "") for name in tables]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "what"),
-    [
-        (["simulate", "fourbar", "--rrd", "a.rrd"], "a.rrd: a recording"),
-        (["simulate", "fourbar", "--live"], "--live"),
-        (["review", "run.mcap"], "run.mcap: a review"),
-        (["review", "run.mcap", "--screenshot", "a.png"], "run.mcap: a review"),
-    ],
-)
-def test_what_needs_the_viewer_is_refused_before_anything_is_written(
-    arguments: list[str], what: str, tmp_path: Path
-) -> None:
+def test_what_needs_the_viewer_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    refused = {
+        "simulate fourbar --rrd a.rrd": "a.rrd: a recording",
+        "simulate fourbar --live": "--live",
+        "review run.mcap": "run.mcap: a review",
+        "review run.mcap --screenshot a.png": "run.mcap: a review",
+    }
     (tmp_path / "run.mcap").touch()
-    assert kinfmu(tmp_path, *arguments) == (1, "", f"kinfmu: {what} {INSTALL}\n")
+    assert outcomes(tmp_path, *refused) == [(1, "", f"kinfmu: {what} {INSTALL}\n") for what in refused.values()]
     assert [path.name for path in tmp_path.iterdir()] == ["run.mcap"]
 
 
