@@ -38,9 +38,8 @@ from kinfmu.plan.plan import PlanParameter
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.run.axis import TIME, axis_for
 from kinfmu.run.designs import Batch, Driving, first_failure, parts_of, solve_alone, solve_by_library
-from kinfmu.run.driving import column_of, run_times
+from kinfmu.run.driving import column_of, numbers_of, run_times
 from kinfmu.run.model import Model
-from kinfmu.run.numbers import numbers_of
 from kinfmu.solver.python.status import Status
 from kinfmu.units import CoordinateName, InputName, Quantity, unit_of
 

@@ -20,14 +20,13 @@ from kinfmu.plan import SolvePlan
 from kinfmu.plan.plan import PlanParameter
 from kinfmu.run import Run
 from kinfmu.run.arguments import Arguments, Settings
-from kinfmu.run.driving import driven_by_inputs
+from kinfmu.run.driving import driven_by_inputs, numbers_of
 from kinfmu.run.engine import Driven
-from kinfmu.run.numbers import numbers_of
 from kinfmu.solver.python.status import Status
 from kinfmu.units import CoordinateName
 
 if TYPE_CHECKING:
-    from kinfmu.run.library import Library
+    from kinfmu.run.native_engine import Library
 
 SAMPLES_AT_ONCE = 500_000  # of a piece of work: its diagnostics stay in some 30 MB
 
@@ -286,7 +285,7 @@ def solve_by_library(
     anew: bool,
 ) -> tuple[Sequence[int], dict[int, str]]:
     """Fill the tables by the compiled plan; return the designs still to be solved alone, and reasons of the others."""
-    from kinfmu.run.library import LawDriven
+    from kinfmu.run.native_engine import LawDriven
 
     library, start = batch.model.load_library(), batch.plan.mechanism.run.start
     invalid = batch.invalid()

@@ -23,11 +23,9 @@ from kinfmu.run import Event, Run
 from kinfmu.run.arguments import Arguments, Setting, Settings
 from kinfmu.run.continued import anew as anew_note
 from kinfmu.run.designs import Batch, Designs, Driving, solve_batch
-from kinfmu.run.driving import column_of, driven_by_inputs, run_times, without_huge_rates
-from kinfmu.run.engine import Driven, Engine, Tables, UnreachedError, require_engine, tables_for
+from kinfmu.run.driving import column_of, driven_by_inputs, numbers_of, run_times, without_huge_rates
+from kinfmu.run.engine import Driven, Engine, PythonEngine, Tables, UnreachedError, require_engine, tables_for
 from kinfmu.run.forces import ForceModel, applied_efforts, force_plan
-from kinfmu.run.numbers import numbers_of
-from kinfmu.run.python_engine import PythonEngine
 from kinfmu.run.sensitivities import Sensitivities, SensitivityModel, plan_of_unknowns
 from kinfmu.run.solution import Solution
 from kinfmu.solver.python import Solver, UnsolvableModel, with_parameters
@@ -319,7 +317,7 @@ class Model:
 
     @cached_property
     def _library(self) -> Any:
-        from kinfmu.run.library import Library
+        from kinfmu.run.native_engine import Library
 
         return Library(self.plan)
 

@@ -28,10 +28,9 @@ from kinfmu.motion.history import FEWEST
 from kinfmu.motion.measure import with_measures
 from kinfmu.motion.quantities import QuantityNames, coordinates_behind
 from kinfmu.plan import compile_plan
-from kinfmu.run.driving import run_times
+from kinfmu.run.driving import numbers_of, run_times
 from kinfmu.run.engine import require_engine
 from kinfmu.run.model import WORTH_COMPILING, Model, compile  # noqa: A004  as re.compile
-from kinfmu.run.numbers import numbers_of
 
 SAMPLES = 1000  # of sampled parameters, by default
 SEED = 0
