@@ -179,7 +179,7 @@ class Model:
             applied_efforts(self._load_inputs, efforts, count),
             driven,
             result,
-            lambda model: model.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, **inputs),
+            {"t": t, "parameters": parameters, "tolerance": tolerance, "wrap": wrap, **inputs},
             is_kept=out is None,
         ).run(tables)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,7 +32,7 @@ class Solution:
         efforts: Of external loads, (n,) by their inputs.
         driven: Values, speeds and accelerations of the drivers, (n, d) each.
         result: Diagnostics of the samples.
-        again: Solves the same samples by another model.
+        arguments: Of `Model.solve`, for these samples by another model.
         is_kept: False where the caller has the tables, which may hold other numbers by the time that forces are read.
 
     """
@@ -47,13 +47,13 @@ class Solution:
         efforts: Mapping[str, FloatArray],
         driven: Driven,
         result: SweepResult,
-        again: Callable[[Model], Run],
+        arguments: Mapping[str, Any],
         *,
         is_kept: bool,
     ) -> None:
         self._model, self._setting, self._engine = model, setting, engine
         self._times, self._inputs, self._efforts, self._driven = times, inputs, efforts, driven
-        self._result, self._again, self._is_kept = result, again, is_kept
+        self._result, self._arguments, self._is_kept = result, arguments, is_kept
 
     def run(self, tables: Tables) -> Run:
         """Return the run; tables: values, rates and accelerations."""
@@ -134,6 +134,6 @@ class Solution:
         driven = with_constants(self._model.plan.drivers, self._driven, self._inputs)
         has_gaps = bool(self._result.failures)
         if poses is None or model is not self._model or not self._is_kept:
-            poses = self._again(model)
+            poses = model.solve(**self._arguments)
             driven, has_gaps = (poses.inputs[:, ::3], poses.inputs[:, 1::3], poses.inputs[:, 2::3]), True
         return LoadedRun(poses, driven, has_gaps, self._setting, self._efforts, self._times)
