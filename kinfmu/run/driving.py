@@ -205,6 +205,24 @@ def with_constants(drivers: Sequence[DriverInfo], driven: Driven, inputs: Mappin
     return u, ud, udd
 
 
+def applied_efforts(known: Sequence[str], given: Mapping[str, ArrayLike], count: int) -> dict[str, FloatArray]:
+    """Return the efforts of external loads at all samples, (n,) by the names of their inputs; 0 where none is given.
+
+    Raises:
+        RequestError: An effort is not a number, or neither one number nor one for each sample.
+
+    """
+    efforts = {}
+    for name in known:
+        column = column_of(name, given.get(name, 0.0))
+        if len(column) not in (1, count):
+            raise RequestError(
+                f"{name} must be a number or have {count} values, one for each sample, not {len(column)}"
+            )
+        efforts[name] = np.broadcast_to(column, (count,)).copy()
+    return efforts
+
+
 def without_huge_rates(driven: Driven) -> Driven:
     """Return the driver values; NaN where a law has no value, or has rates whose squares overflow."""
     u, ud, udd = driven

@@ -23,9 +23,9 @@ from kinfmu.run import Event, Run
 from kinfmu.run.arguments import Arguments, Setting, Settings
 from kinfmu.run.continued import anew as anew_note
 from kinfmu.run.designs import Batch, Designs, Driving, solve_batch
-from kinfmu.run.driving import column_of, driven_by_inputs, numbers_of, run_times, without_huge_rates
+from kinfmu.run.driving import applied_efforts, column_of, driven_by_inputs, numbers_of, run_times, without_huge_rates
 from kinfmu.run.engine import Driven, Engine, PythonEngine, Tables, UnreachedError, require_engine, tables_for
-from kinfmu.run.forces import ForceModel, applied_efforts, force_plan
+from kinfmu.run.forces import ForceModel, force_plan
 from kinfmu.run.sensitivities import Sensitivities, SensitivityModel, plan_of_unknowns
 from kinfmu.run.solution import Solution
 from kinfmu.solver.python import Solver, UnsolvableModel, with_parameters
