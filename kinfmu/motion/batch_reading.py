@@ -153,9 +153,10 @@ class BatchReading:
             self.reasons |= {part.start + k: reason for k, reason in reasons.items()}
 
     def _compute_quantities(self) -> None:
-        """Let the model compute the quantities that are read, in place of coordinates."""
+        """Let the model compute the quantities that are read; Python, which divides by no 0, the coordinates behind."""
         read = self._names.quantities(*self._in_tables)
-        quantities = [one for one in read if one not in self.motion.fixed]
+        self._computed = read if self._is_native else coordinates_behind(read)
+        quantities = [one for one in self._computed if one not in self.motion.fixed]
         model = quantity_model(self._model, quantities)
         if self._is_native:
             use_compiled()
@@ -288,7 +289,8 @@ class BatchReading:
     def _motion_of(self, batch: Batch, tables: Sequence[FloatArray]) -> Motion:
         """Return the motion of the designs of a part."""
         motion = self.motion
-        if self._open and any(isinstance(reading, PressureAngle) for reading in self._in_tables):
+        has_pressure = any(isinstance(reading, PressureAngle) for reading in self._in_tables)
+        if self._open and (has_pressure or not self._is_native):
             given = {name: batch.parameters[name] for name in self._open}
             motion = replace(motion, points=points_of_designs(self._model.mechanism, given))
         return replace(
@@ -317,11 +319,10 @@ class BatchReading:
     def _open_fixed(self) -> dict[CoordinateName, Node]:
         """Constant coordinates that are read and that depend on parameters which are given, as nodes."""
         given = {parameter_symbol(name) for name in self._open}
-        read = self._names.quantities(*self._in_tables)
         return {
             name: node
             for name, node in self._model.plan.fixed_nodes.items()
-            if name in read and given.intersection(symbol.name for symbol in symbols([node]))
+            if name in self._computed and given.intersection(symbol.name for symbol in symbols([node]))
         }
 
     def _empty_motion(self) -> tuple[Motion, slice]:

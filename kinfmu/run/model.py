@@ -27,7 +27,7 @@ from kinfmu.run.driving import applied_efforts, column_of, driven_by_inputs, num
 from kinfmu.run.engine import Driven, Engine, PythonEngine, Tables, UnreachedError, require_engine, tables_for
 from kinfmu.run.forces import ForceModel, force_plan
 from kinfmu.run.sensitivities import Sensitivities, SensitivityModel, plan_of_unknowns
-from kinfmu.run.solution import Solution
+from kinfmu.run.solved_samples import SolvedSamples
 from kinfmu.solver.python import Solver, UnsolvableModel, with_parameters
 from kinfmu.solver.python.pose import Vector
 from kinfmu.solver.python.solver import TOLERANCE
@@ -170,7 +170,7 @@ class Model:
             return self._solve_anew(
                 str(reason), setting.given, t, tolerance=tolerance, wrap=wrap, out=out, **inputs, **efforts
             )
-        return Solution(
+        return SolvedSamples(
             self,
             setting,
             engine,

@@ -15,7 +15,7 @@ from kinfmu.errors import KinfmuError
 from kinfmu.mechanism.measures import Maximum, Minimum, Range, Reading
 
 STEP = 0.1  # of difference quotients, in standard deviations: their error is a hundredth of the third-order term
-_ENDS: dict[type[Reading], tuple[float, ...]] = {Minimum: (1.0,), Maximum: (1.0,), Range: (-1.0, 1.0)}  # signs of the extremes
+_ENDS: dict[type[Reading], tuple[float, ...]] = {Minimum: (1.0,), Maximum: (1.0,), Range: (-1.0, 1.0)}
 EXACT, DIFFERENCES = "sensitivities", "differences"
 
 

@@ -1,10 +1,10 @@
-"""Solution: what a run is made of when its samples are solved; the other fields are computed when they are read."""
+"""SolvedSamples: what a run is made of when its samples are solved; the rest is computed when it is read."""
 
 from __future__ import annotations
 
 import weakref
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -12,15 +12,27 @@ from kinfmu.arrays import FloatArray
 from kinfmu.run import Event, Run
 from kinfmu.run.arguments import Setting
 from kinfmu.run.axis import TIME, axis_for
+from kinfmu.run.designs import Solvable
 from kinfmu.run.driving import with_constants
 from kinfmu.run.engine import Driven, Engine, SweepResult, Tables
-from kinfmu.run.forces import LoadedRun
-
-if TYPE_CHECKING:
-    from kinfmu.run.model import Model
+from kinfmu.run.forces import ForceModel, LoadedRun
+from kinfmu.units import CoordinateName, ForceName, InputName
 
 
-class Solution:
+class SolvedModel(Solvable, Protocol):
+    """What a run needs of a Model."""
+
+    outputs: tuple[CoordinateName, ...]
+    input_names: tuple[InputName, ...]
+    watch_names: tuple[str, ...]
+    force_names: tuple[ForceName, ...]
+    reaction_names: tuple[ForceName, ...]
+
+    @property
+    def force_model(self) -> ForceModel: ...
+
+
+class SolvedSamples:
     """The solved samples of a model.
 
     Args:
@@ -39,7 +51,7 @@ class Solution:
 
     def __init__(
         self,
-        model: Model,
+        model: SolvedModel,
         setting: Setting,
         engine: Engine,
         times: FloatArray | None,
