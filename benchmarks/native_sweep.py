@@ -19,8 +19,8 @@ from kinfmu.errors import MissingPackageError
 from kinfmu.mechanism.gallery import load
 from kinfmu.mechanism.gallery.chains import fourbar_chain
 from kinfmu.plan import compile_plan
-from kinfmu.run.library import FLAGS, Library
 from kinfmu.run.model import compile as compiled_model
+from kinfmu.run.native_engine import FLAGS, Library
 
 ROUNDS = 9
 SAMPLES = 360_000  # a thousand turns by one degree

@@ -14,7 +14,7 @@ from hypothesis import settings
 
 from kinfmu.codegen.c import compiler
 from kinfmu.fmu.native import archive
-from kinfmu.run import library
+from kinfmu.run import native_engine as library
 from tests import compiled_once
 
 GOLDEN = Path(__file__).parent / "golden"

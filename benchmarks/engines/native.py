@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.case import Case, Motion
 from benchmarks.engine import BenchEngine, EngineSetting, Sampler
 from kinfmu.errors import CompilerError, MissingPackageError
-from kinfmu.run.library import Library
+from kinfmu.run.native_engine import Library
 
 LAPS = 50  # how often a call solves the samples
 

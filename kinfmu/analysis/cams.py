@@ -36,7 +36,7 @@ from kinfmu.motion.cams.profile import TURN, angles_within, profile_at
 from kinfmu.motion.cams.traced import traced
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.origin import in_world
-from kinfmu.run.numbers import numbers_of
+from kinfmu.run.driving import numbers_of
 
 SLIDING_LIMIT, SWINGING_LIMIT = math.radians(30.0), math.radians(45.0)  # [rad], usual for pressure angles
 _ANGLES = 361  # of a table by default, one a degree

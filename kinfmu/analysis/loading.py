@@ -218,7 +218,7 @@ class _Forces:
         self._run = run
         self._motion: Motion | None = None  # without it extremes are those of samples
         with suppress(RequestError):  # too few samples, or they are not in the order of one argument
-            self._motion = Motion.of_run(run, with_margin=False)
+            self._motion = Motion.of_run(run)
 
     def peak(self, name: str) -> ForcePeak:
         """Return the largest size of a force, of those that measures read; NaN if it has no numbers."""

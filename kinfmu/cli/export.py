@@ -49,7 +49,7 @@ def _write(run: Run, path: Path, columns: Sequence[str], *, width: int | None, *
 def _write_svaj(run: Run, output: Path, name: str, *, degrees: bool, **form: Any) -> None:
     """Write displacement, velocity, acceleration and jerk as a table."""
     from kinfmu.log.table import write_columns
-    from kinfmu.motion.svaj_table import svaj_columns
+    from kinfmu.motion.motion_curve import svaj_columns
     from kinfmu.run.tables import csv_lines
 
     columns = svaj_columns(run, name, degrees=degrees)

@@ -15,8 +15,7 @@ from kinfmu.draw.overlay import curve_colour, range_of, sheet_title
 from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
 from kinfmu.draw.writing import check_suffix, write
 from kinfmu.errors import FigureError
-from kinfmu.motion.motion_curve import MotionCurve, motion_curve
-from kinfmu.motion.svaj_table import units_of
+from kinfmu.motion.motion_curve import MotionCurve, motion_curve, units_of
 from kinfmu.run import Run
 from kinfmu.units import degrees_of, unit_of
 

@@ -1,12 +1,12 @@
-"""The reading of many designs: they are solved and measured part by part."""
+"""The reading of many designs: part by part they are solved into tables of quantities and read, or read alone."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,45 +14,48 @@ from numpy.typing import ArrayLike, NDArray
 from kinfmu.arrays import FloatArray
 from kinfmu.codegen.python import load_model
 from kinfmu.errors import KinfmuError, RequestError, listed
-from kinfmu.mechanism.force_names import measured_forces
-from kinfmu.mechanism.measures import Finding, LowestMargin, PressureAngle, Reading
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.measures import LowestMargin, PressureAngle, Reading
+from kinfmu.mechanism.parameters import in_order, parameter_values
+from kinfmu.mechanism.quantities.arithmetic import Value, atan2_like, cos, sin, sqrt
 from kinfmu.mechanism.settings import LawConstant
-from kinfmu.motion.crowding import is_crowded
-from kinfmu.motion.design_points import dependent_numbers, points_of_designs
-from kinfmu.motion.driven_samples import driven_samples
-from kinfmu.motion.geometry import moves_evenly
 from kinfmu.motion.history import FEWEST
 from kinfmu.motion.measure import (
-    MeasuredValue,
-    chosen_measures,
-    known_values,
     listed_measures,
+    moves_evenly,
     read_value,
+    read_values,
     reason_without_value,
     with_measures,
 )
 from kinfmu.motion.motion import Motion
-from kinfmu.motion.needed import QuantityRead, needed
-from kinfmu.motion.quantity_model import quantity_model
+from kinfmu.motion.quantities import QuantityNames, QuantityRead, coordinates_behind, quantity_model
 from kinfmu.motion.quintic import use_compiled
+from kinfmu.motion.samples import driven_samples, is_crowded
 from kinfmu.motion.splitting import has_breaks
 from kinfmu.plan.equations.graph import Node, evaluate, symbols
 from kinfmu.plan.plan import PlanParameter
 from kinfmu.plan.trace import parameter_symbol
-from kinfmu.run import Run
 from kinfmu.run.axis import TIME, axis_for
-from kinfmu.run.designs import Batch, Driving, parts_of, solve_batch, solve_by_library
-from kinfmu.run.driving import column_of, run_times
+from kinfmu.run.designs import Batch, Driving, first_failure, parts_of, solve_alone, solve_by_library
+from kinfmu.run.driving import column_of, numbers_of, run_times
 from kinfmu.run.model import Model
-from kinfmu.run.numbers import numbers_of
 from kinfmu.solver.python.status import Status
 from kinfmu.units import CoordinateName, InputName, Quantity, unit_of
 
 SAMPLES_AT_ONCE = 150_000  # of designs that are solved and measured together
 
+sin.register(np.ndarray, np.sin)
+cos.register(np.ndarray, np.cos)
+sqrt.register(np.ndarray, np.sqrt)
 
-@dataclass(frozen=True, eq=False)
-class SampledAxis:
+
+@atan2_like.register
+def _(like: np.ndarray, y: Value, x: Value) -> FloatArray:  # noqa: ARG001
+    return np.asarray(np.arctan2(y, x))
+
+
+class SampledAxis(NamedTuple):
     """The samples of a motion without the motion: what its axis is made of, as in Run."""
 
     t: FloatArray
@@ -111,20 +114,20 @@ class BatchReading:
             raise RequestError(f"there are {len(times)} samples; measures need {FEWEST} or more")
         self._model, self._driving = model, Driving(times, driven, given)
         self._tolerance, self._anew = tolerance, anew
-        self._needed = needed(mechanism, self._readings)
-        self._quantities = {reading.name: needed(mechanism, [reading]).quantities for reading in self._readings}
-        self._columns = [k for k, name in enumerate(model.outputs) if name in self._needed.coordinates]
         self._idle: list[tuple[FloatArray, NDArray[np.int32]]] = []  # memory of earlier parts
+        self._names = QuantityNames(mechanism)
         self.motion, self._order = self._empty_motion()
-        self._alone = self._read_alone()
+        alone = self._read_alone()
+        self._alone = [reading for reading in self._readings if reading.name in alone]
+        self._in_tables = [reading for reading in self._readings if reading.name not in alone]
         self.units = self._units_of_parameters()
         self.values: dict[str, FloatArray] = {}
         self.at: dict[str, FloatArray] = {}
         for reading in self._readings:
-            found = self._found(reading, self.motion)
-            self.units[reading.name] = unit_of(found.quantity, mechanism.length_unit)
+            values = read_values(self.motion, reading)
+            self.units[reading.name] = unit_of(values.quantity, mechanism.length_unit)
             self.values[reading.name] = np.full(self._count, np.nan)
-            self.at[reading.name] = np.full((self._count, len(found.at)), np.nan)
+            self.at[reading.name] = np.full((self._count, len(values.at)), np.nan)
         self.status = np.zeros(self._count, dtype=np.int32)
         self.reasons: dict[int, str] = {}
 
@@ -135,153 +138,147 @@ class BatchReading:
 
     def run(self, workers: int) -> None:
         """Solve and measure all designs."""
-        parts = parts_of(self._count, max(1, SAMPLES_AT_ONCE // len(self._driving.times)), workers)
-        is_native = self._model.is_native(self._count * len(self._driving.times))
-        if not is_native or not self._needed.quantities:
-            found = [self._measure(part) for part in parts]
-        elif self._prepare_compiled() and workers > 1:
+        samples = len(self._driving.times)
+        parts = parts_of(self._count, max(1, SAMPLES_AT_ONCE // samples), workers)
+        self._is_native = self._model.is_native(self._count * samples)
+        if self._in_tables:
+            self._compute_quantities()
+        measure = self._measure if self._in_tables else self._measure_alone
+        if self._is_native and workers > 1:
             with ThreadPoolExecutor(workers) as pool:
-                found = list(pool.map(self._measure_compiled, parts))
+                found = list(pool.map(measure, parts))
         else:
-            found = [self._measure_compiled(part) for part in parts]
+            found = [measure(part) for part in parts]
         for part, reasons in zip(parts, found, strict=True):
             self.reasons |= {part.start + k: reason for k, reason in reasons.items()}
 
-    def _prepare_compiled(self) -> bool:
-        """Compile the quantities that are read; True."""
-        use_compiled()
-        quantities = [one for one in self._needed.quantities if one not in self.motion.fixed]
-        model, names = quantity_model(self._model, quantities)
-        model.load_library()
-        self._compiled = Batch(model, self.parameters, self._count)
-        self._count_kept = len(quantities)
-        self.motion = replace(self.motion, outputs=model.outputs, computed=names, _histories={})
-        return True
-
-    def _measure_compiled(self, part: slice) -> dict[int, str]:
-        """Solve and measure the designs of a part by compiled code; return reasons as `_measure` does."""
-        batch, driving = self._compiled.part(part), self._driving_of(part)
-        shape = (batch.count, self._count_kept, len(driving.times))
-        kept = self._idle.pop() if self._idle else (np.empty((3, *shape)), np.empty((shape[0], shape[2]), np.int32))
-        if len(kept[1]) < batch.count:
-            kept = (np.empty((3, *shape)), np.empty((shape[0], shape[2]), np.int32))
-        tables, status = [table[: batch.count].transpose(0, 2, 1) for table in kept[0]], kept[1][: batch.count]
-        with np.errstate(all="ignore"):  # samples without numbers are NaN
-            alone, found = solve_by_library(batch, driving, tables, status, self._tolerance, 1, anew=self._anew)
-            good = np.asarray(status <= Status.BRIDGED)
-            is_solved = np.asarray(good.any(axis=1))
-            is_solved[list(alone)] = False
-            self.status[part] = status.max(axis=1, initial=0)
-            reasons = {k: found[k] for k in np.flatnonzero(~is_solved).tolist() if k in found}
-            motion = self._motion_of(batch, [table[:, self._order] for table in tables])
-            self._read(part, batch, motion, good, is_solved, reasons)
-            for k in alone:
-                reason = self._read_one(self._readings, batch, k, part.start + k)
-                if reason:
-                    reasons[k] = reason
-        self._idle.append(kept)
-        return reasons
+    def _compute_quantities(self) -> None:
+        """Let the model compute the quantities that are read; Python, which divides by no 0, the coordinates behind."""
+        read = self._names.quantities(*self._in_tables)
+        self._computed = read if self._is_native else coordinates_behind(read)
+        quantities = [one for one in self._computed if one not in self.motion.fixed]
+        model = quantity_model(self._model, quantities)
+        if self._is_native:
+            use_compiled()
+            model.load_library()
+        self._quantities = self._batch.of_model(model)
+        self.motion = replace(self.motion, outputs=quantities, _histories={})
 
     def _measure(self, part: slice) -> dict[int, str]:
-        """Solve and measure the designs of a part; return the reasons of those without values, by number in it."""
-        batch = self._batch.part(part)
-        designs = solve_batch(
-            batch, self._driving_of(part), highest=2, tolerance=self._tolerance, anew=self._anew, threads=0
-        )
-        self.status[part] = designs.status.max(axis=1, initial=0)
-        is_solved = np.asarray(designs.good.any(axis=1))
-        reasons = {k: designs.reasons[k] for k in np.flatnonzero(~is_solved).tolist()}
-        tables = [
-            np.ascontiguousarray(table.transpose(0, 2, 1)[:, self._columns, self._order]).transpose(0, 2, 1)
-            for table in (designs.values, designs.rates, designs.accelerations)
-            if table is not None
-        ]
+        """Solve the designs of a part and measure them; return why one has no values, by its number in the part."""
+        batch, driving = self._quantities.part(part), self._driving.part(part)
+        memory = self._idle.pop() if self._idle else None
+        if memory is None or len(memory[1]) < batch.count:
+            samples = len(driving.times)
+            whole = np.empty((3, batch.count, len(self.motion.outputs), samples))
+            memory = whole, np.empty((batch.count, samples), np.int32)
+        tables, status = [table[: batch.count].transpose(0, 2, 1) for table in memory[0]], memory[1][: batch.count]
         with np.errstate(all="ignore"):  # samples without numbers are NaN
-            self._read(part, batch, self._motion_of(batch, tables), designs.good, is_solved, reasons)
+            left, reasons = self._solve(batch, driving, tables, status)
+            good = np.asarray(status <= Status.BRIDGED)
+            is_solved = np.asarray(good.any(axis=1))
+            is_solved[list(left)] = False
+            self.status[part] = status.max(axis=1, initial=0)
+            reasons = {k: reasons[k] for k in np.flatnonzero(~is_solved).tolist() if k in reasons}
+            for k in np.flatnonzero(is_solved).tolist() if self._alone else ():
+                if reason := self._measure_design(self._alone, part.start + k):
+                    reasons[k] = reason
+            self._read(
+                part, self._motion_of(batch, [table[:, self._order] for table in tables]), good, is_solved, reasons
+            )
+            for k in left:
+                if reason := self._measure_design(self._readings, part.start + k):
+                    reasons[k] = reason
+        self._idle.append(memory)
         return reasons
 
-    def _driving_of(self, part: slice) -> Driving:
-        """Return what moves the designs of a part."""
-        times, driven, given = self._driving
-        inputs = {name: array[part] if array.ndim == 2 else array for name, array in given.items()}
-        if driven is not None and driven[0].ndim == 3:
-            driven = (driven[0][part], driven[1][part], driven[2][part])
-        return Driving(
-            times, driven, {name: array[part] if array.ndim == 2 else array for name, array in inputs.items()}
-        )
+    def _solve(
+        self, batch: Batch, driving: Driving, tables: Sequence[FloatArray], status: NDArray[np.int32]
+    ) -> tuple[Sequence[int], dict[int, str]]:
+        """Fill the tables; return the designs that are left to be assembled anew, and reasons of the others."""
+        if self._is_native:
+            return solve_by_library(batch, driving, tables, status, self._tolerance, 1, anew=self._anew)
+        left, reasons = [], {}
+        for k in range(batch.count):
+            outcome = solve_alone(batch, driving, k, tables, status, self._tolerance, anew=False)
+            if self._anew and not outcome.is_reached:
+                left.append(k)
+            elif outcome.reason:
+                reasons[k] = outcome.reason
+        return left, reasons
 
     def _read(
         self,
         part: slice,
-        batch: Batch,
         motion: Motion,
         good: NDArray[np.bool_],
         is_solved: NDArray[np.bool_],
         reasons: dict[int, str],
     ) -> None:
         """Read the measures of the designs of a part that are solved; add the reasons of those without values."""
-        alone = [reading for reading in self._readings if reading.name in self._alone]
-        for k in np.flatnonzero(is_solved).tolist() if alone else ():
-            reason = self._read_one(alone, batch, k, part.start + k)
-            if reason:
-                reasons.setdefault(k, reason)
         closed_ones: dict[tuple[QuantityRead, ...], NDArray[np.bool_]] = {}
         is_whole = np.asarray(good.all(axis=1))
         whole: dict[bool, Motion] = {}  # of all designs: measures of one quantity share its extremes
-        for reading in self._readings:
+        for reading in self._in_tables:
             value, at = self.values[reading.name][part], self.at[reading.name][part]
-            if reading.name in self._alone:
-                continue
-            quantities = self._quantities[reading.name]
+            quantities = self._names.quantities(reading)
             if quantities not in closed_ones:
                 closed_ones[quantities] = motion.goes_round(quantities, is_whole)
             for is_closed in (True, False):
-                is_chosen = is_solved & (closed_ones[quantities] == is_closed)
-                if not is_chosen.any():
+                chosen = np.flatnonzero(is_solved & (closed_ones[quantities] == is_closed))
+                if not len(chosen):
                     continue
-                chosen = np.flatnonzero(is_chosen)
                 if len(chosen) < len(good):
                     some = motion.of_designs(chosen).going_round(is_closed)
                 else:
                     some = whole.setdefault(is_closed, motion.going_round(is_closed))
                 try:
-                    found = self._found(reading, some)
+                    values = read_values(some, reading)
                 except RequestError as error:
                     reasons |= {k: str(error) for k in chosen.tolist() if k not in reasons}
                     continue
-                value[chosen], lack = known_values(found)
-                for k, text in zip(chosen.tolist(), np.broadcast_to(lack, len(chosen)).tolist(), strict=True):
+                value[chosen] = values.value
+                texts = np.broadcast_to(values.reason, len(chosen)).tolist()
+                for k, text in zip(chosen.tolist(), texts, strict=True):
                     if text and good[k].all():
                         reasons.setdefault(k, text)
-                for column, x in enumerate(found.at):
-                    at[chosen, column] = some.driven_at(x)
+                for column, places in enumerate(values.at):
+                    at[chosen, column] = places
             for k in np.flatnonzero(is_solved & ~np.isfinite(value)).tolist():
                 if k not in reasons:
                     reasons[k] = reason_without_value(self._samples(part.start + k), good[k])
 
-    def _read_one(self, readings: Sequence[Reading], batch: Batch, k: int, design: int) -> str:
+    def _measure_alone(self, part: slice) -> dict[int, str]:
+        """Measure the designs of a part one by one; return why one has no values, by its number in the part."""
+        found = {k: self._measure_design(self._readings, part.start + k) for k in range(part.stop - part.start)}
+        return {k: reason for k, reason in found.items() if reason}
+
+    def _measure_design(self, readings: Sequence[Reading], design: int) -> str:
         """Read measures of one design, as `measure` does; return why one has no value."""
-        given = self._driving.inputs
-        inputs: dict[str, Any] = {key: array[design] if array.ndim == 2 else array for key, array in given.items()}
-        times = None if inputs else self._driving.times
+        parameters = self._batch.of(design)
+        solved = partial(self._model.solve, parameters=parameters, tolerance=self._tolerance, anew=self._anew)
         try:
-            run = self._model.solve(times, parameters=batch.of(k), tolerance=self._tolerance, anew=self._anew, **inputs)
+            run = solved(**self._driving.of(design))
         except KinfmuError as error:
             self.status[design] = Status.INCONSISTENT
             return str(error)
         self.status[design] = run.status.max(initial=0)
-        margins = [reading for reading in readings if isinstance(reading, LowestMargin)]
-        if len(margins) == len(readings) and self._dependent.isdisjoint(reading.name for reading in readings):
+        if not run.good.any():
+            return first_failure(run)
+        is_of_samples = all(isinstance(reading, LowestMargin) for reading in readings)
+        if is_of_samples and self._dependent.isdisjoint(reading.name for reading in readings):
             # They read the samples alone: the mechanism with these parameters, which takes milliseconds, is not needed.
             run = run.replaced(mechanism_source=self._model.mechanism)
         try:
-            motion = Motion.of_run(run, with_margin=bool(margins))
+            motion = Motion.of_run(run)
         except KinfmuError as error:
             return str(error)
         reasons = []
         for reading in readings:
             try:
-                found = self._value_of(run, motion, reading, batch.of(k))
+                if reading.name in self._dependent:
+                    (reading,) = with_measures(motion.mechanism, [self._asked[reading.name]]).measures
+                found = read_value(run, motion, reading, solved)
             except KinfmuError as error:
                 reasons.append(str(error))
                 continue
@@ -289,30 +286,20 @@ class BatchReading:
             reasons += [found.reason] if found.reason else []
         return reasons[0] if reasons else ""
 
-    def _value_of(self, run: Run, motion: Motion, reading: Reading, parameters: Mapping[str, float]) -> MeasuredValue:
-        """Return a measure of one design, as `measure` does."""
-        if reading.name in self._dependent:
-            (reading,) = chosen_measures(motion.mechanism, [self._asked[reading.name]])
-        solved = partial(self._model.solve, parameters=parameters, tolerance=self._tolerance, anew=self._anew)
-        return read_value(run, motion, reading, solved)
-
-    def _found(self, reading: Reading, motion: Motion) -> Finding:
-        try:
-            return reading.read(motion.part(reading.begin, reading.end))
-        except RequestError as error:
-            raise RequestError(f"[measures.{reading.name}]: {error}") from None
-
     def _motion_of(self, batch: Batch, tables: Sequence[FloatArray]) -> Motion:
         """Return the motion of the designs of a part."""
         motion = self.motion
-        places_bodies = not motion.computed or any(isinstance(one, PressureAngle) for one in self._readings)
-        if self._open and places_bodies:
+        has_pressure = any(isinstance(reading, PressureAngle) for reading in self._in_tables)
+        if self._open and (has_pressure or not self._is_native):
             given = {name: batch.parameters[name] for name in self._open}
             motion = replace(motion, points=points_of_designs(self._model.mechanism, given))
-        fixed = {**motion.fixed, **self._fixed_of(batch)}
-        drive = motion.drive and replace(motion.drive, is_closed=False)
         return replace(
-            motion, tables=(tables[0], tables[1], tables[2]), fixed=fixed, is_closed=False, drive=drive, _histories={}
+            motion,
+            tables=(tables[0], tables[1], tables[2]),
+            fixed={**motion.fixed, **self._fixed_of(batch)},
+            is_closed=False,
+            drive=motion.drive and replace(motion.drive, is_closed=False),
+            _histories={},
         )
 
     @cached_property
@@ -332,21 +319,19 @@ class BatchReading:
     def _open_fixed(self) -> dict[CoordinateName, Node]:
         """Constant coordinates that are read and that depend on parameters which are given, as nodes."""
         given = {parameter_symbol(name) for name in self._open}
-        read = self._needed.quantities if self.motion.computed else self._needed.coordinates
         return {
             name: node
             for name, node in self._model.plan.fixed_nodes.items()
-            if name in read and given.intersection(symbol.name for symbol in symbols([node]))
+            if name in self._computed and given.intersection(symbol.name for symbol in symbols([node]))
         }
 
     def _empty_motion(self) -> tuple[Motion, slice]:
         """Return a motion at the samples that goes round, with NaN for the first design, and the samples' order."""
-        plan, driving = self._model.plan, self._driving
-        samples = self._samples(0)
-        x, per, order, driver, drive = driven_samples(samples)
-        outputs = [self._model.outputs[k] for k in self._columns]
-        gap = np.full((len(driving.times), len(outputs)), np.nan)
-        fixed: Any = plan.fixed
+        x, per, order, driver, drive = driven_samples(self._samples(0))
+        needed = coordinates_behind(self._names.quantities(*self._readings))
+        outputs = [name for name in self._model.outputs if name in needed]
+        gap = np.full((len(x), len(outputs)), np.nan)
+        fixed: Any = self._model.plan.fixed
         return Motion(
             mechanism=self._model.mechanism,
             x=x,
@@ -357,7 +342,6 @@ class BatchReading:
             drive=replace(drive, is_closed=True) if drive else None,
             points=self._model.mechanism.body_points,
             driver=driver,
-            margin=np.full(len(x), np.nan),
             is_closed=True,
         ), order
 
@@ -391,11 +375,10 @@ class BatchReading:
             return names
         drive = self.motion.drive
         varies = drive is not None and not moves_evenly(drive)
-        forces = measured_forces(self._model.mechanism)
         return self._dependent | {
             one.name
             for one in self._readings
-            if isinstance(one, LowestMargin) or getattr(one, "of", None) in forces or (varies and one.compares_rates)
+            if not self._names.quantities(one) or (varies and one.compares_rates)  # margins and forces are samples
         }
 
     @cached_property
@@ -411,3 +394,37 @@ class BatchReading:
         quantities = {one.name: one.quantity for one in known}
         unit = plan.mechanism.length_unit
         return {name: unit_of(quantities[name] or Quantity("number"), unit) for name in self.parameters}
+
+
+def points_of_designs(mechanism: Mechanism, given: Mapping[str, FloatArray]) -> dict[str, tuple[Value, Value]]:
+    """Return body-fixed coordinates of every point by 'body.point'.
+
+    Args:
+        mechanism: The mechanism as written.
+        given: Arrays (m,) of parameters by name.
+
+    Returns:
+        Pairs of numbers; (m, 1) those that differ between designs.
+
+    """
+    with np.errstate(all="ignore"):  # designs without a solution may have any numbers
+        known = parameter_values(mechanism.parameters, {name: array[:, None] for name, array in given.items()})
+        points: dict[str, tuple[Value, Value]] = dict(mechanism.body_points)
+        for place in dependent_numbers(mechanism, given):
+            if place[0] == "bodies" and place[2] == "points":
+                body, point, axis = str(place[1]), str(place[3]), place[4]
+                pair = list(points[f"{body}.{point}"])
+                pair[int(axis)] = mechanism.expressions[place].value(known)
+                points[f"{body}.{point}"] = pair[0], pair[1]
+    return points
+
+
+def dependent_numbers(mechanism: Mechanism, given: Collection[str]) -> list[tuple[str | int, ...]]:
+    """Return the paths of the numbers that change with parameters, directly or through other parameters."""
+    parameters = mechanism.parameters
+    expressions = {name: p.expression for name, p in parameters.items() if p.expression and name not in given}
+    changing = set(given)
+    for name in in_order(parameters, expressions):
+        if name in expressions and changing.intersection(expressions[name].names):
+            changing.add(name)
+    return [place for place, expression in mechanism.expressions.items() if changing.intersection(expression.names)]

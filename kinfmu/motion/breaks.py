@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.joints import CamRoller
 from kinfmu.mechanism.joints.joint import Joint
 from kinfmu.mechanism.laws import External, Law
+from kinfmu.mechanism.laws.law import Constant
+from kinfmu.mechanism.quantities.arithmetic import Value
+from kinfmu.plan.equations.jets import Jet
 from kinfmu.plan.equations.system import placement
 from kinfmu.run import Run
 from kinfmu.run.axis import TIME
@@ -77,3 +81,23 @@ def bracket(place: float, side: int) -> tuple[int, int]:
     if abs(place - nearest) < AT_SAMPLE:
         return (nearest - 1, nearest) if side < 0 else (nearest, nearest + 1)
     return math.floor(place), math.floor(place) + 1
+
+
+@dataclass(frozen=True, eq=False)
+class OneSided(Law):
+    """A law at arguments that are jets, with the limits of its derivatives at breaks.
+
+    law: the law; side: (n,) -1 where the limit is that from below, 1 from above.
+    """
+
+    type: ClassVar[str] = "one_sided"
+
+    law: Law
+    side: FloatArray
+
+    def constants(self) -> dict[str, Constant]:
+        return self.law.constants()
+
+    def target(self, x: Value, **constants: Value) -> Value:
+        found = self.law.target(replace(x, side=self.side) if isinstance(x, Jet) else x, **constants)
+        return replace(found, side=None) if isinstance(found, Jet) else found

@@ -16,8 +16,8 @@ from kinfmu.mechanism.joints.cam_roller import CamRoller
 from kinfmu.mechanism.joints.joint import Joint
 from kinfmu.mechanism.laws import External
 from kinfmu.mechanism.quantities.placement import Placement
+from kinfmu.motion.breaks import OneSided
 from kinfmu.motion.jet_equations import LEAST_MARGIN, JetEquations, derivative
-from kinfmu.motion.one_sided import OneSided
 from kinfmu.plan.equations.jets import Jet
 from kinfmu.plan.equations.system import placement
 from kinfmu.run import Run

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import math
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +17,17 @@ from kinfmu.display import Displayed
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import measured_forces
-from kinfmu.mechanism.measures import LowestMargin, Reading
-from kinfmu.mechanism.measures.reading import Finding
+from kinfmu.mechanism.measures import Reading
 from kinfmu.mechanism.valid import quoted
-from kinfmu.motion.geometry import geometry_of
+from kinfmu.motion.history import History
 from kinfmu.motion.motion import Motion
-from kinfmu.motion.needed import needed
 from kinfmu.run import Run
 from kinfmu.run.axis import HasAxis, axis_of
-from kinfmu.units import unit_of
+from kinfmu.run.solve import solve
+from kinfmu.units import Quantity, unit_of
+
+_SAMPLES = 360  # of the geometry of a motion, in a turn and in every range
+_AT_REST = 1e-12  # of the value of the driver; one that changes by less does not move
 
 
 @dataclass(frozen=True)
@@ -91,20 +96,13 @@ def measure(run: Run, measures: Iterable[Reading | str] | None = None) -> Measur
     """
     if run.mechanism is None:
         raise RequestError("the run holds no mechanism, so nothing can be measured on it")
-    readings = chosen_measures(run.mechanism, measures)
-    motion = Motion.of_run(run, with_margin=any(isinstance(reading, LowestMargin) for reading in readings))
+    readings = with_measures(run.mechanism, measures).measures
+    motion = Motion.of_run(run)
     return MeasuredValues((reading.name, read_value(run, motion, reading)) for reading in readings)
 
 
-def chosen_measures(
-    mechanism: Mechanism, measures: Iterable[Reading | str] | Reading | str | None
-) -> tuple[Reading, ...]:
-    """Return the measures of a call, checked and with numbers in place of texts."""
-    return with_measures(mechanism, measures).measures
-
-
 def with_measures(mechanism: Mechanism, measures: Iterable[Reading | str] | Reading | str | None) -> Mechanism:
-    """Return a mechanism with the measures of a call in place of its own; None: its own."""
+    """Return a mechanism with the measures of a call, checked and with numbers for texts; None: with its own."""
     if measures is None:
         return mechanism
     own = {reading.name: reading for reading in mechanism.measures}
@@ -142,34 +140,59 @@ def read_value(run: Run, motion: Motion, reading: Reading, solved: Callable[...,
     solved: Solves the run's mechanism for inputs; default: `solve`.
     """
     unit = motion.mechanism.length_unit
-    try:
+    with _named_in_errors(reading):
         motion = geometry_of(run, motion, reading, solved)
-        quantities = needed(motion.mechanism, [reading]).quantities
-        motion = motion.going_round(bool(motion.goes_round(quantities)))
-        with np.errstate(all="ignore"):  # quotients at samples where the driver rests are NaN
-            found = reading.read(motion.part(reading.begin, reading.end))
-    except RequestError as error:
-        raise RequestError(f"[measures.{reading.name}]: {error}") from None
-    value, lack = known_values(found)
-    at = tuple(float(motion.driven_at(np.asarray(x))) for x in found.at)
+        motion = motion.going_round(bool(motion.goes_round(motion.names.quantities(reading))))
+    values = read_values(motion, reading)
+    has_value = bool(np.isfinite(values.value))
     return MeasuredValue(
         name=reading.name,
         type=reading.type,
-        value=float(value),
-        unit=unit_of(found.quantity, unit),
+        value=float(values.value),
+        unit=unit_of(values.quantity, unit),
         driver=motion.driver,
-        at=at,
+        at=tuple(map(float, values.at)),
         at_unit=unit_of(motion.driver_quantity, unit),
-        reason="" if np.isfinite(value) else str(lack) or _reason(run, reading),
+        reason="" if has_value else str(values.reason) or _reason(run, reading),
     )
 
 
-def known_values(found: Finding) -> tuple[FloatArray, NDArray[np.str_]]:
-    """Return the values of designs, NaN where there is none, and the reasons that the reading states, else ''."""
-    value, reason = np.asarray(found.value, dtype=float), np.full(np.shape(found.value), "")
-    for is_lacking, text in found.lacks:
-        reason = np.where((reason == "") & is_lacking, text, reason)
-    return np.where(np.isfinite(value) & (reason == ""), value, np.nan), reason
+class Values(NamedTuple):
+    """A measure of one design or of many.
+
+    value: (...) NaN where there is none; quantity: what it measures; at: (...) each, values of the driver where it
+    occurs; reason: (...) why designs whose samples all have numbers have no value, else ''.
+    """
+
+    value: FloatArray
+    quantity: Quantity
+    at: tuple[FloatArray, ...]
+    reason: NDArray[np.str_]
+
+
+def read_values(motion: Motion, reading: Reading) -> Values:
+    """Return a measure of all designs of a motion, which goes round or does not for all of them.
+
+    Raises:
+        RequestError: The motion does not fit; the message names the measure.
+
+    """
+    with _named_in_errors(reading), np.errstate(all="ignore"):  # quotients at samples where the driver rests are NaN
+        found = reading.read(motion.part(reading.begin, reading.end))
+        value, reason = np.asarray(found.value, dtype=float), np.full(np.shape(found.value), "")
+        for is_lacking, text in found.lacks:
+            reason = np.where((reason == "") & is_lacking, text, reason)
+        at = tuple(np.asarray(motion.driven_at(np.asarray(x))) for x in found.at)
+    return Values(np.where(np.isfinite(value) & (reason == ""), value, np.nan), found.quantity, at, reason)
+
+
+@contextmanager
+def _named_in_errors(reading: Reading) -> Iterator[None]:
+    """Let messages about a motion begin with the measure."""
+    try:
+        yield
+    except RequestError as error:
+        raise RequestError(f"[measures.{reading.name}]: {error}") from None
 
 
 def _reason(run: Run, reading: Reading) -> str:
@@ -191,3 +214,36 @@ def reason_without_value(samples: HasAxis, good: NDArray[np.bool_]) -> str:
         return "the quantity has no finite value at some samples"
     first = axis_of(samples).place(float(samples.t[missing[0]]))
     return f"{len(missing)} of {len(good)} samples have no numbers, the first at {first}"
+
+
+def moves_evenly(drive: History) -> bool:
+    """Return True for a driver with one speed that is not 0, at which the motion is its geometry."""
+    return drive.is_linear and bool(drive.rate[0])
+
+
+def geometry_of(run: Run, motion: Motion, reading: Reading, solved: Callable[..., Run] | None = None) -> Motion:
+    """Return the motion on which a measure is read: of one that compares rates the geometry of the run.
+
+    Args:
+        run: The run.
+        motion: Its motion.
+        reading: The measure. A rate over another is not geometry.
+        solved: Solves the run's mechanism for inputs. Default: `solve`.
+
+    Raises:
+        RequestError: The driver does not move.
+
+    """
+    drive, orders = motion.drive, motion.names.orders
+    if not reading.compares_rates or drive is None or moves_evenly(drive) or not run.good.all():
+        return motion
+    if any(orders[name][1] for name in reading.quantities() if isinstance(name, str) and name in orders):
+        return motion  # the rate of a rate
+    low, high = (float(extreme.value) for extreme in drive.extremes())
+    if high - low <= _AT_REST * max(abs(low), abs(high)):
+        raise RequestError(f"{motion.driver} does not move")
+    angle, speed, _ = next(one.inputs() for one in motion.mechanism.drivers if one.name == motion.driver)
+    turns = (high - low) / math.tau if angle.quantity.kind == "angle" else 1.0
+    values = np.linspace(low, high, _SAMPLES * math.ceil(max(turns, 1.0)) + 1)
+    solved = solved or partial(solve, replace(motion.mechanism, coordinates="all"))
+    return Motion.of_run(solved(**{angle: values, speed: 1.0}))

@@ -16,20 +16,23 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.force_names import NEVER_NEGATIVE
 from kinfmu.mechanism.members import kind_of_measured
-from kinfmu.mechanism.quantities import PoseQuantity
+from kinfmu.mechanism.quantities import PoseQuantity, cosine_between
 from kinfmu.mechanism.quantities.arithmetic import Value, sqrt
 from kinfmu.mechanism.quantities.placement import GROUND, BodyFrame, Placement, body_of, unit_vector
-from kinfmu.motion.crowding import is_crowded, spread
-from kinfmu.motion.driven_samples import driven_samples
-from kinfmu.motion.driver_values import driven_at, window, within_period
 from kinfmu.motion.fitting import Circle, Line, deviation
-from kinfmu.motion.going_round import goes_round
-from kinfmu.motion.history import FEWEST, Extreme, History
-from kinfmu.motion.margins import lowest
-from kinfmu.motion.needed import Cosine, PathCoordinate, QuantityRead, cosine_between, is_angle, value_of
-from kinfmu.motion.poles import first_pole
-from kinfmu.motion.quantity_names import QuantityNames
-from kinfmu.motion.sampled import sampled_history
+from kinfmu.motion.history import FEWEST, Extreme, History, first_pole
+from kinfmu.motion.quantities import QuantityNames, QuantityRead, path_of
+from kinfmu.motion.samples import (
+    driven_at,
+    driven_samples,
+    goes_round,
+    is_crowded,
+    lowest,
+    sampled_history,
+    spread,
+    window,
+    within_period,
+)
 from kinfmu.motion.splitting import ORDER, Break, distinct, law_breaks, split_at
 from kinfmu.plan.equations.system import size_of
 from kinfmu.plan.equations.taylor import Taylor
@@ -39,6 +42,7 @@ from kinfmu.units import CoordinateName, Quantity
 
 SHAPES: dict[str, type[Line] | type[Circle]] = {"line": Line, "circle": Circle}
 Vector = tuple[Taylor, Taylor]
+MARGIN = "solver.margin"  # its column, of which only samples are known
 _STILL = 1e-9  # [rad, sizes]; of rates: of their largest value; a quantity that changes by less does not move
 _TURNED = 1.0  # [rad]; the ends of a motion that goes round differ by nothing or by whole turns
 
@@ -52,16 +56,15 @@ class Motion:
         x: (n,) ascending arguments: time, or values of the driver; rates are derivatives by them.
         per: What x is: 'time', 'angle' or 'length'.
         tables: Values, rates and accelerations of the outputs, each (..., n, m).
-        outputs: Names of the m outputs.
+        outputs: The m quantities of which the tables hold columns: coordinates by their names, and others.
         fixed: Coordinates that a joint holds at a constant, by name; those that differ between designs are (m, 1).
         drive: Value of the driver over x; None if several drivers move.
         points: Body-fixed coordinates of the points by 'body.point'; those that differ between designs are (m, 1).
         driver: Name of that driver; 'time' if several move.
-        margin: (..., n) 1 / condition of the samples; None if unknown.
         is_closed: True if the motion goes round: the last sample is the first, after one period.
         window: First and last argument of the part that readings see; None: all of it.
-        force: The samples (..., n) of a force by its name; None if the motion has none.
-        computed: Outputs that are quantities which measures read, by the quantity.
+        sampled: The samples (..., n) of a column of which rates are unknown, by its name: of a force, or of the margin.
+            None: they are unknown too.
         is_seamed: True if a law's derivatives jump at the ends of a motion that goes round. Inside x is twice where
             they jump, once for each side.
 
@@ -71,16 +74,14 @@ class Motion:
     x: FloatArray
     per: str
     tables: tuple[FloatArray, FloatArray, FloatArray]
-    outputs: Sequence[CoordinateName]
+    outputs: Sequence[QuantityRead]
     fixed: Mapping[CoordinateName, Value]
     drive: History | None
     points: Mapping[str, tuple[Value, Value]]
     driver: str = TIME
-    margin: FloatArray | None = None
     is_closed: bool = False
     window: tuple[float, float] | None = None
-    force: Callable[[str], FloatArray] | None = None
-    computed: Mapping[QuantityRead, CoordinateName] = field(default_factory=dict)
+    sampled: Callable[[str], FloatArray] | None = None
     is_seamed: bool = False
     _histories: dict[QuantityRead, History] = field(default_factory=dict, repr=False)
     _names: QuantityNames | None = field(default=None, repr=False)  # the same object in all parts and all designs
@@ -89,8 +90,8 @@ class Motion:
     )
 
     @classmethod
-    def of_run(cls, run: Run, *, with_margin: bool = True) -> Motion:
-        """Return the motion of a run; margins are computed only if they are wanted.
+    def of_run(cls, run: Run) -> Motion:
+        """Return the motion of a run; forces and margins are computed when they are read.
 
         Raises:
             RequestError: The run has too few samples or no mechanism, or its samples are not in the order of time or of
@@ -114,8 +115,7 @@ class Motion:
             drive,
             mechanism.body_points,
             driver,
-            run.margin[order] if with_margin else None,
-            force=lambda name: force_of(run, name)[order],
+            sampled=lambda name: (run.margin if name == MARGIN else force_of(run, name))[order],
         )
         motion = motion._spread()
         outputs = [(motion.quantity_history(name), name.is_angle) for name in run.outputs]
@@ -128,14 +128,13 @@ class Motion:
         if not is_crowded(self.x):
             return self
         kept = spread(self.x, self.tables[1], self.tables[2])
-        force = self.force
+        sampled = self.sampled
         return replace(
             self,
             x=self.x[kept],
             tables=tuple(table[kept] for table in self.tables),  # type: ignore[arg-type]  # three of them
             drive=self.drive and self.drive.samples(kept),
-            margin=None if self.margin is None else self.margin[kept],
-            force=None if force is None else lambda name: force(name)[kept],
+            sampled=sampled and (lambda name: sampled(name)[kept]),
             _histories={},
         )
 
@@ -157,14 +156,13 @@ class Motion:
         split = split_at(self.x, breaks, is_closed=is_closed)
         if split.is_empty:
             return replace(self, is_seamed=split.is_seamed, _histories={})
-        force = self.force
+        sampled = self.sampled
         return replace(
             self,
             x=split.x_split,
             tables=split.tables(self.tables),
-            drive=None if self.drive is None else split.driver(self.drive),
-            margin=None if self.margin is None else self.margin[split.source],
-            force=None if force is None else lambda name: split.samples(force(name)),
+            drive=self.drive and split.driver(self.drive),
+            sampled=sampled and (lambda name: split.samples(sampled(name), is_smooth=name != MARGIN)),
             is_seamed=split.is_seamed,
             _histories={},
         )
@@ -173,7 +171,7 @@ class Motion:
         self, quantities: Sequence[QuantityRead], is_known: NDArray[np.bool_] | None = None
     ) -> NDArray[np.bool_]:
         """Return (...) whether quantities go round, whatever else moves; is_known: designs without gaps, if known."""
-        moving = [(self.quantity_history(one), is_angle(one)) for one in quantities if one not in self.fixed]
+        moving = [(self.quantity_history(one), one.is_angle) for one in quantities if one not in self.fixed]
         return goes_round(moving, is_known) if moving else np.full(self.tables[0].shape[:-2], self.is_closed)
 
     def going_round(self, is_closed: bool) -> Motion:
@@ -195,7 +193,6 @@ class Motion:
             tables=(tables[0], tables[1], tables[2]),
             fixed={name: rows(value) for name, value in self.fixed.items()},
             points={name: (rows(x), rows(y)) for name, (x, y) in self.points.items()},
-            margin=None,
             _histories={},
         )
 
@@ -350,10 +347,6 @@ class Motion:
         """Return the cosine of the angle between two vectors."""
         return self._cut(self._as_history(cosine_between(a, b)))
 
-    def line_cosine(self, first: tuple[str, str], second: tuple[str, str]) -> History:
-        """Return the cosine of the angle between two lines, each from a point to another."""
-        return self._cut(self.quantity_history(Cosine(first, second)))
-
     def arc_sine(self, sine: FloatArray) -> FloatArray:
         """Return the angle [rad] of a sine that may exceed 1 by rounding."""
         return np.arcsin(np.clip(sine, -1.0, 1.0))
@@ -377,9 +370,7 @@ class Motion:
 
     def lowest_margin(self) -> tuple[FloatArray, FloatArray]:
         """Return the smallest margin of the samples and where it occurs; margins have no rates."""
-        if self.margin is None:
-            raise RequestError("the motion has no margins")
-        return lowest(self.x, self.margin, self.window, is_closed=self.is_closed)
+        return lowest(self.x, self._samples(MARGIN), self.window, is_closed=self.is_closed)
 
     def quantity_history(self, quantity: QuantityRead) -> History:
         """Return a quantity that measures read, without regard to the window."""
@@ -388,12 +379,10 @@ class Motion:
         return self._histories[quantity]
 
     def _new_history(self, quantity: QuantityRead) -> History:
-        if quantity in self.computed:
-            history = self._coordinate(self.computed[quantity])
-        elif isinstance(quantity, CoordinateName):
-            history = self._coordinate(quantity)
+        if isinstance(quantity, str) or quantity in self.outputs:
+            history = self._column(quantity)
         else:
-            history = self._as_history(value_of(quantity, self._placement))
+            history = self._as_history(quantity.value(self._placement(quantity.bodies())))
         is_root = isinstance(quantity, PoseQuantity) and quantity.is_root
         return replace(history, is_root=True) if is_root else history
 
@@ -408,28 +397,33 @@ class Motion:
 
     def _force_history(self, name: str) -> History:
         """Return a force, of which only samples are known."""
-        if self.force is None:
-            unknown = np.full(self.tables[0].shape[:-1], np.nan)
-            return History(self.x, unknown, unknown, unknown, self.is_closed, self.is_seamed)
-        history = sampled_history(self.x, self.force(name), is_closed=self.is_closed, is_seamed=self.is_seamed)
+        samples = self._samples(name)
+        if self.sampled is None:
+            return History(self.x, samples, samples, samples, self.is_closed, self.is_seamed)
+        history = sampled_history(self.x, samples, is_closed=self.is_closed, is_seamed=self.is_seamed)
         made_of = self.names.forces[name]  # the size of a force is made of two components
         return replace(history, is_nonnegative=len(made_of) > 1 or made_of[0].noun in NEVER_NEGATIVE)
 
+    def _samples(self, name: str) -> FloatArray:
+        """Return a column of which samples alone are known, (..., n); NaN if not even these are."""
+        return np.full(self.tables[0].shape[:-1], np.nan) if self.sampled is None else self.sampled(name)
+
     def _path(self, point: str) -> tuple[History, History]:
         """Return the world coordinates of a point, without regard to the window."""
-        return self.quantity_history(PathCoordinate(point, "x")), self.quantity_history(PathCoordinate(point, "y"))
+        x, y = map(self.quantity_history, path_of(point))
+        return x, y
 
-    def _coordinate(self, name: str) -> History:
-        """Return the history of a coordinate."""
-        if name in self.fixed:
-            constant = self.fixed[name] + np.zeros_like(self.x)  # type: ignore[index]  # a name is a text
+    def _column(self, quantity: QuantityRead) -> History:
+        """Return the history of a quantity that is fixed, or has a column in the tables."""
+        if quantity in self.fixed:
+            constant = self.fixed[quantity] + np.zeros_like(self.x)  # type: ignore[index]  # it is the name of one
             return History(self.x, constant, 0.0 * constant, 0.0 * constant, self.is_closed, self.is_seamed)
-        if name not in self.outputs:
+        if quantity not in self.outputs:
             raise RequestError(
-                f"there is no output '{name}', which a measure needs; solve or compile the mechanism with it, or with "
-                f"all outputs"
+                f"there is no output '{quantity}', which a measure needs; solve or compile the mechanism with it, or "
+                f"with all outputs"
             )
-        k = [str(output) for output in self.outputs].index(name)
+        k = self.outputs.index(quantity)
         value, rate, acceleration = (table[..., k] for table in self.tables)
         return History(self.x, value, rate, acceleration, self.is_closed, self.is_seamed)
 
@@ -462,7 +456,7 @@ def break_places(run: Run) -> list[float]:
         RequestError: As `Motion.of_run`.
 
     """
-    motion = Motion.of_run(run, with_margin=False)
+    motion = Motion.of_run(run)
     return [one.x for one in motion.breaks(over_time=run.axis == TIME)]
 
 

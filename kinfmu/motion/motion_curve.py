@@ -13,15 +13,16 @@ from kinfmu.arrays import FloatArray
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.joints import CamRoller
 from kinfmu.mechanism.laws.law import TURN
-from kinfmu.motion.breaks import AT_SAMPLE, FollowedLaw, bracket, breaks_of, followed_laws
+from kinfmu.motion.breaks import AT_SAMPLE, FollowedLaw, OneSided, bracket, breaks_of, followed_laws
 from kinfmu.motion.jerk import motion_of, quantity_table, targets_at
 from kinfmu.motion.jet_equations import LEAST_MARGIN, JetEquations, derivative, with_derivative
-from kinfmu.motion.one_sided import OneSided
 from kinfmu.plan.equations.jets import Jet
 from kinfmu.plan.equations.system import placement
-from kinfmu.run import Run
-from kinfmu.run.axis import TIME
+from kinfmu.run import Column, Run
+from kinfmu.run.axis import TIME, rates_per
+from kinfmu.run.tables import in_degrees
 from kinfmu.solver.python.status import Status
+from kinfmu.units import Quantity, unit_of
 
 _STEPS = 12  # of Newton at most
 _CLOSE = 1e-11  # of the size, of a step between samples; a smaller correction ends Newton
@@ -198,3 +199,41 @@ class _Limits:
 
 def _jets(q: FloatArray) -> list[Jet]:
     return [Jet.of(column) for column in q.T]
+
+
+NAMES = ("position", "velocity", "acceleration", "jerk")
+
+
+def units_of(run: Run, curve: MotionCurve) -> list[str]:
+    """Return the units of displacement, velocity, acceleration and jerk."""
+    per = rates_per(run)
+    return [unit_of(Quantity(curve.kind, order, per), run.length_unit) for order in range(4)]
+
+
+def svaj_columns(run: Run, name: str, *, degrees: bool = False) -> list[Column]:
+    """Return time, values of the drivers, position, velocity, acceleration, jerk and side of a quantity.
+
+    There is a row for each sample, of side 0. At each break of a law two more rows hold the limits before it in the
+    order of the run, of side -1, and after it, of side 1. A sample exactly at a break has the value of the piece on the
+    right of the law, which is before the break where the law's argument falls. Without time on the axis of the run
+    there is no column of it. Numbers that are not known are NaN.
+
+    Args:
+        run: The run, as for `motion_of`.
+        name: A coordinate or a cam joint, as for `motion_of`.
+        degrees: True: angles, and their rates in time, in deg.
+
+    Raises:
+        RequestError, KinfmuError, MechanismError: As `motion_of`.
+
+    """
+    curve = motion_curve(run, name)
+    found = [Column("time", "s", curve.t)] if run.axis == TIME else []
+    for k, driven in enumerate(run.input_names[::3]):
+        found.append(Column(str(driven), unit_of(driven.quantity, run.length_unit), curve.drive[:, k]))
+    for order, unit in enumerate(units_of(run, curve)):
+        found.append(Column(NAMES[order], unit, curve.table[:, order]))
+    if degrees:
+        found = [*map(in_degrees, found)]
+    found = [column._replace(values=column.values + 0.0) for column in found]  # no -0.0
+    return [*found, Column("side", "1", curve.side)]

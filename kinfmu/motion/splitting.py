@@ -83,10 +83,10 @@ class Splitting:
                 table[limit.number] = row
         return found[0], found[1], found[2]
 
-    def samples(self, values: FloatArray) -> FloatArray:
-        """Return a quantity of which only samples (n,) are known at the new samples."""
+    def samples(self, values: FloatArray, *, is_smooth: bool = True) -> FloatArray:
+        """Return a quantity of which only samples (n,) are known at the new samples; one that has bends: of the old."""
         found = values[self.source]
-        for limit in self._limits:
+        for limit in self._limits if is_smooth else ():
             if limit.at is None:
                 base = values[limit.near[0]]
                 weights = _weights(self._distance(limit, _PLAIN), 1)[0]

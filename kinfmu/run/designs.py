@@ -20,14 +20,13 @@ from kinfmu.plan import SolvePlan
 from kinfmu.plan.plan import PlanParameter
 from kinfmu.run import Run
 from kinfmu.run.arguments import Arguments, Settings
-from kinfmu.run.driving import driven_by_inputs
+from kinfmu.run.driving import driven_by_inputs, numbers_of
 from kinfmu.run.engine import Driven
-from kinfmu.run.numbers import numbers_of
 from kinfmu.solver.python.status import Status
 from kinfmu.units import CoordinateName
 
 if TYPE_CHECKING:
-    from kinfmu.run.library import Library
+    from kinfmu.run.native_engine import Library
 
 SAMPLES_AT_ONCE = 500_000  # of a piece of work: its diagnostics stay in some 30 MB
 
@@ -161,6 +160,12 @@ class Batch:
             )
         return driven_by_inputs(self.plan.drivers, inputs, rows=self.count)
 
+    def of_model(self, model: Solvable) -> Batch:
+        """Return the same designs of a model with the same arguments."""
+        other = copy(self)
+        other.model, other.plan = model, model.plan
+        return other
+
     def part(self, part: slice) -> Batch:
         """Return a batch of some of the designs."""
         some = copy(self)
@@ -209,6 +214,18 @@ class Driving(NamedTuple):
     driven: Driven | None
     inputs: Mapping[str, FloatArray]
 
+    def part(self, part: slice) -> Driving:
+        """Return what moves some of the designs."""
+        driven, inputs = self.driven, self.inputs
+        if driven is not None and driven[0].ndim == 3:
+            driven = (driven[0][part], driven[1][part], driven[2][part])
+        return Driving(self.times, driven, {name: row[part] if row.ndim == 2 else row for name, row in inputs.items()})
+
+    def of(self, design: int) -> dict[str, Any]:
+        """Return what moves one design as arguments of `solve`."""
+        inputs = {name: row[design] if row.ndim == 2 else row for name, row in self.inputs.items()}
+        return inputs or {"t": self.times}
+
 
 Wanted = Sequence[FloatArray | None]  # (m, n, k) each: values, rates, accelerations; None: not wanted
 
@@ -239,11 +256,11 @@ def solve_batch(batch: Batch, driving: Driving, *, highest: int, tolerance: floa
         alone, reasons = solve_by_library(batch, driving, tables, status, tolerance, threads, anew=anew)
     assembled = []
     for design in alone:
-        reason, was_assembled = _alone(batch, driving, design, tables, status, tolerance, anew=anew)
-        if was_assembled:
+        outcome = solve_alone(batch, driving, design, tables, status, tolerance, anew=anew)
+        if outcome.is_assembled:
             assembled.append(design)
-        if reason:
-            reasons[design] = reason
+        if outcome.reason:
+            reasons[design] = outcome.reason
     return Designs(
         parameters=batch.parameters,
         t=driving.times,
@@ -268,21 +285,17 @@ def solve_by_library(
     anew: bool,
 ) -> tuple[Sequence[int], dict[int, str]]:
     """Fill the tables by the compiled plan; return the designs still to be solved alone, and reasons of the others."""
-    from kinfmu.run.library import LawDriven
+    from kinfmu.run.native_engine import LawDriven
 
     library, start = batch.model.load_library(), batch.plan.mechanism.run.start
     invalid = batch.invalid()
     written = [parameter.value for parameter in batch.plan.parameters]
     values = np.where(invalid[:, None], written, batch.values)
-    driven = driving.driven
 
     def piece(part: slice) -> tuple[NDArray[np.int32], dict[int, str]]:
-        law = LawDriven(driving.times, batch.constants[part], start) if driven is None else None
-        given = driven
-        if driven is not None and driven[0].ndim == 3:
-            given = (driven[0][part], driven[1][part], driven[2][part])
+        law = LawDriven(driving.times, batch.constants[part], start) if driving.driven is None else None
         into = [None if table is None else table[part] for table in tables]
-        return library.solve_designs(values[part], given, law, into, status[part], tolerance)
+        return library.solve_designs(values[part], driving.part(part).driven, law, into, status[part], tolerance)
 
     parts = parts_of(batch.count, max(1, SAMPLES_AT_ONCE // max(1, len(driving.times))), threads)
     with ThreadPoolExecutor(threads) as pool:
@@ -305,7 +318,15 @@ def parts_of(designs: int, most: int, threads: int) -> list[slice]:
     return [slice(first, min(first + size, designs)) for first in range(0, designs, size)]
 
 
-def _alone(
+class Outcome(NamedTuple):
+    """How one design was solved: why it has gaps, else ''; assembled anew; not reached: it has no run at all."""
+
+    reason: str
+    is_assembled: bool = False
+    is_reached: bool = True
+
+
+def solve_alone(
     batch: Batch,
     driving: Driving,
     design: int,
@@ -314,25 +335,27 @@ def _alone(
     tolerance: float,
     *,
     anew: bool,
-) -> tuple[str, bool]:
-    """Solve one design as `solve` does; return why it has gaps, if so, and whether it was assembled anew."""
-    inputs = {name: array[design] if array.ndim == 2 else array for name, array in driving.inputs.items()}
-    times = None if inputs else driving.times
+) -> Outcome:
+    """Fill the tables of one design as `solve` solves it."""
+    parameters = batch.of(design)
     try:
-        run = batch.model.solve(times, parameters=batch.of(design), tolerance=tolerance, anew=anew, **inputs)
+        run = batch.model.solve(parameters=parameters, tolerance=tolerance, anew=anew, **driving.of(design))
     except KinfmuError as error:
         for table in tables:
             if table is not None:
                 table[design] = np.nan
         status[design] = Status.INCONSISTENT
-        return str(error), False
+        return Outcome(str(error), is_reached=False)
     for table, values in zip(tables, (run.values, run.rates, run.accelerations), strict=True):
         if table is not None:
             table[design] = values
     status[design] = run.status
-    was_assembled = bool(run.events) and run.events[0].level == "info"
-    failures = [event.text for event in run.events if event.level == "error"]
-    return failures[0] if failures else "", was_assembled
+    return Outcome(first_failure(run), is_assembled=bool(run.events) and run.events[0].level == "info")
+
+
+def first_failure(run: Run) -> str:
+    """Return why a run has no numbers at some sample; '' if it has no gaps."""
+    return next((event.text for event in run.events if event.level == "error"), "")
 
 
 def _arrays(model: Solvable, parameters: Mapping[str, ArrayLike | str]) -> dict[str, FloatArray]:

@@ -1,4 +1,4 @@
-"""What moves a sweep: times for the laws, or driver values given as inputs."""
+"""What moves a sweep: times for the laws, or driver values given as inputs, as arrays of numbers."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import math
 import sys
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from kinfmu.arrays import FloatArray
 from kinfmu.errors import KinfmuError, RequestError, listed, suggestion
@@ -16,8 +17,68 @@ from kinfmu.mechanism import RunSettings
 from kinfmu.plan import DriverInfo
 from kinfmu.run import MOST_SAMPLES
 from kinfmu.run.engine import Driven
-from kinfmu.run.numbers import numbers_of
-from kinfmu.run.unwrap import unwrap
+from kinfmu.solver.python.bridge import TURN, turned
+
+_DOUBLE = np.dtype(np.float64)
+_NO_NUMBERS: dict[tuple[type, ...], str] = {  # types that numpy makes floats of
+    (bool, np.bool_): "true or false",
+    (complex, np.complexfloating): "complex",
+    (np.datetime64,): "dates",
+    (np.timedelta64,): "durations; divide them by a unit, such as np.timedelta64(1, 's')",
+    (np.void,): "records of several fields",
+}
+
+
+def numbers_of(name: str, values: ArrayLike, what: str = "numbers") -> FloatArray:
+    """Return an array of floats.
+
+    Raises:
+        RequestError: They are no real numbers, though numpy may make numbers of them, or some are masked.
+
+    """
+    if type(values) is np.ndarray and values.dtype is _DOUBLE:
+        return values
+    if type(values) is float:
+        return np.array(values)
+    items: Sequence[Any] = values if isinstance(values, list | tuple) else ()
+    types: set[type] = set(map(type, items))
+    try:
+        if any(issubclass(one, np.ma.MaskedArray) for one in types):  # numpy would drop their masks
+            values = np.ma.stack(list(map(np.ma.asanyarray, items)))
+        array = np.asanyarray(values)
+        types |= set(map(type, array.ravel().tolist())) if array.dtype == object else {array.dtype.type}
+        for kinds, what_they_are in _NO_NUMBERS.items():
+            if any(issubclass(one, kinds) for one in types):
+                raise RequestError(f"{name} must be {what}, not {what_they_are}")
+        if np.ma.is_masked(array):
+            place = np.argwhere(np.ma.getmaskarray(array))[0]
+            where = f"[{', '.join(map(str, place))}]" if array.ndim else ""
+            raise RequestError(f"{name}{where} is masked; leave it out, or fill in a number")
+        return np.asarray(array, dtype=float)
+    except (TypeError, ValueError):
+        raise RequestError(f"{name} must be {what}") from None
+
+
+_HALF = 0.5 + 1e-9  # [turns]; a step of half a turn, within rounding, is unchanged
+
+
+def unwrap(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the angles, each moved by whole turns to within half a turn of the one before.
+
+        350, 10, 350 deg -> 350, 370, 350 deg
+
+    angles: (n,) [rad]; the first is unchanged.
+    """
+    steps = np.diff(angles) / TURN
+    back = np.sign(steps) * np.ceil(np.abs(steps) - _HALF)  # [turns]
+    turns = -np.concatenate([[0.0], np.cumsum(back)])[: len(angles)]
+    return np.array([turned(angle, n) for angle, n in zip(angles.tolist(), turns.tolist(), strict=True)])  # (n,)
+
+
+def is_long(steps: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which steps between angles [rad] are longer than half a turn, so that unwrapping changes them."""
+    return np.abs(steps) > _HALF * TURN
+
 
 LARGEST_RATE = 1e100  # of drivers; squares of much larger numbers are infinite
 _LARGEST_KEPT = 1_000_000  # numbers
@@ -142,6 +203,24 @@ def with_constants(drivers: Sequence[DriverInfo], driven: Driven, inputs: Mappin
         tables.append(table)
     u, ud, udd = tables
     return u, ud, udd
+
+
+def applied_efforts(known: Sequence[str], given: Mapping[str, ArrayLike], count: int) -> dict[str, FloatArray]:
+    """Return the efforts of external loads at all samples, (n,) by the names of their inputs; 0 where none is given.
+
+    Raises:
+        RequestError: An effort is not a number, or neither one number nor one for each sample.
+
+    """
+    efforts = {}
+    for name in known:
+        column = column_of(name, given.get(name, 0.0))
+        if len(column) not in (1, count):
+            raise RequestError(
+                f"{name} must be a number or have {count} values, one for each sample, not {len(column)}"
+            )
+        efforts[name] = np.broadcast_to(column, (count,)).copy()
+    return efforts
 
 
 def without_huge_rates(driven: Driven) -> Driven:

@@ -8,12 +8,10 @@ from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kinfmu.arrays import FloatArray
 from kinfmu.codegen.lanes.stage import strided_columns
 from kinfmu.codegen.python.stage import CompiledStage, load_stage
-from kinfmu.errors import RequestError
 from kinfmu.mechanism.force_names import shaking_names
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.forces import force_names, force_steps, loaded_coordinates
@@ -27,7 +25,6 @@ from kinfmu.plan.undetermined import undetermined_reactions
 from kinfmu.run import Run
 from kinfmu.run.arguments import Setting
 from kinfmu.run.designs import Solvable
-from kinfmu.run.driving import column_of
 from kinfmu.run.engine import Driven
 from kinfmu.run.stages import native_results, native_stage, stage_results
 from kinfmu.solver.python.status import Status
@@ -51,24 +48,6 @@ class LoadedRun(NamedTuple):
     setting: Setting
     efforts: Mapping[str, FloatArray]
     times: FloatArray | None
-
-
-def applied_efforts(known: Sequence[str], given: Mapping[str, ArrayLike], count: int) -> dict[str, FloatArray]:
-    """Return the efforts of external loads at all samples, (n,) by the names of their inputs; 0 where none is given.
-
-    Raises:
-        RequestError: An effort is not a number, or neither one number nor one for each sample.
-
-    """
-    efforts = {}
-    for name in known:
-        column = column_of(name, given.get(name, 0.0))
-        if len(column) not in (1, count):
-            raise RequestError(
-                f"{name} must be a number or have {count} values, one for each sample, not {len(column)}"
-            )
-        efforts[name] = np.broadcast_to(column, (count,)).copy()
-    return efforts
 
 
 class ForceModel:

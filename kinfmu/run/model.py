@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import weakref
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kinfmu.arrays import FloatArray
 from kinfmu.codegen.python import load_model, load_module
 from kinfmu.errors import CompilerError, RequestError, listed
 from kinfmu.mechanism import Mechanism
@@ -21,15 +21,13 @@ from kinfmu.plan.reactions import reaction_names_of
 from kinfmu.processes import require_workers
 from kinfmu.run import Event, Run
 from kinfmu.run.arguments import Arguments, Setting, Settings
-from kinfmu.run.axis import TIME, axis_for
 from kinfmu.run.continued import anew as anew_note
 from kinfmu.run.designs import Batch, Designs, Driving, solve_batch
-from kinfmu.run.driving import column_of, driven_by_inputs, run_times, with_constants, without_huge_rates
-from kinfmu.run.engine import Engine, Tables, UnreachedError, require_engine, tables_for
-from kinfmu.run.forces import ForceModel, LoadedRun, applied_efforts, force_plan
-from kinfmu.run.numbers import numbers_of
-from kinfmu.run.python_engine import PythonEngine
+from kinfmu.run.driving import applied_efforts, column_of, driven_by_inputs, numbers_of, run_times, without_huge_rates
+from kinfmu.run.engine import Driven, Engine, PythonEngine, Tables, UnreachedError, require_engine, tables_for
+from kinfmu.run.forces import ForceModel, force_plan
 from kinfmu.run.sensitivities import Sensitivities, SensitivityModel, plan_of_unknowns
+from kinfmu.run.solved_samples import SolvedSamples
 from kinfmu.solver.python import Solver, UnsolvableModel, with_parameters
 from kinfmu.solver.python.pose import Vector
 from kinfmu.solver.python.solver import TOLERANCE
@@ -92,9 +90,9 @@ class Model:
         self.engine = engine
         self.outputs = plan.outputs
         self.parameters = tuple(parameter.name for parameter in plan.parameters)
-        self._input_names = tuple(name for driver in plan.drivers for name in driver.inputs)
-        self._watch_names = plan.watch_names
-        self._force_names, self._reaction_names = force_names(plan.mechanism), reaction_names_of(plan.mechanism)
+        self.input_names = tuple(name for driver in plan.drivers for name in driver.inputs)
+        self.watch_names = plan.watch_names
+        self.force_names, self.reaction_names = force_names(plan.mechanism), reaction_names_of(plan.mechanism)
         self._load_inputs = tuple(name for load in plan.mechanism.loads for name in load.inputs())
         self.arguments = Arguments(plan)
         self._solver = lru_cache(maxsize=_SOLVERS_KEPT)(self._new_solver)
@@ -158,17 +156,8 @@ class Model:
         tolerance = read_tolerance("tolerance", tolerance)
         setting = self.arguments.setting(parameters or {})
         efforts: dict[str, Any] = {name: inputs.pop(name) for name in self._load_inputs if name in inputs}
-        driven, times = None, np.empty(0)
-        if inputs:
-            if t is not None:
-                raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
-            driven = driven_by_inputs(self.plan.drivers, inputs, wrap=wrap)
-            count = len(driven[0])
-        elif wrap:
-            raise RequestError("wrap unwraps angles given as inputs, such as crank_angle; times by a law have no jumps")
-        else:
-            times = column_of("t", run_times(self.mechanism.run) if t is None else t)
-            count = len(times)
+        times, driven = self._driving(t, inputs, wrap=wrap)
+        count = len(times if driven is None else driven[0])
         try:
             engine = self._engine(count, setting, tolerance, by_law=driven is None)
             if driven is None:
@@ -181,55 +170,30 @@ class Model:
             return self._solve_anew(
                 str(reason), setting.given, t, tolerance=tolerance, wrap=wrap, out=out, **inputs, **efforts
             )
-        plan, given = self.plan, driven
-        applied = applied_efforts(self._load_inputs, efforts, count)
+        return SolvedSamples(
+            self,
+            setting,
+            engine,
+            None if inputs else times,
+            inputs,
+            applied_efforts(self._load_inputs, efforts, count),
+            driven,
+            result,
+            {"t": t, "parameters": parameters, "tolerance": tolerance, "wrap": wrap, **inputs},
+            is_kept=out is None,
+        ).run(tables)
 
-        def loaded() -> LoadedRun:
-            """Return what forces are computed from; tables that were given may hold other numbers by now."""
-            poses, moved, has_gaps = itself(), with_constants(plan.drivers, given, inputs), bool(result.failures)
-            if poses is None or self._force_model.poses is not self or out is not None:
-                again: dict[str, Any] = dict(inputs)
-                model = self._force_model.poses
-                poses = model.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, **again)
-                moved, has_gaps = (poses.inputs[:, ::3], poses.inputs[:, 1::3], poses.inputs[:, 2::3]), True
-            return LoadedRun(poses, moved, has_gaps, setting, applied, None if inputs else times)
-
-        def events(found: Iterable[tuple[int, str]], level: str) -> tuple[Event, ...]:
-            return tuple(Event(float(k if inputs else times[k]), level, message) for k, message in found)
-
-        failures = events(result.failures, "error")
-        run = Run.of_fields(
-            t=(lambda: np.arange(count, dtype=float)) if inputs else times,
-            outputs=self.outputs,
-            coordinate_count=plan.coordinate_count,
-            values=tables[0],
-            rates=tables[1],
-            accelerations=tables[2],
-            fixed=lambda: dict(zip(plan.fixed_nodes, engine.fixed.values(), strict=True)),
-            input_names=self._input_names,
-            inputs=lambda: np.stack([table.T for table in given], axis=1).reshape(len(self._input_names), count).T,
-            status=result.status,
-            iterations=result.iterations,
-            residual=result.residual,
-            margin=result.margin,
-            error=result.error,
-            watch_names=self._watch_names,
-            watch=result.watch,
-            force_names=self._force_names,
-            forces=(lambda: self._force_model.forces(loaded())) if self._force_names else None,
-            reaction_names=self._reaction_names,
-            reactions=(lambda: self._force_model.reactions(loaded())) if self._force_names else None,
-            shaking=(lambda: self._force_model.shaking(loaded())) if self._force_names else None,
-            length_unit=plan.mechanism.length_unit,
-            mechanism_source=self.arguments.mechanism_with(setting),
-            info=lambda: self.arguments.info(setting, engine.name),
-            events=(lambda: (*failures, *events(self._force_model.meetings(loaded()), "warning")))
-            if any(load.needs_direction for load in plan.mechanism.loads)
-            else failures,
-            axis=(lambda: axis_for(given[0], self._input_names[::3])) if inputs else TIME,
-        )
-        itself = weakref.ref(run)  # a run that refers to itself would keep its tables until they are collected
-        return run
+    def _driving(
+        self, t: ArrayLike | None, inputs: Mapping[str, ArrayLike], *, wrap: bool
+    ) -> tuple[FloatArray, Driven | None]:
+        """Return times for the laws, or values, speeds and accelerations of the drivers by inputs."""
+        if inputs:
+            if t is not None:
+                raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
+            return np.empty(0), driven_by_inputs(self.plan.drivers, inputs, wrap=wrap)
+        if wrap:
+            raise RequestError("wrap unwraps angles given as inputs, such as crank_angle; times by a law have no jumps")
+        return column_of("t", run_times(self.mechanism.run) if t is None else t), None
 
     def solve_designs(
         self,
@@ -337,7 +301,8 @@ class Model:
         return SensitivityModel(self, self if plan is self.plan else Model(plan, self.engine))
 
     @cached_property
-    def _force_model(self) -> ForceModel:
+    def force_model(self) -> ForceModel:
+        """The forces of the model."""
         plan = force_plan(self.plan)
         return ForceModel(self if plan is self.plan else Model(plan, self.engine))
 
@@ -352,7 +317,7 @@ class Model:
 
     @cached_property
     def _library(self) -> Any:
-        from kinfmu.run.library import Library
+        from kinfmu.run.native_engine import Library
 
         return Library(self.plan)
 

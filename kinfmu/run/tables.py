@@ -1,16 +1,18 @@
-"""Columns with units as tables of Arrow, pandas and polars."""
+"""Columns with units: their places in the tables of a run, and tables of Arrow, pandas and polars made of them."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from importlib import import_module
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from numpy.typing import NDArray
 
 from kinfmu.errors import MissingPackageError, RequestError
-from kinfmu.units import degrees_of
+from kinfmu.units import CoordinateName, ForceName, InputName, SignalName, degrees_of, force_sizes
 
 
 class Column(NamedTuple):
@@ -122,3 +124,41 @@ def table_package(name: str) -> Any:
         return import_module(name)
     except ImportError:
         raise MissingPackageError(f"a table of {name} needs this package: pip install {name}") from None
+
+
+Place = tuple[str, str, int | None]  # of a column: its name, the table, and the number of the column there
+NAMES = ("input_names", "outputs", "force_names", "reaction_names", "signal_names", "watch_names")  # fields of a run
+
+
+@lru_cache(maxsize=64)  # the runs of a model have the same names
+def tables_of(
+    input_names: tuple[InputName, ...],
+    outputs: tuple[CoordinateName, ...],
+    force_names: tuple[ForceName, ...],
+    reaction_names: tuple[ForceName, ...],
+    signal_names: tuple[SignalName, ...],
+    watch_names: tuple[str, ...],
+) -> tuple[Place, ...]:
+    """Return the places of all columns, in their order; names of equal text have equal places."""
+    places: list[Place] = [("time", "t", None)]
+    places += [(name, "inputs", k) for k, name in enumerate(input_names)]
+    for order, table in enumerate(("values", "rates", "accelerations")):
+        places += [(name.derivative(order), table, k) for k, name in enumerate(outputs)]
+    places += [(name, "forces", k) for k, name in enumerate(force_names)]
+    places += [(name, "reactions", k) for k, name in enumerate(reaction_names)]
+    places += [(name, "signals", k) for k, name in enumerate(signal_names)]
+    places += [(f"solver.{table}", table, None) for table in ("status", "residual", "iterations", "margin")]
+    places += [(f"solver.error_{order}", "error", k) for k, order in enumerate(("q", "qd", "qdd"))]
+    return (*places, *((f"watch.{name}", "watch", k) for k, name in enumerate(watch_names)))
+
+
+@lru_cache(maxsize=64)
+def index_of(*names: Any) -> Mapping[str, tuple[str, int | None]]:
+    """Return the table and the number of the column by name."""
+    return {name: (table, column) for name, table, column in tables_of(*names)}
+
+
+@lru_cache(maxsize=64)
+def sizes_of(reaction_names: tuple[ForceName, ...]) -> Mapping[ForceName, tuple[ForceName, ForceName]]:
+    """Return the sizes of forces among the reactions, with their components; they are computed, not kept."""
+    return MappingProxyType(force_sizes(reaction_names))

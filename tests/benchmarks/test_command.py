@@ -264,7 +264,7 @@ def test_a_sweep_is_compared_with_the_closed_form(monkeypatch: pytest.MonkeyPatc
     except CompilerError as error:
         pytest.skip(str(error))
     monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
-    monkeypatch.setattr("kinfmu.run.library.FLAGS", ("-O1",))
+    monkeypatch.setattr("kinfmu.run.native_engine.FLAGS", ("-O1",))
     monkeypatch.setattr(native_sweep, "FLAGS", ("-O1",))
     table = native_sweep.run(rounds=1, samples=2000, loops=3)
     assert table.splitlines()[2].split()[-1] == "1.00"

@@ -22,7 +22,7 @@ from kinfmu.codegen.python import load_model, load_module
 from kinfmu.errors import CompilerError
 from kinfmu.mechanism import gallery
 from kinfmu.plan import SolvePlan, compile_plan
-from kinfmu.run import library
+from kinfmu.run import native_engine as library
 from kinfmu.solver.python import Solver
 from tests.fmu.test_parameters import geared, linkage
 from tests.gallery_members import FEW, mostly_long

@@ -22,7 +22,7 @@ from kinfmu.codegen.c import compiler, library_cache
 from kinfmu.errors import CompilerError
 from kinfmu.mechanism import gallery
 from kinfmu.plan import compile_plan
-from kinfmu.run.library import Library
+from kinfmu.run.native_engine import Library
 
 SEVEN = {"a.c": "int f(void);\nint f(void) { return 7; }\n"}
 EIGHT = {"a.c": "int f(void);\nint f(void) { return 8; }\n"}

@@ -11,8 +11,7 @@ import pytest
 import kinfmu
 from kinfmu.arrays import FloatArray
 from kinfmu.draw.svaj import _sheet, driver_axis
-from kinfmu.motion.motion_curve import motion_curve
-from kinfmu.motion.svaj_table import svaj_columns
+from kinfmu.motion.motion_curve import motion_curve, svaj_columns
 from kinfmu.run import Run
 from tests.motion.cams import followers
 

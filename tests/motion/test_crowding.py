@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 
 import kinfmu
 from kinfmu.mechanism.measures import Maximum, PeakAcceleration, PeakSpeed, Reading
-from kinfmu.motion.crowding import is_crowded, spread
+from kinfmu.motion.samples import is_crowded, spread
 
 READINGS: list[Reading] = [
     PeakSpeed("v", "piston.x"),

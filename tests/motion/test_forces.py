@@ -12,7 +12,7 @@ import kinfmu
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism.measures import Maximum, Minimum, Peak, PeakSpeed, Range
 from kinfmu.mechanism.toml_file import parse
-from kinfmu.motion.sampled import sampled_history
+from kinfmu.motion.samples import sampled_history
 from tests.analysis.test_loading import ARM
 from tests.run.test_forces import loaded
 

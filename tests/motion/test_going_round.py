@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kinfmu.motion import History, quintic
-from kinfmu.motion.going_round import goes_round
 from kinfmu.motion.quintic import ranges, use_compiled
+from kinfmu.motion.samples import goes_round
 
 X = np.linspace(0.0, 2.0 * np.pi, 38)
 

@@ -84,8 +84,8 @@ def test_many_designs_at_once_equal_each_alone() -> None:
     alone = [Motion.of_run(run) for run in runs]
     tables = tuple(np.stack([motion.tables[k] for motion in alone]) for k in range(3))
     tables[0][2, 100] = np.nan
-    margin = np.stack([motion.margin for motion in alone if motion.margin is not None])
-    many = replace(alone[0], tables=tables, margin=margin, _histories={})
+    margin = np.stack([run.margin for run in runs])
+    many = replace(alone[0], tables=tables, sampled=lambda _: margin, _histories={})
     readings = (
         Range("", "rocker.phi"),
         PeakAcceleration("", "coupler.x"),

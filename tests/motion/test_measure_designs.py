@@ -195,7 +195,8 @@ def test_laws_over_time(constants: dict[str, object]) -> None:
     assert_as_measured(found, model, measures, t)
 
 
-def test_every_design_may_have_driver_values_of_its_own() -> None:
+def test_every_design_may_have_driver_values_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("kinfmu.motion.batch_reading.SAMPLES_AT_ONCE", len(TURN))  # a part for each
     model = kinfmu.compile(crank_rocker())
     angles = TURN + np.array([[0.0], [0.5], [1.0]])
     measures = [one for one in READ if one.name in ("minimum", "peak_speed", "dwell", "velocity_ratio")]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kinfmu.run.coarse import coarse_samples
+from kinfmu.run.verdict import coarse_samples
 from kinfmu.units import InputName
 
 CRANK, SLIDE = InputName("crank", "angle"), InputName("slide", "position")

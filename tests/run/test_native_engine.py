@@ -14,7 +14,8 @@ from kinfmu.codegen.c import compiler
 from kinfmu.codegen.lanes.lanes import emit_lanes
 from kinfmu.errors import CompilerError, KinfmuError
 from kinfmu.plan import compile_plan
-from kinfmu.run import Run, library
+from kinfmu.run import Run
+from kinfmu.run import native_engine as library
 from kinfmu.run.engine import Driven
 from tests.fmu.test_parameters import geared, linkage
 from tests.gallery_members import every_member

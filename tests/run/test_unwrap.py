@@ -10,7 +10,7 @@ import pytest
 import kinfmu
 from kinfmu.errors import KinfmuError
 from kinfmu.fmu import build, simulate
-from kinfmu.run.unwrap import unwrap
+from kinfmu.run.driving import unwrap
 from tests.oracle import largest_error, reference_fourbar
 
 

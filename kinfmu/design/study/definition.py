@@ -25,13 +25,12 @@ from kinfmu.mechanism.measures import Reading
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.mechanism.valid import quoted
 from kinfmu.motion.history import FEWEST
-from kinfmu.motion.measure import chosen_measures
-from kinfmu.motion.needed import needed
+from kinfmu.motion.measure import with_measures
+from kinfmu.motion.quantities import QuantityNames, coordinates_behind
 from kinfmu.plan import compile_plan
-from kinfmu.run.driving import run_times
+from kinfmu.run.driving import numbers_of, run_times
 from kinfmu.run.engine import require_engine
 from kinfmu.run.model import WORTH_COMPILING, Model, compile  # noqa: A004  as re.compile
-from kinfmu.run.numbers import numbers_of
 
 SAMPLES = 1000  # of sampled parameters, by default
 SEED = 0
@@ -147,7 +146,7 @@ class Study:
     def model(self) -> Model:
         """Return the compiled mechanism, whose arguments are the varied parameters."""
         names = [one.name for one in self.sampling.variations if one.name in self.mechanism.parameters]
-        outputs = needed(self.mechanism, self.mechanism.measures).coordinates
+        outputs = coordinates_behind(QuantityNames(self.mechanism).quantities(*self.mechanism.measures))
         every = replace(self.mechanism, coordinates="all")
         return compile(every, outputs or None, parameters=names, engine=self.engine)
 
@@ -204,7 +203,7 @@ def define(
     samples = Sampling(variations, sampling, count, whole_number("seed", seed, 0))
     whole_number("the number of designs, of all grids and samples together,", samples.grid_points * samples.samples, 1)
     _refuse_large_hypercube(samples)
-    readings = chosen_measures(mechanism, measures)
+    readings = with_measures(mechanism, measures).measures
     if not readings:
         raise RequestError(f"{mechanism.name} declares no measures; give some, as [measures] or measures=")
     mechanism = replace(mechanism, measures=readings)

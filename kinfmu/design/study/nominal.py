@@ -15,6 +15,7 @@ from kinfmu.errors import KinfmuError
 from kinfmu.mechanism.measures import Maximum, Minimum, Range, Reading
 
 STEP = 0.1  # of difference quotients, in standard deviations: their error is a hundredth of the third-order term
+_ENDS: dict[type[Reading], tuple[float, ...]] = {Minimum: (1.0,), Maximum: (1.0,), Range: (-1.0, 1.0)}
 EXACT, DIFFERENCES = "sensitivities", "differences"
 
 
@@ -128,7 +129,7 @@ def _exact(
     study: Study, job: Job, reading: Reading, at: tuple[float, ...], values: Mapping[str, float]
 ) -> dict[str, float] | None:
     """Return exact derivatives of an extreme of a coordinate; None for other measures, and where there are none."""
-    signs = {Minimum: (1.0,), Maximum: (1.0,), Range: (-1.0, 1.0)}.get(type(reading))
+    signs = _ENDS.get(type(reading))
     of = getattr(reading, "of", None)
     drivers = study.mechanism.drivers
     if signs is None or study.motion.t is not None or len(drivers) != 1 or of not in job.model.outputs:

@@ -11,7 +11,7 @@ from kinfmu.arrays import FloatArray
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.laws import ConstantSpeed
 from kinfmu.mechanism.parameters import parameter_values
-from kinfmu.motion.design_points import dependent_numbers
+from kinfmu.motion.batch_reading import dependent_numbers
 
 
 def law_changing(mechanism: Mechanism, names: Collection[str]) -> list[str]:

@@ -18,8 +18,7 @@ from kinfmu.mechanism import RunSettings
 from kinfmu.mechanism.table_file import read_decimal
 from kinfmu.mechanism.valid import quoted
 from kinfmu.run import MOST_SAMPLES, Event
-from kinfmu.run.numbers import numbers_of
-from kinfmu.run.unwrap import is_long, unwrap
+from kinfmu.run.driving import is_long, numbers_of, unwrap
 from kinfmu.units import Quantity, factors, in_turns, looks_like_degrees, quantity_in, spelled
 
 if TYPE_CHECKING:

@@ -18,8 +18,8 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import force_names, reaction_names_of
 from kinfmu.run import Event, Run
 from kinfmu.run.channels import absent_columns, is_all_but
-from kinfmu.run.coarse import coarse_samples
 from kinfmu.run.run import Sink
+from kinfmu.run.verdict import coarse_samples
 from kinfmu.solver.python.status import Status
 from kinfmu.units import ForceName, read_inputs
 

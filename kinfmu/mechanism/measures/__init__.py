@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
-from kinfmu.mechanism.measures.extremes import LowestMargin, Maximum, Minimum, Peak, PeakAcceleration, PeakSpeed, Range
+from kinfmu.mechanism.measures.extremes import (
+    Dwell,
+    LowestMargin,
+    Maximum,
+    Minimum,
+    Peak,
+    PeakAcceleration,
+    PeakSpeed,
+    Range,
+    TimeRatio,
+)
 from kinfmu.mechanism.measures.paths import PathDistance, Roundness, Straightness
 from kinfmu.mechanism.measures.reading import Finding, Measured, Reading
-from kinfmu.mechanism.measures.timing import Dwell, TimeRatio
 from kinfmu.mechanism.measures.transfer import MechanicalAdvantage, PressureAngle, TransmissionAngle, VelocityRatio
 
 READINGS: tuple[type[Reading], ...] = (

@@ -1,24 +1,32 @@
-"""Extremes and range of a quantity, its peak speed and acceleration, and the lowest margin from singular points."""
+"""Readings of one quantity: extremes, range, peaks, when it moves and rests; and the lowest margin."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
+from kinfmu.errors import MechanismError
+from kinfmu.mechanism.laws import LawQuantity
 from kinfmu.mechanism.measures.reading import Begin, End, Finding, Measured, Motion, Reading
+from kinfmu.mechanism.quantities.placement import Reference
 from kinfmu.units import Quantity
 
 
 @dataclass(frozen=True)
-class Minimum(Reading):
-    """The smallest value of a quantity."""
-
-    type: ClassVar[str] = "minimum"
+class _OfQuantity(Reading):
+    """A number of one quantity over a part of the motion."""
 
     name: str
     of: Measured
     begin: Begin = None
     end: End = None
+
+
+@dataclass(frozen=True)
+class Minimum(_OfQuantity):
+    """The smallest value of a quantity."""
+
+    type: ClassVar[str] = "minimum"
 
     def read(self, motion: Motion) -> Finding:
         low = motion.history(self.of).minimum()
@@ -26,15 +34,10 @@ class Minimum(Reading):
 
 
 @dataclass(frozen=True)
-class Maximum(Reading):
+class Maximum(_OfQuantity):
     """The largest value of a quantity."""
 
     type: ClassVar[str] = "maximum"
-
-    name: str
-    of: Measured
-    begin: Begin = None
-    end: End = None
 
     def read(self, motion: Motion) -> Finding:
         high = motion.history(self.of).maximum()
@@ -42,18 +45,13 @@ class Maximum(Reading):
 
 
 @dataclass(frozen=True)
-class Range(Reading):
+class Range(_OfQuantity):
     """The largest value minus the smallest: the stroke of a slide, the swing angle of a rocker.
 
     It occurs at two values of the driver: of the smallest and of the largest value.
     """
 
     type: ClassVar[str] = "range"
-
-    name: str
-    of: Measured
-    begin: Begin = None
-    end: End = None
 
     def read(self, motion: Motion) -> Finding:
         history = motion.history(self.of)
@@ -62,15 +60,10 @@ class Range(Reading):
 
 
 @dataclass(frozen=True)
-class Peak(Reading):
+class Peak(_OfQuantity):
     """The largest size of a quantity: the peak torque of a driver, the largest force on a pin."""
 
     type: ClassVar[str] = "peak"
-
-    name: str
-    of: Measured
-    begin: Begin = None
-    end: End = None
 
     def read(self, motion: Motion) -> Finding:
         peak = motion.history(self.of).largest_size()
@@ -78,15 +71,10 @@ class Peak(Reading):
 
 
 @dataclass(frozen=True)
-class PeakSpeed(Reading):
+class PeakSpeed(_OfQuantity):
     """The largest size of the speed of a quantity, or of a point 'body.point'."""
 
     type: ClassVar[str] = "peak_speed"
-
-    name: str
-    of: Measured
-    begin: Begin = None
-    end: End = None
 
     def read(self, motion: Motion) -> Finding:
         peak = motion.derivative(self.of, 1).largest_size()
@@ -94,15 +82,10 @@ class PeakSpeed(Reading):
 
 
 @dataclass(frozen=True)
-class PeakAcceleration(Reading):
+class PeakAcceleration(_OfQuantity):
     """The largest size of the acceleration of a quantity, or of a point 'body.point'."""
 
     type: ClassVar[str] = "peak_acceleration"
-
-    name: str
-    of: Measured
-    begin: Begin = None
-    end: End = None
 
     def read(self, motion: Motion) -> Finding:
         peak = motion.derivative(self.of, 2).largest_size()
@@ -122,3 +105,53 @@ class LowestMargin(Reading):
     def read(self, motion: Motion) -> Finding:
         value, x = motion.lowest_margin()
         return Finding(value, Quantity("number"), (x,))
+
+
+@dataclass(frozen=True)
+class TimeRatio(Reading):
+    """Time of the slower stroke over that of the faster one (quick return), of a motion that goes round.
+
+    The strokes lie between the smallest and the largest value of the quantity, one after the other. Of a quantity that
+    repeats on the way, as over several turns of a crank, they are those of one repeat.
+    """
+
+    type: ClassVar[str] = "time_ratio"
+
+    name: str
+    of: Measured
+
+    def read(self, motion: Motion) -> Finding:
+        lacks = motion.at_rest(self.of), motion.turning_on(self.of, "so it has no two strokes")
+        if not lacks[0][0].all():
+            motion.require_closed(self.type)
+        history = motion.history(self.of)
+        low, high = (extreme.x for extreme in history.extremes())
+        period = history.span / history.repeats()
+        stroke = abs(high - low) % period
+        longer = 0.5 * (period + abs(period - 2.0 * stroke))
+        at = tuple(history.x[0] + (x - history.x[0]) % period for x in (low, high))
+        return Finding(motion.ratio(longer, period - longer), Quantity("number"), at, lacks)
+
+
+@dataclass(frozen=True)
+class Dwell(Reading):
+    """How far the driver moves while a quantity stays within a band below its maximum or above its minimum."""
+
+    type: ClassVar[str] = "dwell"
+
+    name: str
+    of: Measured
+    band: Annotated[float, LawQuantity("led"), "height of the band, positive"]
+    near: Annotated[str, Reference("choice", ("maximum", "minimum")), "'maximum' or 'minimum'"] = "maximum"
+    begin: Begin = None
+    end: End = None
+
+    def check(self) -> None:
+        if not self.band > 0.0:
+            raise MechanismError(f"[measures.{self.name}] band = {float(self.band):g} must be positive")
+
+    def read(self, motion: Motion) -> Finding:
+        history = motion.history(self.of)
+        start, stop = (history if self.near == "maximum" else history.negative()).stay(self.band)
+        lacks = (motion.turning_on(self.of, f"so it has no {self.near}"),)
+        return Finding(motion.driven_between(start, stop), motion.driver_quantity, (start, stop), lacks)

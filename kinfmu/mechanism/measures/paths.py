@@ -15,30 +15,30 @@ LENGTH = Quantity("length")
 
 
 @dataclass(frozen=True)
-class Straightness(Reading):
-    """Deviation of a path from a straight line: the largest distance from the line for which it is smallest."""
-
-    type: ClassVar[str] = "straightness"
+class _OfPath(Reading):
+    """A deviation of the path of a point."""
 
     name: str
     of: PathPoint
     begin: Begin = None
     end: End = None
+
+
+@dataclass(frozen=True)
+class Straightness(_OfPath):
+    """Deviation of a path from a straight line: the largest distance from the line for which it is smallest."""
+
+    type: ClassVar[str] = "straightness"
 
     def read(self, motion: Motion) -> Finding:
         return Finding(motion.deviation(self.of, "line"), LENGTH)
 
 
 @dataclass(frozen=True)
-class Roundness(Reading):
+class Roundness(_OfPath):
     """Deviation of a path from a circle: the largest distance from the circle for which it is smallest."""
 
     type: ClassVar[str] = "roundness"
-
-    name: str
-    of: PathPoint
-    begin: Begin = None
-    end: End = None
 
     def read(self, motion: Motion) -> Finding:
         return Finding(motion.deviation(self.of, "circle"), LENGTH)

@@ -57,5 +57,9 @@ class Reading(ABC):
     def read(self, motion: Motion) -> Finding:
         """Return the numbers of a motion; NaN for designs without them."""
 
+    def quantities(self) -> tuple[str | PoseQuantity, ...]:
+        """Return what it reads of a motion: quantities, and names of coordinates, points and forces."""
+        return tuple(value for key in ("of", "to") if (value := getattr(self, key, None)) is not None)
+
     def check(self) -> None:  # noqa: B027  most readings accept all values
         """Raise a MechanismError for invalid values; numbers are finite and references valid by then."""

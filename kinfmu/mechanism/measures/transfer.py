@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
+from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.measures.reading import Begin, End, Finding, Measured, Motion, Reading
-from kinfmu.mechanism.quantities.placement import BodyName, PointName, PointPair, Reference
+from kinfmu.mechanism.quantities import CosineBetween
+from kinfmu.mechanism.quantities.placement import BodyName, PointName, PointPair, Reference, body_of
 from kinfmu.units import Quantity, Radians
 
 ANGLE, NUMBER = Quantity("angle"), Quantity("number")
@@ -31,8 +33,15 @@ class TransmissionAngle(Reading):
     end: End = None
 
     def read(self, motion: Motion) -> Finding:
-        worst = motion.line_cosine(self.coupler, self.output).largest_size()
+        worst = motion.history(self._cosine).largest_size()
         return Finding(motion.arc_sine(worst.value), ANGLE, (worst.x,))
+
+    def quantities(self) -> tuple[CosineBetween, ...]:
+        return (self._cosine,)
+
+    @property
+    def _cosine(self) -> CosineBetween:
+        return CosineBetween(self.coupler, self.output)
 
 
 @dataclass(frozen=True)
@@ -44,7 +53,7 @@ class TransmissionSide(TransmissionAngle):
     """
 
     def read(self, motion: Motion) -> Finding:
-        worst = motion.line_cosine(self.coupler, self.output).maximum()
+        worst = motion.history(self._cosine).maximum()
         return Finding(motion.arc_sine(worst.value), ANGLE, (worst.x,))
 
 
@@ -74,6 +83,10 @@ class PressureAngle(Reading):
             along = -arm_y, arm_x
         worst = motion.cosine(along, motion.velocity_against(self.follower, self.cam)).largest_size()
         return Finding(motion.arc_sine(worst.value), ANGLE, (worst.x,))
+
+    def quantities(self) -> tuple[str, ...]:
+        bodies = dict.fromkeys((self.cam, body_of(self.follower), body_of(self.pivot or self.follower)))
+        return tuple(f"{body}.{axis}" for body in bodies if body != GROUND_NAME for axis in ("x", "y", "phi"))
 
 
 @dataclass(frozen=True)

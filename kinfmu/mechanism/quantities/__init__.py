@@ -5,10 +5,12 @@ from __future__ import annotations
 from kinfmu.mechanism.quantities.measure import (
     AngleBetween,
     CoordinateOf,
+    CosineBetween,
     DistanceBetween,
     OffsetFrom,
     PoseQuantity,
     PositionAlong,
+    cosine_between,
 )
 
 POSE_QUANTITIES: tuple[type[PoseQuantity], ...] = (
@@ -23,8 +25,10 @@ __all__ = [
     "POSE_QUANTITIES",
     "AngleBetween",
     "CoordinateOf",
+    "CosineBetween",
     "DistanceBetween",
     "OffsetFrom",
     "PoseQuantity",
     "PositionAlong",
+    "cosine_between",
 ]

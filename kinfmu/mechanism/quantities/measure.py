@@ -24,6 +24,11 @@ class PoseQuantity(ABC):
     is_absolute: ClassVar[bool] = False  # True if it depends on the world's origin
     is_root: ClassVar[bool] = False  # True if it is a square root, with a kink where it is 0
 
+    @property
+    def is_angle(self) -> bool:
+        """True for an angle [rad]."""
+        return self.kind == "angle"
+
     @abstractmethod
     def bodies(self) -> tuple[str, ...]:
         """Return the names of its bodies, ground included."""
@@ -149,3 +154,26 @@ class OffsetFrom(_OnSlide):
         (a_x, a_y), (b_x, b_y) = map(at.point, self.between)
         e_x, e_y = at.direction(body_of(self.between[0]), self.axis)
         return e_x * (b_y - a_y) - e_y * (b_x - a_x)
+
+
+@dataclass(frozen=True)
+class CosineBetween(PoseQuantity):
+    """Cosine of the angle between two lines, each from a point to another. It is no quantity of mechanism files."""
+
+    type: ClassVar[str] = "cosine"
+    kind: ClassVar[str] = "number"
+
+    first: PointPair
+    second: PointPair
+
+    def bodies(self) -> tuple[str, ...]:
+        return tuple(map(body_of, (*self.first, *self.second)))
+
+    def value(self, at: Placement) -> Value:
+        return cosine_between(at.vector(self.first), at.vector(self.second))
+
+
+def cosine_between(a: tuple[Value, Value], b: tuple[Value, Value]) -> Value:
+    """Return the cosine of the angle between two vectors."""
+    (a_x, a_y), (b_x, b_y) = a, b
+    return (a_x * b_x + a_y * b_y) / sqrt((a_x * a_x + a_y * a_y) * (b_x * b_x + b_y * b_y))

@@ -15,7 +15,7 @@ from kinfmu.mechanism.laws.law import Jumps
 from kinfmu.mechanism.loads import Load
 from kinfmu.mechanism.valid import is_number, quoted
 from kinfmu.run import MOST_SAMPLES
-from kinfmu.run.numbers import numbers_of
+from kinfmu.run.driving import numbers_of
 
 TIME = "time"  # the column of a table
 _VALID = "a number, a law of time, a function of t or of (t, state), or an array with 'time'"

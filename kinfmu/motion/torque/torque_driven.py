@@ -19,10 +19,11 @@ from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.efforts import effort_inputs
 from kinfmu.run import Event, Run
 from kinfmu.run.axis import TIME
-from kinfmu.run.coarse import coarse_samples
 from kinfmu.run.continued import Settings, continued
-from kinfmu.run.forces import ForceModel, LoadedRun, applied_efforts, force_plan
+from kinfmu.run.driving import applied_efforts
+from kinfmu.run.forces import ForceModel, LoadedRun, force_plan
 from kinfmu.run.model import Model
+from kinfmu.run.verdict import coarse_samples
 from kinfmu.solver.python.law_breaks import LEAST_TOLERANCE, MOST_TOLERANCE, STEP_TOLERANCE
 from kinfmu.solver.python.pose import Vector
 from kinfmu.solver.python.status import Status

@@ -1,0 +1,151 @@
+"""SolvedSamples: what a run is made of when its samples are solved; the rest is computed when it is read."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Iterable, Mapping
+from typing import Any, Protocol
+
+import numpy as np
+
+from kinfmu.arrays import FloatArray
+from kinfmu.run import Event, Run
+from kinfmu.run.arguments import Setting
+from kinfmu.run.axis import TIME, axis_for
+from kinfmu.run.designs import Solvable
+from kinfmu.run.driving import with_constants
+from kinfmu.run.engine import Driven, Engine, SweepResult, Tables
+from kinfmu.run.forces import ForceModel, LoadedRun
+from kinfmu.units import CoordinateName, ForceName, InputName
+
+
+class SolvedModel(Solvable, Protocol):
+    """What a run needs of a Model."""
+
+    outputs: tuple[CoordinateName, ...]
+    input_names: tuple[InputName, ...]
+    watch_names: tuple[str, ...]
+    force_names: tuple[ForceName, ...]
+    reaction_names: tuple[ForceName, ...]
+
+    @property
+    def force_model(self) -> ForceModel: ...
+
+
+class SolvedSamples:
+    """The solved samples of a model.
+
+    Args:
+        model: The model.
+        setting: Parameters and law constants.
+        engine: The engine with these.
+        times: (n,) for the laws; None where inputs are given.
+        inputs: Driver values in place of times, by name, as they were given.
+        efforts: Of external loads, (n,) by their inputs.
+        driven: Values, speeds and accelerations of the drivers, (n, d) each.
+        result: Diagnostics of the samples.
+        arguments: Of `Model.solve`, for these samples by another model.
+        is_kept: False where the caller has the tables, which may hold other numbers by the time that forces are read.
+
+    """
+
+    def __init__(
+        self,
+        model: SolvedModel,
+        setting: Setting,
+        engine: Engine,
+        times: FloatArray | None,
+        inputs: Mapping[str, Any],
+        efforts: Mapping[str, FloatArray],
+        driven: Driven,
+        result: SweepResult,
+        arguments: Mapping[str, Any],
+        *,
+        is_kept: bool,
+    ) -> None:
+        self._model, self._setting, self._engine = model, setting, engine
+        self._times, self._inputs, self._efforts, self._driven = times, inputs, efforts, driven
+        self._result, self._arguments, self._is_kept = result, arguments, is_kept
+
+    def run(self, tables: Tables) -> Run:
+        """Return the run; tables: values, rates and accelerations."""
+        model, result = self._model, self._result
+        plan, is_driven = model.plan, self._times is None
+        has_forces, may_meet = bool(model.force_names), any(load.needs_direction for load in plan.mechanism.loads)
+        run = Run.of_fields(
+            t=self._numbers if is_driven else self._times,
+            outputs=model.outputs,
+            coordinate_count=plan.coordinate_count,
+            values=tables[0],
+            rates=tables[1],
+            accelerations=tables[2],
+            fixed=self._fixed,
+            input_names=model.input_names,
+            inputs=self._input_columns,
+            status=result.status,
+            iterations=result.iterations,
+            residual=result.residual,
+            margin=result.margin,
+            error=result.error,
+            watch_names=model.watch_names,
+            watch=result.watch,
+            force_names=model.force_names,
+            forces=self._forces if has_forces else None,
+            reaction_names=model.reaction_names,
+            reactions=self._reactions if has_forces else None,
+            shaking=self._shaking if has_forces else None,
+            length_unit=plan.mechanism.length_unit,
+            mechanism_source=model.arguments.mechanism_with(self._setting),
+            info=self._info,
+            events=self._events if may_meet else self._failures(),
+            axis=self._axis if is_driven else TIME,
+        )
+        self._itself = weakref.ref(run)  # a run that refers to itself would keep its tables until they are collected
+        return run
+
+    def _numbers(self) -> FloatArray:
+        return np.arange(len(self._driven[0]), dtype=float)
+
+    def _fixed(self) -> Mapping[Any, float]:
+        return dict(zip(self._model.plan.fixed_nodes, self._engine.fixed.values(), strict=True))
+
+    def _input_columns(self) -> FloatArray:
+        shape = len(self._model.input_names), len(self._driven[0])
+        return np.stack([table.T for table in self._driven], axis=1).reshape(shape).T
+
+    def _info(self) -> Mapping[str, str]:
+        return self._model.arguments.info(self._setting, self._engine.name)
+
+    def _axis(self) -> str:
+        return axis_for(self._driven[0], self._model.input_names[::3])
+
+    def _failures(self) -> tuple[Event, ...]:
+        return self._as_events(self._result.failures, "error")
+
+    def _events(self) -> tuple[Event, ...]:
+        """Return failures, and warnings of loads whose ends meet."""
+        meetings = self._model.force_model.meetings(self._loaded())
+        return (*self._failures(), *self._as_events(meetings, "warning"))
+
+    def _as_events(self, found: Iterable[tuple[int, str]], level: str) -> tuple[Event, ...]:
+        times = self._times
+        return tuple(Event(float(k if times is None else times[k]), level, message) for k, message in found)
+
+    def _forces(self) -> FloatArray:
+        return self._model.force_model.forces(self._loaded())
+
+    def _reactions(self) -> FloatArray:
+        return self._model.force_model.reactions(self._loaded())
+
+    def _shaking(self) -> FloatArray:
+        return self._model.force_model.shaking(self._loaded())
+
+    def _loaded(self) -> LoadedRun:
+        """Return what forces are computed from: the run itself, if it is kept and holds all that they need."""
+        model, poses = self._model.force_model.poses, self._itself()
+        driven = with_constants(self._model.plan.drivers, self._driven, self._inputs)
+        has_gaps = bool(self._result.failures)
+        if poses is None or model is not self._model or not self._is_kept:
+            poses = model.solve(**self._arguments)
+            driven, has_gaps = (poses.inputs[:, ::3], poses.inputs[:, 1::3], poses.inputs[:, 2::3]), True
+        return LoadedRun(poses, driven, has_gaps, self._setting, self._efforts, self._times)
