@@ -11,10 +11,8 @@ import numpy as np
 from kinfmu.arrays import FloatArray
 from kinfmu.mechanism import Mechanism, Point, Start
 from kinfmu.mechanism.quantities.arithmetic import decimal_sum
-from kinfmu.plan.equations.system import System, size_of
+from kinfmu.plan.equations.system import FAR, System, size_of
 from kinfmu.units import CoordinateName
-
-FAR = 4.0  # sizes from the world's origin beyond which a mechanism is planned about a ground point of its own
 
 
 class FarRows(NamedTuple):

@@ -17,7 +17,7 @@ from kinfmu import AngleDriver, Body, ConstantSpeed, Distance, Mechanism, PointO
 from kinfmu.codegen.python import load_model
 from kinfmu.mechanism.joints import Joint
 from kinfmu.plan import compile_plan
-from kinfmu.solver.python import Pose, Solver, Status
+from kinfmu.solver.python import Pose, Solver, Status, survey
 from kinfmu.solver.python.trusted_step import trusted_step
 from tests import oracle
 from tests.mechanisms import slider_crank, tight_jaw, with_arm
@@ -331,3 +331,35 @@ def test_a_dead_centre_of_a_slide_is_no_pole(engine: str) -> None:
     assert text.endswith(
         "the limit is crank = 0.7297276562 rad (41.8103149 deg); beyond it the loop of block.x cannot close"
     )
+
+
+def test_a_determinant_that_stays_low_is_not_searched_again_in_every_short_step(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    searched: list[float] = []
+
+    def counted(model: Any, pose: Pose, block: int, distance: float) -> Pose | None:
+        searched.append(pose.u[0])
+        return nearby(model, pose, block, distance)
+
+    nearby = survey._nearby
+    monkeypatch.setattr(survey, "_nearby", counted)
+    flat = Mechanism(
+        "flat",
+        [
+            Body("ground", {"O": (0, 0), "C": (2, 0)}),
+            Body("crank", {"O": (0, 0), "P": (0.002, 0)}, (0, 0, 1.0)),
+            Body("coupler", {"P": (0, 0), "Q": (1, 0)}, (0, 0, 0.09)),
+            Body("rocker", {"C": (0, 0), "Q": (1.006, 0)}, (2, 0, 3.05)),
+        ],
+        [
+            Revolute("O", ("ground.O", "crank.O")),
+            Revolute("P", ("crank.P", "coupler.P")),
+            Revolute("Q", ("coupler.Q", "rocker.Q")),
+            Revolute("C", ("ground.C", "rocker.C")),
+        ],
+        [AngleDriver("crank", "crank", ConstantSpeed(1.0, 1.0))],
+    )
+    run = kinfmu.solve(flat, np.arange(100) * 1e-4, engine="python")
+    assert (run.status == 0).all()
+    assert len(searched) <= 2

@@ -21,10 +21,11 @@ from tests.stress.drawn import Drawn, Frame
 from tests.stress.families import FAMILIES, Draw
 from tests.stress.jets import DIGITS, LONG
 from tests.stress.report import Report
-from tests.stress.trial import Trial, trial
+from tests.stress.trial import BEYOND, Trial, trial
 
 ROOT = Path(__file__).parents[2]
 MECHANISMS = 4  # of each family
+LEAST = 1e-14  # [rad, sizes] of estimates: a speed of 0 where a rise begins is off by the rounding's square
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -47,6 +48,20 @@ def test_a_sample_solved_in_one_order_and_not_in_another_has_an_estimate(
     """At a limit the order of the samples decides: errors are estimated in the order in which samples were solved."""
     monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
     assert trial(seed, family, "native").judged().faults == []
+
+
+@pytest.mark.parametrize(
+    ("engine", "seed"),
+    [("python", 36), ("python", 252), ("python", 530), ("native", 1055), ("native", 1114), ("native", 1197)],
+)
+def test_estimates_count_the_rounding_of_arguments_of_steep_laws(
+    engine: Literal["python", "native"], seed: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
+    verdict = trial(seed, "led by laws", engine).judged()
+    known = ~np.isnan(verdict.absolute)
+    assert verdict.faults == []
+    assert (verdict.absolute[known] <= BEYOND * np.fmax(verdict.estimate[known], LEAST)).all()
 
 
 @pytest.mark.parametrize("engine", ["python", "native"])

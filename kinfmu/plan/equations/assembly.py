@@ -17,6 +17,7 @@ from kinfmu.plan.equations.closing import (
     closed_up_to,
     dependent_rows,
     followed,
+    gap_of,
     margin,
     reaches,
 )
@@ -282,8 +283,9 @@ def _assembled_in_order(
         least = min(least, _block_margin(part.jacobian(q[list(columns)])))
         if least <= comfortable(system):
             return None, f"the rows {listed(system.rows[k].name for k in rows[:5])} are singular there or nearly so"
-    open_rows = np.flatnonzero(np.abs(Part(system).residual(q, u)) > CLOSED)
-    if len(open_rows):  # a cam that dwells at every random pose does not show what it moves
+    whole = Part(system)
+    open_rows = [k for k, left in enumerate(whole.residual(q, u)) if gap_of(whole, q, left) > CLOSED]
+    if open_rows:  # a cam that dwells at every random pose does not show what it moves
         return None, f"the rows {listed(system.rows[k].name for k in open_rows[:5])} open when others close"
     return Assembled(q, u, least), ""
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from kinfmu.arrays import FloatArray
 from kinfmu.plan.equations.part import Part
-from kinfmu.plan.equations.system import System
+from kinfmu.plan.equations.system import FAR, System
 
 CLOSED = 1e-12  # residual relative to the mechanism's size at which a pose counts as closed
 CONSISTENT = 1e-11  # gap up to which a dependent row counts as consistent, of the link that it is about
@@ -16,6 +17,8 @@ _DEPENDENT = 1e-6  # part of a row outside the span of others that counts as zer
 _APART = 1e-6  # [rad, sizes]; poses further apart are different branches
 _ITERATIONS = 200
 _SLOW, _SLOW_STEPS = 0.9, 4  # a small residual that falls more slowly in so many steps does not close
+_OFFSET_ROUNDING = 8.0 * 2.0**-52  # of what is far from the origin, in the residual that it leaves
+_TOLERANCE = 1e-9  # residual relative to the size up to which samples are good, by default
 _ROUNDED = 1e-14  # residual relative to the size that rounding leaves
 _FAR_FROM_SINGULAR = 1e-3  # least singular value over the largest; gradients keep the digits to tell what depends
 _LONGEST = 0.2  # [rad, sizes]; step from the start poses to the start of the laws
@@ -40,7 +43,7 @@ def close(part: System | Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray
         u: Driver values, (d,).
 
     Returns:
-        The pose and its residual; above CLOSED the pose does not close.
+        The pose and its residual beyond what the rounding of an offset leaves; above CLOSED the pose does not close.
 
     """
     part = Part(part) if isinstance(part, System) else part
@@ -73,7 +76,14 @@ def close(part: System | Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray
             too_far = True
         else:
             damping *= 8.0
-    return best, float(np.abs(residual).max(initial=0.0))
+    return best, gap_of(part, best, residual)
+
+
+def gap_of(part: Part, q: FloatArray, residual: ArrayLike) -> float:
+    """Return the largest residual of a pose, less what the rounding of its offset from the origin leaves of it."""
+    away = float(np.abs(part.whole(q).reshape(-1, 3)[:, :2]).max(initial=0.0)) / part.system.size
+    rounding = min(_OFFSET_ROUNDING * away, _TOLERANCE) if away > FAR else 0.0
+    return max(0.0, float(np.abs(residual).max(initial=0.0)) - rounding)
 
 
 def closed_up_to(system: System) -> float:

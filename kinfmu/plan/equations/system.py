@@ -22,6 +22,7 @@ from kinfmu.plan.equations.row_code import RowCode, row_code
 from kinfmu.plan.equations.taylor import Taylor
 from kinfmu.units import METRES
 
+FAR = 4.0  # sizes from the world's origin beyond which a mechanism is planned about a ground point of its own
 RARELY = 50  # evaluations of a gradient; more are faster by code, which is made in the time of as many
 
 

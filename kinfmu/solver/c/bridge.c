@@ -119,7 +119,7 @@ static bool find_middle(kf_solver *solver, const kf_bridge *bridge, kf_found *fo
 #if KF_TRACKS
     double buffer[KF_DRIVERS];
 #endif
-    double largest = fabs(bridge->centre) / kf_reach[KF_ALONG(solver)];
+    double largest = fmax(kf_row_offset, fabs(bridge->centre) / kf_reach[KF_ALONG(solver)]);
     int block, k = 0;
     kf_span_middle(span, z);
     turn_on(bridge, z, z);

@@ -4,12 +4,14 @@
  *
  *     |dz| = |J^-1| R (2 eps (1 + offset) + residual + eps |z|)        R: scales of the rows, in lengths
  *
- * which moves all blocks that come after it. The effect on outputs and rates is computed, not estimated: position,
+ * which moves all blocks that come after it. Of laws with short rises, the roundings of their arguments are a source like
+ * those of the driver values. The effect on outputs and rates is computed, not estimated: position,
  * velocity and acceleration are formed again at the moved pose. See kinfmu/solver/python/estimate.py.
  */
 #include "internal.h"
 
 #define UNBOUNDED 0.5 /* relative change of a determinant within a pose's error from which rates are unknown */
+#define STEEP_LAW 40.0 /* steps through a law per radian or size of its argument, from which the argument's rounding counts */
 
 /* Speeds and accelerations of the drivers (with one driver: 1 and 0), and the blocks held; the largest derivatives, in
  * radians and sizes.
@@ -61,7 +63,53 @@ static void make_source(kf_solver *solver, const kf_pose *pose, const kf_driven 
         source->second[k] = of_rates * drive->curve * all_of[k];
     }
     source->missed[0] = source->missed[1] = source->missed[2] = 0.0;
+    source->is_given = source->is_of_laws = false;
+}
+
+/* Return how well the arguments of steep laws are known, in radians and sizes; 0 without such laws. */
+static double rounding_of_laws(const kf_solver *solver, const kf_pose *pose)
+{
+#if KF_LAWS
+    double slopes[KF_ROOM(KF_LAW_ARGUMENTS)], here[KF_LAWS], largest = -1.0;
+    int k;
+    if (KF_LAW_ARGUMENTS == 0) {
+        return 0.0;
+    }
+    kf_law_slopes(&solver->model, slopes);
+    kf_law_positions(&solver->model, &pose->found, here);
+    for (k = 0; k < KF_LAW_ARGUMENTS; ++k) {
+        if (slopes[k] * kf_law_units[k] > STEEP_LAW) {
+            largest = fmax(largest, fabs(here[k]) / kf_law_units[k]);
+        }
+    }
+    return largest < 0.0 ? 0.0 : KF_ROUNDINGS * KF_EPS * (1.0 + largest);
+#else
+    (void)solver;
+    (void)pose;
+    return 0.0;
+#endif
+}
+
+/* Form the source of steep laws: the motion where the drivers are moved by the rounding of the arguments. */
+static void make_source_of_laws(kf_solver *solver, const kf_pose *pose, const kf_driven *drive, double moved)
+{
+    kf_source *const source = &solver->scratch.source;
+    int k;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        source->u[k] = KF_ALONG(solver) < 0 || k == KF_ALONG(solver) ? moved * kf_reach[k] : 0.0;
+    }
+    memset(source->first, 0, KF_UNKNOWNS * sizeof(double));
+    memset(source->second, 0, KF_UNKNOWNS * sizeof(double));
+    if (KF_IS_ONE(solver)) {
+        for (k = 0; k < KF_UNKNOWNS; ++k) {
+            source->z[k] = source->u[KF_ALONG(solver)] * pose->x1[k];
+        }
+    } else {
+        KF_VELOCITY(&solver->model, &pose->found, source->u, source->first, drive->held, source->z);
+    }
+    source->missed[0] = source->missed[1] = source->missed[2] = 0.0;
     source->is_given = false;
+    source->is_of_laws = true;
 }
 
 /* Move `there` by `more` away from `here`, so that two errors cannot cancel by chance. */
@@ -83,14 +131,19 @@ static bool move(kf_solver *solver, const kf_pose *pose, const kf_driven *drive,
 {
     const kf_model *const model = &solver->model;
     const kf_source *const source = &solver->scratch.source;
+    const double *const here = KF_POSE_U(pose);
     double *const z = solver->scratch.x1;
+    double moved[KF_DRIVERS];
     bool all[KF_ROOM(KF_BLOCKS)];
     int k;
     memset(all, 1, sizeof all);
+    for (k = 0; source->is_of_laws && k < KF_DRIVERS; ++k) {
+        moved[k] = here[k] + source->u[k];
+    }
     for (k = 0; k < KF_UNKNOWNS; ++k) {
         z[k] = pose->found.x[k] + source->z[k];
     }
-    if (!kf_evaluated(model, KF_POSE_U(pose), z, all, &there->found)) {
+    if (!kf_evaluated(model, source->is_of_laws ? moved : here, z, all, &there->found)) {
         return false;
     }
     KF_VELOCITY(model, &there->found, drive->ud, source->is_given ? source->given_first : pose->x1, drive->held,
@@ -113,7 +166,7 @@ static bool round_node(kf_solver *solver, const kf_span *span, int place, double
     double *const squares = solver->scratch.zd;
     const double half = span->half;
     int worst[KF_MOST_SOURCES], count, i, k;
-    double weight;
+    double weight, rounded;
     kf_driven drive;
     kf_fresh(node, -1, -INFINITY, INFINITY);
 #if KF_TRACKS
@@ -124,9 +177,14 @@ static bool round_node(kf_solver *solver, const kf_span *span, int place, double
     }
     drive = drive_of(solver, node, KF_SPEEDS(&solver->model), kf_at_rest);
     count = kf_worst_blocks(&solver->model, &node->found, NULL, worst, &weight);
+    rounded = rounding_of_laws(solver, node);
     memset(squares, 0, KF_UNKNOWNS * sizeof(double));
-    for (i = 0; i < count; ++i) {
-        make_source(solver, node, &drive, worst[i], weight);
+    for (i = rounded > 0.0 ? -2 : 0; i < count; ++i) {
+        if (i < 0) {
+            make_source_of_laws(solver, node, &drive, i == -2 ? -rounded : rounded);
+        } else {
+            make_source(solver, node, &drive, worst[i], weight);
+        }
         if (!move(solver, node, &drive, there)) {
             return false;
         }
@@ -178,6 +236,7 @@ static bool make_source_of_bridge(kf_solver *solver, const kf_pose *pose, const 
     KF_VELOCITY(&solver->model, &pose->found, kf_at_rest, scratch->z, drive->held, scratch->x1);
     memcpy(source->z, scratch->x1, KF_UNKNOWNS * sizeof(double));
     source->is_given = true;
+    source->is_of_laws = false;
     return true;
 }
 
@@ -263,9 +322,12 @@ static bool tried(kf_solver *solver, kf_pose *pose, const double *ud, const doub
     double weight, missed[3];
     const int count = kf_worst_blocks(&solver->model, &pose->found, drive->held, worst, &weight);
     const int most = pose->bridge >= 0 ? 1 : KF_TRACKS ? KF_DRIVERS : 0;
+    const double rounded = rounding_of_laws(solver, pose);
     kf_outputs_of(&solver->model, pose, ud, udd, rows[0][0], rows[0][1], rows[0][2]);
-    for (i = 0; i < count + most; ++i) {
-        if (i < count) {
+    for (i = rounded > 0.0 ? -2 : 0; i < count + most; ++i) {
+        if (i < 0) { /* at a break of a law its two sides differ */
+            make_source_of_laws(solver, pose, drive, i == -2 ? -rounded : rounded);
+        } else if (i < count) {
             make_source(solver, pose, drive, worst[i], weight);
 #if KF_TRACKS
         } else if (!KF_IS_ONE(solver)) {

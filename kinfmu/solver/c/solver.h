@@ -143,12 +143,13 @@ typedef struct {
 
 #define KF_POOLS (KF_TRACKS ? KF_DRIVERS : 1)
 
-/* Errors of the unknowns: of z, of the derivatives by rounding, and the derivatives given of held blocks. */
+/* Errors of the unknowns: of z, of the derivatives by rounding, the derivatives given of held blocks, and of u. */
 typedef struct {
     double z[KF_ROOM(KF_UNKNOWNS)], first[KF_ROOM(KF_UNKNOWNS)], second[KF_ROOM(KF_UNKNOWNS)];
     double given_first[KF_ROOM(KF_UNKNOWNS)], given_second[KF_ROOM(KF_UNKNOWNS)];
     double missed[3]; /* errors of outputs and their derivatives because lengths miss a change point */
-    bool is_given;
+    double u[KF_DRIVERS];
+    bool is_given, is_of_laws;
 } kf_source;
 
 #define KF_INNERS 2 /* as many as most mechanisms have singular points */

@@ -1,6 +1,9 @@
 /* Survey: find the singular points near a pose and bridge them. See kinfmu/solver/python/survey.py. */
 #include "internal.h"
 
+#define NEXT_TO 1e-3 /* [rad, sizes] up to which the secant through two poses is too rough to find a zero by */
+#define FAR_OFF 4.0  /* times as far as zeros are bridged: one that the rough secant has beyond is not searched for */
+
 /* Return a pose at a distance from another, on the side where a block's determinant grows; NULL if there is none. */
 static kf_pose *nearby(kf_solver *solver, kf_pose *pose, int block, double distance)
 {
@@ -15,6 +18,24 @@ static kf_pose *nearby(kf_solver *solver, kf_pose *pose, int block, double dista
     return NULL;
 }
 
+/* Return whether the secant through two poses next to each other has all zeros of low determinants far off; block: the
+ * first that is low.
+ */
+static bool is_far_off(const kf_solver *solver, const kf_pose *pose, const kf_pose *trial, int block)
+{
+    const double here = KF_HERE(solver, trial), from = KF_HERE(solver, pose);
+    const double *const after = trial->found.determinants, *const before = pose->found.determinants;
+    double zero;
+    for (; block < KF_BLOCKS; ++block) {
+        if (fabs(after[block]) < KF_REGULAR && !kf_knows(solver, trial->map, here, block)
+            && !(kf_secant_zero(from, before[block], here, after[block], &zero)
+                 && fabs(zero - here) > FAR_OFF * KF_HALF_WIDTH * kf_reach[KF_ALONG(solver)])) {
+            return false;
+        }
+    }
+    return true;
+}
+
 /* Return the singularity map with what a trial pose shows: the map itself if that is nothing new.
  *
  * New is a bridge, where the trial comes near a singular point, or a searched interval, where no bridge holds.
@@ -24,7 +45,7 @@ int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial)
     const double here = KF_HERE(solver, trial), reach = kf_reach[KF_ALONG(solver)];
     const double *const determinants = trial->found.determinants;
     int map = trial->map, block = 0, k;
-    kf_pose *before;
+    kf_pose *before = pose;
     while (block < KF_BLOCKS && !(fabs(determinants[block]) < KF_REGULAR && !kf_knows(solver, map, here, block))) {
         ++block;
     }
@@ -37,7 +58,12 @@ int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial)
             return kf_with_bridge(solver, map, again);
         }
     }
-    before = fabs(here - KF_HERE(solver, pose)) > 1e-3 * reach ? pose : nearby(solver, trial, block, 0.02 * reach);
+    if (fabs(here - KF_HERE(solver, pose)) <= NEXT_TO * reach) {
+        if (is_far_off(solver, pose, trial, block)) {
+            return map;
+        }
+        before = nearby(solver, trial, block, 0.02 * reach);
+    }
     for (; before != NULL && block < KF_BLOCKS; ++block) { /* upstream first */
         const double from = KF_HERE(solver, before), of_from = before->found.determinants[block];
         kf_interval searched;

@@ -103,7 +103,8 @@ class Bridge:
     def _largest(self, z: Vector) -> float:
         """Return the largest of the driver value and the unknowns, in radians and sizes."""
         scales = (*self.span.model.REACH, *self.span.model.UNKNOWN_SCALES)
-        return float(max([abs(a) / c for a, c in zip((self.centre, *z), scales, strict=True)]))
+        parts = [abs(a) / c for a, c in zip((self.centre, *z), scales, strict=True)]
+        return float(max(self.span.model.ROW_OFFSET, *parts))
 
     def _keeps_distances(self, values: Any) -> bool:
         """Return whether a driven distance that passes 0 in the window closes as a length: d.d - u^2 always does.

@@ -4,7 +4,8 @@ Every solved block is a source. Its rows are known to a few roundings of their t
 
     |dz| = |J^-1| R (2 eps (1 + offset) + residual + eps |z|)        R: scales of the rows, in lengths
 
-which moves all blocks that come after it. The effect on outputs and rates is computed, not estimated: position,
+which moves all blocks that come after it. Of laws with short rises, the roundings of their arguments are a source like
+those of the driver values. The effect on outputs and rates is computed, not estimated: position,
 velocity and acceleration are formed again at the moved pose, so that they contain the effect of a bad condition and of
 rounding at each stage. The estimate is the sum over the sources. Near a singular point, of determinant m, errors grow
 like 1/m, 1/m^2, 1/m^3. On a bridge the source is the difference of its two widths and the errors of its nodes.
@@ -23,6 +24,7 @@ from .worst_case_step import worst_case_step
 ROUNDINGS = 2.0  # of a row's terms, and of what is formed of them
 UNBOUNDED = 0.5  # relative change of a determinant within a pose's error from which rates are unknown
 MOST_SOURCES = 3  # with more blocks, those that move farthest represent all
+STEEP_LAW = 40.0  # steps through a law per radian or size of its argument, from which the argument's rounding counts
 UNKNOWN_ERRORS = inf, inf, inf
 
 
@@ -44,13 +46,14 @@ class UnknownRates(NamedTuple):
 
 
 class Source(NamedTuple):
-    """Errors of the unknowns: of z, of the derivatives by rounding, and the derivatives given of held blocks."""
+    """Errors of the unknowns: of z, of the derivatives by rounding, the derivatives given of held blocks, and of u."""
 
     z: Vector
     first: Vector
     second: Vector
     given_first: Vector = ()
     given_second: Vector = ()
+    u: Vector = ()
 
 
 def estimated_errors(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple[float, float, float]:
@@ -253,7 +256,28 @@ def _sources(model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRates
                 tuple([of_second * a for a in all_of]),
             )
         )
+    rounded = _rounding_of_laws(model, pose) if model.LAW_TURNS else 0.0
+    if rounded:  # at a break of a law its two sides differ
+        sources += [_of_laws(model, pose, driven, rates, moved) for moved in (-rounded, rounded)]
     return sources
+
+
+def _rounding_of_laws(model: Model, pose: Pose) -> float:
+    """Return how well the arguments of steep laws are known, in radians and sizes; 0 without such laws."""
+    arguments = zip(model.law_slopes(), model.law_positions(pose.values), model.LAW_UNITS)  # noqa: B905  more positions
+    steep = [abs(here) / unit for slope, here, unit in arguments if slope * unit > STEEP_LAW]
+    return ROUNDINGS * EPS * (1.0 + max(steep)) if steep else 0.0
+
+
+def _of_laws(model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRates, moved: float) -> Source:
+    """Return the source of steep laws: the motion where the drivers are moved by the rounding of the arguments."""
+    u = tuple([moved * reach for reach in model.REACH])
+    none = (0.0,) * len(pose.z)
+    if len(u) == 1:
+        z = tuple([u[0] * a for a in rates.first])
+    else:
+        z = tuple(model.velocity(pose.values, u, none, driven.held))
+    return Source(z, none, none, u=u)
 
 
 def _of_bridge(model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRates) -> Source:
@@ -315,7 +339,8 @@ def _moved(
 ) -> tuple[Found, Vector, Vector]:
     """Return the result of `position` at the pose moved by a source, and its first and second derivative."""
     z = tuple([a + d for a, d in zip(pose.z, source.z)])  # noqa: B905
-    there = evaluated(model, pose.u, z)
+    u = tuple([a + d for a, d in zip(pose.u, source.u)]) if source.u else pose.u  # noqa: B905
+    there = evaluated(model, u, z)
     values = there[-1]
     first = model.velocity(values, driven.ud, source.given_first or rates.first, driven.held)
     first = _added(first, rates.first, source.first)

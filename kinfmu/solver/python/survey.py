@@ -9,6 +9,9 @@ from .singularity_map import Interval, SingularityMap
 from .span import REGULAR
 from .trusted_step import follow_path
 
+NEXT_TO = 1e-3  # [rad, sizes] up to which the secant through two poses is too rough to find a zero by
+FAR_OFF = 4.0  # times as far as zeros are bridged: one that the rough secant has beyond is not searched for
+
 
 def surveyed(model: Model, pose: Pose, trial: Pose) -> SingularityMap | None:
     """Return the singularity map with what a trial pose shows: the map itself if that is nothing new.
@@ -26,7 +29,12 @@ def surveyed(model: Model, pose: Pose, trial: Pose) -> SingularityMap | None:
             if again is not None:
                 return known.with_bridge(again, pose.u[0])
     reach: float = model.REACH[0]
-    before = pose if abs(here - pose.u[0]) > 1e-3 * reach else _nearby(model, trial, low[0], 0.02 * reach)
+    before: Pose | None = pose
+    if abs(here - pose.u[0]) <= NEXT_TO * reach:
+        rough = [secant_zero(pose, trial, block) for block in low]
+        if all(zero is not None and abs(zero - here) > FAR_OFF * HALF_WIDTH * reach for zero in rough):
+            return singularities
+        before = _nearby(model, trial, low[0], 0.02 * reach)
     if before is None:
         return singularities
     for block in low:  # upstream first
