@@ -96,6 +96,7 @@ def tips_off(run: Run, crank: float, at: tuple[float, float] = (0.0, 0.0)) -> li
 
 
 @every_member
+@pytest.mark.few(4)
 def test_a_mechanism_larger_by_a_power_of_two_moves_equally_to_the_bit(name: str) -> None:
     mechanism = kinfmu.load(name)
     times = np.linspace(mechanism.run.start, mechanism.run.stop, 9)
@@ -121,6 +122,7 @@ def _tables(run: Run) -> tuple[np.ndarray, ...]:
     [(name, factor) for name in ("fourbar", "slider_crank", "triple_rocker") for factor in (1e-6, 1e6)]
     + [("parallel_jaw", 1e-6), ("excavator", 1e6)],
 )
+@pytest.mark.few(2)
 def test_check_finds_the_same_at_every_size(name: str, factor: float) -> None:
     mechanism = kinfmu.load(name)
     report, original = kinfmu.check(scaled(mechanism, factor)), kinfmu.check(mechanism)
@@ -191,6 +193,7 @@ def test_change_points_are_bridged_equally_at_all_sizes_where_the_unknown_is_a_l
 
 @pytest.mark.parametrize("ratio", [1e2, 1e4])
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.few(3)
 def test_short_cranks_on_long_links_are_right_relative_to_the_size(ratio: float, scale: float) -> None:
     bars = [written(bar * scale) for bar in (ratio + 0.3, 1.1, ratio, 1.7)]
     run = kinfmu.solve(crank_rocker(bars), crank_angle=ANGLES)
@@ -241,6 +244,7 @@ def third_crank(ratio: float, wrong: float, *, is_body: bool, at: tuple[float, f
         (1e4, 1.0, (0.0, 0.0)),
     ],
 )
+@pytest.mark.few(2)
 def test_a_third_crank_wrong_by_1e_9_of_its_length_is_distinguished_from_a_right_one(
     ratio: float, scale: float, at: tuple[float, float], is_body: bool
 ) -> None:
@@ -271,6 +275,7 @@ def test_the_tolerance_is_1e_11_of_the_link_and_check_states_it() -> None:
 
 
 @pytest.mark.parametrize("at", [FAR, (1e6, -1e6), (-123456.7, 1000000.9)])
+@pytest.mark.few(2)
 def test_far_from_the_origin_angles_and_rates_are_as_near_it(at: tuple[float, float], tmp_path: Path) -> None:
     mechanism, exact = crank_rocker(BARS, at), oracle.fourbar(*map(repr, BARS), ANGLES)
     run = kinfmu.solve(mechanism, crank_angle=ANGLES)
@@ -420,6 +425,7 @@ def far_rack(x: float, y: float) -> tuple[Mechanism, Residual]:
 
 @pytest.mark.parametrize("made", [far_slider_crank, far_tip, far_coupling, far_rack])
 @pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.few(2)
 def test_estimates_count_the_offset_of_what_is_tied_to_the_world(
     made: Callable[[float, float], tuple[Mechanism, Residual]], engine: Literal["python", "native"]
 ) -> None:

@@ -57,6 +57,7 @@ def case(request: pytest.FixtureRequest) -> Case:
 
 
 @pytest.mark.parametrize("engine", [SHIPPED, NATIVE, GENERATED, NUMPY_NEWTON, READABLE], ids=lambda engine: engine.name)
+@pytest.mark.few(4)
 def test_newton_to_round_off_agrees_with_the_50_digits(engine: BenchEngine, case: Case) -> None:
     sampler = engine.sampler(case, engine.usual)
     assert sampler is not None
@@ -155,6 +156,7 @@ def test_a_sample_that_kimech_refuses_is_a_gap_and_those_after_it_are_solved() -
 
 @pytest.mark.parametrize("order", [0, 1, 2])
 @pytest.mark.parametrize("name", ["fourbar", "crank_rocker", "slider_crank", "stephenson_six_bar", "excavator"])
+@pytest.mark.few(5)
 def test_numpy_newton_agrees_on_every_kind_of_row_it_states(name: str, order: int) -> None:
     stated = of_gallery(name)
     sampler = NUMPY_NEWTON.sampler(stated, NUMPY_NEWTON.usual._replace(predictor=order))

@@ -45,6 +45,7 @@ def test_a_fixed_number_of_corrections_is_made_in_every_block(name: str, correct
 
 
 @every_kind
+@pytest.mark.few(2)
 def test_each_correction_brings_the_residual_down_and_newton_faster_than_chord(name: str) -> None:
     plan = plan_of(name)
     full = [position_nearby(model_with(plan, EngineSetting(corrections=n)))[3] for n in range(4)]
@@ -56,6 +57,7 @@ def test_each_correction_brings_the_residual_down_and_newton_faster_than_chord(n
 
 
 @every_kind
+@pytest.mark.few(2)
 def test_correcting_ends_at_the_tolerance_and_not_long_after(name: str) -> None:
     plan = plan_of(name)
     counts = []

@@ -270,6 +270,7 @@ _PEAK = '[measures.peak]\ntype = "maximum"\nof = "crank.torque"\n'
         ),
     ],
 )
+@pytest.mark.few(2)
 def test_what_is_valid_of_a_file_is_reported_before_its_problem(
     old: str,
     new: str,

@@ -51,6 +51,7 @@ def test_list_names_the_gallery_with_titles(command: Command) -> None:
 
 
 @every_member
+@pytest.mark.few(2)
 def test_new_writes_a_commented_file_that_checks(name: str, command: Command, tmp_path: Path) -> None:
     result = command("new", name, "mine.toml")
     assert result.exit_code == 0

@@ -295,6 +295,7 @@ def test_tables_of_every_format_have_angles_in_degrees(way: str, suffix: str, co
 
 @pytest.mark.parametrize(("separator", "decimal"), [(";", ","), ("tab", ","), ("|", "."), (",", ".")])
 @pytest.mark.parametrize("way", ["export", "print", "svaj", "cam", "solve"])
+@pytest.mark.few(2)
 def test_csv_files_have_the_separator_and_decimal_sign_of_spreadsheets(
     way: str, separator: str, decimal: str, command: Command
 ) -> None:

@@ -41,6 +41,7 @@ def test_a_hint_without_quotes_is_found() -> None:
 
 @pytest.mark.parametrize("name", FOLDERS)
 @pytest.mark.parametrize("is_absolute", [False, True])
+@pytest.mark.few(2)
 def test_suggested_commands_name_the_file_also_in_folders_with_blanks_and_quotes(
     name: str, is_absolute: bool, command: Command, tmp_path: Path
 ) -> None:

@@ -16,6 +16,7 @@ from tests.docs.follow import accept, follow, page_text, typed
 PAGE = page_text("coupling.md")
 
 
+@pytest.mark.long
 def test_the_page_runs_and_prints_its_comments(request: pytest.FixtureRequest, tmp_path: Path) -> None:
     followed = follow("coupling.md", tmp_path)
     accept("coupling.md", followed.commented(PAGE), request)

@@ -10,6 +10,7 @@ import pytest
 from tests.docs.follow import accept, follow, page_text
 
 
+@pytest.mark.long
 def test_the_page_runs_and_prints_what_it_shows(request: pytest.FixtureRequest, tmp_path: Path) -> None:
     followed = follow("forces.md", tmp_path)
     report = followed.outputs["kinfmu check pump.toml"]

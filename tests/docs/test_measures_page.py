@@ -11,6 +11,7 @@ from tests.docs.follow import accept, follow, page_text
 from tests.docs.key_tables import with_readings
 
 
+@pytest.mark.long
 def test_the_page_runs_and_prints_what_it_shows(request: pytest.FixtureRequest, tmp_path: Path) -> None:
     followed = follow("measures.md", tmp_path)
     report, as_json, faster = followed.outputs.values()

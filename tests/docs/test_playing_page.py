@@ -9,6 +9,7 @@ import pytest
 from tests.docs.follow import follow
 
 
+@pytest.mark.long
 def test_the_page_runs_and_the_live_mechanism_has_the_length_of_the_page(tmp_path: Path) -> None:
     pytest.importorskip("anywidget", reason="anywidget is not installed")
     pytest.importorskip("ziglang", reason="pages are compiled by zig")

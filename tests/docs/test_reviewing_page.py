@@ -14,6 +14,7 @@ SCRIPT = (ROOT / "scripts" / "pictures").read_text(encoding="utf-8")
 MOST = 600_000  # [bytes] of a picture; pages load it
 
 
+@pytest.mark.long
 def test_the_page_runs_and_its_table_has_units(tmp_path: Path) -> None:
     pytest.importorskip("pandas")
     names = follow("reviewing-a-run.md", tmp_path).names

@@ -141,6 +141,7 @@ def test_the_check_of_the_gallery_accepts_pages_with_all_their_files(site: Any, 
         ('<a href="../_downloads/1/mechanism.toml">', "no link to mechanism.toml"),
     ],
 )
+@pytest.mark.few(2)
 def test_the_check_of_the_gallery_finds_a_missing_link(site: Any, built: Path, link: str, fault: str) -> None:
     page = built / "gallery" / "fourbar.html"
     assert link in GALLERY_PAGE

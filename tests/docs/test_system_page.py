@@ -15,6 +15,7 @@ from tests.docs.follow import SHOWN, accept, follow, page_text
 NAME = "system.md"
 
 
+@pytest.mark.long
 def test_the_page_runs_in_ecos_and_libcosim_too_and_prints_what_it_shows(
     request: pytest.FixtureRequest, tmp_path: Path
 ) -> None:

@@ -89,6 +89,7 @@ def test_a_committed_kind_of_svg_has_the_violet_lines(tmp_path: Path) -> None:
 
 
 @every_member
+@pytest.mark.few(2)
 def test_loads_are_the_only_violet_lines_of_the_gallery(name: str) -> None:
     mechanism = kinfmu.load(name)
     assert bool(lines(sheet_of(instant(mechanism)))) == bool(mechanism.loads)

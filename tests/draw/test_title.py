@@ -44,6 +44,7 @@ def test_a_long_title_continues_on_a_second_line_and_ends_in_an_ellipsis() -> No
 @pytest.mark.parametrize(
     "title", ["\U0001f468\ue1ff", pytest.param("a" * 10_000, marks=pytest.mark.long), "$\\frac{$ {} %s <b>&amp;"]
 )
+@pytest.mark.few(1)
 def test_any_line_of_text_is_a_title_of_every_picture(title: str, tmp_path: Path) -> None:
     mechanism = dataclasses.replace(load("fourbar"), title=title)
     figure(mechanism, tmp_path / "a.svg")

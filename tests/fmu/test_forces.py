@@ -148,6 +148,7 @@ def assert_forces_equal(run: kinfmu.Run, reference: kinfmu.Run) -> None:
 
 @of_each_flavour
 @pytest.mark.parametrize("name", mostly_long(["fourbar", "five_bar", "excavator"], few=("excavator",)))
+@pytest.mark.few(2)
 def test_forces_equal_those_of_a_run(fmu_of: Callable[..., Path], flavour: str, fmi: int, name: str) -> None:
     mechanism = loaded(name)
     run = kinfmu.simulate(fmu_of(mechanism, flavour, fmi))
@@ -155,6 +156,7 @@ def test_forces_equal_those_of_a_run(fmu_of: Callable[..., Path], flavour: str, 
 
 
 @of_each_flavour
+@pytest.mark.few(2)
 def test_external_loads_laws_over_time_and_masses_equal_those_of_a_run(
     fmu_of: Callable[..., Path], flavour: str, fmi: int
 ) -> None:
@@ -172,6 +174,7 @@ def test_external_loads_laws_over_time_and_masses_equal_those_of_a_run(
 
 
 @of_each_flavour
+@pytest.mark.few(2)
 def test_declared_dependencies_are_those_that_count(start: Callable[..., Host], flavour: str, fmi: int) -> None:
     host = start(flavour, fmi)
     at = {"crank_angle": 0.7, "crank_speed": 3.0, "crank_acceleration": 20.0, "work_force": -150.0}
@@ -275,6 +278,7 @@ def test_a_native_fmu_discards_forces_of_an_unreachable_sample(fmu_of: Callable[
         ("native", ["guide.moment", "shaking_moment"], ["reactions", "shaking"]),
     ],
 )
+@pytest.mark.few(2)
 def test_outputs_choose_forces(flavour: str, outputs: Sequence[str], stages: Sequence[str], tmp_path: Path) -> None:
     """What no output asks for is not generated."""
     path = kinfmu.build(press(), tmp_path, flavour=flavour, outputs=outputs)
@@ -432,6 +436,7 @@ def test_potential_energy_counts_from_the_origin_of_the_world(tmp_path: Path) ->
 
 
 @of_each_flavour
+@pytest.mark.few(2)
 def test_ends_that_meet_are_reported_in_the_log(flavour: str, fmi: int, tmp_path: Path) -> None:
     fmu = kinfmu.build(met(MEETING[0]), tmp_path / "met.fmu", flavour=flavour, fmi=fmi)
     run = kinfmu.simulate(fmu, stop=1.0, step=0.05)
@@ -446,6 +451,7 @@ def test_ends_that_meet_are_reported_in_the_log(flavour: str, fmi: int, tmp_path
 
 
 @of_each_flavour
+@pytest.mark.few(2)
 def test_the_ends_of_a_spring_without_free_length_may_meet(flavour: str, fmi: int, tmp_path: Path) -> None:
     fmu = kinfmu.build(toml_file.parse(MET), tmp_path / "met.fmu", flavour=flavour, fmi=fmi)
     run = kinfmu.simulate(fmu, stop=1.0, step=0.05)

@@ -249,6 +249,7 @@ def test_instances_of_one_fmu_and_of_two_in_one_process_share_nothing(start: Sta
 
 
 @pytest.mark.parametrize("drive", ["time", "inputs"])
+@pytest.mark.few(3)
 def test_a_step_past_the_stop_time_is_invalid_and_one_that_rounds_past_it_is_valid(start: Start, drive: str) -> None:
     host = start("fourbar", drive, initialize=False)
     host.initialize(0.5, 1.5)
@@ -319,6 +320,7 @@ def test_rates_are_estimated_until_they_are_wired(start: Start) -> None:
 
 @pytest.mark.parametrize("drive", ["inputs", "time"])
 @pytest.mark.parametrize(("t", "h"), NO_STEPS)
+@pytest.mark.few(11)
 def test_an_invalid_step_changes_nothing(start: Start, drive: str, t: float, h: float) -> None:
     host, other = start("fourbar", drive), start("fourbar", drive)
     assert host.step(t, h) == host.invalid

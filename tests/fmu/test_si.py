@@ -122,6 +122,7 @@ def pair(request: pytest.FixtureRequest, press: kinfmu.Mechanism, tmp_path_facto
     )
 
 
+@pytest.mark.few(2)
 def test_every_variable_is_in_si_units_and_shown_in_the_unit_of_the_file(pair: tuple[Path, Path]) -> None:
     metric, original = pair
     assert not validate_fmu(str(metric))

@@ -141,6 +141,7 @@ def has_breaks(mechanism: kinfmu.Mechanism) -> bool:
 
 
 @pytest.mark.parametrize("name", [name for name in kinfmu.mechanism.gallery.names() if has_breaks(kinfmu.load(name))])
+@pytest.mark.few(2)
 def test_limits_agree_with_samples_next_to_the_break(name: str) -> None:
     """1e-6 of a step away from the break, the jerk has hardly changed."""
     mechanism = kinfmu.load(name)

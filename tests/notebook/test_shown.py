@@ -229,6 +229,7 @@ def test_every_class_that_shows_itself_has_html() -> None:
 
 
 @needs_browser
+@pytest.mark.long
 def test_tables_that_follow_each_other_do_not_touch(tmp_path: Path) -> None:
     shown = html_page("fit", table([("a", 1.0)], ("unknown", "value")), table([("b", 2.0)], ("target", "error")))
     with browser(tmp_path) as chromium, chromium.tab() as opened:

@@ -43,6 +43,7 @@ def test_the_page_of_a_run_has_its_parameters_and_its_time(command: Command, tmp
     assert data_of(tmp_path / "part.html")["run"]["to"] == pytest.approx(0.95)
 
 
+@pytest.mark.long
 def test_the_page_of_a_run_over_an_angle_has_the_axis_of_the_driver(tmp_path: Path, command: Command) -> None:
     run = kinfmu.solve(kinfmu.load("crank_rocker"), crank_angle=np.radians(np.linspace(30.0, 120.0, 19)))
     write_mcap(run, tmp_path / "run.mcap")
@@ -62,6 +63,7 @@ def test_the_page_of_a_run_over_an_angle_has_the_axis_of_the_driver(tmp_path: Pa
         assert page.errors == []
 
 
+@pytest.mark.long
 def test_the_page_of_a_run_over_two_drivers_shows_its_samples(tmp_path: Path, command: Command) -> None:
     left, right = np.linspace(2.0, 2.6, 31), 0.8 + 0.2 * np.sin(np.linspace(0.0, 6.0, 31))
     run = kinfmu.solve(kinfmu.load("five_bar"), left_angle=left, right_angle=right, right_speed=0.5)

@@ -47,6 +47,7 @@ def worst_difference(run: Run, other: Run, size: float) -> float:
 
 
 @pytest.mark.parametrize("name", MEMBERS)
+@pytest.mark.few(2)
 def test_an_opened_mechanism_solves_to_the_same_numbers(name: str) -> None:
     mechanism, found = of(name)
     moving = replace(mechanism, coordinates="moving")

@@ -33,6 +33,7 @@ def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 
 
 @pytest.mark.parametrize("name", ["crank_rocker", "jansen_leg", "excavator"])
+@pytest.mark.few(2)
 def test_page_is_one_small_file_without_addresses(name: str) -> None:
     text = text_of(name)
     assert 200_000 <= len(text.encode()) <= LARGEST
@@ -91,6 +92,7 @@ def test_dragged_bucket_moves_three_cylinders_whose_sliders_end_at_their_limits(
 
 
 @pytest.mark.parametrize("stop", [1e-6, 0.004, 0.2, 3.0, 100.0])
+@pytest.mark.few(2)
 def test_the_clock_has_the_digits_of_the_run_and_the_speed_makes_short_runs_visible(
     chromium: Browser, stop: float
 ) -> None:
@@ -126,6 +128,7 @@ def _geared(ratio: float) -> kinfmu.Mechanism:
     ],
     ids=lambda one: getattr(one, "name", one),
 )
+@pytest.mark.few(2)
 def test_slider_plots_curves_and_clock_run_over_one_whole_cycle(
     chromium: Browser, mech: kinfmu.Mechanism, turns: int
 ) -> None:
@@ -189,6 +192,7 @@ def test_page_fits_a_phone(chromium: Browser) -> None:
 
 @pytest.mark.parametrize("name", ["jansen_leg", "parallel_jaw", "peaucellier", "fourbar", "toggle_press"])
 @pytest.mark.parametrize("size", [PHONE, DESKTOP])
+@pytest.mark.few(2)
 def test_names_cover_neither_each_other_nor_the_linkage(chromium: Browser, name: str, size: dict[str, int]) -> None:
     with chromium.open(text_of(name)) as page:
         page.resize(size)
@@ -216,6 +220,7 @@ def _light(colour: str) -> float:
     "size", [pytest.param(PHONE, id="phone"), pytest.param(DESKTOP, id="desktop", marks=pytest.mark.long)]
 )
 @every_member
+@pytest.mark.few(2)
 def test_names_keep_their_places_in_a_turn_and_have_the_contrast_of_wcag_aa(
     chromium: Browser, name: str, size: dict[str, int]
 ) -> None:
@@ -439,6 +444,7 @@ def test_flat_face_touches_its_cam_and_a_roller_runs_on_its_pitch_curve(chromium
         assert np.hypot(*(curve - place).T).min() < 0.5 * np.hypot(*(curve[1] - curve[0])) * 1.1
 
 
+@pytest.mark.long
 def test_masses_and_gravity_have_the_limits_and_the_effects_of_the_file(chromium: Browser) -> None:
     mech = kinfmu.load("fourbar_loaded")
     with chromium.open(text_of("fourbar_loaded")) as page:
@@ -518,6 +524,7 @@ def test_forces_in_joints_are_drawn_to_one_scale_and_only_computed_when_shown(ch
     assert at_pin == pytest.approx([scale * run["P.force_x"][0], scale * run["P.force_y"][0]], rel=1e-6)
 
 
+@pytest.mark.long
 def test_every_dyad_has_its_transmission_angle_in_the_drawing_and_the_plots(chromium: Browser) -> None:
     angles = {}
     for loop in (*(report := kinfmu.check(kinfmu.load("watt_six_bar"))).loops, *report.dyads):
@@ -548,6 +555,7 @@ def test_every_dyad_has_its_transmission_angle_in_the_drawing_and_the_plots(chro
         ),
     ],
 )
+@pytest.mark.few(2)
 def test_the_first_plots_are_of_coordinates_that_move(chromium: Browser, more: str, shown: list[str]) -> None:
     mech = parse(toml_text(kinfmu.load("slider_crank")) + more)
     with chromium.open(kinfmu.page.page(mech)) as page:
@@ -562,6 +570,7 @@ def test_the_first_plots_are_of_coordinates_that_move(chromium: Browser, more: s
 
 
 @pytest.mark.parametrize("name", ["triple_rocker", "peaucellier", "stephenson_six_bar", "crank_rocker"])
+@pytest.mark.few(2)
 def test_plots_over_a_driver_clip_poles_as_export_does(chromium: Browser, name: str) -> None:
     mech = kinfmu.load(name)
     body = mech.moving_bodies[1].name
@@ -658,6 +667,7 @@ def test_keyboard_alone_moves_plays_and_changes_values(chromium: Browser) -> Non
 
 
 @pytest.mark.parametrize("name", ["crank_rocker", "jansen_leg", "slider_crank"])
+@pytest.mark.few(2)
 def test_a_pin_is_chosen_and_moved_by_keys(chromium: Browser, name: str) -> None:
     with chromium.open(text_of(name)) as page:
         keyboard, ring = page.tab.keyboard, "k.linkage.pose && k.hand.place"
@@ -738,6 +748,7 @@ def test_nothing_is_spoken_at_frame_rate_and_the_drawing_states_its_pose(chromiu
     "name", ["crank_rocker", "triple_rocker", "cam_roller", "slider_crank", "toggle_press", "five_bar"]
 )
 @pytest.mark.parametrize("size", [PHONE, DESKTOP], ids=["phone", "desktop"])
+@pytest.mark.few(7)
 def test_fit_shows_the_circles_of_the_drivers(chromium: Browser, name: str, size: dict[str, int]) -> None:
     with chromium.open(text_of(name)) as page:
         page.resize(size)

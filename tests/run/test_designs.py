@@ -59,6 +59,7 @@ def assert_as_solved(model: kinfmu.Model, designs: kinfmu.Designs, **arguments: 
 @pytest.mark.parametrize(
     "name", mostly_long(["crank_rocker", "fourbar", "five_bar", "slider_crank"], few=("fourbar", "five_bar"))
 )
+@pytest.mark.few(2)
 def test_designs_equal_solve_of_each(name: str, engine: str) -> None:
     mechanism = with_open_lengths(kinfmu.load(name))
     model = kinfmu.compile(mechanism, engine=engine)
@@ -187,6 +188,7 @@ def test_a_wrong_request_is_refused_in_one_line(
 @pytest.mark.parametrize("threads", [1, 2, 3, 8])
 @pytest.mark.parametrize("designs", [1, 2, 7, 1000, 10_000])
 @pytest.mark.parametrize("most", [1, 415])
+@pytest.mark.few(15)
 def test_parts_hold_all_designs_and_every_thread_gets_as_many(designs: int, most: int, threads: int) -> None:
     parts = parts_of(designs, most, threads)
     assert [k for part in parts for k in range(part.start, part.stop)] == list(range(designs))

@@ -53,6 +53,7 @@ def assert_same_motion(native: Run, python: Run) -> None:
 
 
 @every_member
+@pytest.mark.few(2)
 def test_the_gallery_moves_as_in_python(name: str) -> None:
     mechanism = kinfmu.load(name)
     plan = compile_plan(mechanism)
@@ -80,11 +81,13 @@ def test_change_points_are_crossed_at_full_accuracy_in_any_order() -> None:
         np.testing.assert_allclose(run["coupler.ax"], -np.cos(u), rtol=0, atol=1e-8)
 
 
+@pytest.mark.long
 def test_optimizing_compilers_find_nothing_to_warn_of(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(library, "FLAGS", (*library.FLAGS, "-O2"))
     assert kinfmu.solve(kinfmu.load("crank_rocker"), crank_angle=[1.0, 2.0], engine="native").good.all()
 
 
+@pytest.mark.long
 def test_optimization_changes_no_bit(request: pytest.FixtureRequest) -> None:
     plan = compile_plan(kinfmu.load("jansen_leg"))
     angles = driven(np.linspace(0.0, 6.0, 120))  # too few for lanes, which fuse on purpose
@@ -103,6 +106,7 @@ def test_most_samples_are_solved_in_lanes() -> None:
 
 
 @pytest.mark.usefixtures("optimized")
+@pytest.mark.long
 def test_loops_of_one_kind_with_other_lengths_agree_with_python() -> None:
     u = np.linspace(1.0, 8.0, SAMPLES)
     native, python = (kinfmu.solve(uneven_chain(4), crank_angle=u, engine=engine) for engine in ("native", "python"))

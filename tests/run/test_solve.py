@@ -172,6 +172,7 @@ def entries(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Callable[[Any
 
 
 @pytest.mark.parametrize("case", NO_NUMBERS)
+@pytest.mark.few(2)
 def test_what_numpy_would_make_numbers_of_is_refused_in_one_line(
     case: str, entries: dict[str, Callable[[Any], object]]
 ) -> None:

@@ -121,6 +121,7 @@ def test_a_crossing_too_near_a_dead_centre_is_a_limit() -> None:
 
 
 @pytest.mark.parametrize("degrees", [24.5, 24.6, 24.61, 24.618])
+@pytest.mark.few(2)
 def test_a_crossing_without_room_for_a_bridge_is_reported_as_one(degrees: float) -> None:
     """The crossing comes as close as 3e-8 mm to the dead centre, where the rods and the cranks are in line."""
     turn = math.radians(degrees)
@@ -259,6 +260,7 @@ LEVERS = [
 
 @pytest.mark.parametrize("target", [math.pi, math.pi + 1e-9, 9.0, -1.5])
 @pytest.mark.parametrize(("offset", "turn", "unit", "has_shoe"), LEVERS)
+@pytest.mark.few(19)
 def test_beyond_a_pole_a_path_ends_early_with_the_pole_and_what_runs_to_infinity(
     monkeypatch: pytest.MonkeyPatch, offset: float, turn: float, unit: float, has_shoe: bool, target: float
 ) -> None:
@@ -282,6 +284,7 @@ def test_beyond_a_pole_a_path_ends_early_with_the_pole_and_what_runs_to_infinity
 
 @pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize(("offset", "turn", "unit", "has_shoe"), LEVERS[::3])
+@pytest.mark.few(2)
 def test_toward_a_pole_samples_up_to_10_000_sizes_away_are_right(
     engine: str, offset: float, turn: float, unit: float, has_shoe: bool
 ) -> None:

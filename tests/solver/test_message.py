@@ -33,6 +33,7 @@ DEAD_CENTRE = math.acos(1.0 / 13.0)  # 65^2 + 100^2 - 2 65 100 cos u = (50 + 65)
         (math.inf, 6, "crank = inf rad (inf deg)"),
     ],
 )
+@pytest.mark.few(3)
 def test_an_angle_has_as_many_decimals_as_it_is_known_to(value: float, digits: int, text: str) -> None:
     model = load_model(compile_plan(kinfmu.load("fourbar")))
     assert place(model, (value,), digits) == text

@@ -95,6 +95,7 @@ def test_at_the_start_pose_a_sample_is_judged_like_the_same_one_later(gap: float
     ("engine", "drivers", "gap"),
     [*(("python", drivers, gap) for drivers in (1, 2) for gap in (0.1, 1e-2, 1e-4)), ("native", 2, 1e-4)],
 )
+@pytest.mark.few(3)
 def test_before_a_limit_the_first_sample_is_judged_like_later_ones(gap: float, drivers: int, engine: Engine) -> None:
     """A triple rocker before its dead centre; an arm of its own is the second driver."""
     start = math.acos(-1.0 / 8.0) - gap  # 2, 1, 1.5, 1: coupler and rocker stretched

@@ -97,6 +97,7 @@ def random_grids(seed: int) -> list[FloatArray]:
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", MECHANISMS)
+@pytest.mark.few(2)
 def test_bodies_that_translate_are_followed_over_every_grid(name: str, engine: Engine) -> None:
     build, from_crossing = MECHANISMS[name]
     model = kinfmu.compile(build(), engine=engine)

@@ -211,6 +211,7 @@ def test_starts_and_offsets_are_listed_with_their_units() -> None:
     assert {name: rows[name] for name in units} == units
 
 
+@pytest.mark.long
 def test_the_report_shows_numbers_in_the_units_in_which_they_are_written() -> None:
     written = four_bar()
     tilted = kinfmu.Mechanism(
@@ -374,6 +375,7 @@ def test_bare_angles_of_a_function_that_are_probably_degrees_are_noted(
         assert line.endswith(' deg" for degrees')
 
 
+@pytest.mark.long
 def test_bare_angles_of_measures_and_poses_that_are_probably_degrees_are_noted() -> None:
     swing = Range(name="swing", of="rocker.phi")
     targets = [
@@ -564,6 +566,7 @@ def _at_a_change_point() -> kinfmu.FitProblem:
     return kinfmu.FitProblem(mechanism, {"ground": (3.5, 4.0), "rocker": (1.7, 2.0)}, [target])
 
 
+@pytest.mark.long
 def test_an_optimum_at_a_change_point_is_reported_with_the_sums_of_the_search_and_of_its_file() -> None:
     result = kinfmu.fit(_at_a_change_point(), starts=2, engine="python")
     found = re.search(r"its sum of squares is (\S+), that of the search (\S+)$", result.note)
@@ -598,6 +601,7 @@ def test_another_optimum_is_chosen_where_a_file_does_not_give_the_fitted_motion(
 
 @pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize("side", [-1.0, 0.0, 2.0])
+@pytest.mark.few(2)
 def test_the_nearest_point_of_a_path_is_converged_close_to_a_dead_centre(side: float, engine: str) -> None:
     """Points at a distance from the path along its normal have their foot where they were set off."""
     model = kinfmu.compile(kinfmu.load("triple_rocker"), engine=engine)

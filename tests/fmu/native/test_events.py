@@ -63,6 +63,7 @@ def begin(start: Start, mechanism: Mechanism | str, drive: str = "time") -> tupl
 
 
 @pytest.mark.parametrize("name", mostly_long(JUMPS, few=("harmonic", "sequence")))
+@pytest.mark.few(2)
 def test_every_jump_of_a_law_is_announced_and_has_its_right_hand_value(start: Start, name: str) -> None:
     law, expected = JUMPS[name]
     host, event = begin(start, named(name, law))

@@ -216,6 +216,7 @@ HOSTS = [
 
 
 @pytest.mark.parametrize(("host", "flavour"), HOSTS)
+@pytest.mark.few(2)
 def test_rates_of_a_driven_crank_are_estimated_in_hosts_that_wire_the_angle_alone(
     fmus: Callable[[str, str], Path], host: str, flavour: str, tmp_path: Path
 ) -> None:
@@ -231,6 +232,7 @@ def test_rates_of_a_driven_crank_are_estimated_in_hosts_that_wire_the_angle_alon
 
 
 @pytest.mark.parametrize(("host", "flavour"), HOSTS)
+@pytest.mark.few(2)
 def test_hosts_react_to_a_limit_as_documented(
     fmus: Callable[[str, str], Path], host: str, flavour: str, tmp_path: Path
 ) -> None:

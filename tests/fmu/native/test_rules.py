@@ -72,6 +72,7 @@ def _differences(host: Host, names: list[str], at: dict[str, float], way: dict[s
 
 
 @pytest.mark.parametrize("known", UNIT_INPUTS)
+@pytest.mark.few(2)
 def test_directional_derivative_with_respect_to_an_input_is_the_finite_difference(start: Start, known: str) -> None:
     host = start("stephenson_six_bar" if known == "crank_angle" else "fourbar")
     inputs = [variable.name for variable in host.about.interface.part("inputs")]
@@ -137,6 +138,7 @@ def test_every_real_output_has_directional_derivatives_which_do_not_change_the_s
 
 
 @pytest.mark.parametrize("parameter", ["ground", "coupler"])
+@pytest.mark.few(2)
 def test_directional_derivative_with_respect_to_a_parameter_is_the_finite_difference(
     start: Start, parameter: str
 ) -> None:
@@ -381,6 +383,7 @@ def test_inputs_set_while_time_drives_are_warned_about_once_in_model_exchange(st
 
 @pytest.mark.parametrize("name", ["fourbar", "five_bar", "double_pendulum"])
 @pytest.mark.parametrize("wired", [0, 1, 2])
+@pytest.mark.few(10)
 def test_no_output_is_infinite_and_errors_without_an_estimate_are_the_declared_maximum(
     start: Start, name: str, wired: int
 ) -> None:

@@ -52,6 +52,7 @@ def test_simulate_writes_the_record_alone_and_reports_it(tmp_path: Path) -> None
         (["review", "run.mcap", "--screenshot", "a.png"], "run.mcap: a review"),
     ],
 )
+@pytest.mark.few(2)
 def test_what_needs_the_viewer_is_refused_before_anything_is_written(
     arguments: list[str], what: str, tmp_path: Path
 ) -> None:
@@ -80,6 +81,7 @@ for call in (
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 def test_so_is_the_recording_of_the_demo(tmp_path: Path) -> None:
     code = f"{BASE}from kinfmu.cli import demo; sys.exit(demo.main())"
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)

@@ -23,6 +23,7 @@ EMIT = import_module("kinfmu.codegen.python.emit")  # the package shows a functi
 
 
 @pytest.mark.parametrize("count", [1, 2, 9, 49, 50, 51])
+@pytest.mark.few(2)
 def test_all_bars_of_a_chain_of_parallelograms_stay_parallel(count: int) -> None:
     run = kinfmu.solve(fourbar_chain(count))
     u = run["crank_angle"]

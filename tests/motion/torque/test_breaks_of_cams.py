@@ -34,6 +34,7 @@ def energy_error(run: Run, torque: float) -> float:
 
 @pytest.mark.parametrize("law", ["cycloidal", "simple_harmonic"])
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-9, 1e-11])
+@pytest.mark.few(2)
 def test_the_error_follows_the_tolerance_over_breaks(law: str, tolerance: float) -> None:
     """Ten turns in few long steps; the harmonic law jumps in its second derivative, the cycloidal one in its third."""
     run = kinfmu.simulate(

@@ -179,6 +179,7 @@ def test_the_page_works_under_its_security_policy(server: PlayServer, tmp_path: 
 
 
 @needs_browser
+@pytest.mark.long
 def test_while_a_page_is_made_the_old_one_states_it_and_goes_on(
     server: PlayServer, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

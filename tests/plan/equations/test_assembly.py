@@ -203,6 +203,7 @@ def test_a_start_between_limits_close_to_each_other_is_reached(seed: int) -> Non
 
 @pytest.mark.parametrize("miss", [1e-13, 1e-10, 1e-8, 1e-6, 1e-5, 1e-3])
 @pytest.mark.parametrize(("bars", "angle"), [((2, 1, 2, 1), 0.0), ((4, 1, 3, 2), math.pi), ((3, 3, 2, 2), 0.0)])
+@pytest.mark.few(6)
 def test_a_start_that_misses_a_change_point_is_assembled_or_reported_as_ambiguous(
     bars: tuple[int, ...], angle: float, miss: float
 ) -> None:

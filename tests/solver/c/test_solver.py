@@ -120,6 +120,7 @@ def defined(files: Sequence[str]) -> dict[str, float]:
 
 
 @every_member
+@pytest.mark.few(2)
 def test_c_and_python_are_the_same_over_the_run_of_a_gallery_mechanism(name: str) -> None:
     mechanism = kinfmu.load(name)
     plan = compile_plan(mechanism)
@@ -182,6 +183,7 @@ SINGULAR: dict[str, tuple[Callable[[], Mechanism], Samples, set[Status]]] = {
         ),
     ),
 )
+@pytest.mark.few(2)
 def test_c_and_python_are_the_same_near_singular_points_and_limits(name: str) -> None:
     mechanism, samples, expected = SINGULAR[name]
     statuses = assert_same(compile_plan(mechanism()), samples)
