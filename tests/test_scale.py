@@ -96,7 +96,7 @@ def tips_off(run: Run, crank: float, at: tuple[float, float] = (0.0, 0.0)) -> li
 
 
 @every_member
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 def test_a_mechanism_larger_by_a_power_of_two_moves_equally_to_the_bit(name: str) -> None:
     mechanism = kinfmu.load(name)
     times = np.linspace(mechanism.run.start, mechanism.run.stop, 9)
@@ -275,7 +275,7 @@ def test_the_tolerance_is_1e_11_of_the_link_and_check_states_it() -> None:
 
 
 @pytest.mark.parametrize("at", [FAR, (1e6, -1e6), (-123456.7, 1000000.9)])
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_far_from_the_origin_angles_and_rates_are_as_near_it(at: tuple[float, float], tmp_path: Path) -> None:
     mechanism, exact = crank_rocker(BARS, at), oracle.fourbar(*map(repr, BARS), ANGLES)
     run = kinfmu.solve(mechanism, crank_angle=ANGLES)

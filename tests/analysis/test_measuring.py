@@ -151,7 +151,7 @@ LAWS = [
 
 
 @pytest.mark.parametrize(("law", "over", "angles"), LAWS)
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 def test_a_law_of_constant_speed_is_measured_over_its_cycle_and_others_over_the_run(
     law: str, over: str, angles: tuple[float, float] | None
 ) -> None:

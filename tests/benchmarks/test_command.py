@@ -215,6 +215,7 @@ def test_the_help_has_a_line_for_every_measurement(command: Command) -> None:
         ("import", ["pass", "import kinfmu", "difference"]),
     ],
 )
+@pytest.mark.few(1)
 def test_a_measurement_prints_a_table_of_what_it_compares(what: str, lines: list[str], command: Command) -> None:
     result = command(what, "--rounds", 2)
     assert result.exit_code == 0

@@ -29,6 +29,7 @@ def position_nearby(model: Any, off: float = 0.05) -> tuple[Any, ...]:
 
 
 @every_kind
+@pytest.mark.few(2)
 def test_round_off_is_the_shipped_rule_to_the_bit(name: str) -> None:
     found, shipped = (
         position_nearby(model) for model in (model_with(plan_of(name), EngineSetting()), load_model(plan_of(name)))
@@ -38,6 +39,7 @@ def test_round_off_is_the_shipped_rule_to_the_bit(name: str) -> None:
 
 @every_kind
 @pytest.mark.parametrize("corrections", [0, 1, 2, 3])
+@pytest.mark.few(7)
 def test_a_fixed_number_of_corrections_is_made_in_every_block(name: str, corrections: int) -> None:
     plan = plan_of(name)
     found = position_nearby(model_with(plan, EngineSetting(corrections=corrections)))

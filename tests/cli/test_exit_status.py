@@ -150,7 +150,7 @@ def folder(tmp_path: Path, made: dict[str, bytes]) -> Path:
 
 
 @pytest.mark.parametrize(("arguments", "message"), WRONG_USAGE, ids=[arguments for arguments, _ in WRONG_USAGE])
-@pytest.mark.few(13)
+@pytest.mark.few(6)
 def test_wrong_usage_is_reported_with_status_two_and_leaves_nothing_behind(
     arguments: str, message: str, refuses: Callable[..., str], folder: Path
 ) -> None:

@@ -44,7 +44,7 @@ def test_a_command_makes_the_folders_of_its_file(words: str, command: Command) -
 
 
 @pytest.mark.parametrize("ending", [".csv", ".npz", ".svg", ".dxf"])
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_export_makes_the_folders_of_its_file(ending: str, record: str, command: Command) -> None:
     done = command("export", record, "-o", f"other/deep/run{ending}")
     assert done.exit_code == 0, done.stderr

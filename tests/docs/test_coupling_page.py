@@ -23,6 +23,7 @@ def test_the_page_runs_and_prints_its_comments(request: pytest.FixtureRequest, t
     assert "current [A]" in (tmp_path / "drive.svg").read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_constants_and_the_message_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     typed("python examples/dc_motor/build.py drive")

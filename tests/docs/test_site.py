@@ -166,6 +166,7 @@ def test_the_site_is_checked_when_it_is_built() -> None:
     assert "-m _site.contents docs/_build" in script
 
 
+@pytest.mark.long
 def test_quotes_in_the_api_are_those_of_code(tmp_path: Path) -> None:
     pytest.importorskip("myst_parser")
     names = "".join(f".. autofunction:: kinfmu.{name}\n" for name in ("solve", "measure", "fit", "build", "simulate"))

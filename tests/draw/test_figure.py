@@ -30,6 +30,7 @@ def texts_in(path: Path) -> str:
 
 
 @every_member
+@pytest.mark.few(2)
 def test_a_mechanism_of_the_gallery_is_drawn_with_all_its_names(
     name: str, gallery_figure: Callable[[str], Path]
 ) -> None:
@@ -49,6 +50,7 @@ def test_a_mechanism_of_the_gallery_is_drawn_with_all_its_names(
 
 
 @pytest.mark.parametrize("suffix", [".svg", ".png"])
+@pytest.mark.few(1)
 def test_the_same_mechanism_gives_the_same_bytes(suffix: str, tmp_path: Path) -> None:
     mechanism = kinfmu.load("fourbar")
     first, second = tmp_path / f"first{suffix}", tmp_path / f"second{suffix}"
@@ -101,6 +103,7 @@ def test_a_title_is_not_read_as_mathematics(tmp_path: Path) -> None:
     ],
     ids=["without a driver", "with one too many", "with two that contradict"],
 )
+@pytest.mark.few(1)
 def test_a_mechanism_that_only_closes_is_drawn(drivers: tuple[AngleDriver, ...], tmp_path: Path) -> None:
     mechanism = replace(fourbar(4.0, 1.0, 3.5, 3.0), drivers=drivers)
     assert kinfmu.check(mechanism).problem is not None

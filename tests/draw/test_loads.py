@@ -111,6 +111,7 @@ def test_an_animation_shows_the_spring_as_it_changes(tmp_path: Path, monkeypatch
 
 
 @pytest.mark.parametrize(("pull", "side"), [((0.0, -9.81), 1), ((0.0, 9.81), -1), ((0.0, 0.0), 0)])
+@pytest.mark.few(1)
 def test_an_animation_shows_the_direction_of_gravity_at_one_place(
     pull: tuple[float, float], side: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -77,6 +77,7 @@ def test_the_title_of_plots_is_in_the_picture_and_above_the_names(title: str) ->
 
 
 @pytest.mark.parametrize("stop", [1.0, 1e5, 9e5, 0.0123456])
+@pytest.mark.few(2)
 def test_the_number_of_the_last_tick_is_in_the_picture(stop: float) -> None:
     run = fourbar(np.arange(10.0))
     figure = _sheet(

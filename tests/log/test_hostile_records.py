@@ -64,7 +64,7 @@ FITTING = {
 
 
 @pytest.mark.parametrize("key", KEYS)
-@pytest.mark.few(6)
+@pytest.mark.few(2)
 def test_odd_texts_at_the_beginning_are_one_line(run: Run, tmp_path: Path, key: str) -> None:
     for value in ODD:
         if value in FITTING.get(key, ()):

@@ -148,6 +148,7 @@ def assert_as_measured(
 
 
 @pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.few(1)
 def test_every_kind_of_measure_equals_measure_of_each_design(engine: str) -> None:
     assert {reading.type for reading in READ} == {reading.type for reading in READINGS}
     model = kinfmu.compile(crank_rocker(), engine=engine)
@@ -229,7 +230,7 @@ def test_workers_and_the_size_of_parts_change_nothing(monkeypatch: pytest.Monkey
 
 
 @pytest.mark.parametrize("name", ["jansen_leg", "cam_roller", "five_bar"])
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_mechanisms_of_the_gallery(name: str) -> None:
     """Coordinates, paths and distances as outputs of generated code, over the file's own laws."""
     mechanism = kinfmu.load(name)

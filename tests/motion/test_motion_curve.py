@@ -68,6 +68,7 @@ def driver_by(law: Law, mechanism: Mechanism) -> Driver:
 
 @pytest.mark.parametrize("name", ["lift", "lever.phi"])
 @pytest.mark.parametrize("step", [0.002, 0.0011, 0.01])  # with samples at breaks, and without
+@pytest.mark.few(3)
 def test_the_jerk_at_both_sides_of_a_break_of_a_cam_is_that_of_its_law(
     lever: Mechanism, name: str, step: float
 ) -> None:

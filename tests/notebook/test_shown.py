@@ -155,6 +155,7 @@ def test_a_run_shows_verdict_plot_events_and_ranges() -> None:
     ],
     ids=["no sample", "one sample", "no numbers", "no positions", "a column not kept"],
 )
+@pytest.mark.few(3)
 def test_a_run_shows_what_it_holds(change: Callable[[kinfmu.Run], kinfmu.Run]) -> None:
     run = change(fourbar(np.arange(181.0)))
     shown = page(run)

@@ -263,6 +263,7 @@ def test_profile_that_cannot_be_is_left_out_and_the_page_states_why(
     assert cams.tab.is_hidden("#note")
 
 
+@pytest.mark.long
 def test_cam_that_does_not_turn_all_the_way_is_left_out(cams: Opened) -> None:
     cams.get(STOP_AT_6)
     set_values(cams, **{"joints.lift.offset": 44.0})

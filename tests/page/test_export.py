@@ -151,6 +151,7 @@ def test_a_mechanism_is_exported_as_a_page_only(command: Command, refuses: Calla
     assert "not in the gallery" in refuses("export", "run", "-o", "mech.html")
 
 
+@pytest.mark.long
 def test_the_documentation_of_an_fmu_has_the_page(command: Command, tmp_path: Path) -> None:
     for name in ("one", "two"):
         assert command("build", "crank_rocker", "--flavour", "python", "--page", "-o", f"{name}.fmu").exit_code == 0
@@ -167,6 +168,7 @@ def test_the_documentation_of_an_fmu_has_the_page(command: Command, tmp_path: Pa
     assert contents["one"] == contents["none"]
 
 
+@pytest.mark.long
 def test_build_puts_the_page_into_the_documentation_if_asked(tmp_path: Path) -> None:
     mech = kinfmu.load("crank_rocker")
     for page in (True, False):
@@ -175,6 +177,7 @@ def test_build_puts_the_page_into_the_documentation_if_asked(tmp_path: Path) -> 
             assert ("documentation/play.html" in archive.namelist()) is page
 
 
+@pytest.mark.long
 def test_an_fmu_whose_page_cannot_be_compiled(command: Command, fails: Callable[..., str], tmp_path: Path) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("kinfmu.codegen.c.compiler.wasm_module", _refused)

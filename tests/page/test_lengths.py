@@ -64,6 +64,7 @@ def test_lengths_that_do_not_close_keep_the_pose_and_name_row_and_gap(tmp_path: 
         assert row in texts
 
 
+@pytest.mark.long
 def test_the_gap_is_that_of_the_triangle(tmp_path: Path) -> None:
     """With the crank at 0, crank 20, coupler 50 and rocker b: the rocker's pivot is 20 from the pin of the crank."""
     found = broken(tmp_path, ["crank_rocker"])["crank_rocker"]

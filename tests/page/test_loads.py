@@ -189,6 +189,7 @@ def turn_of(found: Drawn, centre: FloatArray) -> float:
     return float(angles[-1] - angles[0])
 
 
+@pytest.mark.long
 def test_a_force_by_an_expression_of_changed_parameters_is_left_out_by_name(chromium: Browser) -> None:
     parameters = '[parameters]\nF = "30 N"\na = "20 deg"\n'
     loads = (

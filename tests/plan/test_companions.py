@@ -97,7 +97,7 @@ def test_a_mismatch_that_counts_as_consistent_moves_coupled_wheels_by_as_little(
 
 
 @pytest.mark.parametrize(("flavour", "fmi"), [("python", 2), ("native", 2), ("native", 3)])
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_fmus_of_coupled_wheels_with_a_mismatch_turn(tmp_path: Path, flavour: str, fmi: int) -> None:
     fmu = kinfmu.build(mismatched(2e-12), tmp_path / "wheels.fmu", flavour=flavour, fmi=fmi)
     run = kinfmu.simulate(fmu, stop=6.5, step=0.05)
@@ -158,7 +158,7 @@ def test_check_names_the_crossing_of_a_block_with_a_companion() -> None:
 
 
 @pytest.mark.parametrize(("flavour", "fmi"), [("python", 2), ("native", 2), ("native", 3)])
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_fmus_of_coupled_wheels_are_regular_at_every_angle(tmp_path: Path, flavour: str, fmi: int) -> None:
     fmu = kinfmu.build(wheels(LOCOMOTIVE), tmp_path / "wheels.fmu", flavour=flavour, fmi=fmi)
     run = kinfmu.simulate(fmu, stop=6.5, step=0.05)

@@ -59,7 +59,7 @@ def assert_as_solved(model: kinfmu.Model, designs: kinfmu.Designs, **arguments: 
 @pytest.mark.parametrize(
     "name", mostly_long(["crank_rocker", "fourbar", "five_bar", "slider_crank"], few=("fourbar", "five_bar"))
 )
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_designs_equal_solve_of_each(name: str, engine: str) -> None:
     mechanism = with_open_lengths(kinfmu.load(name))
     model = kinfmu.compile(mechanism, engine=engine)
@@ -74,6 +74,7 @@ def test_designs_equal_solve_of_each(name: str, engine: str) -> None:
 
 
 @pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.few(1)
 def test_parameters_that_are_not_given_follow_from_those_that_are(engine: str) -> None:
     crank_rocker = with_open_lengths(kinfmu.load("crank_rocker"))
     values = {name: float(parameter.value) for name, parameter in crank_rocker.parameters.items()}
@@ -90,6 +91,7 @@ def test_parameters_that_are_not_given_follow_from_those_that_are(engine: str) -
 
 
 @pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.few(1)
 def test_laws_drive_designs_with_constants_of_their_own(engine: str) -> None:
     mechanism = with_open_lengths(kinfmu.load("crank_rocker"))
     model = kinfmu.compile(mechanism, engine=engine)
@@ -178,6 +180,7 @@ def test_derivatives_that_are_not_requested_are_not_computed() -> None:
         ({"a": 1.0}, {"t": [0.0], "crank_angle": [0.0]}, "give times or inputs, not both"),
     ],
 )
+@pytest.mark.few(9)
 def test_a_wrong_request_is_refused_in_one_line(
     values: dict[str, object], arguments: dict[str, object], message: str
 ) -> None:

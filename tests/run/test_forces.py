@@ -89,7 +89,7 @@ def efforts_in_50_digits(name: str, mechanism: Mechanism, run: Run, t: float) ->
 
 @pytest.mark.parametrize("at", ["some samples", pytest.param("every sample", marks=pytest.mark.long)])
 @every_member
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 def test_efforts_equal_virtual_work_in_50_digits(name: str, at: str) -> None:
     mechanism = loaded(name)
     run = kinfmu.solve(mechanism)
@@ -327,6 +327,7 @@ def met(load: str) -> Mechanism:
 
 @pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize("count", [3, 41])
+@pytest.mark.few(2)
 def test_a_spring_without_free_length_acts_where_its_ends_meet(engine: str, count: int) -> None:
     """At the inner dead centre the slide does not move: the torque carries half of the rod's weight at P."""
     model = kinfmu.compile(toml_file.parse(MET), engine=engine)
@@ -344,7 +345,7 @@ def test_a_spring_without_free_length_acts_where_its_ends_meet(engine: str, coun
 @pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize("count", [3, 41])
 @pytest.mark.parametrize("load", MEETING)
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_a_load_whose_ends_meet_has_no_direction_which_a_warning_says(load: str, count: int, engine: str) -> None:
     """What does not depend on it keeps its value: energies and the shaking force."""
     mechanism = met(load)

@@ -53,7 +53,7 @@ def assert_same_motion(native: Run, python: Run) -> None:
 
 
 @every_member
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_the_gallery_moves_as_in_python(name: str) -> None:
     mechanism = kinfmu.load(name)
     plan = compile_plan(mechanism)
@@ -66,6 +66,7 @@ def test_the_gallery_moves_as_in_python(name: str) -> None:
 
 
 @pytest.mark.usefixtures("optimized")
+@pytest.mark.long
 def test_change_points_are_crossed_at_full_accuracy_in_any_order() -> None:
     rng = np.random.default_rng(5)
     turns = np.concatenate(
@@ -214,6 +215,7 @@ def test_samples_past_a_limit_are_reported_and_the_branch_comes_back() -> None:
     assert [event.text for event in native.events] == [event.text for event in python.events]
 
 
+@pytest.mark.long
 def test_after_thousands_of_turns_samples_are_as_good_as_at_first() -> None:
     u = 2.0 * np.pi * 3_000 + np.linspace(0.0, 7.0, 700)  # the last ones fill no lanes
     native, python = (kinfmu.solve(kinfmu.load("jansen_leg"), engine=engine, crank_angle=u) for engine in ENGINES)

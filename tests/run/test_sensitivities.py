@@ -244,6 +244,7 @@ def crossing(scaled: bool) -> Mechanism:
 
 
 @pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.few(1)
 def test_parameters_that_keep_a_change_point_have_derivatives_there(engine: str) -> None:
     """A factor of all lengths changes no angle; lengths by themselves remove the change point."""
     angles = np.array([0.5, 3.1, math.pi - 1e-3, math.pi, math.pi + 1e-9, 3.2, 4.0])
@@ -419,7 +420,7 @@ def test_samples_one_by_one_equal_samples_as_arrays() -> None:
 
 
 @pytest.mark.parametrize("name", ["stephenson_six_bar", "cam_roller", "five_bar"])
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_native_and_python_engine_give_the_same(name: str) -> None:
     """Blocks of one and two unknowns, of more, and curves."""
     mechanism = with_open_lengths(kinfmu.load(name))

@@ -67,6 +67,7 @@ def test_closed_form_of_a_fourbar_has_18_digits(lengths: tuple[str, str, str, st
 
 
 @pytest.mark.parametrize("case", FEW)
+@pytest.mark.few(1)
 def test_closed_form_is_the_smooth_branch_through_the_change_points(case: Case) -> None:
     """Against the residuals alone, followed in small steps with 50 digits."""
     numbers = case.name.removesuffix(" crossed")
@@ -109,7 +110,7 @@ def test_reference_fourbar_stays_a_parallelogram_on_every_grid(grids: tuple[int,
 
 
 @pytest.mark.parametrize("case", CASES)
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_the_smooth_branch_is_kept_on_every_grid(case: Case, grids: tuple[int, int | None]) -> None:
     count, most = grids
     for seed in range(count):
@@ -188,7 +189,7 @@ def gaps(case: Case) -> NDArray[np.float64]:
 
 
 @pytest.mark.parametrize("by", mostly_long(OFF, few=("1e-6", "-1e-8", "-1e-11")))
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_near_a_change_point_samples_are_right_within_their_estimate_or_outside(
     by: str, grids: tuple[int, int | None]
 ) -> None:

@@ -26,7 +26,7 @@ def numbers() -> list[Number]:
 
 
 @pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_the_estimate_is_at_least_the_error_in_99_percent_and_1000_times_too_large_at_most(
     numbers: list[Number], order: str
 ) -> None:

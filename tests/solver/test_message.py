@@ -90,6 +90,7 @@ def native_message(native: Native, limit: float, asked: float) -> str:
 
 @pytest.mark.parametrize("turns", [0, 5, 1_000_000])
 @pytest.mark.parametrize("beyond", [3e-9, 1e-10, 3e-11, 1e-12, 0.0])
+@pytest.mark.few(5)
 def test_a_refused_value_never_has_the_digits_of_its_limit(native: Native, turns: int, beyond: float) -> None:
     model = load_model(compile_plan(kinfmu.load("triple_rocker")))
     limit = DEAD_CENTRE + turns * math.tau

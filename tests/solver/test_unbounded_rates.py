@@ -188,7 +188,7 @@ def cylinder_fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int
 
 
 @pytest.mark.parametrize(("flavour", "fmi"), FLAVOURS)
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_in_fmus_estimates_hold_at_the_longest_reach_that_is_declared(
     flavour: str, fmi: int, cylinder_fmu: Callable[[str, int], tuple[Path, float, float]], tmp_path: Path
 ) -> None:
@@ -214,6 +214,7 @@ def test_in_fmus_estimates_hold_at_the_longest_reach_that_is_declared(
 
 @pytest.mark.parametrize(("flavour", "fmi"), FLAVOURS)
 @pytest.mark.parametrize("has_moved", [False, True])
+@pytest.mark.few(3)
 def test_in_fmus_a_cylinder_beyond_its_declared_range_is_outside(
     flavour: str,
     fmi: int,

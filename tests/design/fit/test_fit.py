@@ -174,6 +174,7 @@ def test_the_first_line_and_the_first_optimum_have_the_same_sum_of_squares() -> 
     assert float(first[1]) < 1e-24
 
 
+@pytest.mark.long
 def test_a_file_gives_what_python_gives(tmp_path: Path) -> None:
     (tmp_path / "bar.toml").write_text(toml_text.text(four_bar()), encoding="utf-8")
     (tmp_path / "points.csv").write_text("x [m], y [cm]\n0.5, 230\n0.0, 230\n-0.4, 190\n-0.4, 150\n", encoding="utf-8")
@@ -528,6 +529,7 @@ def test_law_constants_are_unknowns_over_time() -> None:
     assert LENGTHS["crank"] == result.mechanism.parameters["crank"].value
 
 
+@pytest.mark.long
 def test_unknowns_that_the_targets_leave_free_together_are_noted() -> None:
     swing = MeasureTarget(name="swing", of=Range("swing", "rocker.phi"), value="40 deg")
     unknowns = {"crank": (0.5, 1.5), "coupler": (2.0, 5.0)}
@@ -601,7 +603,7 @@ def test_another_optimum_is_chosen_where_a_file_does_not_give_the_fitted_motion(
 
 @pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize("side", [-1.0, 0.0, 2.0])
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_the_nearest_point_of_a_path_is_converged_close_to_a_dead_centre(side: float, engine: str) -> None:
     """Points at a distance from the path along its normal have their foot where they were set off."""
     model = kinfmu.compile(kinfmu.load("triple_rocker"), engine=engine)

@@ -55,6 +55,7 @@ IN_AXES: dict[str, tuple[dict[str, Any], tuple[str, str]]] = {
 
 
 @pytest.mark.parametrize("kind", IN_AXES)
+@pytest.mark.few(2)
 def test_one_measure_is_drawn_into_axes(kind: str, tmp_path: Path) -> None:
     from matplotlib.figure import Figure
 

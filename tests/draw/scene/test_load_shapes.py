@@ -57,6 +57,7 @@ def test_every_kind_of_load_has_a_symbol(found: Scene) -> None:
 
 
 @every_member
+@pytest.mark.few(4)
 def test_a_mechanism_without_loads_has_no_symbols(name: str) -> None:
     mechanism = kinfmu.load(name)
     shown = [shape.name for shape in scene_of(replace(mechanism, loads=())).shapes if shape.strips]

@@ -123,6 +123,7 @@ def test_osp_steps_it(built_native: Build, tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not _has("ecospy"), reason="ecospy is not installed, or lacks libtbb12")
+@pytest.mark.few(1)
 def test_ecospy_steps_it(built_native: Build, fmi: int, tmp_path: Path) -> None:
     rows = _rows(ECOS, built_native("fourbar_loaded", fmi, "time"), tmp_path, *NAMES)
     times = STEP * np.arange(1, COUNT + 1)

@@ -52,7 +52,7 @@ def test_simulate_writes_the_record_alone_and_reports_it(tmp_path: Path) -> None
         (["review", "run.mcap", "--screenshot", "a.png"], "run.mcap: a review"),
     ],
 )
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_what_needs_the_viewer_is_refused_before_anything_is_written(
     arguments: list[str], what: str, tmp_path: Path
 ) -> None:

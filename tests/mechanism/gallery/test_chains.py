@@ -68,6 +68,7 @@ def test_loops_over_tables_and_unrolled_code_agree_to_the_bit(
 
 
 @every_member
+@pytest.mark.few(4)
 def test_loops_over_tables_serve_any_mechanism(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     """Units of their own, several drivers, parameters, triads, rows set aside, points of interest."""
     mechanism = kinfmu.load(name)

@@ -35,7 +35,7 @@ def complexes(points: Any) -> Any:
 
 
 @pytest.mark.parametrize("kind", followers.ALL)
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 def test_the_profile_touches_the_follower_of_the_solved_mechanism_and_nowhere_cuts_it(kind: str) -> None:
     mechanism = followers.ALL[kind]()
     profile = kinfmu.cam_profile(mechanism, "lift", ANGLES)
@@ -298,6 +298,7 @@ WRONG: dict[str, tuple[Any, str]] = {
 
 
 @pytest.mark.parametrize("case", WRONG)
+@pytest.mark.few(3)
 def test_a_cam_without_a_profile_is_reported_with_the_reason(case: str) -> None:
     made, message = WRONG[case]
     with pytest.raises(MechanismError, match=message):
@@ -306,6 +307,7 @@ def test_a_cam_without_a_profile_is_reported_with_the_reason(case: str) -> None:
 
 @pytest.mark.parametrize("kind", [kinfmu.CamRoller, kinfmu.CamFlatFace])
 @pytest.mark.parametrize("pole", [(0.0, 0.0), (2.0, -1.0)])
+@pytest.mark.few(2)
 def test_a_lever_on_the_axle_of_its_cam_turns_with_it_and_has_no_profile(kind: Any, pole: Any) -> None:
     mechanism = followers.coaxial(kind, pole)
     why = r"the follower 'lever' is pinned at the cam's axle, 'ground\.O', so that it turns with the cam"

@@ -52,6 +52,7 @@ def test_the_error_follows_the_tolerance_over_breaks(law: str, tolerance: float)
 
 
 @pytest.mark.parametrize(("flavour", "fmi"), [("native", 3), ("python", 2)])
+@pytest.mark.few(1)
 def test_an_fmu_restarts_at_breaks_too(
     flavour: Literal["native", "python"], fmi: Literal[2, 3], tmp_path: Path
 ) -> None:
