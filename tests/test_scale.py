@@ -31,6 +31,7 @@ from kinfmu.plan import compile_plan
 from kinfmu.solver.python import Status
 from tests import oracle
 from tests.gallery_members import every_member
+from tests.mechanisms import fourbar
 from tests.oracle import Motion, Residual, largest_error, mp
 from tests.scaled import scaled
 
@@ -45,27 +46,9 @@ def written(value: float) -> float:
     return float(f"{value:.15g}")
 
 
-def crank_rocker(bars: Sequence[float], at: tuple[float, float] = (0.0, 0.0), start: float = 1.0) -> Mechanism:
-    """A four-bar about `at`, started roughly at a crank angle; inputs crank_angle, ..."""
-    ground, crank, coupler, rocker = bars
-    exact = oracle.fourbar(*map(repr, bars), start).rounded().q[0]
-    tip = (at[0] + crank * math.cos(start), at[1] + crank * math.sin(start))
-    return Mechanism(
-        "crank_rocker",
-        [
-            Body("ground", {"O": at, "C": (written(at[0] + ground), at[1])}),
-            Body("crank", {"O": (0, 0), "P": (crank, 0)}, (*at, start)),
-            Body("coupler", {"P": (0, 0), "Q": (coupler, 0)}, (*tip, exact[1])),
-            Body("rocker", {"C": (0, 0), "Q": (rocker, 0)}, (at[0] + ground, at[1], exact[2])),
-        ],
-        [
-            Revolute("O", ("ground.O", "crank.O")),
-            Revolute("P", ("crank.P", "coupler.P")),
-            Revolute("Q", ("coupler.Q", "rocker.Q")),
-            Revolute("C", ("ground.C", "rocker.C")),
-        ],
-        [AngleDriver("crank", "crank", ConstantSpeed(start, 1.0))],
-    )
+def crank_rocker(bars: Sequence[float], at: tuple[float, float] = (0.0, 0.0)) -> Mechanism:
+    """A four-bar about `at`; inputs crank_angle, ..."""
+    return fourbar(*bars, at=at)
 
 
 def angles_off(run: Run, exact: Motion) -> list[float]:
