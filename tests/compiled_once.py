@@ -1,8 +1,8 @@
-"""C compiled for tests: without optimization, which gives the same numbers, in few units, each compiled once in a run.
+"""C compiled for tests: without optimization, which gives the same numbers, in few units, each compiled once.
 
 Most of a library is the run time, and most of the run time depends on the sizes of the mechanism alone: designs with
 other lengths, and libraries for sweeps and for FMUs, link the same objects. The run time must be clean under the
-strictest warnings.
+strictest warnings. Objects and libraries are kept for later runs as long as the texts, the compiler and this file stay.
 """
 
 from __future__ import annotations
@@ -10,7 +10,9 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import shutil
 import tempfile
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -26,7 +28,20 @@ PER_SAMPLE = {"curve.c", "position.c", "pose.c", "solver.c", "trusted_step.c"}  
 SWEEPS = {path.name for path in compiler.RUNTIME.glob("*.c")} - set(compiler.SOLVER) | {"segments.c", "side_by_side.c"}
 SOLVER = {name for name in compiler.SOLVER if name.endswith(".c")} - PER_SAMPLE
 INSTANCE = {path.name for path in sources.RUNTIME.glob("*.c")}
+KEPT = 7 * 86400.0  # [s] that objects are kept without being used
 GROUPS = {"search.c": SOLVER, "per_sample.c": PER_SAMPLE, "sweeps.c": SWEEPS, "instance_units.c": INSTANCE}
+
+
+def folder(cache: Path) -> Path:
+    """Return the folder for what is compiled, by the content of this file; remove what is old."""
+    here = cache / hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:12]
+    for other in cache.iterdir():
+        if other != here and other.stat().st_mtime < time.time() - KEPT:
+            shutil.rmtree(other, ignore_errors=True)
+    for path in (here / "objects").glob("*.o"):
+        if path.stat().st_mtime < time.time() - KEPT:
+            path.unlink(missing_ok=True)  # another worker may have been first
+    return here
 
 
 def compile_files(
@@ -43,10 +58,10 @@ def compile_files(
     if "ziglang" in cc:
         FILE_BY_FILE(cc, files, flags, output)
         return
-    folder = Path(os.environ["KINFMU_CACHE"]) / "objects"
-    folder.mkdir(parents=True, exist_ok=True)
+    kept = Path(os.environ["KINFMU_CACHE"]) / "objects"
+    kept.mkdir(parents=True, exist_ok=True)
     objects, commands = [], []
-    with tempfile.TemporaryDirectory(dir=folder) as scratch:
+    with tempfile.TemporaryDirectory(dir=kept) as scratch:
         for name, text in files.items():
             (Path(scratch) / name).write_text(text, "utf-8", newline="\n")
         for unit in compiler.units(files):
@@ -57,13 +72,15 @@ def compile_files(
                 set(STRICT) if unit in GROUPS or "-Werror" in flags else set()
             )  # generated files may have more names
             command = [*cc, *sorted(used), "-c", unit]
-            key = hashlib.sha256("\0".join([*command, text]).encode()).hexdigest()[:24]
-            objects.append(folder / f"{key}.o")
-            if not objects[-1].exists():
+            key = hashlib.sha256("\0".join([*compiler._version(tuple(cc)), *command, text]).encode()).hexdigest()[:24]
+            objects.append(kept / f"{key}.o")
+            if objects[-1].exists():
+                objects[-1].touch()
+            else:
                 commands.append([*command, "-o", objects[-1].name])
         compiler._run(commands, scratch)
         for command in commands:
-            (Path(scratch) / command[-1]).replace(folder / command[-1])
+            (Path(scratch) / command[-1]).replace(kept / command[-1])
         compiler._run([[*cc, *flags, *map(str, objects), "-o", str(output.resolve()), "-lm"]], scratch)
 
 

@@ -1,11 +1,12 @@
-"""For every folder: golden files with `--update`, and how hypothesis draws."""
+"""For every folder: golden files with `--update`, how hypothesis draws, which tests run, and what compiles C."""
 
 from __future__ import annotations
 
 import gc
-import os
 import signal
-from collections.abc import Callable, Iterator
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module
 from pathlib import Path
 
@@ -20,10 +21,14 @@ from tests import compiled_once
 GOLDEN = Path(__file__).parent / "golden"
 
 FLAGS = ((compiler, "FLAGS"), (compiler, "VECTORIZED"), (archive, "FLAGS"), (library, "FLAGS"))
+MEASURED = "kinfmu/seconds"  # in the cache of pytest: how long runs took, by their arguments
+MOST_MEASURED = 20  # runs
+USUAL_TIME = "the tests take about 4 min on two cores, 15 with --long; the first run compiles more"
+STARTED = pytest.StashKey[float]()
 SHIPPED_FLAGS = {place: getattr(*place) for place in FLAGS}
 
 # Few examples, the same every time; .ci/run draws more: --hypothesis-profile=long.
-settings.register_profile("kinfmu", deadline=None, derandomize=True, database=None, max_examples=12)
+settings.register_profile("kinfmu", deadline=None, derandomize=True, database=None, max_examples=6)
 settings.register_profile("long", settings.get_profile("kinfmu"), max_examples=60)
 settings.load_profile("kinfmu")
 
@@ -52,13 +57,11 @@ def signals_of_a_terminal() -> None:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def quickly_compiled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """C is compiled as `compiled_once` says, once for all workers of a run."""
-    folder = tmp_path_factory.getbasetemp()
-    if "PYTEST_XDIST_WORKER" in os.environ:
-        folder = folder.parent
+def quickly_compiled(request: pytest.FixtureRequest) -> Iterator[None]:
+    """C is compiled as `compiled_once` says, once for all workers and runs: `--cache-clear` compiles all anew."""
+    folder = compiled_once.folder(request.config.cache.mkdir("compiled"))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("KINFMU_CACHE", str(folder / "compiled"))
+        patch.setenv("KINFMU_CACHE", str(folder))
         patch.setattr(compiler, "compile_files", compiled_once.compile_files)
         for (module, name), flags in SHIPPED_FLAGS.items():
             quick = ["-O0" if flag.startswith("-O") else flag for flag in flags if flag != "-march=native"]
@@ -90,17 +93,57 @@ def pytest_configure() -> None:
     gc.disable()  # until all is imported, and never for that: a tenth of the time
 
 
+def pytest_report_header(config: pytest.Config) -> str:
+    """Return how long the run takes, as measured the last time that it had these arguments."""
+    seconds = config.cache.get(MEASURED, {}).get(" ".join(config.invocation_params.args))
+    return f"takes about {seconds / 60:.1f} min, as the last time" if seconds else USUAL_TIME
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    session.config.stash[STARTED] = time.monotonic()
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    config = session.config
+    if session.testscollected and not hasattr(config, "workerinput"):
+        seconds = {" ".join(config.invocation_params.args): time.monotonic() - config.stash[STARTED]}
+        config.cache.set(MEASURED, dict(list({**config.cache.get(MEASURED, {}), **seconds}.items())[-MOST_MEASURED:]))
+
+
 def pytest_collection_finish() -> None:
     gc.freeze()
     gc.enable()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what is long, unless it is asked for: with --long, with -m, or by its name."""
+    """Leave out what is long, and all but a few sets of parameters of tests that are marked so.
+
+    All of them run with --long, with -m, or if a test is named.
+    """
     if config.getoption("--long") or config.option.markexpr or any("::" in argument for argument in config.args):
         return
-    config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("long")])
-    items[:] = [item for item in items if not item.get_closest_marker("long")]
+    sets = defaultdict(list)
+    for item in items:
+        if not item.get_closest_marker("long"):
+            sets[item.nodeid.partition("[")[0]].append(item)
+    chosen = {item for group in sets.values() for item in _few(group)}
+    config.hook.pytest_deselected(items=[item for item in items if item not in chosen])
+    items[:] = [item for item in items if item in chosen]
+
+
+def _few(items: list[pytest.Item]) -> Iterable[pytest.Item]:
+    """Return the sets of parameters of one test that run by default: each with as many new values as possible."""
+    marker = items[0].get_closest_marker("few")
+    if marker is None:
+        return items
+    chosen: list[pytest.Item] = []
+    seen: set[tuple[str, int]] = set()
+    while len(chosen) < min(marker.args[0], len(items)):
+        rest = [item for item in items if item not in chosen]
+        best = max(rest, key=lambda item: len(item.callspec.indices.items() - seen))
+        chosen.append(best)
+        seen |= best.callspec.indices.items()
+    return chosen
 
 
 @pytest.fixture

@@ -192,6 +192,7 @@ def assert_exact(guided: Guided, run: Run) -> None:
 
 @pytest.mark.parametrize("guided", GUIDED)
 @pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.few(1)
 def test_guides_close_to_a_world_axis(guided: Callable[[float], Guided], engine: Literal["python", "native"]) -> None:
     for axis in AXES if engine == "python" else FEW:
         one = guided(axis)
@@ -199,6 +200,7 @@ def test_guides_close_to_a_world_axis(guided: Callable[[float], Guided], engine:
 
 
 @pytest.mark.parametrize(("flavour", "fmi"), [("python", 2), ("native", 2), ("native", 3)])
+@pytest.mark.few(1)
 def test_fmus_of_guides_close_to_a_world_axis(flavour: str, fmi: int, tmp_path: Path) -> None:
     one = bar_in_slot(3.1416)
     assert_exact(

@@ -191,6 +191,7 @@ def test_rates_of_two_drivers_are_those_of_their_sum() -> None:
     assert motion.qdd.tolist() == [[29.0, 7 * 0.25 + 2 * 3 * 5 + 0.5 * 11]]
 
 
+@pytest.mark.long
 def test_following_crosses_the_change_points_of_the_reference_fourbar() -> None:
     """At 0 exactly, at the double next to pi, very near it, and on: always the parallelogram."""
     angles = [1e-9, 0.0, 2.0, 179 * DEGREE, math.pi, math.pi + 1e-6, 3.3]

@@ -63,6 +63,7 @@ def test_solve_and_the_mechanism_that_check_and_build_take_are_on_one_branch() -
 @pytest.mark.parametrize(
     ("flavour", "fmi"), [("python", 2), ("native", 2), ("native", 3)], ids=["python", "native 2", "native 3"]
 )
+@pytest.mark.few(1)
 def test_fmus_are_on_the_branch_of_solve_or_refuse(tmp_path: Path, flavour: str, fmi: int) -> None:
     fmu = kinfmu.build(linkage(), tmp_path, flavour=flavour, fmi=fmi)
     compared = 0

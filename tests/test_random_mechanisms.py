@@ -323,6 +323,7 @@ def stephensons(draw: st.DrawFn) -> Linkage:
 @pytest.mark.parametrize("kind", KINDS)
 @given(data=st.data(), start=ANGLES, rates=RATES)
 @settings(max_examples=EXAMPLES // 3, phases=PHASES)
+@pytest.mark.few(2)
 def test_four_bars_of_every_kind_move_as_the_closed_form_says(
     kind: str, data: st.DataObject, start: float, rates: tuple[float, float]
 ) -> None:

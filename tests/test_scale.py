@@ -31,6 +31,7 @@ from kinfmu.plan import compile_plan
 from kinfmu.solver.python import Status
 from tests import oracle
 from tests.gallery_members import every_member
+from tests.mechanisms import fourbar
 from tests.oracle import Motion, Residual, largest_error, mp
 from tests.scaled import scaled
 
@@ -45,27 +46,9 @@ def written(value: float) -> float:
     return float(f"{value:.15g}")
 
 
-def crank_rocker(bars: Sequence[float], at: tuple[float, float] = (0.0, 0.0), start: float = 1.0) -> Mechanism:
-    """A four-bar about `at`, started roughly at a crank angle; inputs crank_angle, ..."""
-    ground, crank, coupler, rocker = bars
-    exact = oracle.fourbar(*map(repr, bars), start).rounded().q[0]
-    tip = (at[0] + crank * math.cos(start), at[1] + crank * math.sin(start))
-    return Mechanism(
-        "crank_rocker",
-        [
-            Body("ground", {"O": at, "C": (written(at[0] + ground), at[1])}),
-            Body("crank", {"O": (0, 0), "P": (crank, 0)}, (*at, start)),
-            Body("coupler", {"P": (0, 0), "Q": (coupler, 0)}, (*tip, exact[1])),
-            Body("rocker", {"C": (0, 0), "Q": (rocker, 0)}, (at[0] + ground, at[1], exact[2])),
-        ],
-        [
-            Revolute("O", ("ground.O", "crank.O")),
-            Revolute("P", ("crank.P", "coupler.P")),
-            Revolute("Q", ("coupler.Q", "rocker.Q")),
-            Revolute("C", ("ground.C", "rocker.C")),
-        ],
-        [AngleDriver("crank", "crank", ConstantSpeed(start, 1.0))],
-    )
+def crank_rocker(bars: Sequence[float], at: tuple[float, float] = (0.0, 0.0)) -> Mechanism:
+    """A four-bar about `at`; inputs crank_angle, ..."""
+    return fourbar(*bars, at=at)
 
 
 def angles_off(run: Run, exact: Motion) -> list[float]:
@@ -96,6 +79,7 @@ def tips_off(run: Run, crank: float, at: tuple[float, float] = (0.0, 0.0)) -> li
 
 
 @every_member
+@pytest.mark.few(2)
 def test_a_mechanism_larger_by_a_power_of_two_moves_equally_to_the_bit(name: str) -> None:
     mechanism = kinfmu.load(name)
     times = np.linspace(mechanism.run.start, mechanism.run.stop, 9)
@@ -121,6 +105,7 @@ def _tables(run: Run) -> tuple[np.ndarray, ...]:
     [(name, factor) for name in ("fourbar", "slider_crank", "triple_rocker") for factor in (1e-6, 1e6)]
     + [("parallel_jaw", 1e-6), ("excavator", 1e6)],
 )
+@pytest.mark.few(2)
 def test_check_finds_the_same_at_every_size(name: str, factor: float) -> None:
     mechanism = kinfmu.load(name)
     report, original = kinfmu.check(scaled(mechanism, factor)), kinfmu.check(mechanism)
@@ -191,6 +176,7 @@ def test_change_points_are_bridged_equally_at_all_sizes_where_the_unknown_is_a_l
 
 @pytest.mark.parametrize("ratio", [1e2, 1e4])
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.few(3)
 def test_short_cranks_on_long_links_are_right_relative_to_the_size(ratio: float, scale: float) -> None:
     bars = [written(bar * scale) for bar in (ratio + 0.3, 1.1, ratio, 1.7)]
     run = kinfmu.solve(crank_rocker(bars), crank_angle=ANGLES)
@@ -241,6 +227,7 @@ def third_crank(ratio: float, wrong: float, *, is_body: bool, at: tuple[float, f
         (1e4, 1.0, (0.0, 0.0)),
     ],
 )
+@pytest.mark.few(2)
 def test_a_third_crank_wrong_by_1e_9_of_its_length_is_distinguished_from_a_right_one(
     ratio: float, scale: float, at: tuple[float, float], is_body: bool
 ) -> None:
@@ -271,6 +258,7 @@ def test_the_tolerance_is_1e_11_of_the_link_and_check_states_it() -> None:
 
 
 @pytest.mark.parametrize("at", [FAR, (1e6, -1e6), (-123456.7, 1000000.9)])
+@pytest.mark.few(1)
 def test_far_from_the_origin_angles_and_rates_are_as_near_it(at: tuple[float, float], tmp_path: Path) -> None:
     mechanism, exact = crank_rocker(BARS, at), oracle.fourbar(*map(repr, BARS), ANGLES)
     run = kinfmu.solve(mechanism, crank_angle=ANGLES)
@@ -445,6 +433,7 @@ def far_rack(x: float, y: float) -> tuple[Mechanism, Residual]:
 
 @pytest.mark.parametrize("made", [far_slider_crank, far_bar, far_tip, far_coupling, far_rack])
 @pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.few(2)
 def test_estimates_count_the_offset_of_what_is_tied_to_the_world(
     made: Callable[[float, float], tuple[Mechanism, Residual]], engine: Literal["python", "native"]
 ) -> None:

@@ -64,6 +64,7 @@ def on_command_line(setting: str, file: Path) -> str:
 
 
 @pytest.mark.parametrize(("name", "value", "words"), MISTAKES.values(), ids=list(MISTAKES))
+@pytest.mark.few(3)
 def test_a_mistake_has_one_message_by_every_way(
     name: str, value: float | str, words: str, fmu: Path, tmp_path: Path
 ) -> None:

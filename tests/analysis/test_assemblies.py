@@ -107,6 +107,7 @@ def test_a_six_bar_goes_together_as_often_as_circles_say() -> None:
         (fourbar(4, 1, 3.5, 3, at=(300.0, -200.0)), 2),
     ],
 )
+@pytest.mark.few(4)
 def test_every_assembly_is_found_and_its_start_poses_lead_to_it(mechanism: Mechanism, count: int) -> None:
     assemblies = found_for(mechanism)
     assert len(assemblies.found) == count
@@ -212,6 +213,7 @@ def tables() -> Iterator[tuple[Sequence[Pair], Sequence[Pair], Sequence[float]]]
 
 
 @pytest.mark.parametrize("number", range(10))
+@pytest.mark.few(2)
 def test_a_table_on_three_bars_goes_together_as_often_as_its_sextic_has_roots(number: int) -> None:
     base, table, lengths = [*tables()][number]
     expected = angles_of_the_table(base, table, lengths)
@@ -301,6 +303,7 @@ def all_starts_or_one(plan: SolvePlan) -> list[list[str]]:
     ],
     ids=lambda given: given if isinstance(given, str) else given.name,
 )
+@pytest.mark.few(2)
 def test_start_poses_left_out_give_an_assembly_that_is_listed(given: Mechanism | str) -> None:
     mechanism = kinfmu.load(given) if isinstance(given, str) else given
     whole = compile_plan(mechanism)

@@ -62,6 +62,7 @@ def test_a_sound_mechanism_has_no_note() -> None:
 
 
 @every_member
+@pytest.mark.few(2)
 def test_no_gallery_mechanism_has_a_note(name: str) -> None:
     assert kinfmu.check(kinfmu.load(name)).notes == ()
 
@@ -192,6 +193,7 @@ FOLDED = math.acos((30.0**2 + 40.0**2 - 50.0**2) / (2.0 * 30.0 * 40.0)) + math.p
 
 @pytest.mark.parametrize("start", [0.0, 60.0, 360.0, -300.0])
 @pytest.mark.parametrize("speed", ["30 rpm", "60 rpm", "150 rpm", "-90 rpm"])
+@pytest.mark.few(4)
 def test_toggle_positions_are_listed_for_runs_of_any_length(start: float, speed: str) -> None:
     mechanism = changed(('speed = "60 rpm"', f'start = "{start} deg"\nspeed = "{speed}"'))
     run = math.radians(start), math.radians(start) + float(speed.split()[0]) / 60.0 * math.tau
@@ -274,6 +276,7 @@ def test_a_rod_across_the_slide_of_its_driver_is_reported_with_its_position() ->
         ("170 deg", "20 deg", "100 deg"),
     ],
 )
+@pytest.mark.few(2)
 def test_a_point_that_nothing_uses_decides_nothing(starts: tuple[str, str, str], far: float) -> None:
     coupler, rocker, crank = starts
     drawn = (

@@ -188,6 +188,7 @@ def turning_number(points: list[tuple[float, float]]) -> int:
     return abs(round(sum(turns) / math.tau))
 
 
+@pytest.mark.long
 def test_four_bars_are_open_or_crossed_as_assembled() -> None:
     rng = np.random.default_rng(12)
     seen = set()

@@ -81,6 +81,7 @@ def test_contact_force_of_sliding_followers(joint: str) -> None:
 
 
 @pytest.mark.parametrize("joint", JOINTS)
+@pytest.mark.few(2)
 def test_check_reports_where_sliding_followers_lift_off(joint: str) -> None:
     report = kinfmu.check(sliding(joint))
     assert report.loading is not None
@@ -190,6 +191,7 @@ def test_a_pressed_follower_has_no_such_line() -> None:
 
 
 @pytest.mark.parametrize("joint", JOINTS)
+@pytest.mark.few(2)
 def test_the_variable_of_an_fmu_states_its_sign(joint: str) -> None:
     mechanism = sliding(joint)
     (name,) = (name for name in reaction_names_of(mechanism) if name.owner == "lift")

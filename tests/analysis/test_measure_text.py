@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 import kinfmu
 from kinfmu.design.fit import MeasureConstraint, MeasureTarget
@@ -34,6 +35,7 @@ def test_reports_and_pictures_state_that_a_transmission_angle_counts_from_90_deg
     assert Quantities("swing", "deg", np.zeros(1), counted_from("range")).label == "swing [deg]"
 
 
+@pytest.mark.long
 def test_fits_state_that_a_transmission_angle_counts_from_90_deg() -> None:
     text = toml_text(kinfmu.load("crank_rocker")).replace("Q = [50.0, 0.0], tracer", 'Q = ["q", 0.0], tracer')
     mechanism = parse(text + _MEASURES + '[parameters]\nq = "50 mm"\n')

@@ -151,6 +151,7 @@ LAWS = [
 
 
 @pytest.mark.parametrize(("law", "over", "angles"), LAWS)
+@pytest.mark.few(2)
 def test_a_law_of_constant_speed_is_measured_over_its_cycle_and_others_over_the_run(
     law: str, over: str, angles: tuple[float, float] | None
 ) -> None:
@@ -165,6 +166,7 @@ def test_a_law_of_constant_speed_is_measured_over_its_cycle_and_others_over_the_
 
 
 @pytest.mark.parametrize(("law", "over"), [(law, over) for law, over, _ in LAWS])
+@pytest.mark.few(2)
 def test_the_file_chooses_the_motion_that_is_measured(law: str, over: str) -> None:
     text = SLIDER_CRANK.replace("LAW", law)
     turned = kinfmu.check(parse(text.replace("step = 0.005", 'step = 0.005, over = "turn"')))

@@ -266,6 +266,7 @@ def sequence(*rises: str, repeat: str = "true") -> str:
         (sequence("20 deg", repeat="false"), None),
     ],
 )
+@pytest.mark.few(5)
 def test_a_mechanism_repeats_where_the_motion_does_not_only_the_pose(law: str, turns: int | None) -> None:
     report = kinfmu.check(parse(COUPLED.format(law=law)))
     assert report.range is not None

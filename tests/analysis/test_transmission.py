@@ -125,6 +125,7 @@ def sampled(mechanism: kinfmu.Mechanism, first: str, middle: str, second: str, *
         ("geared_five_bar", ("left", "right"), "T", ("left.P", "left.T", "right.Q")),
     ],
 )
+@pytest.mark.few(1)
 def test_a_dyad_between_moving_bodies_has_its_transmission_angle(
     name: str, links: tuple[str, str], joint: str, points: tuple[str, str, str]
 ) -> None:

@@ -134,6 +134,7 @@ def test_it_writes_into_docs_of_a_checkout_and_else_into_the_current_folder(
 
 
 @pytest.mark.usefixtures("once")
+@pytest.mark.long
 def test_a_page_of_the_user_keeps_the_text_between_its_tables(command: Command, tmp_path: Path) -> None:
     marks = "\n".join(
         f"word {name}\n<!-- generated: {name} -->old<!-- end: {name} -->"
@@ -153,6 +154,7 @@ def test_a_page_without_a_place_for_a_table_is_refused(fails: Callable[..., str]
 
 
 @pytest.mark.usefixtures("once")
+@pytest.mark.long
 def test_without_matplotlib_the_tables_are_written_and_the_reason_is_reported(
     command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -213,6 +215,7 @@ def test_the_help_has_a_line_for_every_measurement(command: Command) -> None:
         ("import", ["pass", "import kinfmu", "difference"]),
     ],
 )
+@pytest.mark.few(1)
 def test_a_measurement_prints_a_table_of_what_it_compares(what: str, lines: list[str], command: Command) -> None:
     result = command(what, "--rounds", 2)
     assert result.exit_code == 0

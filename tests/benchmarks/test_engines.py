@@ -57,6 +57,7 @@ def case(request: pytest.FixtureRequest) -> Case:
 
 
 @pytest.mark.parametrize("engine", [SHIPPED, NATIVE, GENERATED, NUMPY_NEWTON, READABLE], ids=lambda engine: engine.name)
+@pytest.mark.few(2)
 def test_newton_to_round_off_agrees_with_the_50_digits(engine: BenchEngine, case: Case) -> None:
     sampler = engine.sampler(case, engine.usual)
     assert sampler is not None
@@ -73,6 +74,7 @@ PEERS = [(CASADI, "casadi", 1e-11), (PYLINKAGE, "pylinkage", 1e-11), (KIMECH, "k
 
 
 @pytest.mark.parametrize(("engine", "package", "within"), PEERS, ids=["casadi", "pylinkage", "kimech"])
+@pytest.mark.few(1)
 def test_peers_agree_where_they_are_installed(engine: BenchEngine, package: str, within: float) -> None:
     pytest.importorskip(package)
     jansen = of_gallery("jansen_leg")
@@ -115,6 +117,7 @@ def test_pylinkage_is_not_asked_for_what_it_cannot_state(case: Case) -> None:
     assert PYLINKAGE.sampler(case, PYLINKAGE.usual) is None
 
 
+@pytest.mark.few(1)
 def test_kimech_agrees_on_slides_and_on_driven_distances(case: Case) -> None:
     pytest.importorskip("kimech")
     sampler = KIMECH.sampler(case, KIMECH.usual)
@@ -155,6 +158,7 @@ def test_a_sample_that_kimech_refuses_is_a_gap_and_those_after_it_are_solved() -
 
 @pytest.mark.parametrize("order", [0, 1, 2])
 @pytest.mark.parametrize("name", ["fourbar", "crank_rocker", "slider_crank", "stephenson_six_bar", "excavator"])
+@pytest.mark.few(2)
 def test_numpy_newton_agrees_on_every_kind_of_row_it_states(name: str, order: int) -> None:
     stated = of_gallery(name)
     sampler = NUMPY_NEWTON.sampler(stated, NUMPY_NEWTON.usual._replace(predictor=order))
@@ -248,6 +252,7 @@ def test_without_mpmath_it_is_reported_in_one_line(monkeypatch: pytest.MonkeyPat
 
 @pytest.mark.parametrize("engine", [SHIPPED, NATIVE], ids=lambda engine: engine.name)
 @pytest.mark.parametrize("point", POINTS, ids=lambda point: point.title)
+@pytest.mark.few(2)
 def test_kinfmu_keeps_its_digits_through_the_point_and_stays_on_the_branch(
     point: singular.Point, engine: BenchEngine
 ) -> None:

@@ -29,6 +29,7 @@ def position_nearby(model: Any, off: float = 0.05) -> tuple[Any, ...]:
 
 
 @every_kind
+@pytest.mark.few(2)
 def test_round_off_is_the_shipped_rule_to_the_bit(name: str) -> None:
     found, shipped = (
         position_nearby(model) for model in (model_with(plan_of(name), EngineSetting()), load_model(plan_of(name)))
@@ -38,6 +39,7 @@ def test_round_off_is_the_shipped_rule_to_the_bit(name: str) -> None:
 
 @every_kind
 @pytest.mark.parametrize("corrections", [0, 1, 2, 3])
+@pytest.mark.few(7)
 def test_a_fixed_number_of_corrections_is_made_in_every_block(name: str, corrections: int) -> None:
     plan = plan_of(name)
     found = position_nearby(model_with(plan, EngineSetting(corrections=corrections)))
@@ -45,6 +47,7 @@ def test_a_fixed_number_of_corrections_is_made_in_every_block(name: str, correct
 
 
 @every_kind
+@pytest.mark.few(2)
 def test_each_correction_brings_the_residual_down_and_newton_faster_than_chord(name: str) -> None:
     plan = plan_of(name)
     full = [position_nearby(model_with(plan, EngineSetting(corrections=n)))[3] for n in range(4)]
@@ -56,6 +59,7 @@ def test_each_correction_brings_the_residual_down_and_newton_faster_than_chord(n
 
 
 @every_kind
+@pytest.mark.few(2)
 def test_correcting_ends_at_the_tolerance_and_not_long_after(name: str) -> None:
     plan = plan_of(name)
     counts = []

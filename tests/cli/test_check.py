@@ -270,6 +270,7 @@ _PEAK = '[measures.peak]\ntype = "maximum"\nof = "crank.torque"\n'
         ),
     ],
 )
+@pytest.mark.few(2)
 def test_what_is_valid_of_a_file_is_reported_before_its_problem(
     old: str,
     new: str,
@@ -309,6 +310,7 @@ def test_a_file_whose_bodies_or_joints_are_invalid_has_no_report(
 
 
 @pytest.mark.parametrize(("old", "new"), [('speed = "1 deg/s"', 'speed = "60 rmp"'), ("P = [1, 0]", "P = [9, 0]")])
+@pytest.mark.few(1)
 def test_a_terminal_shows_a_problem_once(old: str, new: str, fourbar_file: Callable[..., Path]) -> None:
     """Of a file that is reported in part, and of a mechanism that does not close."""
     on_a_terminal = pytest.importorskip("tests.cli.test_colours").on_a_terminal

@@ -50,6 +50,7 @@ def on_a_terminal(arguments: tuple[str, ...], folder: Path, variables: dict[str,
     ],
     ids=["report", "error", "help", "usage", "limit", "progress"],
 )
+@pytest.mark.few(1)
 def test_commands_on_a_terminal_print_no_colours(arguments: tuple[str, ...], contains: bytes, tmp_path: Path) -> None:
     printed = on_a_terminal(arguments, tmp_path, {})
     assert contains in printed

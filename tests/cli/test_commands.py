@@ -51,6 +51,7 @@ def test_list_names_the_gallery_with_titles(command: Command) -> None:
 
 
 @every_member
+@pytest.mark.few(2)
 def test_new_writes_a_commented_file_that_checks(name: str, command: Command, tmp_path: Path) -> None:
     result = command("new", name, "mine.toml")
     assert result.exit_code == 0
@@ -311,6 +312,7 @@ def test_parameters_are_set_for_a_check_and_a_build(command: Command, slider: Pa
     np.testing.assert_allclose(one.values, two.values, rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.long
 def test_what_a_check_takes_a_solve_and_a_simulation_take_too(command: Command, slider: Path, tmp_path: Path) -> None:
     paced = slider.read_text().replace("parameters = { ", 'parameters = { pace = "1 rad/s", ')
     slider.write_text(paced.replace("law = ", 'speed = "pace", law = '))
@@ -372,6 +374,7 @@ def test_what_belongs_to_a_run_is_not_set_elsewhere(slider: Path, refuses: Calla
 
 
 @pytest.mark.parametrize("fmi", ["2", "3"])
+@pytest.mark.few(1)
 def test_native_fmus_are_built_and_simulated(command: Command, tmp_path: Path, fmi: str) -> None:
     built = command("build", "fourbar", "--flavour", "native", "--fmi", fmi, "-o", "four.fmu")
     assert re.fullmatch(

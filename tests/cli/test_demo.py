@@ -10,6 +10,7 @@ from kinfmu.cli import demo
 from tests.oracle import largest_error, reference_fourbar
 
 
+@pytest.mark.long
 def test_the_demo_does_the_main_job(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

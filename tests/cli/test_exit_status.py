@@ -150,6 +150,7 @@ def folder(tmp_path: Path, made: dict[str, bytes]) -> Path:
 
 
 @pytest.mark.parametrize(("arguments", "message"), WRONG_USAGE, ids=[arguments for arguments, _ in WRONG_USAGE])
+@pytest.mark.few(6)
 def test_wrong_usage_is_reported_with_status_two_and_leaves_nothing_behind(
     arguments: str, message: str, refuses: Callable[..., str], folder: Path
 ) -> None:
@@ -159,6 +160,7 @@ def test_wrong_usage_is_reported_with_status_two_and_leaves_nothing_behind(
 
 
 @pytest.mark.parametrize(("arguments", "message"), AT_FAULT, ids=[arguments for arguments, _ in AT_FAULT])
+@pytest.mark.few(7)
 def test_a_fault_of_the_mechanism_or_of_the_run_is_reported_with_status_one(
     arguments: str, message: str, command: Command, folder: Path
 ) -> None:

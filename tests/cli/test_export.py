@@ -267,6 +267,7 @@ def test_a_pose_is_drawn_for_cad(record: Path, command: Command, refuses: Callab
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet", ".npz"])
 @pytest.mark.parametrize("way", ["export", "solve"])
+@pytest.mark.few(2)
 def test_tables_of_every_format_have_angles_in_degrees(way: str, suffix: str, command: Command) -> None:
     assert command("solve", "crank_rocker", "-o", "run.mcap").exit_code == 0
     run = kinfmu.log.read("run.mcap")
@@ -295,6 +296,7 @@ def test_tables_of_every_format_have_angles_in_degrees(way: str, suffix: str, co
 
 @pytest.mark.parametrize(("separator", "decimal"), [(";", ","), ("tab", ","), ("|", "."), (",", ".")])
 @pytest.mark.parametrize("way", ["export", "print", "svaj", "cam", "solve"])
+@pytest.mark.few(2)
 def test_csv_files_have_the_separator_and_decimal_sign_of_spreadsheets(
     way: str, separator: str, decimal: str, command: Command
 ) -> None:

@@ -30,6 +30,7 @@ COMMANDS = {
 
 @pytest.mark.skipif(sys.platform != "linux", reason="a limit on the size of files simulates a full disk")
 @pytest.mark.parametrize("name", mostly_long(COMMANDS, few=("schema", "figure", "new")))
+@pytest.mark.few(1)
 def test_a_full_disk_is_reported_in_one_line_and_leaves_no_file(name: str, tmp_path: Path) -> None:
     arguments, out = COMMANDS[name]
     existed = name != "new"  # new never replaces a file

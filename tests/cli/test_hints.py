@@ -41,6 +41,7 @@ def test_a_hint_without_quotes_is_found() -> None:
 
 @pytest.mark.parametrize("name", FOLDERS)
 @pytest.mark.parametrize("is_absolute", [False, True])
+@pytest.mark.few(1)
 def test_suggested_commands_name_the_file_also_in_folders_with_blanks_and_quotes(
     name: str, is_absolute: bool, command: Command, tmp_path: Path
 ) -> None:
@@ -82,6 +83,7 @@ def test_suggested_commands_name_the_file_also_in_folders_with_blanks_and_quotes
 
 
 @pytest.mark.parametrize("name", FOLDERS)
+@pytest.mark.few(2)
 def test_studies_and_fits_suggest_no_command_that_names_a_file_without_quotes(
     name: str, tmp_path: Path, command: Command
 ) -> None:

@@ -49,6 +49,7 @@ def test_wrong_channels_and_rates_are_wrong_usage(refuses: Callable[..., str]) -
 @pytest.mark.parametrize(
     ("model", "name"), [("fourbar_chain:2", "fourbar_chain_2"), ("mine.toml", "mine"), ("other.fmu", "other")]
 )
+@pytest.mark.few(1)
 def test_logs_have_the_name_of_what_is_simulated(
     model: str, name: str, command: Command, fourbar_file: Callable[..., Path], tmp_path: Path
 ) -> None:

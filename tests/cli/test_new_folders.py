@@ -35,6 +35,7 @@ def test_simulate_makes_the_folders_of_record_and_recording(record: str) -> None
         "export cam_roller --cam pitch -o {}.csv",
     ],
 )
+@pytest.mark.few(2)
 def test_a_command_makes_the_folders_of_its_file(words: str, command: Command) -> None:
     target = words.split("{}")[1]
     done = command(*words.format("new/deep/it").split())
@@ -43,6 +44,7 @@ def test_a_command_makes_the_folders_of_its_file(words: str, command: Command) -
 
 
 @pytest.mark.parametrize("ending", [".csv", ".npz", ".svg", ".dxf"])
+@pytest.mark.few(1)
 def test_export_makes_the_folders_of_its_file(ending: str, record: str, command: Command) -> None:
     done = command("export", record, "-o", f"other/deep/run{ending}")
     assert done.exit_code == 0, done.stderr

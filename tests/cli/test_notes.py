@@ -190,6 +190,7 @@ def test_a_bare_number_is_reported_where_the_file_writes_another_unit(
         ("work.start=2kN", None),
     ],
 )
+@pytest.mark.few(2)
 def test_a_bare_constant_of_a_law_is_reported_where_the_file_writes_another_unit(
     call: tuple[str, ...], setting: str, text: str | None, notes: Callable[..., list[str]]
 ) -> None:

@@ -83,6 +83,7 @@ def test_an_interrupted_study_says_how_to_go_on(number: int, status: int, tmp_pa
     assert len(stderr.splitlines()) == (1 if number == signal.SIGINT else 2)
 
 
+@pytest.mark.long
 def test_on_a_terminal_a_line_shows_how_much_is_done_and_the_time_left(tmp_path: Path) -> None:
     write(tmp_path, LONG.replace("5000", "800"))
     command = ("-m", "kinfmu", "study", "study.toml", "--workers", "1", "--engine", "python")

@@ -33,6 +33,7 @@ def test_the_suffix_of_a_name_is_in_small_letters() -> None:
 
 
 @pytest.mark.parametrize("suffix", BEGINNINGS)
+@pytest.mark.few(2)
 def test_a_run_is_exported_by_a_suffix_in_capitals(suffix: str, record: Path, command: Command, tmp_path: Path) -> None:
     if suffix == "PARQUET":
         pytest.importorskip("pyarrow")

@@ -75,6 +75,7 @@ class Compiled:
 @pytest.mark.parametrize(
     "name", mostly_long([*gallery.names(), "fourbar_chain:60", "open_chain:60"], few=(*FEW, "fourbar_chain:60"))
 )
+@pytest.mark.few(2)
 def test_c_and_python_agree_to_the_bit(name: str) -> None:
     plan = compile_plan(kinfmu.load(name))
     python, c = load_model(plan), Compiled(plan)

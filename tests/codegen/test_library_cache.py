@@ -181,6 +181,7 @@ def pipe(library: Path) -> None:
 @pytest.mark.skipif(os.name == "nt", reason="POSIX files")
 @pytest.mark.parametrize("damage", [truncated, empty, text, flipped, another, huge, writable, link, pipe])
 @pytest.mark.usefixtures("cache")
+@pytest.mark.few(3)
 def test_a_damaged_library_is_compiled_again(damage: Callable[[Path], None]) -> None:
     library = compiler.shared_library(SEVEN)
     damage(library)

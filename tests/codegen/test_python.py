@@ -35,6 +35,7 @@ def plan(request: pytest.FixtureRequest) -> SolvePlan:
     return compile_plan(request.param)
 
 
+@pytest.mark.few(4)
 def test_position_velocity_and_acceleration_equal_the_dense_reference(plan: SolvePlan) -> None:
     system = System(plan.mechanism)
     rows = [*find_redundancy(system).kept, *range(system.joint_row_count, len(system.rows))]
@@ -62,6 +63,7 @@ def test_motion_is_outputs_rates_and_accelerations_in_a_row(plan: SolvePlan) -> 
 
 
 @pytest.mark.parametrize("mechanism", [*MECHANISMS, chains.fourbar_chain(20)], ids=lambda mechanism: mechanism.name)
+@pytest.mark.few(5)
 def test_differences_are_those_of_angles_and_of_lengths_relative_to_the_size(mechanism: Mechanism) -> None:
     plan = compile_plan(mechanism)
     model = load_model(plan)
@@ -92,6 +94,7 @@ def test_rates_of_points_are_the_derivatives_of_their_positions() -> None:
     assert solver.rates(poses[3], (1.0,))[k] == pytest.approx(slope, abs=1e-11)
 
 
+@pytest.mark.few(4)
 def test_generated_code_is_readable_python_on_the_standard_library(plan: SolvePlan) -> None:
     source = emit(plan)
     tree = ast.parse(source)

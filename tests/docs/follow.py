@@ -32,7 +32,7 @@ NOT_RUN = {  # beginnings of the commands and blocks that no page runs in the te
     "scripts/test": "runs the tests",
     "source .venv/bin/activate": "acts on the shell",
     "pip install omsimulator": "downloads a program from a server that is no package registry",
-    "python examples/dc_motor/stability.py": "takes a minute; tests/docs/test_coupling_page.py",
+    "python examples/dc_motor/stability.py": "takes a minute; tests/docs/test_pages.py",
     "scripts/bench": "measures for minutes; tests/benchmarks runs the parts",
     "kinfmu build mine.toml --fmi 3 --platforms all": "zig compiles for minutes; tests/fmu/native/test_build.py",
     "kinfmu build fourbar --platforms all": "zig compiles for minutes; tests/fmu/native/test_build.py",

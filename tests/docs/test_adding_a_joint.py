@@ -60,6 +60,7 @@ def test_the_contract_tests_pick_the_new_joint_up_and_pass(project: Path) -> Non
     assert int(passed) >= 7
 
 
+@pytest.mark.long
 def test_the_mechanism_of_the_page_solves_as_the_page_says(project: Path) -> None:
     (mechanism,) = blocks("toml")
     (project / "vice.toml").write_text(mechanism, encoding="utf-8")

@@ -17,8 +17,8 @@ OWN_TESTS = {  # pages that their own test follows: what their reader edits betw
 }
 OWN_TOML = {"mechanism-files.md": "test_mechanism_files.py"} | OWN_TESTS  # their TOML is no file to type
 CHECKED_ELSEWHERE = {  # other blocks than commands, Python and what these print: page and beginning; where, or why not
-    ("coupling.md", "kinfmu: drive.ssp: connection motor.angle"): "tests/docs/test_coupling_page.py",
-    ("fitting.md", "[targets.flat]"): "tests/docs/test_fitting_page.py",
+    ("coupling.md", "kinfmu: drive.ssp: connection motor.angle"): "tests/docs/test_pages.py",
+    ("fitting.md", "[targets.flat]"): "tests/docs/test_pages.py",
     ("host-openmodelica.md", "importFMU("): "OpenModelica is not installed",
     ("host-osp.md", "<Simulator name="): "tests/docs/test_host_pages.py",
     ("host-osp.md", "<VariableGroupConnection>"): "tests/docs/test_host_pages.py",

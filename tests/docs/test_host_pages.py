@@ -59,6 +59,7 @@ def native_fmus(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(import_module("kinfmu.fmu.build"), "default_flavour", lambda *_of, **_more: "native")
 
 
+@pytest.mark.long
 def test_the_page_of_fmpy_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     followed = follow("host-fmpy.md", tmp_path)
     assert "No problems found." in followed.outputs["fmpy validate fourbar.fmu"]
@@ -87,6 +88,7 @@ def test_libcosim_steps_a_system_of_the_parts_that_its_page_shows(
     assert "steps: 5" in run_in_host(STEPS).splitlines()  # among the log of libcosim
 
 
+@pytest.mark.long
 def test_the_page_of_ecos_runs_and_ends_in_agreement(tmp_path: Path) -> None:
     command = ecos_command()
     if command is None:

@@ -81,6 +81,7 @@ def test_every_channel_is_on_the_page() -> None:
     assert {name for name in known if f"`{name}`" not in section} == {"all", "none", "status"}
 
 
+@pytest.mark.long
 def test_the_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     block = PAGE.split("\n\n")[2]

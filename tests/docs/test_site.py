@@ -141,6 +141,7 @@ def test_the_check_of_the_gallery_accepts_pages_with_all_their_files(site: Any, 
         ('<a href="../_downloads/1/mechanism.toml">', "no link to mechanism.toml"),
     ],
 )
+@pytest.mark.few(2)
 def test_the_check_of_the_gallery_finds_a_missing_link(site: Any, built: Path, link: str, fault: str) -> None:
     page = built / "gallery" / "fourbar.html"
     assert link in GALLERY_PAGE
@@ -165,6 +166,7 @@ def test_the_site_is_checked_when_it_is_built() -> None:
     assert "-m _site.contents docs/_build" in script
 
 
+@pytest.mark.long
 def test_quotes_in_the_api_are_those_of_code(tmp_path: Path) -> None:
     pytest.importorskip("myst_parser")
     names = "".join(f".. autofunction:: kinfmu.{name}\n" for name in ("solve", "measure", "fit", "build", "simulate"))

@@ -89,6 +89,7 @@ def distance_to(curve: np.ndarray, point: np.ndarray) -> float:
 
 @pytest.mark.parametrize("angle", [0.0, 0.7, 2.5, 4.0, 5.9])
 @pytest.mark.parametrize("kind", ["translating", "oscillating", "roller"])
+@pytest.mark.few(8)
 def test_the_roller_is_on_the_pitch_curve_and_touches_the_profile(kind: str, angle: float) -> None:
     disc = drawn(kind, angle)
     assert disc.profile is not None

@@ -189,6 +189,7 @@ slider = { type = "distance", between = ["lever.B", "slider.S"], law = "constant
 
 
 @pytest.mark.parametrize("name", ["bars", *kinfmu.mechanism.gallery.names()])
+@pytest.mark.few(4)
 def test_no_line_has_length_0_and_none_is_drawn_twice(name: str, tmp_path: Path) -> None:
     """Sides of one layer that lie on one line overlap nowhere; together they are those of the shapes."""
     ezdxf = pytest.importorskip("ezdxf")

@@ -36,6 +36,7 @@ def texts_in(path: Path) -> str:
 
 
 @every_member
+@pytest.mark.few(2)
 def test_a_mechanism_of_the_gallery_is_drawn_with_all_its_names(
     name: str, gallery_figure: Callable[[str], Path]
 ) -> None:
@@ -76,6 +77,7 @@ def test_names_are_above_all_lines_and_off_the_links_bars_and_cylinders(name: st
 
 
 @pytest.mark.parametrize("suffix", [".svg", ".png"])
+@pytest.mark.few(1)
 def test_the_same_mechanism_gives_the_same_bytes(suffix: str, tmp_path: Path) -> None:
     mechanism = kinfmu.load("fourbar")
     first, second = tmp_path / f"first{suffix}", tmp_path / f"second{suffix}"
@@ -128,6 +130,7 @@ def test_a_title_is_not_read_as_mathematics(tmp_path: Path) -> None:
     ],
     ids=["without a driver", "with one too many", "with two that contradict"],
 )
+@pytest.mark.few(1)
 def test_a_mechanism_that_only_closes_is_drawn(drivers: tuple[AngleDriver, ...], tmp_path: Path) -> None:
     mechanism = replace(fourbar(4.0, 1.0, 3.5, 3.0), drivers=drivers)
     assert kinfmu.check(mechanism).problem is not None

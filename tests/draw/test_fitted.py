@@ -52,6 +52,7 @@ def test_points_far_apart_need_no_panel() -> None:
 
 
 @pytest.mark.parametrize("name", ["crank_rocker", "jansen_leg", "slider_crank", "watt_six_bar", "double_crank"])
+@pytest.mark.few(1)
 def test_the_name_of_the_driver_keeps_off_a_curve_through_its_usual_place(name: str) -> None:
     mech = kinfmu.load(name)
 

@@ -89,6 +89,7 @@ def test_a_committed_kind_of_svg_has_the_violet_lines(tmp_path: Path) -> None:
 
 
 @every_member
+@pytest.mark.few(2)
 def test_loads_are_the_only_violet_lines_of_the_gallery(name: str) -> None:
     mechanism = kinfmu.load(name)
     assert bool(lines(sheet_of(instant(mechanism)))) == bool(mechanism.loads)
@@ -110,6 +111,7 @@ def test_an_animation_shows_the_spring_as_it_changes(tmp_path: Path, monkeypatch
 
 
 @pytest.mark.parametrize(("pull", "side"), [((0.0, -9.81), 1), ((0.0, 9.81), -1), ((0.0, 0.0), 0)])
+@pytest.mark.few(1)
 def test_an_animation_shows_the_direction_of_gravity_at_one_place(
     pull: tuple[float, float], side: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

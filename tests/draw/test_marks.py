@@ -238,6 +238,7 @@ def test_a_place_is_named_once_by_its_joint_and_its_points_of_interest() -> None
 
 
 @every_member
+@pytest.mark.few(2)
 def test_names_do_not_overlap_stay_on_the_sheet_and_leave_links_and_paths_free(name: str) -> None:
     pytest.importorskip("matplotlib")
     sheet = sheet_of(instant(load(name)))

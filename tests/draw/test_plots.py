@@ -91,6 +91,7 @@ def test_names_of_axes_stay_off_numbers_and_numbers_differ() -> None:
 
 
 @pytest.mark.parametrize("name", ["excavator_loaded", "jansen_leg_loaded", "fourbar_chain"])
+@pytest.mark.few(1)
 def test_names_of_axes_stay_off_each_other_and_within_the_sheet(name: str) -> None:
     mech = kinfmu.load(name)
     run = kinfmu.solve(mech, np.linspace(mech.run.start, mech.run.stop, 30))

@@ -44,6 +44,7 @@ def test_a_long_title_continues_on_a_second_line_and_ends_in_an_ellipsis() -> No
 @pytest.mark.parametrize(
     "title", ["\U0001f468\ue1ff", pytest.param("a" * 10_000, marks=pytest.mark.long), "$\\frac{$ {} %s <b>&amp;"]
 )
+@pytest.mark.few(1)
 def test_any_line_of_text_is_a_title_of_every_picture(title: str, tmp_path: Path) -> None:
     mechanism = dataclasses.replace(load("fourbar"), title=title)
     figure(mechanism, tmp_path / "a.svg")
@@ -76,6 +77,7 @@ def test_the_title_of_plots_is_in_the_picture_and_above_the_names(title: str) ->
 
 
 @pytest.mark.parametrize("stop", [1.0, 1e5, 9e5, 0.0123456])
+@pytest.mark.few(2)
 def test_the_number_of_the_last_tick_is_in_the_picture(stop: float) -> None:
     run = fourbar(np.arange(10.0))
     figure = _sheet(

@@ -183,6 +183,7 @@ DESCRIPTIONS: dict[str, tuple[Callable[[str], str], str]] = {
 
 
 @pytest.mark.parametrize("case", DESCRIPTIONS)
+@pytest.mark.few(4)
 def test_a_damaged_description_is_one_line(whole: bytes, tmp_path: Path, case: str) -> None:
     change, words = DESCRIPTIONS[case]
     text = content_of(whole, DESCRIPTION)

@@ -69,6 +69,7 @@ def _pixels(data: bytes) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", ["triple_rocker", "excavator", "cam_roller", "rack_steering", "double_pendulum"])
+@pytest.mark.few(2)
 def test_documents_are_the_same_again_and_valid(name: str) -> None:
     plan = compile_plan(kinfmu.load(name))
     variables = interface(plan, has_time=True)

@@ -46,6 +46,7 @@ def _assert_as_asked(run: Run, asked: Run) -> None:
 
 
 @pytest.mark.parametrize(("name", "step"), STEPS.items())
+@pytest.mark.few(2)
 def test_estimates_equal_those_of_the_fmu(name: str, step: float, built: Callable[..., Path]) -> None:
     _assert_as_asked(simulate(built(name), step=step), simulate(built(name), step=step, channels=ALL))
 
@@ -76,6 +77,7 @@ def _with_a_length(at: tuple[float, float]) -> Mechanism:
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 @pytest.mark.parametrize("at", [(-14.0, 3.0), (300.0, -150.0), (0.25, 1e6)])
+@pytest.mark.few(1)
 def test_estimates_of_a_length_far_from_the_origin(at: tuple[float, float], flavour: str, tmp_path: Path) -> None:
     mechanism, record, more = _with_a_length(at), tmp_path / "far.mcap", {"stop": 6.0, "step": 0.25}
     fmu = build(mechanism, tmp_path / "far.fmu", flavour=flavour, drive="time")
@@ -119,6 +121,7 @@ def test_estimates_use_the_parameters_as_set(tmp_path: Path) -> None:
         (["-error", "-margin"], False),
     ],
 )
+@pytest.mark.few(5)
 def test_chosen_channels(channels: Sequence[str], is_computed: bool, fourbar: Path) -> None:
     run = simulate(fourbar, step=2.5, channels=channels, rate=0.2)
     asked = simulate(fourbar, step=2.5, channels=ALL, rate=0.2)

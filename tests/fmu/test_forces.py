@@ -148,6 +148,7 @@ def assert_forces_equal(run: kinfmu.Run, reference: kinfmu.Run) -> None:
 
 @of_each_flavour
 @pytest.mark.parametrize("name", mostly_long(["fourbar", "five_bar", "excavator"], few=("excavator",)))
+@pytest.mark.few(1)
 def test_forces_equal_those_of_a_run(fmu_of: Callable[..., Path], flavour: str, fmi: int, name: str) -> None:
     mechanism = loaded(name)
     run = kinfmu.simulate(fmu_of(mechanism, flavour, fmi))
@@ -155,6 +156,7 @@ def test_forces_equal_those_of_a_run(fmu_of: Callable[..., Path], flavour: str, 
 
 
 @of_each_flavour
+@pytest.mark.few(1)
 def test_external_loads_laws_over_time_and_masses_equal_those_of_a_run(
     fmu_of: Callable[..., Path], flavour: str, fmi: int
 ) -> None:
@@ -172,6 +174,7 @@ def test_external_loads_laws_over_time_and_masses_equal_those_of_a_run(
 
 
 @of_each_flavour
+@pytest.mark.few(1)
 def test_declared_dependencies_are_those_that_count(start: Callable[..., Host], flavour: str, fmi: int) -> None:
     host = start(flavour, fmi)
     at = {"crank_angle": 0.7, "crank_speed": 3.0, "crank_acceleration": 20.0, "work_force": -150.0}
@@ -275,6 +278,7 @@ def test_a_native_fmu_discards_forces_of_an_unreachable_sample(fmu_of: Callable[
         ("native", ["guide.moment", "shaking_moment"], ["reactions", "shaking"]),
     ],
 )
+@pytest.mark.few(2)
 def test_outputs_choose_forces(flavour: str, outputs: Sequence[str], stages: Sequence[str], tmp_path: Path) -> None:
     """What no output asks for is not generated."""
     path = kinfmu.build(press(), tmp_path, flavour=flavour, outputs=outputs)
@@ -303,6 +307,7 @@ def test_outputs_that_an_fmu_cannot_have(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("flavour", "fmi"), FLAVOURS[:2])
+@pytest.mark.few(1)
 def test_determined_reactions_of_redundant_rows_and_nan_on_a_bridge(flavour: str, fmi: int, tmp_path: Path) -> None:
     """Wheels whose rods are solved by least squares, and a parallelogram at its change point."""
     wheels = coupled(LOCOMOTIVE)
@@ -362,6 +367,7 @@ def test_adjoint_derivatives_of_forces(start: Callable[..., Host]) -> None:
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.few(1)
 def test_model_exchange_has_the_forces_of_a_run(fmu_of: Callable[..., Path], fmi: int, tmp_path: Path) -> None:
     host = Host(fmu_of(press(), "native", fmi), tmp_path / "model", model_exchange=True)
     host.set({"work_force": -150.0})
@@ -432,6 +438,7 @@ def test_potential_energy_counts_from_the_origin_of_the_world(tmp_path: Path) ->
 
 
 @of_each_flavour
+@pytest.mark.few(1)
 def test_ends_that_meet_are_reported_in_the_log(flavour: str, fmi: int, tmp_path: Path) -> None:
     fmu = kinfmu.build(met(MEETING[0]), tmp_path / "met.fmu", flavour=flavour, fmi=fmi)
     run = kinfmu.simulate(fmu, stop=1.0, step=0.05)
@@ -446,6 +453,7 @@ def test_ends_that_meet_are_reported_in_the_log(flavour: str, fmi: int, tmp_path
 
 
 @of_each_flavour
+@pytest.mark.few(1)
 def test_the_ends_of_a_spring_without_free_length_may_meet(flavour: str, fmi: int, tmp_path: Path) -> None:
     fmu = kinfmu.build(toml_file.parse(MET), tmp_path / "met.fmu", flavour=flavour, fmi=fmi)
     run = kinfmu.simulate(fmu, stop=1.0, step=0.05)

@@ -55,6 +55,7 @@ def arms(*laws: Law) -> Mechanism:
 
 
 @pytest.mark.parametrize("name", LAWS)
+@pytest.mark.few(2)
 def test_an_fmu_driven_by_a_law_moves_as_solve_does(name: str, tmp_path: Path) -> None:
     mechanism = arms(LAWS[name])
     solved = kinfmu.solve(mechanism)

@@ -116,6 +116,7 @@ def test_lengths_that_do_not_close_are_refused_with_the_joint_and_the_gap(fmu: P
     )
 
 
+@pytest.mark.few(1)
 def test_a_redundant_bar_of_another_length_is_refused_with_its_row(tmp_path: Path) -> None:
     reference = kinfmu.load("fourbar")
     joints = tuple(replace(j, length="bar") if isinstance(j, Distance) else j for j in reference.joints)
@@ -166,6 +167,7 @@ def test_numbers_that_are_invalid_in_a_file_are_refused_at_run_time(tmp_path: Pa
             kinfmu.solve(mechanism, parameters={name: value})
 
 
+@pytest.mark.few(1)
 def test_lengths_of_zero_that_make_rows_dependent_are_refused(tmp_path: Path) -> None:
     lengths = {"ground": 2.0, "crank": 1.0, "coupler": 2.0, "rocker": 1.0}
     parallelogram = linkage(lengths)

@@ -42,12 +42,14 @@ def start(request: pytest.FixtureRequest, built: Build, built_native: Build, tmp
         host.free()
 
 
+@pytest.mark.few(1)
 def test_fresh_instance_holds_a_pose_at_the_law_s_start(start: Start) -> None:
     host = start("double_pendulum", "inputs", initialize=False)
     assert host.get("crank_angle", "upper.phi", "upper.x") == pytest.approx([5 * math.pi / 3, 5 * math.pi / 3, 0.5])
     assert host.status() <= Status.BRIDGED
 
 
+@pytest.mark.few(1)
 def test_outputs_follow_a_set_input_at_once(start: Start) -> None:
     host = start()
     host.set({"crank_angle": 0.5, "crank_speed": 2.0, "crank_acceleration": 3.0})
@@ -68,6 +70,7 @@ def test_trial_values_never_influence_a_result(start: Start) -> None:
         assert direct.step(0.1 * k, 0.1) == trying.step(0.1 * k, 0.1) == OK
 
 
+@pytest.mark.few(1)
 def test_time_drives_by_the_law_and_its_constants_can_be_set(start: Start) -> None:
     host = start("fourbar", "time", initialize=False)
     host.set({"crank.speed": 0.2, "crank.start": 0.4})
@@ -154,6 +157,7 @@ def test_unreachable_pose_is_discard_with_driver_value_and_limit_and_the_host_ma
     assert host.get("upper.phi", "upper.x") == pytest.approx([5.1, math.cos(5.1)])
 
 
+@pytest.mark.few(1)
 def test_step_of_time_past_the_limit_is_discard_and_a_smaller_one_goes(start: Start) -> None:
     host = start("double_pendulum", "time")
     assert host.step(0.0, 1.9) == OK
@@ -249,6 +253,7 @@ def test_instances_of_one_fmu_and_of_two_in_one_process_share_nothing(start: Sta
 
 
 @pytest.mark.parametrize("drive", ["time", "inputs"])
+@pytest.mark.few(3)
 def test_a_step_past_the_stop_time_is_invalid_and_one_that_rounds_past_it_is_valid(start: Start, drive: str) -> None:
     host = start("fourbar", drive, initialize=False)
     host.initialize(0.5, 1.5)
@@ -277,6 +282,7 @@ def test_an_unreachable_initial_pose_is_an_error_at_the_end_of_initialization(st
     assert host.step(2.5, 0.1) == host.invalid
 
 
+@pytest.mark.few(1)
 def test_outputs_depend_on_the_inputs_that_are_listed_and_on_no_others(start: Start) -> None:
     """Speeds depend on the angle too where they are estimated, also those of the driven body itself."""
     estimated, wired = start("crank_rocker"), start("crank_rocker")
@@ -319,6 +325,7 @@ def test_rates_are_estimated_until_they_are_wired(start: Start) -> None:
 
 @pytest.mark.parametrize("drive", ["inputs", "time"])
 @pytest.mark.parametrize(("t", "h"), NO_STEPS)
+@pytest.mark.few(11)
 def test_an_invalid_step_changes_nothing(start: Start, drive: str, t: float, h: float) -> None:
     host, other = start("fourbar", drive), start("fourbar", drive)
     assert host.step(t, h) == host.invalid
@@ -380,6 +387,7 @@ def test_rates_estimated_over_no_time_are_finite(start: Start, h: float) -> None
         assert all(math.isfinite(value) for value in host.outputs()), k
 
 
+@pytest.mark.few(1)
 def test_laws_whose_rates_are_beyond_all_bounds_have_no_pose(start: Start) -> None:
     host = start("crank_rocker", "time")
     host.set({"crank.speed": 1e100})

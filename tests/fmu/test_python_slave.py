@@ -100,6 +100,7 @@ def _call(host: Host, rng: random.Random, states: list[Any]) -> None:
 
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(("name", "drive"), [("fourbar", "inputs"), ("crank_rocker", "time"), ("five_bar", "inputs")])
+@pytest.mark.few(2)
 def test_random_calls_are_never_fatal_and_outputs_stay_finite(start: Start, name: str, drive: str, seed: int) -> None:
     rng = random.Random(seed)  # noqa: S311  calls by chance
     host = start(name, drive)

@@ -122,6 +122,7 @@ def pair(request: pytest.FixtureRequest, press: kinfmu.Mechanism, tmp_path_facto
     )
 
 
+@pytest.mark.few(1)
 def test_every_variable_is_in_si_units_and_shown_in_the_unit_of_the_file(pair: tuple[Path, Path]) -> None:
     metric, original = pair
     assert not validate_fmu(str(metric))
@@ -150,6 +151,7 @@ def test_every_variable_is_in_si_units_and_shown_in_the_unit_of_the_file(pair: t
     assert ("mm/s", 1000.0) in [(one.name, one.factor) for one in shown["m/s"].displayUnits]
 
 
+@pytest.mark.few(1)
 def test_inputs_parameters_and_results_are_in_si_units(pair: tuple[Path, Path]) -> None:
     metric, original = pair
     t = np.linspace(0.0, 0.3, 7)

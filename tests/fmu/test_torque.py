@@ -99,6 +99,7 @@ def same_motion(mechanism: Mechanism, stop: float, h: float, **arguments: Any) -
 
 
 @of_each_flavour
+@pytest.mark.few(1)
 def test_co_simulation_is_the_motion_that_python_integrates(
     flavour: str, fmi: int, fmu_of: Callable[..., Path]
 ) -> None:
@@ -151,6 +152,7 @@ def test_a_flywheel_turns_by_the_integral_of_its_torque(start: Callable[..., Hos
 
 
 @of_each_flavour
+@pytest.mark.few(1)
 def test_two_drivers_keep_the_energy(flavour: str, fmi: int, start: Callable[..., Host]) -> None:
     if (flavour, fmi) == ("native", 2):
         pytest.skip("the same code as in FMI 3.0")
@@ -169,6 +171,7 @@ def test_two_drivers_keep_the_energy(flavour: str, fmi: int, start: Callable[...
 @pytest.mark.parametrize(
     ("flavour", "tolerance"), [("native", 1e-5), ("native", 1e-9), ("native", 1e-12), ("python", 1e-9)]
 )
+@pytest.mark.few(1)
 def test_a_motion_ends_at_its_limit_and_stays_before_it(
     flavour: str, tolerance: float, start: Callable[..., Host]
 ) -> None:
@@ -239,6 +242,7 @@ def test_hosts_integrate_the_states_in_model_exchange(fmi: int, fmu_of: Callable
 
 
 @pytest.mark.parametrize("flavour", ["native", "python"])
+@pytest.mark.few(1)
 def test_it_passes_change_points_over_bridges(flavour: str, start: Callable[..., Host]) -> None:
     """The reduced inertia of a parallelogram is constant, and so is its speed."""
     host = start("parallelogram", flavour, 2, crank_speed=7.0)
@@ -339,6 +343,7 @@ def test_a_mechanism_that_no_effort_determines_is_refused(tmp_path: Path) -> Non
 
 
 @of_each_flavour
+@pytest.mark.few(1)
 def test_the_driver_without_reduced_inertia_is_named(flavour: str, fmi: int, tmp_path: Path) -> None:
     heavy_crank = pendulum()
     light = Mechanism(
@@ -352,6 +357,7 @@ def test_the_driver_without_reduced_inertia_is_named(flavour: str, fmi: int, tmp
         kinfmu.simulate(path)
 
 
+@pytest.mark.long
 def test_a_four_bar_keeps_its_energy_over_a_thousand_turns(tmp_path: Path) -> None:
     path = kinfmu.build(heavy(fourbar(2.0, 0.7, 1.9, 1.5)), tmp_path / "a.fmu", flavour="native", drive="torque")
     run = kinfmu.simulate(path, stop=950.0, step=1.0, state={"crank_speed": 7.0}, tolerance=1e-13)
@@ -370,6 +376,7 @@ def test_settings_of_a_torque_driven_fmu_are_for_these_alone(fmu_of: Callable[..
 
 
 @of_each_flavour
+@pytest.mark.few(1)
 def test_a_mass_on_a_crank_turns_in_closed_form(flavour: str, fmi: int, tmp_path: Path) -> None:
     """theta = T t^2 / (2 m r^2), with a parameter as mass, without forces among the outputs."""
     mechanism = replace(

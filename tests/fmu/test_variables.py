@@ -34,6 +34,7 @@ def test_factor_may_hold_a_parameter() -> None:
 
 
 @every_member
+@pytest.mark.few(3)
 def test_linear_outputs_are_straight_lines_over_the_run(name: str) -> None:
     run = kinfmu.solve(kinfmu.load(name))
     for output, inputs in _linear(kinfmu.load(name)).items():

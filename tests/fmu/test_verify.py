@@ -39,6 +39,7 @@ def write(path: Path, rows: list[list[str]], delimiter: str = ",") -> Path:
 
 
 @pytest.mark.parametrize(("name", "drive"), [("fourbar", "inputs"), ("toggle_press", "time")])
+@pytest.mark.few(1)
 def test_an_fmu_has_the_results_of_the_solver(built: Built, name: str, drive: Drive) -> None:
     fmu = built(name, drive)
     found = kinfmu.verify(fmu)
@@ -197,6 +198,7 @@ def test_one_wrong_number_is_named(built: Built, tmp_path: Path) -> None:
         (slice(1, 22), 1, "host.csv: 21 of 21 samples of the reference are missing"),
     ],
 )
+@pytest.mark.few(5)
 def test_only_the_first_and_the_last_samples_may_be_missing(
     built: Built, tmp_path: Path, dropped: slice, status: int, message: str
 ) -> None:

@@ -17,6 +17,7 @@ TORQUE = [seed for seed, variant in enumerate(fmu.VARIANTS) if variant.drive == 
     [1, 2, *(pytest.param(seed, marks=pytest.mark.long) for seed in TORQUE)],
     ids=lambda seed: str(fmu.VARIANTS[seed]),
 )
+@pytest.mark.few(1)
 def test_no_call_of_fmi_does_harm(seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if seed not in TORQUE:  # where single calls are slow: the integrator's steps follow from the numbers given
         monkeypatch.setattr(fmu, "CALLS", 3000)

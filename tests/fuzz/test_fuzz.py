@@ -24,6 +24,7 @@ KINDS = {  # of the programs of `fmu`, compiled under sanitizers, see test_fmu.p
 
 
 @pytest.mark.parametrize("part", PARTS)
+@pytest.mark.few(1)
 def test_hostile_input_of_each_part_has_no_findings(part: str) -> None:
     summary = run(part, 0, SECONDS)
     assert summary.tried.total() > 0

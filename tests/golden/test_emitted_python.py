@@ -39,6 +39,7 @@ def test_generating_twice_gives_the_same_bytes() -> None:
     "names",
     [("sin", "cos", "u"), ("lambda", "None", "class"), ("t1", "r0", "z0"), ("a", "a_x", "cos_a"), ("_", "s", "__")],
 )
+@pytest.mark.few(3)
 def test_bodies_and_drivers_may_be_called_anything_that_is_a_name(names: tuple[str, str, str]) -> None:
     """Words of Python and names that the generated code uses itself, too."""
     fourbar = kinfmu.load("fourbar")

@@ -28,6 +28,7 @@ def solved(name: str) -> Run:
 
 
 @every_member
+@pytest.mark.few(4)
 def test_a_mechanism_of_the_gallery_is_recorded_with_all_that_draws_it(name: str, tmp_path: Path) -> None:
     run, path = solved(name), tmp_path / "run.mcap"
     sink = McapLog(path)
@@ -54,6 +55,7 @@ def test_a_mechanism_of_the_gallery_is_recorded_with_all_that_draws_it(name: str
 @pytest.mark.parametrize(
     "channels", [["none"], ["q"], ["-qd", "-margin"], ["residual", "coupler.*"], ["points", "error"]], ids=" ".join
 )
+@pytest.mark.few(3)
 def test_a_recording_is_made_of_what_was_kept(channels: list[str], tmp_path: Path) -> None:
     write_mcap(fourbar(np.arange(181.0)), tmp_path / "run.mcap", channels=channels)
     run = read(tmp_path / "run.mcap")

@@ -46,6 +46,7 @@ def grown(run: Run, path: Path, size: int, *, drawn: bool = True) -> None:
 
 @pytest.mark.parametrize("size", [1, 7, 1000])
 @pytest.mark.parametrize("kind", ["plain", "with a gap", "nothing but gap", "before zero", "no mechanism"])
+@pytest.mark.few(5)
 def test_a_run_that_grew_reads_back_bit_for_bit(kind: str, size: int, tmp_path: Path) -> None:
     run = KINDS[kind]()
     grown(run, tmp_path / "run.mcap", size)
@@ -138,6 +139,7 @@ def test_a_path_that_cannot_be_written_is_reported_before_the_first_sample(run: 
 
 
 @pytest.mark.parametrize("share", np.linspace(0.0, 0.999, 12))
+@pytest.mark.few(5)
 def test_what_is_left_of_a_cut_file_is_the_beginning_of_the_run(
     share: float, run_with_gap: Run, tmp_path: Path
 ) -> None:

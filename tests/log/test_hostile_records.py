@@ -64,6 +64,7 @@ FITTING = {
 
 
 @pytest.mark.parametrize("key", KEYS)
+@pytest.mark.few(2)
 def test_odd_texts_at_the_beginning_are_one_line(run: Run, tmp_path: Path, key: str) -> None:
     for value in ODD:
         if value in FITTING.get(key, ()):
@@ -103,6 +104,7 @@ def test_texts_that_disagree_are_one_line(run: Run, tmp_path: Path, begin: dict[
 
 
 @pytest.mark.parametrize("key", ["outputs", "columns", "absent", "watch_names"])
+@pytest.mark.few(2)
 def test_a_million_names_are_refused_at_once(run: Run, tmp_path: Path, key: str) -> None:
     names = json.dumps([f"a{k}.x" for k in range(NAMES)])
     path = with_texts(run, tmp_path / "a.mcap", {key: names})

@@ -174,6 +174,7 @@ def test_margins_and_errors_are_not_computed_for_a_record(channels: list[str] | 
 
 @pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize("driven", [{}, {"crank_angle": np.linspace(0.5, 6.5, 90), "crank_speed": 2.0}])
+@pytest.mark.few(1)
 def test_margins_and_errors_of_a_record_are_those_of_its_run(
     driven: dict[str, np.ndarray], engine: str, tmp_path: Path
 ) -> None:

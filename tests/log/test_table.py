@@ -16,6 +16,7 @@ from kinfmu.run.tables import ROWS
 from tests.log.runs import fourbar
 
 
+@pytest.mark.few(5)
 def test_csv_reads_back_bit_for_bit_with_the_csv_module(any_run: Run, tmp_path: Path) -> None:
     write_table(any_run, tmp_path / "run.csv")
     with (tmp_path / "run.csv").open(newline="") as file:

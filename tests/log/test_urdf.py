@@ -41,6 +41,7 @@ def described(name: str) -> dict[str, list[tuple[float, float, float, float]]]:
 
 
 @every_member
+@pytest.mark.few(6)
 def test_every_link_of_the_description_has_a_frame_and_every_frame_a_link(name: str) -> None:
     moving = link_poses(solved(name), kinfmu.load(name))
     assert {*described(name)} == {"ground", *moving}

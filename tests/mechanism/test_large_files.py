@@ -34,6 +34,7 @@ FILES = {
 
 
 @pytest.mark.parametrize("name", FILES)
+@pytest.mark.few(1)
 def test_a_large_file_is_refused_in_one_line_and_less_than_a_second(name: str) -> None:
     text, reason = FILES[name]
     taken = []

@@ -109,6 +109,7 @@ def test_wrong_repeats_are_reported_with_table_and_key(case: str) -> None:
     assert f"a.toml: {WRONG[case]}" in str(caught.value)
 
 
+@pytest.mark.long
 def test_a_small_file_cannot_ask_for_endless_copies() -> None:
     points: dict[str, Any] = {f"P{n}_{{k}}": [0, 0] for n in range(1000)}
     document = {"repeat": {"k": {"to": LARGEST_COUNT, "bodies": {"b_{k}": {"points": points}}}}}

@@ -61,6 +61,7 @@ def test_the_schema_is_valid_and_refers_only_to_its_definitions() -> None:
 
 
 @pytest.mark.parametrize("name", gallery.names())
+@pytest.mark.few(8)
 def test_the_gallery_fits(name: str) -> None:
     path = gallery.folder() / name / "mechanism.toml"
     assert list(SCHEMA.iter_errors(tomllib.loads(path.read_text(encoding="utf-8")))) == []
@@ -110,6 +111,7 @@ BODIES = {name: {"points": {"O": [0, 0], "P": ["1 mm", "2*a"]}} for name in ("gr
 
 
 @pytest.mark.parametrize("cls", JOINTS, ids=lambda cls: cls.type)
+@pytest.mark.few(7)
 def test_every_joint_has_its_table_in_the_schema(cls: Any) -> None:
     table = values(cls, {"type": cls.type})
     if any(key.takes == "law" for key in keys_of(cls)):
@@ -122,6 +124,7 @@ def test_every_joint_has_its_table_in_the_schema(cls: Any) -> None:
 
 
 @pytest.mark.parametrize("cls", LOADS, ids=lambda cls: cls.type)
+@pytest.mark.few(6)
 def test_every_load_has_its_table_in_the_schema(cls: Any) -> None:
     table, optional = values(cls, {"type": cls.type}), {"axes": "ground", "over": {"measure": "angle", "of": "rod"}}
     if any(key.takes == "law" for key in keys_of(cls)):
@@ -171,6 +174,7 @@ def test_every_measure_has_its_table_in_the_schema(cls: Any) -> None:
     ],
     ids=lambda cls: cls.type,
 )
+@pytest.mark.few(5)
 def test_every_driver_has_its_table_with_every_law_in_the_schema(cls: Any, law: Any) -> None:
     table = values(law, values(cls, {"type": cls.type, "law": law.type}))
     document = {"name": "a", "bodies": BODIES, "drivers": {"D": table}}

@@ -292,6 +292,7 @@ def test_any_text_gives_one_line(junk: str) -> None:
 
 
 @pytest.mark.parametrize("name", gallery.names())
+@pytest.mark.few(18)
 def test_a_file_written_in_its_own_units_is_the_same_mechanism(name: str) -> None:
     mechanism = gallery.load(name)
     written = text(mechanism, as_written=True)

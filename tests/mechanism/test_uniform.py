@@ -79,6 +79,7 @@ PLATE = 'plate = ["O", "P", "Q"]\ndensity = "rho"\nthickness = "8 mm"'
 
 @pytest.mark.parametrize("shape", [WIDE, PLATE])
 @pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.few(2)
 def test_lengths_and_densities_as_parameters_change_the_mass(shape: str, engine: str) -> None:
     mechanism = parse(PENDULUM.replace("SHAPE", shape), "pendulum")
     assert parse(text(mechanism), "again") == mechanism

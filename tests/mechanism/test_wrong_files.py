@@ -205,6 +205,7 @@ def test_the_unchanged_file_is_right(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("case", [*CHANGES, *FILES])
+@pytest.mark.few(2)
 def test_a_wrong_file_is_reported_in_one_line_that_names_the_place(case: str, tmp_path: Path) -> None:
     path = tmp_path / "wrong.toml"
     written, expected = content(case)

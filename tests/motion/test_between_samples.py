@@ -112,6 +112,7 @@ def test_the_roundness_of_a_straight_path_is_zero(start: float) -> None:
 
 
 @pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.few(1)
 def test_designs_whose_distance_passes_zero(engine: str) -> None:
     text = (FMUS / "slider_crank" / "mechanism.toml").read_text("utf-8")
     text = text.replace("points = { O = [0, 0] }", 'points = { O = [0, 0], Z = ["z", 0] }')

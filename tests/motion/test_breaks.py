@@ -125,6 +125,7 @@ def test_peaks_of_check_on_a_cam_with_dwells(begin: str) -> None:
 
 @pytest.mark.parametrize("begin", ["40 deg", "40.37 deg"])
 @pytest.mark.parametrize("law", ["cycloidal", "modified_sine", "modified_trapezoid"])
+@pytest.mark.few(2)
 def test_what_is_never_negative_is_0_in_a_dwell(law: str, begin: str) -> None:
     """The reduced inertia is m y'^2; between samples next to a dwell its polynomials go below 0 by 1e-11."""
     mechanism = tappet(law, begin)

@@ -210,6 +210,7 @@ STANDING = [  # laws that stand still for a moment, or for long
 @pytest.mark.parametrize(
     ("law", "engine"), [*((law, "python") for law in STANDING), *((law, "native") for law in STANDING[:2])]
 )
+@pytest.mark.few(2)
 def test_ratios_are_geometry_where_the_law_stands_still(law: str, engine: str) -> None:
     """dx/du = -r sin u (1 + r cos u / sqrt(l^2 - r^2 sin^2 u)) of a slider-crank, over the angles of the law."""
     r, rod = 0.2, 0.6
@@ -265,6 +266,7 @@ def test_a_ratio_to_a_driver_that_rests_for_the_whole_run_has_no_value() -> None
 @pytest.mark.parametrize("count", [90, 360])
 @pytest.mark.parametrize("turned", [0.0, 0.7])
 @pytest.mark.parametrize(("half", "width"), [(0.5, 0.05), (0.8, 0.05), (1.2, 0.02), (0.5, 0.1)])
+@pytest.mark.few(7)
 def test_roundness_of_a_bent_oval_is_half_its_width_although_its_ring_is_not_unique(
     half: float, width: float, turned: float, count: int
 ) -> None:

@@ -148,6 +148,7 @@ def assert_as_measured(
 
 
 @pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.few(1)
 def test_every_kind_of_measure_equals_measure_of_each_design(engine: str) -> None:
     assert {reading.type for reading in READ} == {reading.type for reading in READINGS}
     model = kinfmu.compile(crank_rocker(), engine=engine)
@@ -216,6 +217,7 @@ def test_descending_driver_values_and_fixed_coordinates_that_depend_on_a_paramet
     assert_as_measured(found, model, measures, crank_angle=TURN[::-1])
 
 
+@pytest.mark.long
 def test_workers_and_the_size_of_parts_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     model = kinfmu.compile(crank_rocker(), engine="native")
     values = drawn(50)
@@ -229,6 +231,7 @@ def test_workers_and_the_size_of_parts_change_nothing(monkeypatch: pytest.Monkey
 
 
 @pytest.mark.parametrize("name", ["jansen_leg", "cam_roller", "five_bar"])
+@pytest.mark.few(1)
 def test_mechanisms_of_the_gallery(name: str) -> None:
     """Coordinates, paths and distances as outputs of generated code, over the file's own laws."""
     mechanism = kinfmu.load(name)
@@ -358,6 +361,7 @@ NO_VALUE = (
 
 @pytest.mark.parametrize(("reading", "reason"), NO_VALUE)
 @pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.few(3)
 def test_what_has_no_value_of_an_angle_that_turns_on_or_of_a_constant_is_stated(
     engine: str, reading: Reading, reason: str
 ) -> None:

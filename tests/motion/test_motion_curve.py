@@ -68,6 +68,7 @@ def driver_by(law: Law, mechanism: Mechanism) -> Driver:
 
 @pytest.mark.parametrize("name", ["lift", "lever.phi"])
 @pytest.mark.parametrize("step", [0.002, 0.0011, 0.01])  # with samples at breaks, and without
+@pytest.mark.few(3)
 def test_the_jerk_at_both_sides_of_a_break_of_a_cam_is_that_of_its_law(
     lever: Mechanism, name: str, step: float
 ) -> None:
@@ -141,6 +142,7 @@ def has_breaks(mechanism: kinfmu.Mechanism) -> bool:
 
 
 @pytest.mark.parametrize("name", [name for name in kinfmu.mechanism.gallery.names() if has_breaks(kinfmu.load(name))])
+@pytest.mark.few(2)
 def test_limits_agree_with_samples_next_to_the_break(name: str) -> None:
     """1e-6 of a step away from the break, the jerk has hardly changed."""
     mechanism = kinfmu.load(name)

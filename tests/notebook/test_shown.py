@@ -155,6 +155,7 @@ def test_a_run_shows_verdict_plot_events_and_ranges() -> None:
     ],
     ids=["no sample", "one sample", "no numbers", "no positions", "a column not kept"],
 )
+@pytest.mark.few(3)
 def test_a_run_shows_what_it_holds(change: Callable[[kinfmu.Run], kinfmu.Run]) -> None:
     run = change(fourbar(np.arange(181.0)))
     shown = page(run)
@@ -229,6 +230,7 @@ def test_every_class_that_shows_itself_has_html() -> None:
 
 
 @needs_browser
+@pytest.mark.long
 def test_tables_that_follow_each_other_do_not_touch(tmp_path: Path) -> None:
     shown = html_page("fit", table([("a", 1.0)], ("unknown", "value")), table([("b", 2.0)], ("target", "error")))
     with browser(tmp_path) as chromium, chromium.tab() as opened:

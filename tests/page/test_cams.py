@@ -222,6 +222,7 @@ def test_values_that_enter_a_cam_draw_the_cam_of_the_saved_file(cams: Opened, va
     assert all("cam" not in one and "profile" not in one for one in cams.get("k.linkage.leftOut"))
 
 
+@pytest.mark.long
 def test_roller_of_a_given_curve_can_be_changed(chromium: Browser) -> None:
     with chromium.open(text_of("cam_roller")) as page:
         before = shapes(page, "pitch")["pitch"]["points"]
@@ -262,6 +263,7 @@ def test_profile_that_cannot_be_is_left_out_and_the_page_states_why(
     assert cams.tab.is_hidden("#note")
 
 
+@pytest.mark.long
 def test_cam_that_does_not_turn_all_the_way_is_left_out(cams: Opened) -> None:
     cams.get(STOP_AT_6)
     set_values(cams, **{"joints.lift.offset": 44.0})
@@ -273,6 +275,7 @@ def test_cam_that_does_not_turn_all_the_way_is_left_out(cams: Opened) -> None:
     )
 
 
+@pytest.mark.long
 def test_the_page_states_why_a_contact_force_is_unknown(chromium: Browser) -> None:
     text = HEAD + JOINTS["up"] + SLIDING
     line = "lift: contact force unknown, the key 'roller_radius' or 'normal' is missing; without a value: O.force_x, "
@@ -287,6 +290,7 @@ def test_the_page_states_why_a_contact_force_is_unknown(chromium: Browser) -> No
         assert page.tab.get_by_text("contact force unknown").count() == 0
 
 
+@pytest.mark.long
 def test_the_block_of_a_follower_is_behind_the_cam_and_under_the_edge_of_the_roller(chromium: Browser) -> None:
     mechanism = parse(HEAD + JOINTS["up"] + SLIDING)
     with chromium.open(page_of(mechanism)) as page:

@@ -43,6 +43,7 @@ def test_the_page_of_a_run_has_its_parameters_and_its_time(command: Command, tmp
     assert data_of(tmp_path / "part.html")["run"]["to"] == pytest.approx(0.95)
 
 
+@pytest.mark.long
 def test_the_page_of_a_run_over_an_angle_has_the_axis_of_the_driver(tmp_path: Path, command: Command) -> None:
     run = kinfmu.solve(kinfmu.load("crank_rocker"), crank_angle=np.radians(np.linspace(30.0, 120.0, 19)))
     write_mcap(run, tmp_path / "run.mcap")
@@ -62,6 +63,7 @@ def test_the_page_of_a_run_over_an_angle_has_the_axis_of_the_driver(tmp_path: Pa
         assert page.errors == []
 
 
+@pytest.mark.long
 def test_the_page_of_a_run_over_two_drivers_shows_its_samples(tmp_path: Path, command: Command) -> None:
     left, right = np.linspace(2.0, 2.6, 31), 0.8 + 0.2 * np.sin(np.linspace(0.0, 6.0, 31))
     run = kinfmu.solve(kinfmu.load("five_bar"), left_angle=left, right_angle=right, right_speed=0.5)
@@ -149,6 +151,7 @@ def test_a_mechanism_is_exported_as_a_page_only(command: Command, refuses: Calla
     assert "not in the gallery" in refuses("export", "run", "-o", "mech.html")
 
 
+@pytest.mark.long
 def test_the_documentation_of_an_fmu_has_the_page(command: Command, tmp_path: Path) -> None:
     for name in ("one", "two"):
         assert command("build", "crank_rocker", "--flavour", "python", "--page", "-o", f"{name}.fmu").exit_code == 0
@@ -165,6 +168,7 @@ def test_the_documentation_of_an_fmu_has_the_page(command: Command, tmp_path: Pa
     assert contents["one"] == contents["none"]
 
 
+@pytest.mark.long
 def test_build_puts_the_page_into_the_documentation_if_asked(tmp_path: Path) -> None:
     mech = kinfmu.load("crank_rocker")
     for page in (True, False):
@@ -173,6 +177,7 @@ def test_build_puts_the_page_into_the_documentation_if_asked(tmp_path: Path) -> 
             assert ("documentation/play.html" in archive.namelist()) is page
 
 
+@pytest.mark.long
 def test_an_fmu_whose_page_cannot_be_compiled(command: Command, fails: Callable[..., str], tmp_path: Path) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("kinfmu.codegen.c.compiler.wasm_module", _refused)

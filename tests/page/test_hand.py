@@ -128,6 +128,7 @@ def test_rows_in_messages_are_joints_and_drivers(chromium: Browser) -> None:
 
 
 @pytest.mark.parametrize("size", [None, PHONE])
+@pytest.mark.long
 def test_arrows_of_velocities_end_in_the_view_and_plots_name_a_whole_turn(
     chromium: Browser, size: dict[str, int] | None
 ) -> None:

@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from tests.page.browser import text_of
 from tests.page.engines import NODE, needs_node
 
@@ -52,6 +54,7 @@ def keeps_its_pose_and_recovers(name: str, found: Sequence[dict[str, Any]]) -> N
         assert one["largest"] <= JUMP, where
 
 
+@pytest.mark.long
 def test_lengths_that_do_not_close_keep_the_pose_and_name_row_and_gap(tmp_path: Path) -> None:
     for name, found in broken(tmp_path, NAMES).items():
         assert len(found) >= 8, name
@@ -61,6 +64,7 @@ def test_lengths_that_do_not_close_keep_the_pose_and_name_row_and_gap(tmp_path: 
         assert row in texts
 
 
+@pytest.mark.long
 def test_the_gap_is_that_of_the_triangle(tmp_path: Path) -> None:
     """With the crank at 0, crank 20, coupler 50 and rocker b: the rocker's pivot is 20 from the pin of the crank."""
     found = broken(tmp_path, ["crank_rocker"])["crank_rocker"]

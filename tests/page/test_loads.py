@@ -95,6 +95,7 @@ def test_every_kind_of_load_is_drawn_at_its_points_with_its_name(chromium: Brows
         assert page.errors == []
 
 
+@pytest.mark.long
 def test_the_arrow_of_a_force_turns_with_its_axes_and_follows_its_values(chromium: Browser) -> None:
     wind = (
         '[loads.wind]\ntype = "force"\nat = "rocker.T"\nx = 30\ny = 40\naxes = "rocker"\n'
@@ -155,10 +156,12 @@ def test_gravity_is_not_drawn_over_other_things(chromium: Browser) -> None:
         assert "g" not in drawn(page).texts
 
 
+@pytest.mark.long
 def test_the_page_of_a_loaded_mechanism_stays_small() -> None:
     assert len(text_of("excavator_loaded").encode()) <= 300_000
 
 
+@pytest.mark.long
 def test_constant_loads_show_their_values_as_set_and_turn_with_their_sign(chromium: Browser) -> None:
     loads = (
         '[loads.push]\ntype = "force_along"\nat = "coupler.M"\nlaw = "constant"\nlevel = 20\n'
@@ -186,6 +189,7 @@ def turn_of(found: Drawn, centre: FloatArray) -> float:
     return float(angles[-1] - angles[0])
 
 
+@pytest.mark.long
 def test_a_force_by_an_expression_of_changed_parameters_is_left_out_by_name(chromium: Browser) -> None:
     parameters = '[parameters]\nF = "30 N"\na = "20 deg"\n'
     loads = (

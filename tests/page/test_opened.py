@@ -47,6 +47,7 @@ def worst_difference(run: Run, other: Run, size: float) -> float:
 
 
 @pytest.mark.parametrize("name", MEMBERS)
+@pytest.mark.few(2)
 def test_an_opened_mechanism_solves_to_the_same_numbers(name: str) -> None:
     mechanism, found = of(name)
     moving = replace(mechanism, coordinates="moving")
@@ -124,6 +125,7 @@ def test_lengths_that_do_not_close_are_named_by_their_places(crank_rocker: dict[
 
 
 @needs_node
+@pytest.mark.long
 def test_masses_and_loads_that_are_set_give_the_forces_of_the_file(tmp_path: Path) -> None:
     set_to = {"bodies.ram.mass": 30.0, "loads.balance.stiffness": 4000.0, "loads.work.law.rise_1": -900.0}
     mechanism, found = of("toggle_press")

@@ -33,6 +33,7 @@ def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 
 
 @pytest.mark.parametrize("name", ["crank_rocker", "jansen_leg", "excavator"])
+@pytest.mark.few(1)
 def test_page_is_one_small_file_without_addresses(name: str) -> None:
     text = text_of(name)
     assert 200_000 <= len(text.encode()) <= LARGEST
@@ -52,6 +53,7 @@ def test_page_with_a_spline_of_500_points_has_about_400_kb() -> None:
 
 
 @pytest.mark.parametrize("name", ["crank_rocker", "jansen_leg", "excavator"])
+@pytest.mark.few(1)
 def test_page_opens_without_errors_and_without_requests(chromium: Browser, name: str) -> None:
     with chromium.open(text_of(name)) as page:
         page.tab.click("#tab-plots")
@@ -80,6 +82,7 @@ def test_dragged_crank_turns_through_its_whole_range_with_the_native_poses(chrom
         assert known[name] == pytest.approx(run[name][0], abs=1e-10)
 
 
+@pytest.mark.long
 def test_dragged_bucket_moves_three_cylinders_whose_sliders_end_at_their_limits(chromium: Browser) -> None:
     limits = [(reach.low, reach.high) for reach in kinfmu.check(kinfmu.load("excavator")).ranges]
     with chromium.open(text_of("excavator")) as page:
@@ -91,6 +94,7 @@ def test_dragged_bucket_moves_three_cylinders_whose_sliders_end_at_their_limits(
 
 
 @pytest.mark.parametrize("stop", [1e-6, 0.004, 0.2, 3.0, 100.0])
+@pytest.mark.long
 def test_the_clock_has_the_digits_of_the_run_and_the_speed_makes_short_runs_visible(
     chromium: Browser, stop: float
 ) -> None:
@@ -126,6 +130,7 @@ def _geared(ratio: float) -> kinfmu.Mechanism:
     ],
     ids=lambda one: getattr(one, "name", one),
 )
+@pytest.mark.few(1)
 def test_slider_plots_curves_and_clock_run_over_one_whole_cycle(
     chromium: Browser, mech: kinfmu.Mechanism, turns: int
 ) -> None:
@@ -167,6 +172,7 @@ def test_slider_plots_curves_and_clock_run_over_one_whole_cycle(
         assert np.abs(turn[name] - column).max() < 1e-8 * max(1.0, np.abs(column).max())
 
 
+@pytest.mark.long
 def test_the_cycle_is_counted_again_with_another_ratio(chromium: Browser) -> None:
     with chromium.open(kinfmu.page.page(_geared(-2.0))) as page:
         for ratio, turns in ((-0.5, 2), (-1.5, 2), (-2.25, 4), (-1.0, 1)):
@@ -189,6 +195,7 @@ def test_page_fits_a_phone(chromium: Browser) -> None:
 
 @pytest.mark.parametrize("name", ["jansen_leg", "parallel_jaw", "peaucellier", "fourbar", "toggle_press"])
 @pytest.mark.parametrize("size", [PHONE, DESKTOP])
+@pytest.mark.few(1)
 def test_names_cover_neither_each_other_nor_the_linkage(chromium: Browser, name: str, size: dict[str, int]) -> None:
     with chromium.open(text_of(name)) as page:
         page.resize(size)
@@ -216,6 +223,7 @@ def _light(colour: str) -> float:
     "size", [pytest.param(PHONE, id="phone"), pytest.param(DESKTOP, id="desktop", marks=pytest.mark.long)]
 )
 @every_member
+@pytest.mark.long
 def test_names_keep_their_places_in_a_turn_and_have_the_contrast_of_wcag_aa(
     chromium: Browser, name: str, size: dict[str, int]
 ) -> None:
@@ -439,6 +447,7 @@ def test_flat_face_touches_its_cam_and_a_roller_runs_on_its_pitch_curve(chromium
         assert np.hypot(*(curve - place).T).min() < 0.5 * np.hypot(*(curve[1] - curve[0])) * 1.1
 
 
+@pytest.mark.long
 def test_masses_and_gravity_have_the_limits_and_the_effects_of_the_file(chromium: Browser) -> None:
     mech = kinfmu.load("fourbar_loaded")
     with chromium.open(text_of("fourbar_loaded")) as page:
@@ -518,6 +527,7 @@ def test_forces_in_joints_are_drawn_to_one_scale_and_only_computed_when_shown(ch
     assert at_pin == pytest.approx([scale * run["P.force_x"][0], scale * run["P.force_y"][0]], rel=1e-6)
 
 
+@pytest.mark.long
 def test_every_dyad_has_its_transmission_angle_in_the_drawing_and_the_plots(chromium: Browser) -> None:
     angles = {}
     for loop in (*(report := kinfmu.check(kinfmu.load("watt_six_bar"))).loops, *report.dyads):
@@ -548,6 +558,7 @@ def test_every_dyad_has_its_transmission_angle_in_the_drawing_and_the_plots(chro
         ),
     ],
 )
+@pytest.mark.long
 def test_the_first_plots_are_of_coordinates_that_move(chromium: Browser, more: str, shown: list[str]) -> None:
     mech = parse(toml_text(kinfmu.load("slider_crank")) + more)
     with chromium.open(kinfmu.page.page(mech)) as page:
@@ -562,6 +573,7 @@ def test_the_first_plots_are_of_coordinates_that_move(chromium: Browser, more: s
 
 
 @pytest.mark.parametrize("name", ["triple_rocker", "peaucellier", "stephenson_six_bar", "crank_rocker"])
+@pytest.mark.long
 def test_plots_over_a_driver_clip_poles_as_export_does(chromium: Browser, name: str) -> None:
     mech = kinfmu.load(name)
     body = mech.moving_bodies[1].name
@@ -658,6 +670,7 @@ def test_keyboard_alone_moves_plays_and_changes_values(chromium: Browser) -> Non
 
 
 @pytest.mark.parametrize("name", ["crank_rocker", "jansen_leg", "slider_crank"])
+@pytest.mark.few(2)
 def test_a_pin_is_chosen_and_moved_by_keys(chromium: Browser, name: str) -> None:
     with chromium.open(text_of(name)) as page:
         keyboard, ring = page.tab.keyboard, "k.linkage.pose && k.hand.place"
@@ -738,6 +751,7 @@ def test_nothing_is_spoken_at_frame_rate_and_the_drawing_states_its_pose(chromiu
     "name", ["crank_rocker", "triple_rocker", "cam_roller", "slider_crank", "toggle_press", "five_bar"]
 )
 @pytest.mark.parametrize("size", [PHONE, DESKTOP], ids=["phone", "desktop"])
+@pytest.mark.few(2)
 def test_fit_shows_the_circles_of_the_drivers(chromium: Browser, name: str, size: dict[str, int]) -> None:
     with chromium.open(text_of(name)) as page:
         page.resize(size)
@@ -765,6 +779,7 @@ def test_fit_shows_the_circles_of_the_drivers(chromium: Browser, name: str, size
         assert dial[:, 1].max() <= height - 8.0
 
 
+@pytest.mark.long
 def test_notes_and_long_rows_leave_scale_and_check_boxes_alone(chromium: Browser) -> None:
     with chromium.open(text_of("geared_five_bar")) as page:
         page.get("k.design.set({'joints.mesh.offset': 0.1}) && k.reshape()")
@@ -815,6 +830,7 @@ def test_a_length_that_closes_on_another_branch_only_names_no_gap(chromium: Brow
         assert "joint C closes on another branch only. The last good" in banner
 
 
+@pytest.mark.long
 def test_a_pose_that_is_too_far_is_refused_by_that_reason_alone(chromium: Browser) -> None:
     with chromium.open(text_of("crank_rocker")) as page:
         assert page.get("k.linkage.goTo([1.2e6])") is False

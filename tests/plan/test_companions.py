@@ -57,6 +57,7 @@ def test_rods_in_line_keep_their_change_points() -> None:
 @pytest.mark.parametrize("rods", [LOCOMOTIVE, ROW])
 @pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize("second", [False, pytest.param(True, marks=pytest.mark.long)])
+@pytest.mark.few(2)
 def test_coupled_wheels_turn_by_equal_angles(
     rods: dict[str, tuple[int, int, float]], engine: str, second: bool
 ) -> None:
@@ -86,6 +87,7 @@ def mismatched(longer: float) -> Mechanism:
 
 @pytest.mark.parametrize("longer", [1e-13, -3e-13, 1e-12, -2e-12, 4e-12])
 @pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.few(3)
 def test_a_mismatch_that_counts_as_consistent_moves_coupled_wheels_by_as_little(engine: str, longer: float) -> None:
     """A rod turns its wheel by its mismatch over the pin's distance, 0.5, from the line of centres; within 45 deg."""
     run = kinfmu.solve(mismatched(longer), engine=engine, crank_angle=np.concatenate([ANGLES, AT_ENDS]))
@@ -95,6 +97,7 @@ def test_a_mismatch_that_counts_as_consistent_moves_coupled_wheels_by_as_little(
 
 
 @pytest.mark.parametrize(("flavour", "fmi"), [("python", 2), ("native", 2), ("native", 3)])
+@pytest.mark.few(1)
 def test_fmus_of_coupled_wheels_with_a_mismatch_turn(tmp_path: Path, flavour: str, fmi: int) -> None:
     fmu = kinfmu.build(mismatched(2e-12), tmp_path / "wheels.fmu", flavour=flavour, fmi=fmi)
     run = kinfmu.simulate(fmu, stop=6.5, step=0.05)
@@ -155,6 +158,7 @@ def test_check_names_the_crossing_of_a_block_with_a_companion() -> None:
 
 
 @pytest.mark.parametrize(("flavour", "fmi"), [("python", 2), ("native", 2), ("native", 3)])
+@pytest.mark.few(1)
 def test_fmus_of_coupled_wheels_are_regular_at_every_angle(tmp_path: Path, flavour: str, fmi: int) -> None:
     fmu = kinfmu.build(wheels(LOCOMOTIVE), tmp_path / "wheels.fmu", flavour=flavour, fmi=fmi)
     run = kinfmu.simulate(fmu, stop=6.5, step=0.05)

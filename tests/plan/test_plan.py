@@ -86,6 +86,7 @@ def test_equal_mechanisms_have_equal_plans_and_others_have_not() -> None:
     assert compile_plan(fourbar(4, 1, 3.5, 3)) != compile_plan(fourbar(4, 1, 3.5, 3.25))
 
 
+@pytest.mark.long
 def test_hash_order_never_reaches_the_plan_or_its_code() -> None:
     script = (
         "import hashlib, kinfmu; from kinfmu.plan import compile_plan; from kinfmu.codegen.python import emit\n"

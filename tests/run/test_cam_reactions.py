@@ -122,6 +122,7 @@ def point(run: Run, mechanism: Mechanism, name: str) -> FloatArray:
 
 @pytest.mark.parametrize(("order", "is_carried"), [(0, False), (1, True)])
 @pytest.mark.parametrize("follower", LED)
+@pytest.mark.few(2)
 def test_cam_and_follower_are_in_balance_with_the_contact_force(follower: str, order: int, is_carried: bool) -> None:
     mechanism = heavy(LED[follower](), order, is_carried=is_carried)
     run = kinfmu.solve(mechanism, np.linspace(0.0, 0.9, 29))
@@ -151,6 +152,7 @@ def test_cam_and_follower_are_in_balance_with_the_contact_force(follower: str, o
 
 @pytest.mark.parametrize(("led", "given"), [("up", "roller"), ("face", "flat")])
 @pytest.mark.parametrize("count", [29, 401])
+@pytest.mark.few(2)
 def test_reactions_are_those_of_the_same_cam_given_by_its_curve(led: str, given: str, count: int) -> None:
     """401 samples are solved by the native engine, 29 in Python."""
     theta = np.linspace(0.1, math.tau, count)

@@ -59,6 +59,7 @@ def assert_as_solved(model: kinfmu.Model, designs: kinfmu.Designs, **arguments: 
 @pytest.mark.parametrize(
     "name", mostly_long(["crank_rocker", "fourbar", "five_bar", "slider_crank"], few=("fourbar", "five_bar"))
 )
+@pytest.mark.few(1)
 def test_designs_equal_solve_of_each(name: str, engine: str) -> None:
     mechanism = with_open_lengths(kinfmu.load(name))
     model = kinfmu.compile(mechanism, engine=engine)
@@ -73,6 +74,7 @@ def test_designs_equal_solve_of_each(name: str, engine: str) -> None:
 
 
 @pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.few(1)
 def test_parameters_that_are_not_given_follow_from_those_that_are(engine: str) -> None:
     crank_rocker = with_open_lengths(kinfmu.load("crank_rocker"))
     values = {name: float(parameter.value) for name, parameter in crank_rocker.parameters.items()}
@@ -89,6 +91,7 @@ def test_parameters_that_are_not_given_follow_from_those_that_are(engine: str) -
 
 
 @pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.few(1)
 def test_laws_drive_designs_with_constants_of_their_own(engine: str) -> None:
     mechanism = with_open_lengths(kinfmu.load("crank_rocker"))
     model = kinfmu.compile(mechanism, engine=engine)
@@ -177,6 +180,7 @@ def test_derivatives_that_are_not_requested_are_not_computed() -> None:
         ({"a": 1.0}, {"t": [0.0], "crank_angle": [0.0]}, "give times or inputs, not both"),
     ],
 )
+@pytest.mark.few(9)
 def test_a_wrong_request_is_refused_in_one_line(
     values: dict[str, object], arguments: dict[str, object], message: str
 ) -> None:
@@ -187,6 +191,7 @@ def test_a_wrong_request_is_refused_in_one_line(
 @pytest.mark.parametrize("threads", [1, 2, 3, 8])
 @pytest.mark.parametrize("designs", [1, 2, 7, 1000, 10_000])
 @pytest.mark.parametrize("most", [1, 415])
+@pytest.mark.few(15)
 def test_parts_hold_all_designs_and_every_thread_gets_as_many(designs: int, most: int, threads: int) -> None:
     parts = parts_of(designs, most, threads)
     assert [k for part in parts for k in range(part.start, part.stop)] == list(range(designs))

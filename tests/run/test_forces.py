@@ -89,6 +89,7 @@ def efforts_in_50_digits(name: str, mechanism: Mechanism, run: Run, t: float) ->
 
 @pytest.mark.parametrize("at", ["some samples", pytest.param("every sample", marks=pytest.mark.long)])
 @every_member
+@pytest.mark.few(2)
 def test_efforts_equal_virtual_work_in_50_digits(name: str, at: str) -> None:
     mechanism = loaded(name)
     run = kinfmu.solve(mechanism)
@@ -166,6 +167,7 @@ def is_free_body_diagram_known(name: str) -> bool:
 
 
 @every_member
+@pytest.mark.few(2)
 def test_reactions_and_torques_balance_every_body(name: str) -> None:
     """Newton and Euler about the centre of mass of each body, at every sample."""
     if not is_free_body_diagram_known(name):
@@ -213,6 +215,7 @@ def test_reactions_and_torques_balance_every_body(name: str) -> None:
 
 @pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize("name", ["fourbar", "slider_crank", "jansen_leg", "double_pendulum"])
+@pytest.mark.few(2)
 def test_forces_of_a_driver_that_moves_are_those_of_one_that_rests_somewhere(name: str, engine: str) -> None:
     """Coefficients from rates, or solved where a speed is 0; bridges and limits are on the way."""
     model = kinfmu.compile(loaded(name), engine=engine)  # type: ignore[arg-type]
@@ -324,6 +327,7 @@ def met(load: str) -> Mechanism:
 
 @pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize("count", [3, 41])
+@pytest.mark.few(2)
 def test_a_spring_without_free_length_acts_where_its_ends_meet(engine: str, count: int) -> None:
     """At the inner dead centre the slide does not move: the torque carries half of the rod's weight at P."""
     model = kinfmu.compile(toml_file.parse(MET), engine=engine)
@@ -341,6 +345,7 @@ def test_a_spring_without_free_length_acts_where_its_ends_meet(engine: str, coun
 @pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize("count", [3, 41])
 @pytest.mark.parametrize("load", MEETING)
+@pytest.mark.few(1)
 def test_a_load_whose_ends_meet_has_no_direction_which_a_warning_says(load: str, count: int, engine: str) -> None:
     """What does not depend on it keeps its value: energies and the shaking force."""
     mechanism = met(load)

@@ -238,6 +238,7 @@ ENDS = {  # of the loads of every kind: what they join
 
 @pytest.mark.parametrize("unit", ["mm", "m"])
 @pytest.mark.parametrize("how", ["python", "native", "python FMU", "native FMU", "record"])
+@pytest.mark.few(2)
 def test_springs_and_dampers_have_columns_of_force_and_length(unit: str, how: str, tmp_path: Path) -> None:
     """Force positive where it pushes the points apart; length in the file's unit, angle in rad."""
     slack = '[loads.slack]\ntype = "spring"\nbetween = ["ground.D", "coupler.M"]\nstiffness = 30\nfree_length = 0\n'

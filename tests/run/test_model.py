@@ -28,6 +28,7 @@ def assert_equal(run: Run, wanted: Run) -> None:
 
 
 @pytest.mark.parametrize("name", ["fourbar", "crank_rocker", "five_bar", "cam_roller", "jansen_leg"])
+@pytest.mark.few(3)
 def test_a_model_solves_as_solve_does(name: str) -> None:
     mechanism = kinfmu.load(name)
     model = kinfmu.compile(mechanism)
@@ -99,6 +100,7 @@ def test_a_parameter_by_an_expression_can_be_an_argument_too() -> None:
 
 
 @pytest.mark.parametrize("engine", ["auto", "python", "native"])
+@pytest.mark.few(2)
 def test_models_travel_between_processes(engine: str) -> None:
     model = kinfmu.compile(leg(), ["foot.x", "foot.y"], parameters=["a", "c"], engine=engine)
     there = pickle.loads(pickle.dumps(model))  # noqa: S301  our own

@@ -54,6 +54,7 @@ def assert_same_motion(native: Run, python: Run) -> None:
 
 
 @every_member
+@pytest.mark.few(1)
 def test_the_gallery_moves_as_in_python(name: str) -> None:
     mechanism = kinfmu.load(name)
     plan = compile_plan(mechanism)
@@ -66,6 +67,7 @@ def test_the_gallery_moves_as_in_python(name: str) -> None:
 
 
 @pytest.mark.usefixtures("optimized")
+@pytest.mark.long
 def test_change_points_are_crossed_at_full_accuracy_in_any_order() -> None:
     rng = np.random.default_rng(5)
     turns = np.concatenate(
@@ -81,11 +83,13 @@ def test_change_points_are_crossed_at_full_accuracy_in_any_order() -> None:
         np.testing.assert_allclose(run["coupler.ax"], -np.cos(u), rtol=0, atol=1e-8)
 
 
+@pytest.mark.long
 def test_optimizing_compilers_find_nothing_to_warn_of(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(library, "FLAGS", (*library.FLAGS, "-O2"))
     assert kinfmu.solve(kinfmu.load("crank_rocker"), crank_angle=[1.0, 2.0], engine="native").good.all()
 
 
+@pytest.mark.long
 def test_optimization_changes_no_bit(request: pytest.FixtureRequest) -> None:
     plan = compile_plan(kinfmu.load("jansen_leg"))
     angles = driven(np.linspace(0.0, 6.0, 120))  # too few for lanes, which fuse on purpose
@@ -104,6 +108,7 @@ def test_most_samples_are_solved_in_lanes() -> None:
 
 
 @pytest.mark.usefixtures("optimized")
+@pytest.mark.long
 def test_loops_of_one_kind_with_other_lengths_agree_with_python() -> None:
     u = np.linspace(1.0, 8.0, SAMPLES)
     native, python = (kinfmu.solve(uneven_chain(4), crank_angle=u, engine=engine) for engine in ("native", "python"))
@@ -211,6 +216,7 @@ def test_samples_past_a_limit_are_reported_and_the_branch_comes_back() -> None:
     assert [event.text for event in native.events] == [event.text for event in python.events]
 
 
+@pytest.mark.long
 def test_after_thousands_of_turns_samples_are_as_good_as_at_first() -> None:
     u = 2.0 * np.pi * 3_000 + np.linspace(0.0, 7.0, 700)  # the last ones fill no lanes
     native, python = (kinfmu.solve(kinfmu.load("jansen_leg"), engine=engine, crank_angle=u) for engine in ENGINES)

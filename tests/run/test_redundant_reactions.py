@@ -33,6 +33,7 @@ def coupled(rods: dict[str, tuple[int, int, float]]) -> Mechanism:
 
 @pytest.mark.parametrize("rods", [LOCOMOTIVE, ROW])
 @pytest.mark.parametrize(("engine", "count"), [("python", 3), ("python", 29), ("native", 401)])
+@pytest.mark.few(2)
 def test_determined_reactions_of_coupled_wheels_are_exact(
     rods: dict[str, tuple[int, int, float]], engine: str, count: int
 ) -> None:

@@ -162,6 +162,7 @@ def test_two_drivers_agree_with_fifty_digits() -> None:
         assert_equal(found, exact_derivative(form, {key: mp.mpf(x) for key, x in numbers.items()}, name), outputs, name)
 
 
+@pytest.mark.long
 def test_random_four_bars_agree_with_fifty_digits() -> None:
     rng = random.Random(15)  # noqa: S311
     checked = 0
@@ -243,6 +244,7 @@ def crossing(scaled: bool) -> Mechanism:
 
 
 @pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.few(1)
 def test_parameters_that_keep_a_change_point_have_derivatives_there(engine: str) -> None:
     """A factor of all lengths changes no angle; lengths by themselves remove the change point."""
     angles = np.array([0.5, 3.1, math.pi - 1e-3, math.pi, math.pi + 1e-9, 3.2, 4.0])
@@ -351,6 +353,7 @@ EIGHTH = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
 
 
 @pytest.mark.parametrize("name", mostly_long(NAMES))
+@pytest.mark.few(2)
 def test_gallery_with_open_lengths_agrees_with_fifty_digits(name: str) -> None:
     """Seven lengths at one sample; all lengths at more samples: `python -m tests.stress.sensitivities --gallery`."""
     found = compared_in_gallery(name, lengths=7, samples=slice(1, 2))
@@ -417,6 +420,7 @@ def test_samples_one_by_one_equal_samples_as_arrays() -> None:
 
 
 @pytest.mark.parametrize("name", ["stephenson_six_bar", "cam_roller", "five_bar"])
+@pytest.mark.few(1)
 def test_native_and_python_engine_give_the_same(name: str) -> None:
     """Blocks of one and two unknowns, of more, and curves."""
     mechanism = with_open_lengths(kinfmu.load(name))
@@ -495,6 +499,7 @@ def test_a_model_from_another_process_gives_the_same() -> None:
         ({"parameters": {"couplr": 1.0}}, "there is no parameter 'couplr'; did you mean 'coupler'?"),
     ],
 )
+@pytest.mark.few(2)
 def test_what_is_not_known_is_refused(arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(RequestError, match=re.escape(message)):
         kinfmu.compile(linkage()).sensitivities(**arguments)

@@ -172,6 +172,7 @@ def entries(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Callable[[Any
 
 
 @pytest.mark.parametrize("case", NO_NUMBERS)
+@pytest.mark.few(1)
 def test_what_numpy_would_make_numbers_of_is_refused_in_one_line(
     case: str, entries: dict[str, Callable[[Any], object]]
 ) -> None:
@@ -249,6 +250,7 @@ def test_no_samples_are_an_empty_run() -> None:
     ],
     ids=["inputs", "times", "parameters"],
 )
+@pytest.mark.few(2)
 def test_margins_and_error_estimates_are_computed_when_they_are_read(engine: str, arguments: dict[str, object]) -> None:
     run = kinfmu.solve(kinfmu.load("fourbar"), engine=engine, **arguments)  # type: ignore[arg-type]  # several kinds
     assert callable(vars(run)["margin"])

@@ -80,6 +80,7 @@ def squeezer() -> Mechanism:
 
 
 @pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.few(1)
 def test_the_driving_torque_of_the_published_start(engine: str) -> None:
     count = 1 if engine == "python" else 400
     run = kinfmu.solve(

@@ -121,6 +121,7 @@ def test_a_crossing_too_near_a_dead_centre_is_a_limit() -> None:
 
 
 @pytest.mark.parametrize("degrees", [24.5, 24.6, 24.61, 24.618])
+@pytest.mark.few(2)
 def test_a_crossing_without_room_for_a_bridge_is_reported_as_one(degrees: float) -> None:
     """The crossing comes as close as 3e-8 mm to the dead centre, where the rods and the cranks are in line."""
     turn = math.radians(degrees)
@@ -197,6 +198,7 @@ def test_a_run_is_never_poisoned_by_samples_outside() -> None:
 
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize("lengths", [("4", "1", "3", "2"), ("2", "1", "2", "1")])
+@pytest.mark.few(2)
 def test_a_crossing_that_depends_on_one_driver_is_bridged_for_all_values_of_the_others(
     lengths: tuple[str, str, str, str], branch: int
 ) -> None:
@@ -259,6 +261,7 @@ LEVERS = [
 
 @pytest.mark.parametrize("target", [math.pi, math.pi + 1e-9, 9.0, -1.5])
 @pytest.mark.parametrize(("offset", "turn", "unit", "has_shoe"), LEVERS)
+@pytest.mark.few(13)
 def test_beyond_a_pole_a_path_ends_early_with_the_pole_and_what_runs_to_infinity(
     monkeypatch: pytest.MonkeyPatch, offset: float, turn: float, unit: float, has_shoe: bool, target: float
 ) -> None:
@@ -282,6 +285,7 @@ def test_beyond_a_pole_a_path_ends_early_with_the_pole_and_what_runs_to_infinity
 
 @pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize(("offset", "turn", "unit", "has_shoe"), LEVERS[::3])
+@pytest.mark.few(1)
 def test_toward_a_pole_samples_up_to_10_000_sizes_away_are_right(
     engine: str, offset: float, turn: float, unit: float, has_shoe: bool
 ) -> None:
@@ -308,6 +312,7 @@ def test_check_calls_a_pole_no_dead_centre() -> None:
 
 
 @pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.few(1)
 def test_a_dead_centre_of_a_slide_is_no_pole(engine: str) -> None:
     """Before it the block is as fast as before a pole: x = 1.5 cos phi + sqrt(1 - (1.5 sin phi)^2)."""
     mechanism = Mechanism(

@@ -67,6 +67,7 @@ def test_closed_form_of_a_fourbar_has_18_digits(lengths: tuple[str, str, str, st
 
 
 @pytest.mark.parametrize("case", FEW)
+@pytest.mark.few(1)
 def test_closed_form_is_the_smooth_branch_through_the_change_points(case: Case) -> None:
     """Against the residuals alone, followed in small steps with 50 digits."""
     numbers = case.name.removesuffix(" crossed")
@@ -109,6 +110,7 @@ def test_reference_fourbar_stays_a_parallelogram_on_every_grid(grids: tuple[int,
 
 
 @pytest.mark.parametrize("case", CASES)
+@pytest.mark.few(1)
 def test_the_smooth_branch_is_kept_on_every_grid(case: Case, grids: tuple[int, int | None]) -> None:
     count, most = grids
     for seed in range(count):
@@ -118,6 +120,7 @@ def test_the_smooth_branch_is_kept_on_every_grid(case: Case, grids: tuple[int, i
 
 
 @pytest.mark.parametrize("case", [pytest.param(reference(), id="reference"), *CASES])
+@pytest.mark.few(3)
 def test_at_a_change_point_and_as_near_as_doubles_go_nothing_is_lost(case: Case) -> None:
     quarter = math.pi / 2.0 if case.name.startswith("slider") else 0.0
     near = [0.0, *(side * 10.0**-k for k in range(1, 13) for side in (1.0, -1.0))]
@@ -131,6 +134,7 @@ def test_at_a_change_point_and_as_near_as_doubles_go_nothing_is_lost(case: Case)
 
 @pytest.mark.parametrize("case", [pytest.param(reference(), id="reference"), *CASES])
 @pytest.mark.parametrize("first", [0.0, math.pi, math.pi / 2.0, -9.0 * math.pi, 40.0])
+@pytest.mark.few(13)
 def test_a_run_may_begin_anywhere(case: Case, first: float) -> None:
     run = case.run([first, first + 0.5, first - 4.0])
     assert run.good.all()
@@ -138,6 +142,7 @@ def test_a_run_may_begin_anywhere(case: Case, first: float) -> None:
 
 
 @pytest.mark.parametrize("case", [pytest.param(reference(), id="reference"), *CASES])
+@pytest.mark.few(2)
 def test_going_back_jumps_of_many_turns_and_any_order_arrive_where_small_steps_arrive(case: Case) -> None:
     rng = random.Random(7)  # noqa: S311  # samples, not secrets
     u = [rng.choice([rng.uniform(-60.0, 60.0), round(rng.uniform(-19, 19)) * math.pi]) for _ in range(60)]
@@ -150,6 +155,7 @@ def test_going_back_jumps_of_many_turns_and_any_order_arrive_where_small_steps_a
 
 
 @pytest.mark.parametrize("apart", [0.3, 0.1, 0.06, 0.03, 0.01, 4e-3, 1e-3, 1e-5, 0.0])
+@pytest.mark.few(2)
 def test_change_points_of_two_loops_are_bridged_apart_or_together(apart: float, grids: tuple[int, int | None]) -> None:
     count, most = grids
     case = two_loops(apart)
@@ -183,6 +189,7 @@ def gaps(case: Case) -> NDArray[np.float64]:
 
 
 @pytest.mark.parametrize("by", mostly_long(OFF, few=("1e-6", "-1e-8", "-1e-11")))
+@pytest.mark.few(1)
 def test_near_a_change_point_samples_are_right_within_their_estimate_or_outside(
     by: str, grids: tuple[int, int | None]
 ) -> None:
@@ -204,6 +211,7 @@ def test_near_a_change_point_samples_are_right_within_their_estimate_or_outside(
 
 
 @pytest.mark.parametrize("by", ["1e-12", "-1e-12", "1e-13", "-1e-14"])
+@pytest.mark.few(2)
 def test_a_length_within_1e_12_of_a_change_point_counts_as_one(by: str) -> None:
     for case in change_point_cases():
         lengths = ("1", "1") if case.name.startswith("slider") else tuple(case.name.removesuffix(" crossed").split("-"))

@@ -26,6 +26,7 @@ def numbers() -> list[Number]:
 
 
 @pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.few(1)
 def test_the_estimate_is_at_least_the_error_in_99_percent_and_1000_times_too_large_at_most(
     numbers: list[Number], order: str
 ) -> None:
@@ -70,6 +71,7 @@ def test_they_grow_with_the_speed_and_with_its_square() -> None:
 
 @pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize("ratio", [7.3, -3.7])
+@pytest.mark.few(2)
 def test_rates_of_gears_are_estimated_by_their_own_size(engine: str, ratio: float) -> None:
     """A train that only speeds up: its last gear turns up to ratio^2 times as fast as the driver."""
     names = ["first", "second", "third"]

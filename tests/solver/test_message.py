@@ -33,6 +33,7 @@ DEAD_CENTRE = math.acos(1.0 / 13.0)  # 65^2 + 100^2 - 2 65 100 cos u = (50 + 65)
         (math.inf, 6, "crank = inf rad (inf deg)"),
     ],
 )
+@pytest.mark.few(3)
 def test_an_angle_has_as_many_decimals_as_it_is_known_to(value: float, digits: int, text: str) -> None:
     model = load_model(compile_plan(kinfmu.load("fourbar")))
     assert place(model, (value,), digits) == text
@@ -89,6 +90,7 @@ def native_message(native: Native, limit: float, asked: float) -> str:
 
 @pytest.mark.parametrize("turns", [0, 5, 1_000_000])
 @pytest.mark.parametrize("beyond", [3e-9, 1e-10, 3e-11, 1e-12, 0.0])
+@pytest.mark.few(5)
 def test_a_refused_value_never_has_the_digits_of_its_limit(native: Native, turns: int, beyond: float) -> None:
     model = load_model(compile_plan(kinfmu.load("triple_rocker")))
     limit = DEAD_CENTRE + turns * math.tau

@@ -52,6 +52,7 @@ def test_with_several_drivers_the_path_back_from_a_near_singular_pose_is_the_pat
 
 
 @pytest.mark.parametrize("flavour", ["python", pytest.param("native 2", marks=pytest.mark.long), "native 3"])
+@pytest.mark.few(1)
 def test_in_fmus_the_path_back_from_a_near_singular_pose_is_the_path_there(flavour: str, tmp_path: Path) -> None:
     name, _, fmi = flavour.partition(" ")
     path = kinfmu.build(
@@ -95,6 +96,7 @@ def test_at_the_start_pose_a_sample_is_judged_like_the_same_one_later(gap: float
     ("engine", "drivers", "gap"),
     [*(("python", drivers, gap) for drivers in (1, 2) for gap in (0.1, 1e-2, 1e-4)), ("native", 2, 1e-4)],
 )
+@pytest.mark.few(3)
 def test_before_a_limit_the_first_sample_is_judged_like_later_ones(gap: float, drivers: int, engine: Engine) -> None:
     """A triple rocker before its dead centre; an arm of its own is the second driver."""
     start = math.acos(-1.0 / 8.0) - gap  # 2, 1, 1.5, 1: coupler and rocker stretched
@@ -190,6 +192,7 @@ def pin_by_dense_newton(left: float, right: float, forearms: FloatArray) -> tupl
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(("gap", "rounding"), [(1e-3, 1e-12), (1e-4, 1e-11), (1e-5, 1e-10)])
+@pytest.mark.few(3)
 def test_near_a_singular_pose_of_two_drivers_accelerations_are_those_of_a_dense_newton_that_goes_on(
     engine: Engine, gap: float, rounding: float
 ) -> None:
@@ -277,6 +280,7 @@ def test_a_pose_of_two_bridges_comes_back_from_its_numbers_to_the_bit() -> None:
 
 
 @pytest.mark.parametrize("flavour", ["python", pytest.param("native 2", marks=pytest.mark.long), "native 3"])
+@pytest.mark.few(1)
 def test_fmus_follow_a_crossing_with_blocks_of_several_drivers_and_go_back_to_a_state(
     flavour: str, tmp_path: Path
 ) -> None:
@@ -312,6 +316,7 @@ def test_fmus_follow_a_crossing_with_blocks_of_several_drivers_and_go_back_to_a_
 
 
 @pytest.mark.parametrize("flavour", ["python", "native 3"])
+@pytest.mark.few(1)
 def test_fmus_pass_crossings_of_each_driver_and_go_back_to_a_state(flavour: str, tmp_path: Path) -> None:
     name, _, fmi = flavour.partition(" ")
     case = fourbar("4", "1", "3", "2")
@@ -413,6 +418,7 @@ def test_blocks_that_depend_on_several_drivers_follow_a_track_over_its_crossing(
 
 
 @pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.few(1)
 def test_only_a_crossing_that_depends_on_several_drivers_is_reported_as_a_limit(engine: Engine) -> None:
     reason = "link.phi, strut.phi cross; the crossing depends on several drivers, so no bridge is built"
     ways = {"left_angle": [0.3, -0.3], "right_angle": [math.pi + 0.3, math.pi - 0.3]}

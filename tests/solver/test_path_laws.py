@@ -96,6 +96,7 @@ def solved(mechanism: Mechanism, u: Sequence[float], engine: str) -> kinfmu.Run:
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("width", [0.5, 1e-2, 1e-4, 2e-7])
 @pytest.mark.parametrize("turns", [1, -3])
+@pytest.mark.few(1)
 def test_a_rise_of_whole_turns_turns_all_that_follows(width: float, turns: int, engine: str) -> None:
     """From dwell to dwell: at both ends of a step slope and curvature are 0, and the linkage looks the same."""
     law = sequence(("dwell", math.tau - width, 0.0), ("cycloidal", width, turns * math.tau))
@@ -123,6 +124,7 @@ def cycloid(s: float) -> float:
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("width", [0.5, 1e-2, 1e-4, 2e-7])
+@pytest.mark.few(1)
 def test_a_bump_past_a_dead_centre_is_the_limit_on_every_grid(width: float, engine: str) -> None:
     begin, rise = 3.0, 0.4
     law = sequence(("cycloidal", width, rise), ("cycloidal", width, -rise), begin=begin, repeat=False)
@@ -147,6 +149,7 @@ def test_a_bump_past_a_dead_centre_is_the_limit_on_every_grid(width: float, engi
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("width", [0.05, 1e-3, 1e-5])
+@pytest.mark.few(1)
 def test_rises_over_the_angle_of_a_lever_are_seen_also_where_it_turns_back(width: float, engine: str) -> None:
     """The law's whole turns of 0.01 rad before the lever's dead centre are passed there and back, within a step."""
     lever = linkage("law = 'constant_speed'", **LEVER)
@@ -170,6 +173,7 @@ def test_rises_over_the_angle_of_a_lever_are_seen_also_where_it_turns_back(width
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("step", [0.05, 1.0, 7.0, 45.0])
 @pytest.mark.parametrize("law", ["harmonic", "spline", "constant_speed"])
+@pytest.mark.few(1)
 def test_a_coupled_distance_that_would_be_negative_is_outside_on_every_grid(law: str, step: float, engine: str) -> None:
     spike = [[0, 1], [4.7, 1], [4.71, -0.01], [4.72, 1], [6.3, 1]]
     laws = {
@@ -215,6 +219,7 @@ law = "constant_speed"
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("grid", [[0.0, 1000.0], np.linspace(0.0, 1000.0, 12), np.linspace(0.0, 1000.0, 700)])
+@pytest.mark.few(2)
 def test_a_bump_of_a_linear_cam_past_a_dead_centre_is_the_limit(grid: Sequence[float], engine: str) -> None:
     """A cam on a slide lifts a bar of 100 mm on a crank of 50 mm; a bump of 60 mm would stretch them."""
     mechanism = parse("""
@@ -267,6 +272,7 @@ law = "constant_speed"
 
 
 @pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.few(1)
 def test_a_point_out_of_line_in_a_dense_table_is_seen(engine: str) -> None:
     """720 points in a turn of a slow wave; one of them 0.4 rad off, past the dead centre of the linkage."""
     x = np.radians(0.5 * np.arange(721))
@@ -280,6 +286,7 @@ def test_a_point_out_of_line_in_a_dense_table_is_seen(engine: str) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.few(1)
 def test_fast_harmonic_laws_are_seen_wave_by_wave(engine: str) -> None:
     """1000 waves of 0.4 rad in a turn: from zero to zero no step is as it seems."""
     law = "law = 'harmonic'\nstart = '60 deg'\namplitude = 0.4\nfrequency = 1000"
@@ -288,6 +295,7 @@ def test_fast_harmonic_laws_are_seen_wave_by_wave(engine: str) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.few(1)
 def test_parameters_of_laws_turn_what_follows_by_as_much(engine: str) -> None:
     """A rise before the start of the law grows from 0 to three turns: the linkage then looks the same."""
     law = "law = '3-4-5'\nstart = '60 deg'\nduration = 1\nbegin = -2\nrise = 'r'\n[parameters]\nr = '0 deg'"
@@ -343,6 +351,7 @@ begin = 1.5
 
 
 @pytest.mark.parametrize(("flavour", "fmi"), [("python", 2), ("native", 2), ("native", 3)])
+@pytest.mark.few(1)
 def test_fmus_step_over_no_rise(flavour: str, fmi: int, tmp_path: Path) -> None:
     """Communication points are in the dwells before and after a rise of a turn."""
     width = 1e-4

@@ -97,6 +97,7 @@ def random_grids(seed: int) -> list[FloatArray]:
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", MECHANISMS)
+@pytest.mark.few(1)
 def test_bodies_that_translate_are_followed_over_every_grid(name: str, engine: Engine) -> None:
     build, from_crossing = MECHANISMS[name]
     model = kinfmu.compile(build(), engine=engine)
@@ -114,6 +115,7 @@ def test_bodies_that_translate_are_followed_over_every_grid(name: str, engine: E
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("pins", [PINS, PINS[:1]])
+@pytest.mark.few(2)
 def test_a_resting_body_is_followed_through_its_change_points_in_thousands_of_samples(
     pins: Sequence[tuple[float, float]], engine: Engine
 ) -> None:

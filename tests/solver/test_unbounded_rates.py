@@ -55,6 +55,7 @@ def exact_arm(arm: float, length: float) -> tuple[mp.mpf, mp.mpf, mp.mpf] | None
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("arm", [1.0 + 1e-7, 1.0 - 3e-8, 1.0 + 1e-4, 0.7, 0.5, 1.75])
+@pytest.mark.few(3)
 def test_close_to_the_shortest_and_longest_reach_of_a_cylinder_estimates_hold(engine: str, arm: float) -> None:
     shortest, longest = abs(1.0 - arm), 1.0 + arm
     near = [0.0, 1e-17, 1e-15, 1e-13, 1e-10, 1e-7, 5e-8, 1e-4]
@@ -102,6 +103,7 @@ def test_a_start_at_a_negative_distance_is_refused() -> None:
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("miss", [8e-13, -8e-13, 1e-13, -1e-13])
+@pytest.mark.few(3)
 def test_a_change_point_that_lengths_miss_counts_in_the_estimate(engine: str, miss: float) -> None:
     """Oracle: the closed form in 50 digits, where the loop with these very lengths closes."""
     rocker = 1.0 + miss
@@ -186,6 +188,7 @@ def cylinder_fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int
 
 
 @pytest.mark.parametrize(("flavour", "fmi"), FLAVOURS)
+@pytest.mark.few(1)
 def test_in_fmus_estimates_hold_at_the_longest_reach_that_is_declared(
     flavour: str, fmi: int, cylinder_fmu: Callable[[str, int], tuple[Path, float, float]], tmp_path: Path
 ) -> None:
@@ -211,6 +214,7 @@ def test_in_fmus_estimates_hold_at_the_longest_reach_that_is_declared(
 
 @pytest.mark.parametrize(("flavour", "fmi"), FLAVOURS)
 @pytest.mark.parametrize("has_moved", [False, True])
+@pytest.mark.few(3)
 def test_in_fmus_a_cylinder_beyond_its_declared_range_is_outside(
     flavour: str,
     fmi: int,

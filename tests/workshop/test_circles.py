@@ -34,6 +34,7 @@ def imported(path: Path) -> Iterator[str]:
                 yield from [submodule] if submodule in MODULES else [source] if source in MODULES else []
 
 
+@pytest.mark.long
 def test_no_module_imports_itself_by_way_of_others() -> None:
     graph = {name: set(imported(path)) - {name} for name, path in MODULES.items()}
     assert "kinfmu.errors" in graph["kinfmu.fmu.host.simulate"]

@@ -48,6 +48,7 @@ def test_every_exported_name_exists_and_is_documented(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", MODULES)
+@pytest.mark.few(183)
 def test_every_module_or_the_class_it_is_named_after_is_documented(name: str) -> None:
     module = importlib.import_module(name)
     namesake = name.rpartition(".")[2].replace("_", "")

@@ -40,6 +40,7 @@ def loaded_by(statement: str) -> set[str]:
         ("import kinfmu.fmu", HEAVY - {"numpy", "importlib.metadata"}),
     ],
 )
+@pytest.mark.few(2)
 def test_importing_loads_no_heavy_package(statement: str, late: set[str]) -> None:
     loaded = loaded_by(statement)
     assert "kinfmu" in loaded

@@ -174,6 +174,7 @@ def test_the_first_line_and_the_first_optimum_have_the_same_sum_of_squares() -> 
     assert float(first[1]) < 1e-24
 
 
+@pytest.mark.long
 def test_a_file_gives_what_python_gives(tmp_path: Path) -> None:
     (tmp_path / "bar.toml").write_text(toml_text.text(four_bar()), encoding="utf-8")
     (tmp_path / "points.csv").write_text("x [m], y [cm]\n0.5, 230\n0.0, 230\n-0.4, 190\n-0.4, 150\n", encoding="utf-8")
@@ -211,6 +212,7 @@ def test_starts_and_offsets_are_listed_with_their_units() -> None:
     assert {name: rows[name] for name in units} == units
 
 
+@pytest.mark.long
 def test_the_report_shows_numbers_in_the_units_in_which_they_are_written() -> None:
     written = four_bar()
     tilted = kinfmu.Mechanism(
@@ -374,6 +376,7 @@ def test_bare_angles_of_a_function_that_are_probably_degrees_are_noted(
         assert line.endswith(' deg" for degrees')
 
 
+@pytest.mark.long
 def test_bare_angles_of_measures_and_poses_that_are_probably_degrees_are_noted() -> None:
     swing = Range(name="swing", of="rocker.phi")
     targets = [
@@ -526,6 +529,7 @@ def test_law_constants_are_unknowns_over_time() -> None:
     assert LENGTHS["crank"] == result.mechanism.parameters["crank"].value
 
 
+@pytest.mark.long
 def test_unknowns_that_the_targets_leave_free_together_are_noted() -> None:
     swing = MeasureTarget(name="swing", of=Range("swing", "rocker.phi"), value="40 deg")
     unknowns = {"crank": (0.5, 1.5), "coupler": (2.0, 5.0)}
@@ -564,6 +568,7 @@ def _at_a_change_point() -> kinfmu.FitProblem:
     return kinfmu.FitProblem(mechanism, {"ground": (3.5, 4.0), "rocker": (1.7, 2.0)}, [target])
 
 
+@pytest.mark.long
 def test_an_optimum_at_a_change_point_is_reported_with_the_sums_of_the_search_and_of_its_file() -> None:
     result = kinfmu.fit(_at_a_change_point(), starts=2, engine="python")
     found = re.search(r"its sum of squares is (\S+), that of the search (\S+)$", result.note)
@@ -598,6 +603,7 @@ def test_another_optimum_is_chosen_where_a_file_does_not_give_the_fitted_motion(
 
 @pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize("side", [-1.0, 0.0, 2.0])
+@pytest.mark.few(1)
 def test_the_nearest_point_of_a_path_is_converged_close_to_a_dead_centre(side: float, engine: str) -> None:
     """Points at a distance from the path along its normal have their foot where they were set off."""
     model = kinfmu.compile(kinfmu.load("triple_rocker"), engine=engine)

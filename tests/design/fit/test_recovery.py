@@ -30,6 +30,7 @@ def _assert_known(result: kinfmu.FitResult, names: Any) -> None:
 @pytest.mark.parametrize(
     "timing", [{"at": ANGLES.tolist()}, {"step": "30 deg", "start": ("-90 deg", "90 deg")}, {}], ids=str
 )
+@pytest.mark.few(2)
 def test_a_four_bar_from_twelve_points_of_its_coupler_curve(timing: dict[str, Any]) -> None:
     problem = kinfmu.FitProblem(four_bar(), BOUNDS, [PathTarget(**PATH, **timing)])
 

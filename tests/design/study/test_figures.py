@@ -31,6 +31,7 @@ SHOWN = {
 
 
 @pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.few(2)
 def test_each_kind_names_what_it_shows_and_is_the_same_every_time(kind: str, tmp_path: Path) -> None:
     found = kinfmu.study(linkage(), KINDS[kind], designs=16, workers=1)
     assert picture_of(found) == kind
@@ -54,6 +55,7 @@ IN_AXES: dict[str, tuple[dict[str, Any], tuple[str, str]]] = {
 
 
 @pytest.mark.parametrize("kind", IN_AXES)
+@pytest.mark.few(2)
 def test_one_measure_is_drawn_into_axes(kind: str, tmp_path: Path) -> None:
     from matplotlib.figure import Figure
 
@@ -124,6 +126,7 @@ def test_columns_are_shown_in_the_units_of_the_files_and_the_table_keeps_its_own
     assert [scattered.display_unit(name).unit for name in ("tilt", "crank")] == ["deg", "in"]
 
 
+@pytest.mark.long
 def test_a_scatter_matrix_has_one_axis_for_each_row_and_column_and_marks_designs_that_fail() -> None:
     given = {"crank": {"from": 10, "to": 60}, "base": {"from": 20, "to": 60}}
     found = kinfmu.study(linkage(), given, measures="swing", designs=64, workers=1)

@@ -129,6 +129,7 @@ def test_a_study_that_ended_before_its_parts_were_joined_is_finished(tmp_path: P
 
 
 @pytest.mark.parametrize("damage", ["another part", "a changed byte", "other columns"])
+@pytest.mark.few(1)
 def test_a_part_with_other_content_is_never_joined(damage: str, interrupted: Path, alone: bytes) -> None:
     given = {"measures": "swing", "designs": 160, "workers": 1, "output": interrupted}
     first, second = sorted(interrupted.with_name("rows.parquet.parts").glob("part-*"))[:2]

@@ -106,6 +106,7 @@ SPEEDS = {"crank.speed": {"from": "60 rpm", "to": "-400 rpm", "count": 4}}
 
 @pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize("varied", ["crank.speed", "crank.start", "w", "crank.speed and crank"])
+@pytest.mark.few(1)
 def test_every_design_makes_a_cycle_at_its_own_speed_as_check_does(varied: str, engine: str) -> None:
     mechanism = linkage()
     grids = {

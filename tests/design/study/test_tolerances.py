@@ -96,6 +96,7 @@ measures.stroke = { type = "range", of = "ram.x" }
         (1.0, 0.03, False),
     ],
 )
+@pytest.mark.few(1)
 def test_a_study_warns_where_first_order_and_samples_disagree(offset: float, tolerance: float, warns: bool) -> None:
     mechanism = toml_file.parse(SLIDER_CRANK % offset)
     found = kinfmu.study(mechanism, {"offset": {"tolerance": tolerance}}, measures="stroke", designs=256, workers=1)

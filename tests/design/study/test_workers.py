@@ -166,6 +166,7 @@ def test_a_scheduler_that_does_not_answer_is_named(
         study(tmp_path, dask=address)
 
 
+@pytest.mark.long
 def test_a_worker_process_that_is_killed_ends_the_study_which_goes_on_later(rows: bytes, tmp_path: Path) -> None:
     import multiprocessing
 

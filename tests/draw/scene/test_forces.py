@@ -72,6 +72,7 @@ frequency = 1
 
 
 @pytest.mark.parametrize("follower", ALL)
+@pytest.mark.few(5)
 def test_the_force_of_a_cam_starts_at_the_contact_and_is_that_on_its_axle(follower: str) -> None:
     """The cam has no weight, so its axle carries the contact force alone."""
     mechanism = ALL[follower]()

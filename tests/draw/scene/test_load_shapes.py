@@ -58,6 +58,7 @@ def test_every_kind_of_load_has_a_symbol(found: Scene) -> None:
 
 
 @every_member
+@pytest.mark.few(4)
 def test_a_mechanism_without_loads_has_no_symbols(name: str) -> None:
     mechanism = kinfmu.load(name)
     shown = [shape.name for shape in scene_of(replace(mechanism, loads=())).shapes if shape.strips]
@@ -254,6 +255,7 @@ def test_parts_of_a_cylinder_stay_between_its_ends() -> None:
 
 @pytest.mark.parametrize("cls", CLASSES, ids=lambda cls: cls.type)
 @given(data=st.data())
+@pytest.mark.few(2)
 def test_any_load_has_a_symbol_of_finite_lines(cls: type[Load], data: st.DataObject) -> None:
     mechanism = data.draw(mechanisms(cls))
     poses = {body.name: np.zeros((2, 3)) for body in mechanism.bodies}

@@ -84,6 +84,7 @@ def test_a_body_whose_coordinates_are_not_in_the_run_is_left_out_by_name(run: Ru
 
 
 @pytest.mark.parametrize("name", ["crank_rocker", "fourbar", "parallel_jaw", "five_bar", "cam_roller", "excavator"])
+@pytest.mark.few(2)
 def test_a_run_of_few_outputs_is_drawn_as_one_of_all(name: str) -> None:
     mechanism = kinfmu.load(name)
     whole = solved(name)

@@ -27,7 +27,7 @@ class Host(NamedTuple):
     chosen: str  # by pytest's -k
 
 
-PAGES = ("tests/docs/test_host_pages.py", "tests/docs/test_system_page.py")
+PAGES = ("tests/docs/test_host_pages.py", "tests/docs/test_pages.py")
 HOSTS = (
     Host(
         "fmpy",

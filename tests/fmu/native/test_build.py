@@ -36,6 +36,7 @@ def _files(mechanism: kinfmu.Mechanism, version: str) -> dict[str, str]:
     ("name", "version"),
     [pytest.param("fourbar", "3.0", marks=pytest.mark.long), ("five_bar", "2.0"), ("settable", "3.0")],
 )
+@pytest.mark.few(1)
 def test_each_file_of_c_is_clean_under_strict_warnings(name: str, version: str) -> None:
     mechanism = linkage() if name == "settable" else kinfmu.load(name)
     assert compiler.shared_library(_files(mechanism, version), STRICT).exists()

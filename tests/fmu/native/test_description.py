@@ -39,6 +39,7 @@ def root(data: bytes) -> ET.Element:
     return ET.fromstring(data)  # noqa: S314  # our own
 
 
+@pytest.mark.few(2)
 def test_fmpy_validates_the_fmu_without_problems(fmu: Path) -> None:
     assert validate_fmu(str(fmu)) == []
 

@@ -63,6 +63,7 @@ def begin(start: Start, mechanism: Mechanism | str, drive: str = "time") -> tupl
 
 
 @pytest.mark.parametrize("name", mostly_long(JUMPS, few=("harmonic", "sequence")))
+@pytest.mark.few(1)
 def test_every_jump_of_a_law_is_announced_and_has_its_right_hand_value(start: Start, name: str) -> None:
     law, expected = JUMPS[name]
     host, event = begin(start, named(name, law))
@@ -80,6 +81,7 @@ def test_every_jump_of_a_law_is_announced_and_has_its_right_hand_value(start: St
     assert found == pytest.approx(expected, rel=1e-11)  # a spline's table reaches 1e-12 of its width further
 
 
+@pytest.mark.few(1)
 def test_the_next_event_follows_tunable_constants_and_there_is_none_when_inputs_drive(start: Start) -> None:
     host, event = begin(start, named("rise", JUMPS["rise"][0]))
     assert event == pytest.approx(0.5)
@@ -91,6 +93,7 @@ def test_the_next_event_follows_tunable_constants_and_there_is_none_when_inputs_
     assert next_event(driven) is None
 
 
+@pytest.mark.few(1)
 def test_of_several_drivers_the_earliest_event_comes_next(start: Start) -> None:
     laws = (SimpleHarmonic(1.0, 1.0, begin=0.25), SimpleHarmonic(1.0, 1.0, begin=0.5), Harmonic(1.0, 2.0))
     host, event = begin(start, named("several", *laws))

@@ -123,6 +123,7 @@ def test_osp_steps_it(built_native: Build, tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not _has("ecospy"), reason="ecospy is not installed, or lacks libtbb12")
+@pytest.mark.few(1)
 def test_ecospy_steps_it(built_native: Build, fmi: int, tmp_path: Path) -> None:
     rows = _rows(ECOS, built_native("fourbar_loaded", fmi, "time"), tmp_path, *NAMES)
     times = STEP * np.arange(1, COUNT + 1)
@@ -216,6 +217,7 @@ HOSTS = [
 
 
 @pytest.mark.parametrize(("host", "flavour"), HOSTS)
+@pytest.mark.few(2)
 def test_rates_of_a_driven_crank_are_estimated_in_hosts_that_wire_the_angle_alone(
     fmus: Callable[[str, str], Path], host: str, flavour: str, tmp_path: Path
 ) -> None:
@@ -231,6 +233,7 @@ def test_rates_of_a_driven_crank_are_estimated_in_hosts_that_wire_the_angle_alon
 
 
 @pytest.mark.parametrize(("host", "flavour"), HOSTS)
+@pytest.mark.few(2)
 def test_hosts_react_to_a_limit_as_documented(
     fmus: Callable[[str, str], Path], host: str, flavour: str, tmp_path: Path
 ) -> None:

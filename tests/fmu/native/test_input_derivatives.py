@@ -72,6 +72,7 @@ def give(host: Host, name: str, derivatives: list[float]) -> None:
 @pytest.mark.parametrize("t0", [0.0, 1000.0])
 @pytest.mark.parametrize("clock", CLOCKS)
 @pytest.mark.parametrize("given", GIVEN)
+@pytest.mark.few(12)
 def test_given_derivatives_are_the_rates_whatever_the_clock(
     start: Callable[..., Host], given: str, clock: str, t0: float
 ) -> None:

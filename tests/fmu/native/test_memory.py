@@ -66,6 +66,7 @@ def _program(mechanism: kinfmu.Mechanism, fmi: int, folder: Path, *flags: str, d
         pytest.param("settable", 3, marks=pytest.mark.long),
     ],
 )
+@pytest.mark.few(1)
 def test_address_and_undefined_behaviour_sanitizers_report_no_errors(name: str, fmi: int, tmp_path: Path) -> None:
     check_under_sanitizers(name, fmi, tmp_path)
 

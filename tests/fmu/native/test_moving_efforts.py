@@ -77,6 +77,7 @@ def error_of(host: Host, h: float, orders: int) -> float:
 
 
 @pytest.mark.parametrize("orders", [0, 1, 2, 3])
+@pytest.mark.few(2)
 def test_each_derivative_raises_the_order_in_the_step_of_the_host(start: Callable[..., Host], orders: int) -> None:
     steps = (0.02, 0.01) if orders else (0.004, 0.002)
     coarse, fine = (error_of(start("pendulum", 2, crank_speed=SPAN * PERIOD), h, orders) for h in steps)

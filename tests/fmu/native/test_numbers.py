@@ -21,6 +21,7 @@ from tests.gallery_members import mostly_long
 @pytest.mark.parametrize(
     "name", mostly_long(gallery.names(), few=("excavator", "fourbar", "jansen_leg", "triple_rocker"))
 )
+@pytest.mark.few(1)
 def test_run_of_a_gallery_mechanism_equals_that_of_the_python_engine(built_native: Build, name: str) -> None:
     wanted = kinfmu.solve(kinfmu.load(name))
     run = kinfmu.simulate(built_native(name, 2 + len(name) % 2, "time"))  # half of them of FMI 3.0

@@ -191,6 +191,7 @@ def _errors(host: Any, grid: Callable[[int], float], h: float) -> tuple[float, f
 
 
 @pytest.mark.parametrize("grid", GRIDS)
+@pytest.mark.few(5)
 def test_estimates_are_of_order_2_for_speeds_and_1_for_accelerations_on_any_grid(start: Start, grid: str) -> None:
     coarse, fine = (_errors(start(), GRIDS[grid], h) for h in (0.01, 0.0025))
     orders = [math.log(a / b, 4.0) for a, b in zip(coarse, fine, strict=True)]

@@ -72,6 +72,7 @@ def _differences(host: Host, names: list[str], at: dict[str, float], way: dict[s
 
 
 @pytest.mark.parametrize("known", UNIT_INPUTS)
+@pytest.mark.few(1)
 def test_directional_derivative_with_respect_to_an_input_is_the_finite_difference(start: Start, known: str) -> None:
     host = start("stephenson_six_bar" if known == "crank_angle" else "fourbar")
     inputs = [variable.name for variable in host.about.interface.part("inputs")]
@@ -87,6 +88,7 @@ def test_directional_derivative_with_respect_to_an_input_is_the_finite_differenc
 
 @pytest.mark.parametrize("steps", [[0.1], [0.1, 0.1], [0.1, 0.1, 0.1], [0.1, 0.05, 0.2]])
 @pytest.mark.parametrize("moves", [False, True])
+@pytest.mark.few(8)
 def test_directional_derivatives_after_a_step_are_the_differences_of_setting_an_input(
     start: Start, steps: list[float], moves: bool
 ) -> None:
@@ -137,6 +139,7 @@ def test_every_real_output_has_directional_derivatives_which_do_not_change_the_s
 
 
 @pytest.mark.parametrize("parameter", ["ground", "coupler"])
+@pytest.mark.few(1)
 def test_directional_derivative_with_respect_to_a_parameter_is_the_finite_difference(
     start: Start, parameter: str
 ) -> None:
@@ -193,6 +196,7 @@ def test_derivatives_with_respect_to_fixed_parameters_are_exact_in_initializatio
         assert "no directional derivative along coupler (value reference" in host.messages[-1][1]
 
 
+@pytest.mark.few(1)
 def test_derivatives_with_respect_to_tunable_parameters_are_exact(start: Start, fmi: int) -> None:
     host = start(linkage(), "time", initialize=False)
     host.enter(0.0)
@@ -381,6 +385,7 @@ def test_inputs_set_while_time_drives_are_warned_about_once_in_model_exchange(st
 
 @pytest.mark.parametrize("name", ["fourbar", "five_bar", "double_pendulum"])
 @pytest.mark.parametrize("wired", [0, 1, 2])
+@pytest.mark.few(2)
 def test_no_output_is_infinite_and_errors_without_an_estimate_are_the_declared_maximum(
     start: Start, name: str, wired: int
 ) -> None:

@@ -47,6 +47,7 @@ def recorded(*arguments: str) -> Run:
 
 
 @pytest.mark.parametrize("command", ["simulate", "solve"])
+@pytest.mark.few(1)
 def test_parameters_and_law_constants_are_compared_with_units(command: str, wheel: Path) -> None:
     assert wheel.is_dir()
     a = recorded("simulate", "wheel.toml")

@@ -123,6 +123,7 @@ def test_a_viewer_that_cannot_draw_is_reported_before_it_is_used(monkeypatch: py
 
 
 @pytest.mark.usefixtures("graphics")
+@pytest.mark.long
 def test_a_picture_shows_the_linkage_in_its_colours_and_the_viewer_is_gone(
     mcap: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -123,6 +123,7 @@ def test_the_error_of_a_view_is_reported(tmp_path: Path, viewer: headless.Viewer
     assert report.startswith("wrong: error: 2D visualizers require a pinhole")
 
 
+@pytest.mark.long
 def test_recordings_of_two_mechanisms_do_not_share_a_layout(tmp_path: Path, viewer: headless.Viewer) -> None:
     """Rerun keeps one layout for all recordings of an application; bounds and times of another run would be wrong."""
     write_rrd(fourbar(np.arange(181.0)), tmp_path / "first.rrd")

@@ -84,6 +84,7 @@ for call in (
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 def test_so_is_the_recording_of_the_demo(tmp_path: Path) -> None:
     code = f"{BASE}from kinfmu.cli import demo; sys.exit(demo.main())"
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)

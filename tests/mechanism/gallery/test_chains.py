@@ -23,6 +23,7 @@ EMIT = import_module("kinfmu.codegen.python.emit")  # the package shows a functi
 
 
 @pytest.mark.parametrize("count", [1, 2, 9, 49, 50, 51])
+@pytest.mark.few(2)
 def test_all_bars_of_a_chain_of_parallelograms_stay_parallel(count: int) -> None:
     run = kinfmu.solve(fourbar_chain(count))
     u = run["crank_angle"]
@@ -67,6 +68,7 @@ def test_loops_over_tables_and_unrolled_code_agree_to_the_bit(
 
 
 @every_member
+@pytest.mark.few(4)
 def test_loops_over_tables_serve_any_mechanism(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     """Units of their own, several drivers, parameters, triads, rows set aside, points of interest."""
     mechanism = kinfmu.load(name)

@@ -46,6 +46,7 @@ def test_the_folder_names_the_mechanism(name: str) -> None:
 
 
 @every_member
+@pytest.mark.few(7)
 def test_the_reference_holds_samples_of_the_run_and_every_output(name: str, member: Callable[[str], Member]) -> None:
     asked = member(name)
     run = kinfmu.solve(asked.plan, asked.times[:1])
@@ -69,6 +70,7 @@ def test_a_recomputed_row_equals_the_row_of_the_file(name: str, member: Callable
 
 
 @few_members
+@pytest.mark.few(1)
 def test_check_finds_nothing_wrong_and_a_driver_for_every_freedom(name: str, member: Callable[[str], Member]) -> None:
     report = kinfmu.check(member(name).mechanism)
     assert report.problem is None
@@ -77,6 +79,7 @@ def test_check_finds_nothing_wrong_and_a_driver_for_every_freedom(name: str, mem
 
 
 @every_member
+@pytest.mark.few(6)
 def test_solved_it_equals_the_reference(name: str, member: Callable[[str], Member]) -> None:
     asked = member(name)
     run = kinfmu.solve(asked.plan, asked.times)
@@ -85,6 +88,7 @@ def test_solved_it_equals_the_reference(name: str, member: Callable[[str], Membe
 
 
 @few_members
+@pytest.mark.few(1)
 def test_its_fmu_driven_by_time_equals_the_reference(name: str, member: Callable[[str], Member]) -> None:
     asked, (times, step) = member(name), samples(name)
     run = kinfmu.simulate(asked.fmu("time"), start=times[0], stop=times[-1], step=step)
@@ -94,6 +98,7 @@ def test_its_fmu_driven_by_time_equals_the_reference(name: str, member: Callable
 
 
 @fewest_members
+@pytest.mark.few(1)
 def test_its_fmu_driven_from_a_csv_equals_the_reference(
     name: str, member: Callable[[str], Member], tmp_path: Path
 ) -> None:
@@ -106,6 +111,7 @@ def test_its_fmu_driven_from_a_csv_equals_the_reference(
 
 
 @every_member
+@pytest.mark.few(17)
 def test_no_link_stretches_and_no_joint_opens_over_its_run(name: str, member: Callable[[str], Member]) -> None:
     mechanism, run = member(name).mechanism, kinfmu.solve(member(name).plan)
     assert run.good.all()

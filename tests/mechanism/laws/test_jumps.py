@@ -59,6 +59,7 @@ def test_there_is_an_example_of_every_law() -> None:
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.few(3)
 def test_laws_jump_only_at_the_arguments_they_declare(name: str) -> None:
     law = EXAMPLES[name]
     expected = EXPECTED.get(name, [])

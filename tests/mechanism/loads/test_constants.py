@@ -121,6 +121,7 @@ def test_batches_take_arrays_of_them() -> None:
 
 
 @of_each_flavour
+@pytest.mark.few(1)
 def test_an_fmu_has_them_as_tunable_parameters(
     fmu_of: Callable[..., Path], flavour: str, fmi: int, tmp_path: Path
 ) -> None:
@@ -162,6 +163,7 @@ def driven_by_push(t: float, begin: float, duration: float, rise: float) -> tupl
 
 
 @of_each_flavour
+@pytest.mark.few(1)
 def test_fmus_driven_by_torques_keep_them(fmu_of: Callable[..., Path], flavour: str, fmi: int) -> None:
     weightless = {"gas.start": MASS * G, "gas.speed": 0.0}  # the force carries the mass
     path = fmu_of(flavour, fmi, "torque")

@@ -35,6 +35,7 @@ def complexes(points: Any) -> Any:
 
 
 @pytest.mark.parametrize("kind", followers.ALL)
+@pytest.mark.few(2)
 def test_the_profile_touches_the_follower_of_the_solved_mechanism_and_nowhere_cuts_it(kind: str) -> None:
     mechanism = followers.ALL[kind]()
     profile = kinfmu.cam_profile(mechanism, "lift", ANGLES)
@@ -241,6 +242,7 @@ def test_a_geared_cam_is_reported_at_the_angle_of_the_driver() -> None:
 
 
 @pytest.mark.parametrize("ratio", [1.0, -1.0, 2.0, -3.0, 0.5, -0.5, 1.5])
+@pytest.mark.few(2)
 def test_parts_of_a_geared_cam_go_forwards_over_the_whole_period_of_the_driver(ratio: float) -> None:
     plain = followers.lifted_roller(31.0)
     (direct,), (found,) = kinfmu.check(plain).cams, kinfmu.check(mechanism := geared(plain, ratio)).cams
@@ -296,6 +298,7 @@ WRONG: dict[str, tuple[Any, str]] = {
 
 
 @pytest.mark.parametrize("case", WRONG)
+@pytest.mark.few(3)
 def test_a_cam_without_a_profile_is_reported_with_the_reason(case: str) -> None:
     made, message = WRONG[case]
     with pytest.raises(MechanismError, match=message):
@@ -304,6 +307,7 @@ def test_a_cam_without_a_profile_is_reported_with_the_reason(case: str) -> None:
 
 @pytest.mark.parametrize("kind", [kinfmu.CamRoller, kinfmu.CamFlatFace])
 @pytest.mark.parametrize("pole", [(0.0, 0.0), (2.0, -1.0)])
+@pytest.mark.few(2)
 def test_a_lever_on_the_axle_of_its_cam_turns_with_it_and_has_no_profile(kind: Any, pole: Any) -> None:
     mechanism = followers.coaxial(kind, pole)
     why = r"the follower 'lever' is pinned at the cam's axle, 'ground\.O', so that it turns with the cam"
@@ -352,6 +356,7 @@ def table(law: Law) -> Spline:
 
 @pytest.mark.parametrize("form", ["sequence", "table", "harmonic"])
 @pytest.mark.parametrize("joint", ["swinging", "translating"])
+@pytest.mark.few(2)
 def test_the_note_on_a_steep_cam_names_a_wrong_sign_of_the_lift(joint: str, form: str) -> None:
     """A rise towards the cam; the number of the opposite sign is that of the mended file."""
 

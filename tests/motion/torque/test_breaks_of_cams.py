@@ -34,6 +34,7 @@ def energy_error(run: Run, torque: float) -> float:
 
 @pytest.mark.parametrize("law", ["cycloidal", "simple_harmonic"])
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-9, 1e-11])
+@pytest.mark.few(2)
 def test_the_error_follows_the_tolerance_over_breaks(law: str, tolerance: float) -> None:
     """Ten turns in few long steps; the harmonic law jumps in its second derivative, the cycloidal one in its third."""
     run = kinfmu.simulate(
@@ -51,6 +52,7 @@ def test_the_error_follows_the_tolerance_over_breaks(law: str, tolerance: float)
 
 
 @pytest.mark.parametrize(("flavour", "fmi"), [("native", 3), ("python", 2)])
+@pytest.mark.few(1)
 def test_an_fmu_restarts_at_breaks_too(
     flavour: Literal["native", "python"], fmi: Literal[2, 3], tmp_path: Path
 ) -> None:

@@ -107,6 +107,7 @@ def test_a_pendulum_follows_the_elliptic_functions() -> None:
         ("Radau", 1e-8, 1e-8),
     ],
 )
+@pytest.mark.few(2)
 def test_andrews_squeezer_converges_to_the_published_solution(method: str, tolerance: float, error: float) -> None:
     run = kinfmu.simulate(
         squeezer(),

@@ -124,6 +124,7 @@ def test_only_bodies_of_mechanism_files_within_the_limit_are_read(server: PlaySe
     assert [path.name for path in file.parent.iterdir()] == ["mine.toml"]
 
 
+@pytest.mark.long
 def test_a_malformed_file_is_reported_and_the_next_good_one_is_shown(server: PlayServer, file: Path) -> None:
     good, reports = file.read_text("utf-8"), states(server)
     assert next(reports) == {"version": 1, "problem": ""}
@@ -142,6 +143,7 @@ def test_a_malformed_file_is_reported_and_the_next_good_one_is_shown(server: Pla
     assert 'Number("2")' in ask(server)[1]
 
 
+@pytest.mark.long
 def test_the_fmu_and_the_saved_file_have_the_lengths_as_set(server: PlayServer, file: Path, tmp_path: Path) -> None:
     content = file.read_text("utf-8").replace("P = [20", "P = [22")
     mech = parse(content)
@@ -165,6 +167,7 @@ def test_a_port_in_use_is_reported(server: PlayServer) -> None:
 
 
 @needs_browser
+@pytest.mark.long
 def test_the_page_works_under_its_security_policy(server: PlayServer, tmp_path: Path) -> None:
     with browser(tmp_path) as chromium, chromium.tab() as page:
         page.tab.goto(server.url)
@@ -179,6 +182,7 @@ def test_the_page_works_under_its_security_policy(server: PlayServer, tmp_path: 
 
 
 @needs_browser
+@pytest.mark.long
 def test_while_a_page_is_made_the_old_one_states_it_and_goes_on(
     server: PlayServer, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

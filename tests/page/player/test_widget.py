@@ -74,6 +74,7 @@ def test_a_mechanism_in_a_cell_of_jupyter_is_the_widget(leg: kinfmu.Mechanism, m
 
 
 @needs_browser
+@pytest.mark.long
 def test_the_frame_and_the_traits_follow_each_other(leg: kinfmu.Mechanism, tmp_path: Path) -> None:
     live = kinfmu.play(leg)
     state = {name: getattr(live, name) for name in SYNCED}

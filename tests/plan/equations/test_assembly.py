@@ -117,6 +117,7 @@ def test_whole_turns_of_a_start_pose_change_nothing(name: str, turns: int) -> No
 
 
 @pytest.mark.parametrize("degrees", [425.0, -295.0, 60.0, 80.0, -65.0, 87.0, 200.0, 273.0, 447.0])
+@pytest.mark.few(6)
 def test_the_start_of_the_law_decides_whatever_the_rough_angle_of_the_driven_body(degrees: float) -> None:
     mechanism = kinfmu.load("triple_rocker")
     times = np.linspace(0.0, 2.0, 9)
@@ -158,6 +159,7 @@ def test_start_poses_on_another_branch_than_the_law_can_reach_give_way() -> None
 
 
 @pytest.mark.parametrize(("gap", "noise"), [(1e-3, 0.0), (1e-3, 0.03), (1e-6, 0.0), (1e-8, 0.03)])
+@pytest.mark.few(2)
 def test_close_to_a_dead_centre_the_start_is_assembled(gap: float, noise: float) -> None:
     """The last part before the limit of a triple rocker, where the whole Gauss-Newton step goes too far."""
     mechanism = kinfmu.load("triple_rocker")
@@ -203,6 +205,7 @@ def test_a_start_between_limits_close_to_each_other_is_reached(seed: int) -> Non
 
 @pytest.mark.parametrize("miss", [1e-13, 1e-10, 1e-8, 1e-6, 1e-5, 1e-3])
 @pytest.mark.parametrize(("bars", "angle"), [((2, 1, 2, 1), 0.0), ((4, 1, 3, 2), math.pi), ((3, 3, 2, 2), 0.0)])
+@pytest.mark.few(4)
 def test_a_start_that_misses_a_change_point_is_assembled_or_reported_as_ambiguous(
     bars: tuple[int, ...], angle: float, miss: float
 ) -> None:

@@ -53,6 +53,7 @@ def test_a_four_bar_is_proved_open_exactly_where_coupler_and_rocker_do_not_meet(
 
 
 @pytest.mark.parametrize("name", gallery.names())
+@pytest.mark.few(7)
 def test_nothing_that_closes_is_proved_open(name: str) -> None:
     mechanism = kinfmu.load(name)
     system = System(mechanism)

@@ -120,6 +120,7 @@ def defined(files: Sequence[str]) -> dict[str, float]:
 
 
 @every_member
+@pytest.mark.few(1)
 def test_c_and_python_are_the_same_over_the_run_of_a_gallery_mechanism(name: str) -> None:
     mechanism = kinfmu.load(name)
     plan = compile_plan(mechanism)
@@ -182,6 +183,7 @@ SINGULAR: dict[str, tuple[Callable[[], Mechanism], Samples, set[Status]]] = {
         ),
     ),
 )
+@pytest.mark.few(1)
 def test_c_and_python_are_the_same_near_singular_points_and_limits(name: str) -> None:
     mechanism, samples, expected = SINGULAR[name]
     statuses = assert_same(compile_plan(mechanism()), samples)
@@ -214,6 +216,7 @@ CHANGES: dict[Callable[[], Mechanism], list[dict[str, float]]] = {
 
 
 @pytest.mark.parametrize("seed", [0, 3])
+@pytest.mark.few(1)
 def test_c_and_python_are_the_same_where_each_driver_has_singular_points_of_its_own(seed: int) -> None:
     """Two machines in one file, over crossings and to limits of each."""
     mechanism = trial(seed, "two machines").drawn.mechanism
@@ -235,6 +238,7 @@ def test_c_and_python_are_the_same_where_blocks_of_one_driver_and_of_several_are
 
 
 @pytest.mark.parametrize("mechanism", CHANGES)
+@pytest.mark.few(1)
 def test_parameters_are_followed_and_refused_by_both_solvers(mechanism: Callable[[], Mechanism]) -> None:
     plan = compile_plan(mechanism())
     c = Native(plan, QUICK)

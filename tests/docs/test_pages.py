@@ -1,0 +1,197 @@
+"""Pages of docs whose files, commands and Python run, and print what the page shows."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from importlib.util import find_spec
+from itertools import chain, repeat
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from fmpy.ssp.ssd import read_ssd
+
+from kinfmu.cli import main
+from kinfmu.log import read
+from tests.docs.blocks import DOCS, ROOT
+from tests.docs.follow import SHOWN, accept, files, follow, page_text, typed
+from tests.docs.key_tables import with_readings
+from tests.draw.picture import differences, picture
+
+SCRIPT = (ROOT / "scripts" / "pictures").read_text(encoding="utf-8")
+MOST = 600_000  # [bytes] of a picture; pages load it
+
+
+def with_outputs(page: str, *outputs: str) -> str:
+    """Return a page with these outputs in its blocks of text, the last one also in those that follow."""
+    shown = chain(outputs, repeat(outputs[-1]))
+    return re.sub(r"```text\n.*?```", lambda _: f"```text\n{next(shown)}```", page, flags=re.DOTALL)
+
+
+def test_cams(request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    pytest.importorskip("ezdxf")
+    followed = follow("cams.md", tmp_path)
+    report, *_, of_dxf = followed.outputs.values()
+    assert re.search(r"written: tappet\.dxf \(\d+ corners, within 0\.005 mm of the curve\)", of_dxf)
+    assert len((tmp_path / "tappet.csv").read_text(encoding="utf-8").splitlines()) == 362
+    accept("cams.md", with_outputs(page_text("cams.md"), report, followed.printed), request)
+    committed, drawn = DOCS / "cam.svg", tmp_path / "tappet.svg"
+    if request.config.getoption("--update"):
+        committed.write_bytes(drawn.read_bytes())
+    assert not differences(picture(committed), picture(drawn)), "docs/cam.svg is old; --update draws it anew"
+
+
+@pytest.mark.long
+def test_coupling(request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    followed = follow("coupling.md", tmp_path)
+    accept("coupling.md", followed.commented(page_text("coupling.md")), request)
+    assert "current [A]" in (tmp_path / "drive.svg").read_text(encoding="utf-8")
+
+
+@pytest.mark.long
+def test_constants_and_the_message_of_coupling(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    typed("python examples/dc_motor/build.py drive")
+    command = [
+        "simulate",
+        "drive/press_drive.ssp",
+        "--set",
+        "motor.voltage=600 V",
+        "--stop",
+        "0.05",
+        "--mcap",
+        "a.mcap",
+    ]
+    result = CliRunner().invoke(main, [*command, "--channels", "signals", "--exchange", "jacobi"])
+    assert result.exit_code == 0, result.output
+    (message,) = re.findall(r"^kinfmu: drive\.ssp: (connection .*)$", page_text("coupling.md"), re.MULTILINE)
+    with zipfile.ZipFile("drive/press_drive.ssp") as old, zipfile.ZipFile("drive.ssp", "w") as new:
+        for name in old.namelist():
+            data = old.read(name)
+            new.writestr(name, data.replace(b'endConnector="crank_angle"', b'endConnector="crank_speed"'))
+    result = CliRunner().invoke(main, ["simulate", "drive.ssp"])
+    assert result.exit_code == 1
+    assert result.output.splitlines()[-1].endswith(message)
+    assert "logs" not in {path.name for path in tmp_path.iterdir()} or not list((tmp_path / "logs").iterdir())
+
+
+@pytest.mark.long
+def test_the_figure_of_coupling_is_what_its_command_draws(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    typed("python examples/dc_motor/stability.py F.svg")
+    drawn, committed = (path.read_text(encoding="utf-8") for path in (Path("F.svg"), DOCS / "drive-coupling.svg"))
+    labels = re.compile(r"<!-- (.*?) -->|<text[^>]*>([^<]*)|<(use)")
+    assert len(labels.findall(committed)) > 50
+    assert labels.findall(drawn) == labels.findall(committed)
+
+
+@pytest.mark.long
+def test_designing(request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    accept("designing.md", follow("designing.md", tmp_path).commented(page_text("designing.md")), request)
+
+
+@pytest.mark.long
+def test_fitting(tmp_path: Path) -> None:
+    outputs, printed, *_ = follow("fitting.md", tmp_path)
+    fitted = outputs["kinfmu fit arch.toml -o fitted.toml --figure fitted.png"]
+    assert "turns: holds" in fitted
+    assert "local optima" in fitted
+    assert (tmp_path / "fitted.png").stat().st_size > 10_000
+    arch, timed = printed.splitlines()
+    assert float(arch.split()[0]) < 0.2
+    assert arch.endswith("mm, True")
+    assert float(timed) < 10.0
+
+
+def test_the_target_with_an_offset_finds_a_straight_line_at_any_height(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    head = 'mechanism = "jansen_leg"\nunknowns = { c = [35, 45] }\n'
+    Path("flat.toml").write_text(head + files("fitting.md")["flat.toml"], encoding="utf-8")
+    done = CliRunner().invoke(main, ["fit", "flat.toml", "-o", "leg.toml", "--starts", "1", "--workers", "1"])
+    assert done.exit_code == 0, done.output
+    assert "flat" in done.output
+
+
+@pytest.mark.long
+def test_forces(request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    followed = follow("forces.md", tmp_path)
+    report = followed.outputs["kinfmu check pump.toml"]
+    page = with_outputs(page_text("forces.md"), report[report.index("  forces ") :])
+    accept("forces.md", followed.commented(page), request)
+    faster = followed.outputs["kinfmu check pump.toml --set piston_mass=1.2kg --set crank.speed=600rpm"]
+    assert "at 62.8319 rad/s" in faster
+    assert ",crank.torque," in (tmp_path / "pump.csv").read_text(encoding="utf-8").partition("\n")[0]
+    assert (tmp_path / "pump.svg").is_file()
+
+
+@pytest.mark.long
+def test_measures(request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    followed = follow("measures.md", tmp_path)
+    report, as_json, faster = followed.outputs.values()
+    page = with_outputs(with_readings(page_text("measures.md")), report[report.index("  measures ") :])
+    accept("measures.md", followed.commented(page), request)
+    assert '"measures": {' in as_json
+    assert "at 6.28319 rad/s" in faster
+
+
+@pytest.mark.long
+def test_playing_has_a_live_mechanism_with_the_length_of_the_page(tmp_path: Path) -> None:
+    pytest.importorskip("anywidget", reason="anywidget is not installed")
+    pytest.importorskip("ziglang", reason="pages are compiled by zig")
+    live = follow("playing.md", tmp_path).names["live"]
+    assert live.parameters.m == 14.5
+    assert live.values["crank.speed"] > 0.0
+
+
+@pytest.mark.long
+def test_reviewing_has_a_table_with_units(tmp_path: Path) -> None:
+    pytest.importorskip("pandas")
+    names = follow("reviewing-a-run.md", tmp_path).names
+    assert names["table"].attrs["units"]["coupler.vx"] == "m/s"
+
+
+@pytest.mark.parametrize(
+    ("page", "folder"),
+    [("docs/reviewing-a-run.md", "docs"), ("docs/gallery.md", "docs"), ("README.md", "")],
+    ids=["page", "gallery", "readme"],
+)
+def test_pictures_are_there_of_a_size_to_load_and_made_by_the_script(page: str, folder: str) -> None:
+    found = re.findall(r"!\[[^\]]+\]\(([\w./-]+)\)", (ROOT / page).read_text(encoding="utf-8"))
+    assert found
+    for name in found:
+        path = (ROOT / folder / name).resolve()
+        assert 0 < path.stat().st_size < MOST, name
+        assert path.name in SCRIPT
+
+
+def test_studies(request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    assert list(files("studies.md")) == ["hoeken.toml", "tolerances.toml", "lengths.toml"]
+    followed = follow("studies.md", tmp_path)
+    report, on_a_grid, _ = followed.outputs.values()
+    accept("studies.md", followed.commented(with_outputs(page_text("studies.md"), report)), request)
+    assert "42 designs (on a grid)" in on_a_grid
+    made = {path.name for path in tmp_path.iterdir()}
+    assert {"tolerances.svg", "lengths.png", "swing.svg", "tolerances.parquet", "lengths.parquet"} <= made
+
+
+@pytest.mark.long
+def test_system_in_ecos_and_libcosim_too(request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    followed = follow("system.md", tmp_path)
+    before, in_hosts = page_text("system.md").split("## 5.")
+    accept("system.md", f"{followed.commented(before)}## 5.{in_hosts}", request)
+    assert (tmp_path / "machine.csv").read_text(encoding="utf-8").startswith("time,rocker.phi,slide.block.x")
+    assert {one.name for one in read_ssd(tmp_path / "machine.ssp", validate=True).system.elements} == {
+        "feeder",
+        "slide",
+    }
+    same, longer = (read(tmp_path / name) for name in ("machine.mcap", "longer.mcap"))
+    assert abs(same["rocker.phi"] - longer["rocker.phi"]).max() > 0.01
+    if find_spec("ecospy") and find_spec("libcosimpy"):
+        comments = [comment for _, comment in SHOWN.findall(in_hosts)]
+        printed = [line for line in followed.printed_in_host.splitlines() if re.fullmatch(r"[\d.]+ mm", line)]
+        assert printed == comments
+        ((late, last),) = re.findall(r"# ([\d.]+ mm), ([\d.]+ mm)$", before, re.MULTILINE)
+        assert comments == [last, late]  # Ecos, libcosim
