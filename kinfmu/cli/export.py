@@ -10,13 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kinfmu.cli.arguments import STANDARD_OUTPUT, InputFile, OutputFile, RecordOrMechanism, names_in
-from kinfmu.cli.cams import export_cam
+from kinfmu.cli.arguments import STANDARD_OUTPUT, InputFile, OutputFile, RecordOrMechanism, names_in, on_axis
+from kinfmu.cli.export_formats import PAGES, export_cam, mechanism_of, write_page
 from kinfmu.cli.group import errors_of, main
-from kinfmu.cli.pages import PAGES, mechanism_of, write_page
-from kinfmu.cli.quantities import on_axis
-from kinfmu.cli.settings import checked_settings, set_option
-from kinfmu.cli.tables import csv_form, table_options
+from kinfmu.cli.settings import checked_settings, csv_form, set_option, table_options
 from kinfmu.errors import RequestError, listed
 from kinfmu.files import suffix_of
 from kinfmu.mechanism import gallery

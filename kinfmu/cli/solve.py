@@ -9,12 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kinfmu.cli.arguments import OutputFile, mechanism_argument, names_in, outputs_option
-from kinfmu.cli.group import errors_of, main, on_interrupt
-from kinfmu.cli.messages import note, report, warn
-from kinfmu.cli.quantities import RangeArgument, driver_value, is_bare
-from kinfmu.cli.settings import TOLERANCE, Settings, checked_settings, set_option, tolerance_of
-from kinfmu.cli.tables import csv_form, table_options
+from kinfmu.cli.arguments import (
+    OutputFile,
+    RangeArgument,
+    driver_value,
+    is_bare,
+    mechanism_argument,
+    names_in,
+    outputs_option,
+)
+from kinfmu.cli.group import errors_of, main, note, on_interrupt, report, warn
+from kinfmu.cli.settings import TOLERANCE, Settings, checked_settings, csv_form, set_option, table_options, tolerance_of
 from kinfmu.errors import listed
 from kinfmu.files import suffix_of
 from kinfmu.mechanism import gallery

@@ -27,10 +27,9 @@ from kinfmu.mechanism.loads import Load
 from kinfmu.mechanism.measures import Reading
 from kinfmu.mechanism.members import Members, NumberPath, texts_of
 from kinfmu.mechanism.metres import in_metres
-from kinfmu.mechanism.parameters import Parameter, parameter_values
+from kinfmu.mechanism.parameters import Parameter, parameter_values, resolve
 from kinfmu.mechanism.quantities.arithmetic import Value
 from kinfmu.mechanism.quantities.placement import body_of
-from kinfmu.mechanism.resolve import resolve
 from kinfmu.mechanism.settings import LawConstant, Settable, law_constants, with_law_constants
 from kinfmu.units import OTHER_SPELLINGS, CoordinateName, Quantity
 

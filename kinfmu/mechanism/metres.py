@@ -7,10 +7,9 @@ from dataclasses import fields, replace
 from decimal import Decimal
 from typing import Any
 
-from kinfmu.mechanism.dimension import NUMBER, Dimension, DimensionError
 from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.members import Members, NumberPath
-from kinfmu.mechanism.operations import OPERATIONS, ExpressionStep
+from kinfmu.mechanism.operations import NUMBER, OPERATIONS, Dimension, DimensionError, ExpressionStep
 from kinfmu.mechanism.parameters import NUMBER as PURE
 from kinfmu.mechanism.parameters import Parameter, dimensions_of
 from kinfmu.units import METRES, Quantity, every_unit, length_power

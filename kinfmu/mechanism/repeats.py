@@ -23,7 +23,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.mechanism.toml_tables import check_keys, named_tables, named_values
+from kinfmu.mechanism.toml_document import check_keys, named_tables, named_values
 from kinfmu.mechanism.valid import quoted
 
 COUNTS, REPEAT = "counts", "repeat"

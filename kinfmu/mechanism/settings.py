@@ -9,13 +9,21 @@ from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
 from kinfmu.errors import MechanismError, RequestError, listed, suggestion
-from kinfmu.mechanism.display_unit import DisplayUnit, display_unit, written_unit
 from kinfmu.mechanism.drivers import Driver
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.loads import Load
 from kinfmu.mechanism.loads.following import Following
 from kinfmu.mechanism.members import NumberPath
-from kinfmu.mechanism.number import given_unit, in_unit_of, read_constant, read_number, unit_advice
+from kinfmu.mechanism.number import (
+    DisplayUnit,
+    display_unit,
+    given_unit,
+    in_unit_of,
+    read_constant,
+    read_number,
+    unit_advice,
+    written_unit,
+)
 from kinfmu.mechanism.parameters import NUMBER, Parameter
 from kinfmu.mechanism.quantities.arithmetic import Value
 from kinfmu.mechanism.valid import is_number, quoted

@@ -11,9 +11,8 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.design.fit.argument import Argument
-from kinfmu.design.fit.constraints import Constraint, MarginConstraint, MeasureConstraint
 from kinfmu.design.fit.numbers import read_weights
-from kinfmu.design.fit.targets import MeasureTarget, Target
+from kinfmu.design.fit.targets import Constraint, MarginConstraint, MeasureConstraint, MeasureTarget, Target
 from kinfmu.errors import KinfmuError, MechanismError, listed, suggestion
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.laws import ConstantSpeed

@@ -11,8 +11,8 @@ from kinfmu.errors import MechanismError, RequestError, listed, suggestion
 from kinfmu.files import suffix_of, write_whole
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.gallery.chains import CHAINS, chain
+from kinfmu.mechanism.toml_document import text_of
 from kinfmu.mechanism.toml_file import read
-from kinfmu.mechanism.toml_tables import text_of
 from kinfmu.mechanism.toml_text import text
 from kinfmu.mechanism.valid import quoted
 

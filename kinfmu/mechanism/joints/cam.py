@@ -1,4 +1,4 @@
-"""Cams with a lift law: the position of a follower depends on the angle of a cam."""
+"""Cams with a lift law: the position of a follower depends on the angle of a cam. What touches the cam."""
 
 from __future__ import annotations
 
@@ -8,14 +8,40 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from kinfmu.errors import MechanismError, listed
-from kinfmu.mechanism.joints.follower_element import FaceNormal, RollerRadius, check_element, roller_conditions
 from kinfmu.mechanism.joints.joint import Condition, Joint
 from kinfmu.mechanism.laws import Law, MotionSequence
 from kinfmu.mechanism.laws.law import NEARLY, TURN
 from kinfmu.mechanism.quantities import AngleBetween, PoseQuantity, PositionAlong
 from kinfmu.mechanism.quantities.arithmetic import Value
 from kinfmu.mechanism.quantities.placement import BodyName, BodyPair, Placement, PointPair, Reference, body_of
-from kinfmu.units import Length, Radians
+from kinfmu.units import Length, Quantity, Radians
+
+RollerRadius = Annotated[
+    float | None,
+    Quantity("length"),
+    "radius of the roller, 0 for a knife edge [length]; default: unknown, and then there is no profile",
+]
+FaceNormal = Annotated[
+    float | None,
+    Quantity("angle"),
+    "direction of the normal of a flat face, away from the cam, in the follower's frame [rad]; default: no flat face",
+]
+
+
+def roller_conditions(radius: float | None) -> tuple[Condition, ...]:
+    """Return the condition on the radius of a roller, none without one."""
+    return () if radius is None else (Condition("roller_radius", radius, "0 or more"),)
+
+
+def check_element(name: str, radius: float | None, normal: float | None = None) -> None:
+    """Raise a MechanismError for a negative radius, or for both a roller and a flat face."""
+    if radius is not None and not radius >= 0.0:
+        raise MechanismError(f"[joints.{name}] roller_radius = {radius!r} must be 0 or more", joint=name)
+    if radius is not None and normal is not None:
+        raise MechanismError(
+            f"[joints.{name}] has both 'roller_radius' and 'normal'; a follower has a roller or a flat face", joint=name
+        )
+
 
 _SAMPLES = 24  # angles in a turn at which the size of a lift is sampled
 

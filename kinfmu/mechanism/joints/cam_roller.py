@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from kinfmu.errors import MechanismError
-from kinfmu.mechanism.joints.cam import closing
-from kinfmu.mechanism.joints.follower_element import RollerRadius, check_element, roller_conditions
+from kinfmu.mechanism.joints.cam import RollerRadius, check_element, closing, roller_conditions
 from kinfmu.mechanism.joints.joint import Condition, Joint
 from kinfmu.mechanism.laws import Law
 from kinfmu.mechanism.laws.law import TURN, values_by_degree

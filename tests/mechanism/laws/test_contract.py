@@ -20,8 +20,8 @@ from kinfmu.errors import MechanismError
 from kinfmu.mechanism.drivers import DRIVERS
 from kinfmu.mechanism.joints import JOINTS
 from kinfmu.mechanism.laws import LAWS, RISES, Harmonic, Law, MotionSequence, Polynomial, Spline
+from kinfmu.mechanism.toml_document import table_keys
 from kinfmu.mechanism.toml_file import parse
-from kinfmu.mechanism.toml_tables import table_keys
 from kinfmu.mechanism.toml_text import text
 from kinfmu.plan.equations.graph import Graph, evaluate
 from kinfmu.solver.python.status import Status

@@ -19,8 +19,8 @@ from kinfmu.mechanism.declared import keys_of
 from kinfmu.mechanism.laws import LAWS, ConstantValue, External
 from kinfmu.mechanism.loads import LOADS, Damper, Following, ForceAlong, ForceAt, Load, Spring, TorsionDamper
 from kinfmu.mechanism.quantities.placement import GROUND, BodyFrame, Placement
+from kinfmu.mechanism.toml_document import table_keys
 from kinfmu.mechanism.toml_file import parse
-from kinfmu.mechanism.toml_tables import table_keys
 from kinfmu.mechanism.toml_text import text
 from kinfmu.plan.equations.graph import evaluate
 from kinfmu.plan.equations.system import placement

@@ -1,4 +1,4 @@
-"""kinfmu new: write a mechanism file to start from."""
+"""kinfmu list: the gallery; kinfmu new: write a mechanism file to start from; kinfmu schema: write its JSON Schema."""
 
 from __future__ import annotations
 
@@ -12,6 +12,18 @@ from kinfmu.cli.group import main
 from kinfmu.errors import KinfmuError
 from kinfmu.files import write_whole
 from kinfmu.mechanism import gallery
+
+
+@main.command("list", epilog="Example: kinfmu list")
+def list_() -> None:
+    """List the mechanisms of the gallery.
+
+    Use their names as MECH in other commands.
+    """
+    names = gallery.names()
+    width = max(map(len, names), default=0)
+    for name in names:
+        click.echo(f"{name:{width}}  {gallery.load(name).title}")
 
 
 @main.command(epilog="Example: kinfmu new crank_rocker mine.toml")
@@ -33,3 +45,22 @@ def new(mechanism: str, file: Path) -> None:
     except OSError as error:
         raise KinfmuError(f"{file}: cannot be written ({error.strerror})") from None
     click.echo(f"{file}: written; next: kinfmu check {quote(str(file))}")
+
+
+@main.command(epilog="Example: kinfmu schema -o mechanism.schema.json")
+@click.option("-o", "output", type=OutputFile(), help="The file to write. Default: print it.")
+def schema(output: Path | None) -> None:
+    """Write the JSON Schema of mechanism files.
+
+    Editors use it to complete and check mechanism files.
+    """
+    from kinfmu.mechanism.schema import schema_text
+
+    if output is None:
+        click.echo(schema_text(), nl=False)
+        return
+    try:
+        write_whole(output, schema_text().encode())
+    except OSError as error:
+        raise KinfmuError(f"{output}: cannot be written ({error.strerror})") from None
+    click.echo(f"{output}: written; a mechanism file names it in its first line: #:schema {output}")
