@@ -1,19 +1,20 @@
-"""What export writes."""
+"""What `kinfmu export` writes: one writer for each format, with the options of the command that belong to it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from kinfmu.cli.arguments import STANDARD_OUTPUT, driver_value
+from kinfmu.cli.arguments import STANDARD_OUTPUT, driver_value, names_in, on_axis
 from kinfmu.cli.group import errors_of, patience
 from kinfmu.cli.settings import checked_settings, csv_form
 from kinfmu.errors import KinfmuError, RequestError, listed
-from kinfmu.files import suffix_of, write_whole
+from kinfmu.files import errors_of_writing, suffix_of, write_whole
 from kinfmu.mechanism import gallery
 from kinfmu.units import Quantity
 
@@ -21,31 +22,109 @@ if TYPE_CHECKING:
     from kinfmu.mechanism import Mechanism
     from kinfmu.run import Run
 
-
-FORMATS = (".csv", ".dxf", ".svg", ".png", ".pdf")
+Options = Mapping[str, Any]  # of the command, by the names of its parameters; `form` of a CSV file, `run`: as given
+PAGES = (".html",)
+CAM_FORMATS = (".csv", ".dxf", ".svg", ".png", ".pdf")
 _FINE = 1e-5  # of the largest distance of the profile from the axle
 
 
-def export_cam(
-    given: str,
-    output: Path,
-    joint: str,
-    tolerance: str | None,
-    settings: Sequence[tuple[str, str]],
-    *,
-    degrees: bool,
-    **form: Any,
-) -> None:
-    """Write the profile of a cam of a mechanism, or of the mechanism of a record; form: as `csv_form` takes it."""
-    valid = {"run", "output", "cam", "tolerance", "settings", "degrees", *form}
-    others = [name for name, value in click.get_current_context().params.items() if value and name not in valid]
-    if others:
-        options = listed(f"--{name}" for name in others).replace("--other", "a second run").replace("across", "x")
-        raise click.UsageError(f"--cam {joint} excludes {options}")
+def write_table(run: Run, output: Path, options: Options) -> None:
+    """Write columns of a run, or displacement, velocity, acceleration and jerk, as a table."""
+    from kinfmu.log.table import columns_of, write_columns
+    from kinfmu.log.table import write_table as written
+    from kinfmu.motion.svaj_table import svaj_columns
+    from kinfmu.run.tables import csv_lines
+
+    names, degrees, form = names_in(options["columns"]), options["degrees"], options["form"]
+    columns = svaj_columns(run, options["svaj"], degrees=degrees) if options["svaj"] else None
+    if output == STANDARD_OUTPUT:
+        _print(csv_lines(columns or columns_of(run, names, degrees=degrees), **form))
+    elif columns:
+        write_columns(run, columns, output, **form)
+    else:
+        written(run, output, names, degrees=degrees, **form)
+
+
+def write_plot(run: Run, output: Path, options: Options) -> None:
+    """Plot columns of a run, also of a second one, or displacement, velocity, acceleration and jerk."""
+    from kinfmu.draw import plot, svaj
+    from kinfmu.log import read
+
+    degrees, other = options["degrees"], options["other"]
+    if options["svaj"]:
+        svaj(run, output, options["svaj"], degrees=degrees)
+        return
+    how: dict[str, Any] = {"x": names_in(options["across"]) or (), "overlaid": options["overlay"]}
+    if other is not None:
+        second = samples_between(read(other), options["start"], options["stop"])
+        how |= {"other": second, "names": (Path(options["run"]).stem, other.stem)}
+    plot(run, output, names_in(options["columns"]) or (), degrees=degrees, polar=options["polar"], **how)
+
+
+def write_animation(run: Run, output: Path, options: Options) -> None:
+    """Write the moving linkage."""
+    from kinfmu.draw import animate
+
+    animate(run, output, width=options["width"])
+
+
+def write_drawing(run: Run, output: Path, options: Options) -> None:
+    """Write the pose at a value as a CAD drawing."""
+    from kinfmu.draw import dxf
+
+    at = options["at"]
+    dxf(run, output, None if at is None else _place(run, "--at", at))
+
+
+def _print(lines: Iterable[str]) -> None:
+    for line in lines:
+        click.echo(line, nl=False)
+
+
+def _place(run: Run, option: str, text: str) -> float:
+    """Return a position on the axis of a run, in its unit, from the text of an option."""
+    from kinfmu.run.axis import axis_of
+
+    axis = axis_of(run)
+    return on_axis(option, text, axis.label, axis.unit, f", {axis.range()}") / axis.factor
+
+
+def samples_between(run: Run, start: str | None, stop: str | None) -> Run:
+    """Return the samples from `start` to `stop` on the axis of the run, both included; all by default."""
+    if start is None and stop is None:
+        return run
+    import numpy as np
+
+    from kinfmu.run.axis import axis_of
+
+    axis = axis_of(run)
+
+    first = -math.inf if start is None else _place(run, "--start", start)
+    last = math.inf if stop is None else _place(run, "--stop", stop)
+    edge = 0.0
+    if len(run) and not axis.is_time:  # driver values are rounded: 30 deg in radians, and back
+        edge = 1e-9 * max(abs(axis.values[0]), abs(axis.values[-1]))
+    rows = (axis.values >= first - edge) & (axis.values <= last + edge)
+    if not rows.any():
+        unit = f" {axis.unit}".rstrip()
+        asked = f"from {first:g} to {last:g}{unit}"
+        if stop is None:
+            asked = f"from {first:g}{unit} on"
+        elif start is None:
+            asked = f"up to {last:g}{unit}"
+        available = axis.range() or "none"
+        raise RequestError(f"--start, --stop: the run has no samples {asked}; its samples: {available}")
+    kept = run.t[rows]
+    low, high = (first, last) if axis.is_time else (np.min(kept), np.max(kept))
+    return run.part(rows, events=tuple(event for event in run.events if low <= event.t <= high))
+
+
+def write_cam(given: str, output: Path, joint: str, settings: Sequence[tuple[str, str]], options: Options) -> str:
+    """Write the profile of a cam of a mechanism, or of the mechanism of a record; return what is to be said of it."""
     suffix = ".csv" if output == STANDARD_OUTPUT else suffix_of(output)
-    if suffix not in FORMATS:
-        raise click.UsageError(f"{output}: the profile of a cam is written as {listed(FORMATS)}")
-    form = csv_form(suffix, (".csv",), **form)
+    if suffix not in CAM_FORMATS:
+        raise click.UsageError(f"{output}: the profile of a cam is written as {listed(CAM_FORMATS)}")
+    form, degrees, tolerance = csv_form(suffix, (".csv",), options), options["degrees"], options["tolerance"]
     if degrees and suffix != ".csv":
         about = "its figure has angles in deg" if suffix != ".dxf" else "a drawing has no angles"
         raise click.UsageError(f"--degrees: of a cam only for .csv, not {suffix}; {about}")
@@ -76,19 +155,14 @@ def export_cam(
             profile = cam_profile(mechanism, joint, tolerance=within)
             about = f" ({len(profile.angle)} corners, within {within:.3g} {unit} of the curve)"
     if output == STANDARD_OUTPUT:
-        for line in profile.csv_lines(degrees=degrees, **form):
-            click.echo(line, nl=False)
-        return
-    if suffix == ".csv":
+        _print(profile.csv_lines(degrees=degrees, **form))
+    elif suffix == ".csv":
         profile.write_csv(output, degrees=degrees, **form)
     else:
         from kinfmu.draw import cam
 
         cam(profile, output)
-    click.echo(f"written: {output}{about}")
-
-
-PAGES = (".html",)
+    return about
 
 
 def write_page(mechanism: Mechanism, path: Path, run: Run | None = None) -> None:
@@ -105,10 +179,8 @@ def write_page(mechanism: Mechanism, path: Path, run: Run | None = None) -> None
     samples = samples_of(run, mechanism) if run and not over else None
     with patience():
         text = page(mechanism, over=over, samples=samples)
-    try:
+    with errors_of_writing(path, KinfmuError):
         write_whole(path, text.encode())
-    except OSError as error:
-        raise KinfmuError(f"{path}: cannot be written ({error.strerror})") from None
 
 
 def mechanism_of(run: Run) -> Mechanism:

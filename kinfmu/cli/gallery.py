@@ -10,7 +10,7 @@ import click
 from kinfmu.cli.arguments import OutputFile, exists, mechanism_argument
 from kinfmu.cli.group import main
 from kinfmu.errors import KinfmuError
-from kinfmu.files import write_whole
+from kinfmu.files import errors_of_writing, write_whole
 from kinfmu.mechanism import gallery
 
 
@@ -37,13 +37,11 @@ def new(mechanism: str, file: Path) -> None:
     if exists(file):
         raise click.UsageError(f"{file}: exists already; nothing was written")
     source = gallery.folder() / mechanism / "mechanism.toml" if mechanism in gallery.names() else Path(mechanism)
-    try:
+    with errors_of_writing(file, KinfmuError):
         if ":" in mechanism and gallery.has(mechanism):  # a chain has no file
             gallery.save(gallery.load(mechanism), file)
         else:
             write_whole(file, source.read_bytes())
-    except OSError as error:
-        raise KinfmuError(f"{file}: cannot be written ({error.strerror})") from None
     click.echo(f"{file}: written; next: kinfmu check {quote(str(file))}")
 
 
@@ -59,8 +57,6 @@ def schema(output: Path | None) -> None:
     if output is None:
         click.echo(schema_text(), nl=False)
         return
-    try:
+    with errors_of_writing(output, KinfmuError):
         write_whole(output, schema_text().encode())
-    except OSError as error:
-        raise KinfmuError(f"{output}: cannot be written ({error.strerror})") from None
     click.echo(f"{output}: written; a mechanism file names it in its first line: #:schema {output}")

@@ -171,27 +171,24 @@ def table_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def csv_form(
-    suffix: str, tables: tuple[str, ...], *, units: bool, separator: str | None, decimal: str | None
-) -> dict[str, Any]:
+def csv_form(suffix: str, tables: tuple[str, ...], options: Mapping[str, Any]) -> dict[str, Any]:
     """Return the form of a CSV file, as arguments of `write_table`; raise a UsageError for other files.
 
     Args:
         suffix: Of the file.
         tables: Suffixes of tables, which may be written with units.
-        units: As given.
-        separator: As given; None: the default.
-        decimal: As given; None: the default.
+        options: Of the command, with those of `table_options`.
 
     """
-    given = {"--separator": separator, "--decimal": decimal}
-    asked = [f"{option} '{value}'" for option, value in given.items() if value] + ["--units"] * units
+    units, separator, decimal = (options[name] for name in ("units", "separator", "decimal"))
+    of_csv = [f"--{name} '{options[name]}'" for name in ("separator", "decimal") if options[name]]
+    asked = of_csv + ["--units"] * units
     if suffix not in tables and asked:
         valid = tables[0] if len(tables) == 1 else f"tables, {listed(tables)}"
         raise click.UsageError(f"{listed(asked)}: only for {valid}, not {suffix}")
-    if suffix != CSV and (separator or decimal):
+    if suffix != CSV and of_csv:
         raise click.UsageError(f"{listed(asked)}: only for {CSV}, not {suffix}")
-    found = {"separator": SEPARATORS[separator or ","], "decimal": decimal or "."}
-    if found["separator"] == found["decimal"]:
+    form = {"separator": SEPARATORS[separator or ","], "decimal": decimal or "."}
+    if form["separator"] == form["decimal"]:
         raise click.UsageError("--decimal ',' needs another separator than the comma: --separator ';'")
-    return {"units": units, **found}
+    return {"units": units, **form}

@@ -84,12 +84,10 @@ def solve(
     speed: str | None,
     wrap: bool,
     degrees: bool,
-    units: bool,
-    separator: str | None,
-    decimal: str | None,
     settings: tuple[tuple[str, str], ...],
     outputs: str | None,
     engine: str,
+    **of_table: Any,
 ) -> None:
     """Solve a mechanism at times or driver values.
 
@@ -106,7 +104,7 @@ def solve(
     for option, value in (("--wrap", wrap), (f"--speed {speed}", speed)):
         if value and not angle:
             raise click.UsageError(f"{option} needs --angle")
-    form = csv_form(suffix_of(output), TABLES, units=units, separator=separator, decimal=decimal)
+    form = csv_form(suffix_of(output), TABLES, of_table)
     if degrees and suffix_of(output) == RECORD:
         raise click.UsageError(f"--degrees: only for tables, {listed(TABLES)}; export writes those of a record")
     mech = gallery.load(mechanism)

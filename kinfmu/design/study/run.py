@@ -32,7 +32,7 @@ from kinfmu.design.study.table import (
     write_parquet,
 )
 from kinfmu.errors import MechanismError, MissingPackageError, RequestError, StudyError, listed
-from kinfmu.files import replacement, suffix_of, temporary_folder
+from kinfmu.files import errors_of_writing, replacement, suffix_of, temporary_folder
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.measures import Reading
 from kinfmu.processes import WorkerLostError, cores, processes, require_workers, without_main
@@ -156,15 +156,12 @@ def _run(study: Study, path: Path, workers: int, dask: str | None, progress: Pro
     """Measure the parts that are missing, and join all parts in a file."""
     with PartsFolder(path, study, restart=restart) as parts:
         layout, rows = _measured(study, parts, workers, dask, progress)
-        try:
-            with replacement(path) as temporary:
-                if suffix_of(path) == CSV:
-                    write_csv(rows, layout, temporary)
-                    write_synced(about_file(path), layout.as_json().encode())
-                else:
-                    write_parquet(rows, layout, temporary)
-        except OSError as error:
-            raise StudyError(f"{path}: cannot be written ({error.strerror or error})") from None
+        with errors_of_writing(path, StudyError), replacement(path) as temporary:
+            if suffix_of(path) == CSV:
+                write_csv(rows, layout, temporary)
+                write_synced(about_file(path), layout.as_json().encode())
+            else:
+                write_parquet(rows, layout, temporary)
         parts.remove()
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from kinfmu.errors import MechanismError, RequestError, listed, suggestion
-from kinfmu.files import suffix_of, write_whole
+from kinfmu.files import errors_of_writing, suffix_of, write_whole
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.gallery.chains import CHAINS, chain
 from kinfmu.mechanism.toml_document import text_of
@@ -99,8 +99,6 @@ def save(mechanism: Mechanism, path: str | Path) -> Path:
 
     """
     path = Path(path)
-    try:
+    with errors_of_writing(path, MechanismError):
         write_whole(path, text(mechanism, as_written=True).encode())
-    except OSError as error:
-        raise MechanismError(f"{path}: cannot be written ({error.strerror})") from None
     return path
