@@ -90,6 +90,7 @@ class MissingPackageError(KinfmuError):
 
 
 MOST_LISTED = 100  # names in a message
+MOST_SHOWN = 24  # names in a line of a report
 OTHER_WORDS = {  # words of other programs and of drawings, with the words of kinfmu
     **dict.fromkeys(
         ("pin", "pinned", "hinge", "pivot", "rotational", "rotary", "pin joint", "hinge joint"), "revolute"
@@ -121,6 +122,13 @@ def listed(names: Iterable[str]) -> str:
     if len(names) > MOST_LISTED:
         names[MOST_LISTED - 1 :] = [f"... ({len(names)} in all)"]
     return ", ".join(names) or "none"
+
+
+def some(names: Iterable[str]) -> str:
+    """Return names as `listed` does; of more than MOST_SHOWN names the first ones, and how many more there are."""
+    names = list(names)
+    more = f" and {len(names) - MOST_SHOWN} more" if len(names) > MOST_SHOWN else ""
+    return listed(names[:MOST_SHOWN]) + more
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -61,8 +60,7 @@ def _bare_angles(mechanism: Mechanism) -> Iterator[str]:
     """Yield a line for each angle without a unit that is probably in degrees."""
     large: dict[tuple[NumberPath, float], tuple[NumberPath, float]] = {}  # a rise and its return are one mistake
     cams = {joint.name for joint in mechanism.joints if isinstance(joint, Cam)}
-
-    def look(place: NumberPath, value: Any, quantity: Quantity) -> Any:
+    for place, value, quantity in mechanism.members.numbers():
         # Those of laws may be many turns, but for cams; multiples of 15 are probably degrees.
         is_turns = ("law" in place and place[1] not in cams) or place[0] == "drivers"
         if (
@@ -73,9 +71,6 @@ def _bare_angles(mechanism: Mechanism) -> Iterator[str]:
         ):
             owner = place[:2] if "law" in place else place
             large.setdefault((owner, abs(value)), (place, float(value)))
-        return value
-
-    mechanism.members.changed(look)
     for place, value in large.values():
         yield (
             f"{path_text(place)} = {value:.6g} rad is {math.degrees(value):.6g} deg, more than a turn: "
@@ -87,15 +82,10 @@ def _lengths_without_a_unit(mechanism: Mechanism) -> Iterator[str]:
     """Yield a line for each pure number that would be a length in every expression with it: '0.8*crank' of a length."""
     dimensions, length = dimensions_of(mechanism.parameters), Quantity("length")
     places: dict[str, list[tuple[Expression, Quantity]]] = {}
-
-    def look(place: NumberPath, value: Any, quantity: Quantity) -> Any:
-        if place in mechanism.expressions:
-            expression = mechanism.expressions[place]
-            for name in expression.names:
-                places.setdefault(name, []).append((expression, quantity))
-        return value
-
-    mechanism.members.changed(look)
+    for place, _, quantity in mechanism.members.numbers():
+        expression = mechanism.expressions.get(place)
+        for name in expression.names if expression else ():
+            places.setdefault(name, []).append((expression, quantity))
     derived = {name for p in mechanism.parameters.values() if p.expression for name in p.expression.names}
     for name, parameter in mechanism.parameters.items():
         value = float(parameter.value)
@@ -255,18 +245,14 @@ def unit_notes(mechanism: Mechanism) -> Iterator[str]:
     unit = mechanism.length_unit
     lengths: dict[NumberPath, float] = {}
     bare: dict[NumberPath, tuple[float, Quantity]] = {}
-
-    def look(place: NumberPath, value: Any, quantity: Quantity) -> Any:
+    for place, value, quantity in mechanism.members.numbers():
         is_start = place[0] == "bodies" and place[2] == "start"
         if "law" in place or is_start or place[0] == "measures" or not value:
-            return value
+            continue
         if quantity == Quantity("length"):
             lengths[place] = abs(float(value))
         if not given_unit(value) and place not in mechanism.expressions:
             bare[place] = float(value), quantity
-        return value
-
-    mechanism.members.changed(look)
     yield from _gravity(mechanism, bare)
     for place, (value, quantity) in bare.items():
         meant = _USUAL.get((quantity.kind, unit))

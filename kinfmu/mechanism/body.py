@@ -184,10 +184,12 @@ class Body:
         object.__setattr__(self, "points", MappingProxyType(points))
         object.__setattr__(self, "start", Start(*self.start))
         object.__setattr__(self, "center_of_mass", self._point("center_of_mass", self.center_of_mass))
-        if self.rod is not None:
-            object.__setattr__(self, "rod", self._rod(self.rod))
-        if self.plate is not None:
-            object.__setattr__(self, "plate", self._plate(self.plate))
+        for key, valid in (
+            ("rod", "two points of the body, such as ['A', 'B']"),
+            ("plate", "three or more points of the body, such as ['A', 'B', 'C']"),
+        ):
+            if getattr(self, key) is not None:
+                object.__setattr__(self, key, self._names(key, getattr(self, key), valid))
 
     def _point(self, key: str, point: Iterable[float]) -> Point:
         try:
@@ -196,22 +198,13 @@ class Body:
         except (TypeError, ValueError):
             raise MechanismError(f"[bodies.{self.name}] {key} = {quoted(point)} must be two numbers [x, y]") from None
 
-    def _rod(self, rod: Iterable[str]) -> tuple[str, str]:
-        ends = () if isinstance(rod, str | Mapping) or not isinstance(rod, Iterable) else tuple(rod)
-        if len(ends) != 2 or not all(isinstance(end, str) for end in ends):
-            raise MechanismError(
-                f"[bodies.{self.name}] rod = {quoted(rod)} must be two points of the body, such as ['A', 'B']"
-            )
-        return ends
-
-    def _plate(self, corners: Iterable[str]) -> tuple[str, ...]:
-        names = () if isinstance(corners, str | Mapping) or not isinstance(corners, Iterable) else tuple(corners)
-        if len(names) < 3 or not all(isinstance(name, str) for name in names):
-            raise MechanismError(
-                f"[bodies.{self.name}] plate = {quoted(corners)} must be three or more points of the body, "
-                f"such as ['A', 'B', 'C']"
-            )
-        return names
+    def _names(self, key: str, names: Any, valid: str) -> tuple[str, ...]:
+        """Return the points of a rod, two, or of a plate, three or more; valid: what they must be, in messages."""
+        found = () if isinstance(names, str | Mapping) or not isinstance(names, Iterable) else tuple(names)
+        is_enough = len(found) == 2 if key == "rod" else len(found) >= 3
+        if not is_enough or not all(isinstance(name, str) for name in found):
+            raise MechanismError(f"[bodies.{self.name}] {key} = {quoted(names)} must be {valid}")
+        return found
 
     @property
     def given_masses(self) -> dict[str, Any]:

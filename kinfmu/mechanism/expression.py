@@ -319,7 +319,7 @@ class Expression:
 
         def apply(step: ExpressionStep, operands: Sequence[Value]) -> Value:
             try:
-                result = OPERATIONS[step.operation].value(*operands)
+                result = OPERATIONS[step.operation].value(*operands, *step.exponent)
                 if isinstance(result, float) and not math.isfinite(result):
                     raise OverflowError
             except ZeroDivisionError:
@@ -331,7 +331,7 @@ class Expression:
                 raise error_at(self.text, step.at, what) from None
             return result
 
-        return self._evaluated(leaf, apply)
+        return self.evaluated(leaf, apply)
 
     def dimension(self, dimensions: Mapping[str, Dimension]) -> Dimension:
         """Return the dimension of the expression, or raise a MechanismError where dimensions are incompatible."""
@@ -341,22 +341,21 @@ class Expression:
 
         def apply(step: ExpressionStep, operands: Sequence[Any]) -> Dimension:
             try:
-                return OPERATIONS[step.operation].dimension(*operands)
+                return OPERATIONS[step.operation].dimension(*operands, *step.exponent)
             except DimensionError as error:
                 raise error_at(self.text, step.at, f"'{step.operation}': {error}") from None
 
-        return self._evaluated(leaf, apply)
+        return self.evaluated(leaf, apply)
 
-    def _evaluated(self, leaf: Callable[[ExpressionStep], T], apply: Callable[[ExpressionStep, Sequence[Any]], T]) -> T:
-        """Return the result of the steps; `apply` gets the operands, and of a power also the exponent."""
+    def evaluated(self, leaf: Callable[[ExpressionStep], T], apply: Callable[[ExpressionStep, Sequence[T]], T]) -> T:
+        """Return the result of the steps: what `leaf` makes of numbers and names, and `apply` of operands."""
         stack: list[T] = []
         for step in self.steps:
             if step.operation in ("number", "name"):
                 stack.append(leaf(step))
             else:
                 first = len(stack) - OPERATIONS[step.operation].arity
-                exponent = (step.value,) if step.operation == "power" else ()
-                stack[first:] = [apply(step, (*stack[first:], *exponent))]
+                stack[first:] = [apply(step, stack[first:])]
         return stack[0]
 
     def refuse_unknown(self, names: Collection[str]) -> None:

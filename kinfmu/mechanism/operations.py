@@ -171,6 +171,11 @@ class ExpressionStep(NamedTuple):
     unit: str = ""  # of a number, as written
     dimension: Dimension = BARE  # of a number
 
+    @property
+    def exponent(self) -> tuple[int, ...]:
+        """The exponent of a power, which the operation takes after its operand; empty for others."""
+        return (self.value,) if self.operation == "power" else ()
+
 
 class Operation(NamedTuple):
     """An operation in any arithmetic and on dimensions."""

@@ -7,7 +7,7 @@ parameter such as "10 N" enters as 10000 kg mm/s2. In files in metres nothing is
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from graphlib import CycleError, TopologicalSorter
 from itertools import chain
@@ -187,6 +187,9 @@ def in_order(names: Iterable[str], expressions: Mapping[str, Expression]) -> lis
         raise MechanismError(f"[parameters] {circle[0]} needs itself: {' -> '.join(shown)}") from None
 
 
+Converted = tuple[Dimension, list[ExpressionStep]]  # of a part of an expression
+
+
 def converted(
     where: str,
     expression: Expression,
@@ -219,25 +222,24 @@ def converted(
             f"give a number or a parameter ({listed(expression.names)}) its unit, such as '1 {KINDS[wanted.kind].unit}'"
         )
     units = every_unit(expression.length_unit)
-    stack: list[tuple[Dimension, list[ExpressionStep]]] = []
-    for step in expression.steps:
+
+    def leaf(step: ExpressionStep) -> Converted:
         if step.operation == "number":
-            power = _power(units[step.unit][0] if step.unit else None)
-            stack.append((step.dimension, [step, *_times(metre, -power, step.at)]))
-        elif step.operation == "name":
-            power = _power(quantities.get(step.value))
-            stack.append((dimensions.get(step.value, UNKNOWN), [step, *_times(metre, -power, step.at)]))
+            dimension, quantity = step.dimension, units[step.unit][0] if step.unit else None
         else:
-            operation = OPERATIONS[step.operation]
-            first = len(stack) - operation.arity
-            operands, exponent = [one for one, _ in stack[first:]], (step.value,) if step.operation == "power" else ()
-            parts = [part for _, part in stack[first:]]
-            if step.operation in ("+", "-"):
-                for part, own, other in zip(parts, operands, reversed(operands), strict=True):
-                    power = int(other.length) if own.is_open and other.is_known and other.mass else 0
-                    part += _times(metre, -power, step.at)  # a number without a unit is in N, like the other term
-            stack[first:] = [(operation.dimension(*operands, *exponent), [*chain(*parts), step])]
-    steps = [*stack[0][1], *_times(metre, result, len(expression.text))]
+            dimension, quantity = dimensions.get(step.value, UNKNOWN), quantities.get(step.value)
+        return dimension, [step, *_times(metre, -_power(quantity), step.at)]
+
+    def apply(step: ExpressionStep, operands: Sequence[Converted]) -> Converted:
+        if step.operation in ("+", "-"):
+            for (dimension, part), (other, _) in zip(operands, reversed(operands), strict=True):
+                power = int(other.length) if dimension.is_open and other.is_known and other.mass else 0
+                part += _times(metre, -power, step.at)  # a number without a unit is in N, like the other term
+        dimension = OPERATIONS[step.operation].dimension(*(one for one, _ in operands), *step.exponent)
+        return dimension, [*chain(*(part for _, part in operands)), step]
+
+    _, own_steps = expression.evaluated(leaf, apply)
+    steps = [*own_steps, *_times(metre, result, len(expression.text))]
     if len(steps) == len(expression.steps):
         return expression
     return replace(expression, steps=tuple(steps), is_converted=True)

@@ -109,14 +109,8 @@ def mechanism_of(document: dict[str, Any], folder: Path | None) -> Mechanism:
         title=text_of("title", document.get("title", "")),
         length_unit=text_of("[units] length", units.get("length", "m")),
         bodies=tuple(_body(name, body) for name, body in named_tables(document, "bodies")),
-        joints=tuple(
-            _member(f"[joints.{name}]", name, joint, JOINTS, laws_of_joints, folder)
-            for name, joint in named_tables(document, "joints")
-        ),
-        drivers=tuple(
-            _member(f"[drivers.{name}]", name, driver, DRIVERS, LAWS, folder)
-            for name, driver in named_tables(document, "drivers")
-        ),
+        joints=_members(document, "joints", JOINTS, laws_of_joints, folder),
+        drivers=_members(document, "drivers", DRIVERS, LAWS, folder),
         points={
             name: text_of(f"[points] {name}", target, "text such as 'body.point'")
             for name, target in named_values(document, "points")
@@ -126,18 +120,22 @@ def mechanism_of(document: dict[str, Any], folder: Path | None) -> Mechanism:
         run=_run(table_of(document, "run")),
         measures=read_measures(document, folder),
         gravity=_gravity(document),
-        loads=tuple(
-            _member(f"[loads.{name}]", name, load, LOADS, LAWS, folder)
-            for name, load in named_tables(document, "loads")
-        ),
+        loads=_members(document, "loads", LOADS, LAWS, folder),
     )
 
 
 def read_measures(document: Mapping[str, Any], folder: Path | None) -> tuple[Reading, ...]:
     """Return the measures of the tables [measures.NAME]; a mechanism checks them."""
+    return _members(document, "measures", READINGS, (), folder)
+
+
+def _members(
+    document: Mapping[str, Any], table: str, classes: Iterable[Any], laws: Iterable[type[Law]], folder: Path | None
+) -> tuple[Any, ...]:
+    """Return the joints, drivers, loads or measures of the tables [table.NAME]."""
     return tuple(
-        _member(f"[measures.{name}]", name, reading, READINGS, (), folder)
-        for name, reading in named_tables(document, "measures")
+        _member(f"[{table}.{name}]", name, member, classes, laws, folder)
+        for name, member in named_tables(document, table)
     )
 
 

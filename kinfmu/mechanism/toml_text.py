@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from typing import Any
 
@@ -52,19 +52,22 @@ def text(mechanism: Mechanism, *, as_written: bool = False) -> str:
         if start:
             lines.append(f"start = {{ {start} }}")
         lines += [f"{key} = {_toml(value)}" for key, value in body.given_masses.items()]
-    for table, members in (("joints", parts.joints), ("drivers", parts.drivers)):
-        for member in members:
-            lines += ["", f"[{table}.{member.name}]", f"type = {_toml(member.type)}", *_keys(member)]
+    lines += _tables("joints", parts.joints)
+    lines += _tables("drivers", parts.drivers)
     if parts.gravity is not None:
         lines += ["", "[gravity]", *(f"{key} = {_toml(value)}" for key, value in parts.gravity._asdict().items())]
-    for load in parts.loads:
-        lines += ["", f"[loads.{load.name}]", f"type = {_toml(load.type)}", *_keys(load)]
+    lines += _tables("loads", parts.loads)
     if mechanism.points:
         lines += ["", "[points]", *(f"{name} = {_toml(target)}" for name, target in mechanism.points.items())]
     lines += ["", "[outputs]", f"coordinates = {_toml(mechanism.coordinates)}"]
-    for reading in parts.measures:
-        lines += ["", f"[measures.{reading.name}]", f"type = {_toml(reading.type)}", *_keys(reading)]
+    lines += _tables("measures", parts.measures)
     return "\n".join(lines) + "\n"
+
+
+def _tables(table: str, members: Iterable[Any]) -> Iterator[str]:
+    """Yield the lines of joints, drivers, loads or measures."""
+    for member in members:
+        yield from ("", f"[{table}.{member.name}]", f"type = {_toml(member.type)}", *_keys(member))
 
 
 def _keys(member: Any) -> Iterator[str]:

@@ -160,8 +160,7 @@ class FitProblem:
         settable = self.mechanism.settable
         values: dict[str, float | None] = dict.fromkeys(self.bounds)
         for name in self.parameters:
-            setting = settable.constants.get(name) or self.mechanism.parameters[name]
-            values[name] = min(max(float(setting.value), self.bounds[name].low), self.bounds[name].high)
+            values[name] = min(max(float(settable[name].value), self.bounds[name].low), self.bounds[name].high)
         return values
 
     @property
@@ -182,8 +181,7 @@ class FitProblem:
 
         """
         if name in self.unknowns:
-            settable = self.mechanism.settable
-            return (settable.constants.get(name) or settable.parameters[name]).quantity or NUMBER
+            return self.mechanism.settable[name].quantity or NUMBER
         own, _, key = name.rpartition(".")
         sampled = next(one for one in self.sampled if one.name == own)
         return sampled.argument if key == "start" else Quantity("angle" if sampled.angles[0] else "length")

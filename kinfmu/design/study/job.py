@@ -176,10 +176,9 @@ def nominal(study: Study, job: Job) -> Nominal:
     """
     tolerances = study.sampling.tolerances
     written = study.mechanism.settable
-    values = {
-        one.name: float((written.constants.get(one.name) or written.parameters[one.name]).value)
-        for one in study.sampling.variations
-    } | {one.name: one.nominal for one in tolerances}
+    values = {one.name: float(written[one.name].value) for one in study.sampling.variations} | {
+        one.name: one.nominal for one in tolerances
+    }
     rows = [values]
     for one in tolerances:
         rows += [values | {one.name: one.nominal + sign * STEP * one.deviation} for sign in (1.0, -1.0)]

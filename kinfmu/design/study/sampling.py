@@ -147,7 +147,7 @@ def read_variation(where: str, name: str, table: Mapping[str, Any], mechanism: M
     if not isinstance(table, Mapping):
         raise MechanismError(f"{where} = {quoted(table)} must be a table such as {_EXAMPLE}")
     check_keys(where, table, KEYS)
-    setting = settable.constants.get(name) or settable.parameters[name]
+    setting = settable[name]
     quantity, length = setting.quantity or NUMBER, mechanism.length_unit
     is_positive = isinstance(setting, LawConstant) and setting.is_positive
 
