@@ -131,6 +131,19 @@ def some(names: Iterable[str]) -> str:
     return listed(names[:MOST_SHOWN]) + more
 
 
+def valid_names(word: str, known: Iterable[str], what: str = "known") -> str:
+    """Return `; did you mean 'coupler'?; bodies: ground, crank, coupler`: the nearest valid name, and all of them.
+
+    Args:
+        word: The name that is not valid.
+        known: Names that are.
+        what: What they are, in the message.
+
+    """
+    known = list(known)
+    return f"{suggestion(word, known)}; {what}: {listed(known)}"
+
+
 def suggestion(word: str, known: Iterable[str]) -> str:
     """Return `; did you mean 'coupler'?` if a known word is close to `word`, else ''."""
     import difflib

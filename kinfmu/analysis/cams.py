@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from kinfmu.analysis.cam_driver import CamDriver, cam_driver
 from kinfmu.analysis.driver_path import DriverPath
 from kinfmu.analysis.values import degrees
-from kinfmu.errors import KinfmuError, MechanismError, RequestError, listed, suggestion
+from kinfmu.errors import KinfmuError, MechanismError, RequestError, listed, valid_names
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.joints import CamFlatFace, CamOscillating, CamTranslating
@@ -314,9 +314,7 @@ def _named(mechanism: Mechanism, name: str) -> CamJoint:
     if not cams:
         raise RequestError(f"{mechanism.name} has no cam; joints of cams: {listed(cls.type for cls in CAM_JOINTS)}")
     names = [joint.name for joint in cams]
-    raise RequestError(
-        f"'{name}' is not a cam joint of {mechanism.name}{suggestion(name, names)}; known: {listed(names)}"
-    )
+    raise RequestError(f"'{name}' is not a cam joint of {mechanism.name}{valid_names(name, names)}")
 
 
 def _poses(plan: SolvePlan) -> dict[str, tuple[float, float, float]]:

@@ -16,6 +16,7 @@ from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.drivers import AngleDriver, CoordinateDriver, Driver, RelativeAngleDriver, SlideDriver
 from kinfmu.mechanism.joints import Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism.quantities.placement import body_of, point_of
+from kinfmu.mechanism.toml_text import toml_value
 from kinfmu.plan.equations.closing import motion_samples, null_space
 from kinfmu.plan.equations.part import Part
 from kinfmu.plan.equations.redundancy import Redundancy, find_redundancy
@@ -47,7 +48,7 @@ class Suggestion(NamedTuple):
     table: str = "drivers"
 
     def __str__(self) -> str:
-        keys = ", ".join(f"{key} = {_toml(value)}" for key, value in self.keys.items())
+        keys = ", ".join(f"{key} = {toml_value(value)}" for key, value in self.keys.items())
         return f"[{self.table}] {self.name} = {{ {keys} }}"
 
 
@@ -200,13 +201,6 @@ def _keys(driver: Driver) -> dict[str, Any]:
             keys[field.name] = list(value) if isinstance(value, tuple) else value
     keys["law"] = driver.law.type
     return keys
-
-
-def _toml(value: Any) -> str:
-    """Return a key's value as in a mechanism file."""
-    if isinstance(value, list):
-        return f"[{listed(map(_toml, value))}]"
-    return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
 def clearer_problem(

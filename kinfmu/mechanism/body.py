@@ -8,7 +8,7 @@ from itertools import combinations, pairwise
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.errors import MechanismError, valid_names
 from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.quantities.arithmetic import Value, sqrt
 from kinfmu.mechanism.valid import check_number, is_number, quoted
@@ -303,8 +303,8 @@ class Body:
         for name in names:
             if name not in self.points:
                 raise MechanismError(
-                    f"{where} {key}: body '{self.name}' has no point {quoted(name)}{suggestion(name, self.points)}; "
-                    f"its points: {listed(self.points)}"
+                    f"{where} {key}: body '{self.name}' has no point {quoted(name)}"
+                    f"{valid_names(name, self.points, 'its points')}"
                 )
         places = [self.points[name] for name in names]
         what = f"{where} {key} = {quoted(list(names))}"

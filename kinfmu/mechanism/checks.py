@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
-from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.errors import MechanismError, listed, suggestion, valid_names
 from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.mechanism.declared import keys_of
 from kinfmu.mechanism.drivers import Driver
@@ -45,8 +45,7 @@ def check_header(name: str, title: str, length_unit: str) -> None:
     """Raise a MechanismError for an invalid unit, name or title."""
     if length_unit not in METRES:
         raise MechanismError(
-            f"[units] length = {quoted(length_unit)} is not a unit of length"
-            f"{suggestion(length_unit, METRES)}; known: {listed(METRES)}"
+            f"[units] length = {quoted(length_unit)} is not a unit of length{valid_names(length_unit, METRES)}"
         )
     check_name("name =", name)
     check_line("title", title)
@@ -107,7 +106,7 @@ def check_outputs(members: Members, points: Mapping[str, str], coordinates: str 
         if name not in known:
             raise MechanismError(
                 f"[outputs] coordinates: {quoted(name)} is not a coordinate of this mechanism"
-                f"{suggestion(name, known)}; coordinates: {listed(known)}"
+                f"{valid_names(name, known, 'coordinates')}"
             )
     if len(set(coordinates)) < len(coordinates):
         raise MechanismError("[outputs] coordinates names a coordinate twice")
@@ -283,7 +282,7 @@ def _check_body(bodies: Bodies, where: str, name: str) -> None:
         raise MechanismError(f"{where}: {quoted(name)} must be a body; did you mean '{body}'?")
     if name not in bodies:
         raise MechanismError(
-            f"{where}: body {quoted(name)} is not in the mechanism{suggestion(name, bodies)}; bodies: {listed(bodies)}"
+            f"{where}: body {quoted(name)} is not in the mechanism{valid_names(name, bodies, 'bodies')}"
         )
 
 
@@ -295,6 +294,5 @@ def _check_point(bodies: Bodies, where: str, name: str) -> None:
     known = bodies[body_name].points
     if point not in known:
         raise MechanismError(
-            f"{where}: body '{body_name}' has no point {quoted(point)}{suggestion(point, known)}; "
-            f"its points: {listed(known)}"
+            f"{where}: body '{body_name}' has no point {quoted(point)}{valid_names(point, known, 'its points')}"
         )

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
 
-from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.errors import MechanismError, listed, suggestion, valid_names
 from kinfmu.mechanism.operations import (
     BARE,
     CONSTANTS,
@@ -171,9 +171,8 @@ class _Parser:
         elif token.kind == "name":
             self._next()
             if self._is("("):
-                near = suggestion(token.text, FUNCTIONS)
-                what = f"no function '{token.text}'{near}; functions: {listed(FUNCTIONS)}"
-                raise error_at(self._text, token.at, what)
+                valid = valid_names(token.text, FUNCTIONS, "functions")
+                raise error_at(self._text, token.at, f"no function '{token.text}'{valid}")
             is_constant = token.text in CONSTANTS
             self._steps.append(ExpressionStep(token.text if is_constant else "name", token.at, token.text))
         else:

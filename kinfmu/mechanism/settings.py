@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
-from kinfmu.errors import MechanismError, RequestError, listed, suggestion
+from kinfmu.errors import MechanismError, RequestError, listed, valid_names
 from kinfmu.mechanism.drivers import Driver
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.loads import Load
@@ -129,9 +129,7 @@ class Settable:
                 f"there is no parameter {quoted(name)}: it is a number of {table}; to set it, give it as {key} in "
                 f'[parameters] and write "{key}" in its place; parameters: {listed(known)}'
             )
-        return RequestError(
-            f"there is no parameter {quoted(name)}{suggestion(name, known)}; parameters: {listed(known)}"
-        )
+        return RequestError(f"there is no parameter {quoted(name)}{valid_names(name, known, 'parameters')}")
 
     def parameter(self, name: str, value: object) -> Parameter:
         """Return a parameter with another value: a number, text with a unit, or an expression of other parameters.

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.errors import MechanismError, listed, valid_names
 from kinfmu.mechanism.declared import keys_of
 from kinfmu.mechanism.laws import Spline
 from kinfmu.mechanism.valid import check_name, quoted
@@ -97,9 +97,7 @@ def class_of_type(where: str, table: Mapping[str, Any], key: str, classes: Itera
         raise MechanismError(f"{where} needs the key '{key}', one of {listed(known)}")
     word = text_of(f"{where} {key}", table[key], f"one of {listed(known)}")
     if word not in known:
-        raise MechanismError(
-            f"{where} {key} = {quoted(word)} is not known{suggestion(word, known)}; known: {listed(known)}"
-        )
+        raise MechanismError(f"{where} {key} = {quoted(word)} is not known{valid_names(word, known)}")
     return known[word]
 
 
@@ -110,7 +108,7 @@ def check_keys(where: str, table: Mapping[str, Any], known: Iterable[str]) -> No
         if key not in known:
             shown = key if key.isidentifier() and len(key) < 100 else quoted(key)
             place = f"{where} {shown}" if where else f"[{shown}]" if isinstance(table[key], dict) else shown
-            raise MechanismError(f"{place}: unknown key{suggestion(key, known)}; keys: {listed(known)}")
+            raise MechanismError(f"{place}: unknown key{valid_names(key, known, 'keys')}")
 
 
 def refuse_other_kind(document: Mapping[str, Any], kind: str, keys: Iterable[str]) -> None:

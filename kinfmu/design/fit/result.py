@@ -58,13 +58,10 @@ class TargetErrors:
         units: Their units.
         argument: Name of the driver, or 'time'.
         at: (m,) its values at the points; empty for a measure.
-        wanted: (m, d) targets, in `units`.
         reached: (m, d) what the mechanism reaches, in `units`.
         errors: (m, d) reached minus wanted; of angles without whole turns.
         sizes: (m,) sizes of the points' errors, in the unit of the first column; angles of poses count times their
             length.
-        rms: Root of the mean of their squares.
-        largest: Largest error of a point.
         display: The units of the columns in reports.
 
     """
@@ -75,13 +72,25 @@ class TargetErrors:
     units: tuple[str, ...]
     argument: str
     at: FloatArray
-    wanted: FloatArray
     reached: FloatArray
     errors: FloatArray
     sizes: FloatArray
-    rms: float
-    largest: float
     display: tuple[DisplayUnit, ...]
+
+    @property
+    def wanted(self) -> FloatArray:
+        """Targets (m, d), in `units`."""
+        return self.reached - self.errors
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean of the squares of the sizes."""
+        return float(np.sqrt((self.sizes**2).mean()))
+
+    @property
+    def largest(self) -> float:
+        """Largest error of a point."""
+        return float(self.sizes.max())
 
 
 @dataclass(frozen=True)
@@ -348,48 +357,37 @@ def _undetermined(
 
 def _errors(problem: FitProblem, found: Evaluation) -> list[TargetErrors]:
     unit, argument = problem.mechanism.length_unit, problem.argument.name
-    result = []
-    for row in found.rows:
-        target = row.target
-        sizes = np.sqrt(((row.errors * target.scale) ** 2).sum(axis=1))
-        result.append(
-            TargetErrors(
-                target.name,
-                target.type,
-                target.shown,
-                tuple("rad" if is_angle else unit for is_angle in target.angles),
-                argument,
-                row.arguments,
-                row.reached - row.errors,
-                row.reached,
-                row.errors,
-                sizes,
-                float(np.sqrt((sizes**2).mean())),
-                float(sizes.max()),
-                units_of_columns(problem, target),
-            )
+    errors = [
+        TargetErrors(
+            name=row.target.name,
+            type=row.target.type,
+            names=row.target.shown,
+            units=tuple("rad" if is_angle else unit for is_angle in row.target.angles),
+            argument=argument,
+            at=row.arguments,
+            reached=row.reached,
+            errors=row.errors,
+            sizes=np.sqrt(((row.errors * row.target.scale) ** 2).sum(axis=1)),
+            display=units_of_columns(problem, row.target),
         )
+        for row in found.rows
+    ]
     aims: Any = problem.measuring.aims if problem.measuring else ()
     for aim, value in zip(aims, found.measured, strict=True):
         if aim.value is not None:
-            error = np.array([[float(value) - aim.value]])
-            size = abs(float(error[0, 0]))
-            reached = np.array([[float(value)]])
-            result.append(
+            error = float(value) - aim.value
+            errors.append(
                 TargetErrors(
-                    aim.owner,
-                    "measure",
-                    (aim.owner,),
-                    (aim.unit,),
-                    "",
-                    np.empty(0),
-                    reached - error,
-                    reached,
-                    error,
-                    np.array([size]),
-                    size,
-                    size,
-                    (unit_of_measure(problem, aim.owner, aim.unit),),
+                    name=aim.owner,
+                    type="measure",
+                    names=(aim.owner,),
+                    units=(aim.unit,),
+                    argument="",
+                    at=np.empty(0),
+                    reached=np.array([[float(value)]]),
+                    errors=np.array([[error]]),
+                    sizes=np.array([abs(error)]),
+                    display=(unit_of_measure(problem, aim.owner, aim.unit),),
                 )
             )
-    return result
+    return errors

@@ -17,7 +17,7 @@ from kinfmu import VERSION
 from kinfmu.analysis.measuring import driver_cycle
 from kinfmu.arrays import FloatArray
 from kinfmu.design.study.sampling import METHODS, Grid, Sampling, read_variation, whole_number
-from kinfmu.errors import KinfmuError, RequestError, listed, suggestion
+from kinfmu.errors import KinfmuError, RequestError, listed, valid_names
 from kinfmu.mechanism import Mechanism, gallery, toml_text
 from kinfmu.mechanism.laws import ConstantSpeed
 from kinfmu.mechanism.measures import Reading
@@ -192,9 +192,7 @@ def define(
     require_mechanism(mechanism, "study")
     require_engine(engine)
     if sampling not in METHODS:
-        raise RequestError(
-            f"sampling = {quoted(sampling)} is not known{suggestion(str(sampling), METHODS)}; known: {listed(METHODS)}"
-        )
+        raise RequestError(f"sampling = {quoted(sampling)} is not known{valid_names(str(sampling), METHODS)}")
     if not isinstance(parameters, Mapping) or not parameters:
         raise RequestError("a study needs [parameters]: which of them vary, and how")
     variations = tuple(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.arrays import FloatArray
-from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.errors import MechanismError, listed, valid_names
 from kinfmu.mechanism import LawConstant, Mechanism
 from kinfmu.mechanism.number import read_constant, unit_advice
 from kinfmu.mechanism.parameters import NUMBER
@@ -191,9 +191,8 @@ def read_variation(where: str, name: str, table: Mapping[str, Any], mechanism: M
     tolerance = number("tolerance", table["tolerance"], above=0.0)
     distribution = table.get("distribution", "normal")
     if distribution not in DISTRIBUTIONS:
-        near = suggestion(str(distribution), DISTRIBUTIONS)
         raise MechanismError(
-            f"{where} distribution = {quoted(distribution)} is not known{near}; known: {listed(DISTRIBUTIONS)}"
+            f"{where} distribution = {quoted(distribution)} is not known{valid_names(str(distribution), DISTRIBUTIONS)}"
         )
     deviations = table.get("deviations", 3.0)
     if not (is_number(deviations) and deviations > 0.0 and math.isfinite(deviations)):

@@ -7,7 +7,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from kinfmu.errors import MechanismError, RequestError, listed, suggestion
+from kinfmu.errors import MechanismError, RequestError, valid_names
 from kinfmu.files import errors_of_writing, suffix_of, write_whole
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.gallery.chains import CHAINS, chain
@@ -56,7 +56,7 @@ def load(mechanism: str | Path) -> Mechanism:
         known = names()
         if mechanism not in known:
             raise RequestError(
-                f"{quoted(mechanism)} is not in the gallery{suggestion(mechanism, known)}; gallery: {listed(known)}; "
+                f"{quoted(mechanism)} is not in the gallery{valid_names(mechanism, known, 'gallery')}; "
                 f"files end in .toml"
             )
         return read(folder() / mechanism / "mechanism.toml")
