@@ -14,8 +14,7 @@ from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.force_names import measured_forces
 from kinfmu.mechanism.joints import Joint
 from kinfmu.mechanism.loads import Load
-from kinfmu.mechanism.measures import Reading
-from kinfmu.mechanism.measures.extremes import Maximum, Minimum, Peak, PeakAcceleration, PeakSpeed, Range
+from kinfmu.mechanism.measures import READINGS, Reading
 from kinfmu.mechanism.members import Bodies, Members, NumberPath, path_text
 from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.quantities import PoseQuantity
@@ -26,7 +25,6 @@ from kinfmu.units import METRES, CoordinateName, factors
 NO_DRIVER = "[drivers] there is no driver: "  # before a measure that needs one
 _EFFORTS = ("torque", "force", "power")  # nouns of forces of drivers; joints have forces, too
 _OF_MECHANISM = ("shaking_force", "shaking_moment", "kinetic_energy", "potential_energy")
-OF_FORCES = (Minimum, Maximum, Range, Peak)  # measures that read forces
 _KEY = re.compile(r"^.*\.|_\d+$")  # what a key has around its word: 'rise' of 'law.rise_1'
 MOST_BODIES = 20_000  # fits into the memory of an ordinary computer
 
@@ -136,11 +134,11 @@ def _check_reading(members: Members, known: Mapping[str, Any], reading: Reading)
             continue
         if not isinstance(value, str):
             raise MechanismError(f"{where}{key.name} = {quoted(value)} must be a coordinate or a measured quantity")
-        is_point = isinstance(reading, PeakSpeed | PeakAcceleration) and value in members.body_points
+        is_point = reading.reads_points and value in members.body_points
         forces = measured_forces(members)
         if value in forces and value not in known:
-            if not isinstance(reading, OF_FORCES):
-                valid = listed(cls.type for cls in OF_FORCES)
+            if not reading.reads_forces:
+                valid = listed(cls.type for cls in READINGS if cls.reads_forces)
                 raise MechanismError(
                     f"{where}{key.name}: {quoted(value)} is a force, which has no rates; types for forces: {valid}"
                 )

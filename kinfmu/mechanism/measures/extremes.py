@@ -14,6 +14,7 @@ class Minimum(Reading):
     """The smallest value of a quantity."""
 
     type: ClassVar[str] = "minimum"
+    reads_forces: ClassVar[bool] = True
 
     name: str
     of: Measured
@@ -30,6 +31,7 @@ class Maximum(Reading):
     """The largest value of a quantity."""
 
     type: ClassVar[str] = "maximum"
+    reads_forces: ClassVar[bool] = True
 
     name: str
     of: Measured
@@ -49,6 +51,7 @@ class Range(Reading):
     """
 
     type: ClassVar[str] = "range"
+    reads_forces: ClassVar[bool] = True
 
     name: str
     of: Measured
@@ -66,6 +69,7 @@ class Peak(Reading):
     """The largest size of a quantity: the peak torque of a driver, the largest force on a pin."""
 
     type: ClassVar[str] = "peak"
+    reads_forces: ClassVar[bool] = True
 
     name: str
     of: Measured
@@ -82,6 +86,7 @@ class PeakSpeed(Reading):
     """The largest size of the speed of a quantity, or of a point 'body.point'."""
 
     type: ClassVar[str] = "peak_speed"
+    reads_points: ClassVar[bool] = True
 
     name: str
     of: Measured
@@ -98,6 +103,7 @@ class PeakAcceleration(Reading):
     """The largest size of the acceleration of a quantity, or of a point 'body.point'."""
 
     type: ClassVar[str] = "peak_acceleration"
+    reads_points: ClassVar[bool] = True
 
     name: str
     of: Measured
