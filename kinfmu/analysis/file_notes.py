@@ -83,9 +83,10 @@ def _lengths_without_a_unit(mechanism: Mechanism) -> Iterator[str]:
     dimensions, length = dimensions_of(mechanism.parameters), Quantity("length")
     places: dict[str, list[tuple[Expression, Quantity]]] = {}
     for place, _, quantity in mechanism.members.numbers():
-        expression = mechanism.expressions.get(place)
-        for name in expression.names if expression else ():
-            places.setdefault(name, []).append((expression, quantity))
+        if place in mechanism.expressions:
+            expression = mechanism.expressions[place]
+            for name in expression.names:
+                places.setdefault(name, []).append((expression, quantity))
     derived = {name for p in mechanism.parameters.values() if p.expression for name in p.expression.names}
     for name, parameter in mechanism.parameters.items():
         value = float(parameter.value)

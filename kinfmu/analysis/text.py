@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sized
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from kinfmu.analysis.cams import cam_lines
+from kinfmu.analysis.findings import Findings
 from kinfmu.analysis.loading import ForcePeak, LeftTable, LiftOff, UnknownContact
 from kinfmu.analysis.loops import FourBar, Link, SliderCrank
 from kinfmu.analysis.singular import DriverRange, LimitPosition
@@ -17,9 +18,6 @@ from kinfmu.errors import MOST_SHOWN, listed, some
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.measures import counted_from
 from kinfmu.motion import MeasuredValue
-
-if TYPE_CHECKING:
-    from kinfmu.analysis.report import Report
 
 _MOST_LOOPS = 8  # in the text; JSON has all
 _END = {
@@ -38,7 +36,7 @@ class ReportLine(NamedTuple):
     text: str
 
 
-def findings(report: Report) -> list[ReportLine]:
+def findings(report: Findings) -> list[ReportLine]:
     """Return the findings in order."""
     found: list[ReportLine] = []
     for parts in (_count, _rows, _plan, _advice, _loops, _dyads, _motion, _toggles, _cams, _measures, _forces, _notes):
@@ -53,7 +51,7 @@ def title(mechanism: Mechanism) -> str:
     return f"{mechanism.name}: {mechanism.title}" if mechanism.title else mechanism.name
 
 
-def lines(report: Report) -> list[str]:
+def lines(report: Findings) -> list[str]:
     """Return the findings, one per line, each after its subject."""
     return [title(report.mechanism), *(f"  {found.subject:<12}{found.text}" for found in findings(report))]
 
@@ -64,7 +62,7 @@ def _rest(parts: Sized, most: int, what: str) -> Iterator[ReportLine]:
         yield ReportLine("", f"and {len(parts) - most} more {what}")
 
 
-def _count(report: Report) -> Iterator[ReportLine]:
+def _count(report: Findings) -> Iterator[ReportLine]:
     mechanism = report.mechanism
     rows = sum(len(joint.labels) for joint in mechanism.joints)
     yield ReportLine(
@@ -80,7 +78,7 @@ def _count(report: Report) -> Iterator[ReportLine]:
         yield ReportLine("", f"Gruebler's count gives {report.gruebler}, because it counts redundant rows")
 
 
-def _rows(report: Report) -> Iterator[ReportLine]:
+def _rows(report: Findings) -> Iterator[ReportLine]:
     for row in report.redundant:
         within = f"{row.tolerance:.3g} {'rad' if row.row.kind == 'angle' else report.mechanism.length_unit}"
         reason = f"at every pose it follows from {listed(row.implied_by_joints)}, to within {within}"
@@ -94,7 +92,7 @@ def _rows(report: Report) -> Iterator[ReportLine]:
         yield ReportLine("contradicts", f"{row.row.owner} (row {row.row.name}) {reason}")
 
 
-def _plan(report: Report) -> Iterator[ReportLine]:
+def _plan(report: Findings) -> Iterator[ReportLine]:
     plan = report.plan
     if plan is None:
         return
@@ -113,7 +111,7 @@ def _plan(report: Report) -> Iterator[ReportLine]:
     yield from _rest(report.blocks, MOST_SHOWN, "blocks")
 
 
-def _advice(report: Report) -> Iterator[ReportLine]:
+def _advice(report: Findings) -> Iterator[ReportLine]:
     advice = report.advice
     if advice is None:
         return
@@ -138,7 +136,7 @@ def _advice(report: Report) -> Iterator[ReportLine]:
         yield ReportLine("could add", str(suggestion))
 
 
-def _loops(report: Report) -> Iterator[ReportLine]:
+def _loops(report: Findings) -> Iterator[ReportLine]:
     unit = report.mechanism.length_unit
     for named in report.loops[:_MOST_LOOPS]:
         loop = named.loop
@@ -155,7 +153,7 @@ def _loops(report: Report) -> Iterator[ReportLine]:
     yield from _rest(report.loops, _MOST_LOOPS, "four-bars and slider-cranks")
 
 
-def _dyads(report: Report) -> Iterator[ReportLine]:
+def _dyads(report: Findings) -> Iterator[ReportLine]:
     unit = report.mechanism.length_unit
     for named in report.dyads[:_MOST_LOOPS]:
         dyad = named.dyad
@@ -241,7 +239,7 @@ def _in_line(angle: TransmissionRange) -> str:
     return f"{angle.coupler} and {angle.output} fall in line"
 
 
-def _motion(report: Report) -> Iterator[ReportLine]:
+def _motion(report: Findings) -> Iterator[ReportLine]:
     several = len(report.mechanism.drivers) > 1
     for reach in report.ranges:
         yield from _change_points(report, reach, several)
@@ -253,21 +251,21 @@ def _motion(report: Report) -> Iterator[ReportLine]:
         yield ReportLine("singular", "none in the range")
 
 
-def _toggles(report: Report) -> Iterator[ReportLine]:
+def _toggles(report: Findings) -> Iterator[ReportLine]:
     for k, toggle in enumerate(report.toggles[:_MOST_LOOPS]):
         at = value_text(toggle.value, report.mechanism.length_unit, toggle.kind)
         yield ReportLine("" if k else "toggle", f"{toggle.happens} at {toggle.driver} = {at}")
     yield from _rest(report.toggles, _MOST_LOOPS, "toggle positions")
 
 
-def _cams(report: Report) -> Iterator[ReportLine]:
+def _cams(report: Findings) -> Iterator[ReportLine]:
     for k, cam in enumerate(report.cams):
         texts = cam_lines(cam)
         for text in texts:
             yield ReportLine("cam" if k == 0 and text is texts[0] else "", text)
 
 
-def _measures(report: Report) -> Iterator[ReportLine]:
+def _measures(report: Findings) -> Iterator[ReportLine]:
     measured = report.measured
     if measured is None:
         return
@@ -280,7 +278,7 @@ def _measures(report: Report) -> Iterator[ReportLine]:
         yield ReportLine("", _no_value(name, reason))
 
 
-def _forces(report: Report) -> Iterator[ReportLine]:
+def _forces(report: Findings) -> Iterator[ReportLine]:
     loading = report.loading
     if loading is None:
         return
@@ -332,7 +330,7 @@ def _left_table_text(one: LeftTable) -> str:
     return f"{one.load}: {both}; it keeps {' and '.join(kept)}"
 
 
-def _without_loads(report: Report) -> str:
+def _without_loads(report: Findings) -> str:
     """Return ', without [loads.spring]' for the loads that the report leaves out; '' if there are none."""
     names = [name for name in report.left_out if name.startswith("[loads")]
     return f", without {listed(names)}" if names else ""
@@ -377,12 +375,12 @@ def measured_text(value: MeasuredValue) -> str:
     return f"{number.removesuffix(' 1')}{counted_from(value.type)}{places}"
 
 
-def _notes(report: Report) -> Iterator[ReportLine]:
+def _notes(report: Findings) -> Iterator[ReportLine]:
     for note in report.notes:
         yield ReportLine("note", note)
 
 
-def _change_points(report: Report, reach: DriverRange, several: bool) -> Iterator[ReportLine]:
+def _change_points(report: Findings, reach: DriverRange, several: bool) -> Iterator[ReportLine]:
     ends = (reach.low, reach.high)
     changes = [point.value for point in reach.points if point.kind == "change point" and point.value not in ends]
     if changes:
@@ -397,7 +395,7 @@ def _all_multiples_of_pi(values: list[float]) -> bool:
     return len(values) == 2 and {multiple_of_pi(value % math.tau) for value in values} <= {"0", "pi", "2 pi"}
 
 
-def _range(report: Report, reach: DriverRange) -> Iterator[ReportLine]:
+def _range(report: Findings, reach: DriverRange) -> Iterator[ReportLine]:
     unit = report.mechanism.length_unit
     seen = [value_text(end, unit, reach.kind) for end in reach.reach]
     limits = reach.limits
@@ -427,7 +425,7 @@ def _range(report: Report, reach: DriverRange) -> Iterator[ReportLine]:
             yield ReportLine("", f"at {end} {_limit_reason(report, reach, limit)}")
 
 
-def _limit_reason(report: Report, reach: DriverRange, limit: LimitPosition) -> str:
+def _limit_reason(report: Findings, reach: DriverRange, limit: LimitPosition) -> str:
     """Return the reason of a limit: two links in line, or bodies that can move."""
     angles = [one.transmission for one in report.loops] + [one.transmission for one in report.dyads]
     for found in angles:

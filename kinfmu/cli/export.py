@@ -156,7 +156,7 @@ def export(run: str, output: Path, cam: str | None, settings: tuple[tuple[str, s
         _check_width(options["width"])
     about = ""
     if cam is not None:
-        _refuse_beside_cam(cam)
+        _check_options_of_cam(cam)
         about = write_cam(run, output, cam, settings, options)
     elif options["tolerance"] is not None:
         raise click.UsageError(f"--tolerance {options['tolerance']}: only for the .dxf of a cam, with --cam")
@@ -193,7 +193,7 @@ def _others_than(*valid: str) -> list[str]:
     return [name for name, value in click.get_current_context().params.items() if value and name not in valid]
 
 
-def _refuse_beside_cam(joint: str) -> None:
+def _check_options_of_cam(joint: str) -> None:
     """Raise a UsageError for options that do not belong to the profile of a cam."""
     of_table = ("degrees", "units", "separator", "decimal")
     others = _others_than("run", "output", "cam", "tolerance", "settings", *of_table)

@@ -120,7 +120,7 @@ def samples_between(run: Run, start: str | None, stop: str | None) -> Run:
 
 
 def write_cam(given: str, output: Path, joint: str, settings: Sequence[tuple[str, str]], options: Options) -> str:
-    """Write the profile of a cam of a mechanism, or of the mechanism of a record; return what is to be said of it."""
+    """Write the profile of a cam of a mechanism, or of the mechanism of a record; return the end of the message."""
     suffix = ".csv" if output == STANDARD_OUTPUT else suffix_of(output)
     if suffix not in CAM_FORMATS:
         raise click.UsageError(f"{output}: the profile of a cam is written as {listed(CAM_FORMATS)}")

@@ -16,7 +16,7 @@ import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 from kinfmu.errors import MechanismError, listed, suggestion, valid_names
 from kinfmu.mechanism.operations import (
@@ -338,7 +338,7 @@ class Expression:
         def leaf(step: ExpressionStep) -> Dimension:
             return step.dimension if step.operation == "number" else dimensions.get(step.value, UNKNOWN)
 
-        def apply(step: ExpressionStep, operands: Sequence[Any]) -> Dimension:
+        def apply(step: ExpressionStep, operands: Sequence[Dimension]) -> Dimension:
             try:
                 return OPERATIONS[step.operation].dimension(*operands, *step.exponent)
             except DimensionError as error:

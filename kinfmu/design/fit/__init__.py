@@ -6,8 +6,9 @@ problem (targets, unknowns, constraints) -> equations (residuals, Jacobian) -> s
 from __future__ import annotations
 
 from kinfmu.design.fit.fit import fit
+from kinfmu.design.fit.outcome import Optimum
 from kinfmu.design.fit.problem import FitProblem, read_problem
-from kinfmu.design.fit.result import FitResult, Optimum
+from kinfmu.design.fit.result import FitResult
 from kinfmu.design.fit.targets import (
     FunctionTarget,
     GrashofConstraint,

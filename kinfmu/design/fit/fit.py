@@ -16,8 +16,9 @@ import numpy as np
 from kinfmu.arrays import FloatArray
 from kinfmu.design.fit.argument import SAMPLES
 from kinfmu.design.fit.equations import Equations, Evaluation, NotAssembledError
+from kinfmu.design.fit.outcome import Optimum, constraint_results
 from kinfmu.design.fit.problem import FitProblem, read_problem
-from kinfmu.design.fit.result import FitResult, Optimum, constraint_results, result_of
+from kinfmu.design.fit.result import FitResult, result_of
 from kinfmu.design.fit.text import angle_notes
 from kinfmu.errors import AssemblyError, CompilerError, RequestError
 from kinfmu.processes import cores, processes, require_workers, without_main

@@ -1,21 +1,17 @@
-"""Numbers of targets, bounds and constraints: bare or with a unit, alone or as bounds [low, high]; shown as written."""
+"""Numbers of targets, bounds and constraints: bare or with a unit, alone or as bounds [low, high]."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.errors import MechanismError
-from kinfmu.mechanism.number import DisplayUnit, display_unit, read_constant, written_unit
+from kinfmu.mechanism.number import read_constant
 from kinfmu.mechanism.valid import is_number, quoted
-from kinfmu.units import Quantity, quantity_in
-
-if TYPE_CHECKING:
-    from kinfmu.design.fit.problem import FitProblem
-    from kinfmu.design.fit.sampled import Sampled
+from kinfmu.units import Quantity
 
 Numeral = float | str  # bare or with a unit
 
@@ -90,41 +86,3 @@ def read_weights(where: str, value: Any, count: int) -> FloatArray:
     if not (np.isfinite(found).all() and (found >= 0.0).all() and found.any()):
         raise MechanismError(f"{where} = {quoted(value)}: weights must be 0 or more, and one of them above 0")
     return found
-
-
-_LENGTH, _ANGLE = Quantity("length"), Quantity("angle")
-
-
-def unit_of_unknown(problem: FitProblem, name: str) -> DisplayUnit:
-    """Return the unit of an unknown: of its bounds, else of the mechanism file."""
-    if name in problem.unknowns:
-        return problem.mechanism.settable.display_unit(name, flat(problem.unknowns[name]))
-    own, _, key = name.rpartition(".")
-    target: Any = next(one for one in problem.targets if one.name == own)
-    length = problem.mechanism.length_unit
-    return display_unit(problem.quantity(name), length, written_unit(flat(getattr(target, key)), length))
-
-
-def units_of_columns(problem: FitProblem, sampled: Sampled) -> tuple[DisplayUnit, ...]:
-    """Return the units of the columns of a path, function or poses: of its points, all lengths in the first one."""
-    target: Any = next(one for one in problem.targets if one.name == sampled.name)
-    rows = [list(row) for row in (target.poses if sampled.type == "poses" else target.points)]
-    length, found = problem.mechanism.length_unit, []
-    for is_angle in sampled.angles:
-        places = [k for k, angle in enumerate(sampled.angles) if angle is is_angle]
-        places = [1] if sampled.type == "function" else places
-        written = written_unit([row[k] for row in rows for k in places], length)
-        if not written and sampled.type == "function":
-            written = written_unit(flat(target.offset), length)
-        found.append(display_unit(_ANGLE if is_angle else _LENGTH, length, written))
-    return tuple(found)
-
-
-def unit_of_measure(problem: FitProblem, name: str, unit: str) -> DisplayUnit:
-    """Return the unit of a measure: of its value or limits; `unit`: that used inside."""
-    if unit == "1":
-        return DisplayUnit()
-    one: Any = next(one for one in (*problem.targets, *problem.constraints) if one.name == name)
-    length = problem.mechanism.length_unit
-    written = written_unit((getattr(one, key, None) for key in ("value", "minimum", "maximum")), length)
-    return display_unit(quantity_in(unit, length), length, written)

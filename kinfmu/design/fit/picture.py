@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.design.fit.result import FitResult, TargetErrors
+from kinfmu.design.fit.outcome import FitOutcome, TargetErrors
 from kinfmu.design.fit.sampled import Sampled
 from kinfmu.draw.fitted import Chart, Curve, Fitted, fitted
 from kinfmu.run.solve import solve
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 _SAMPLES = 361
 
 
-def draw(result: FitResult, path: str | Path | None, ax: Axes | None) -> None:
+def draw(result: FitOutcome, path: str | Path | None, ax: Axes | None) -> None:
     """Draw the targets and the mechanism of a result; errors as in `kinfmu.draw.figure`."""
     fitted(path, ax, lambda: content_of(result))
 
 
-def content_of(result: FitResult) -> Fitted:
+def content_of(result: FitOutcome) -> Fitted:
     """Return what the figure of a result shows."""
     argument = result.problem.argument
     curves, charts, at = [], [], None
@@ -48,14 +48,14 @@ def content_of(result: FitResult) -> Fitted:
     return Fitted(result.mechanism, at, curves, charts)
 
 
-def _outputs(result: FitResult, names: tuple[str, ...], values: FloatArray) -> FloatArray:
+def _outputs(result: FitOutcome, names: tuple[str, ...], values: FloatArray) -> FloatArray:
     """Return outputs of the mechanism found (n, names)."""
     mechanism = replace(result.mechanism, points=result.problem.traced.points)
     run = solve(mechanism, **result.problem.argument.keywords(values))
     return np.column_stack([run[name] for name in names])
 
 
-def _chart(result: FitResult, target: Sampled, errors: TargetErrors) -> Chart:
+def _chart(result: FitOutcome, target: Sampled, errors: TargetErrors) -> Chart:
     """Return a function over the driver or another output, angles in degrees."""
     argument = result.problem.argument
     low, high = float(errors.at.min()), float(errors.at.max())

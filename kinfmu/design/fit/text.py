@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from kinfmu.design.fit.numbers import Bounds, flat, unit_of_unknown
+from kinfmu.design.fit.numbers import Bounds, flat
+from kinfmu.design.fit.outcome import FitOutcome, TargetErrors, argument_unit, unit_of_unknown
 from kinfmu.design.fit.problem import FitProblem
-from kinfmu.design.fit.result import FitResult, TargetErrors, argument_unit
 from kinfmu.design.fit.sampled import Sampled
 from kinfmu.display import aligned
 from kinfmu.errors import listed
@@ -23,7 +23,7 @@ MOST_OPTIMA = 10
 _MOST_POINTS = 40  # of a target in the table
 
 
-def report(result: FitResult) -> list[str]:
+def report(result: FitOutcome) -> list[str]:
     """Return the lines of the report."""
     lines = [
         f"{result.mechanism.name}: sum of squares {result.squares:.9g}{_unit_of_errors(result)}, "
@@ -66,7 +66,7 @@ def report(result: FitResult) -> list[str]:
     return lines
 
 
-def _unit_of_errors(result: FitResult) -> str:
+def _unit_of_errors(result: FitOutcome) -> str:
     """Return the unit of the errors whose squares are summed, and the rms residual in the unit of the targets."""
     units = list(dict.fromkeys(one.units[0] for one in result.errors))
     shown = {one.display[0] for one in result.errors}
@@ -107,7 +107,7 @@ def _target(one: TargetErrors, unit: str, datum: str) -> Iterable[str]:
         yield f"  and {len(rows) - _MOST_POINTS} more points"
 
 
-def parameter_rows(result: FitResult) -> list[tuple[str, ...]]:
+def parameter_rows(result: FitOutcome) -> list[tuple[str, ...]]:
     """Return the unknowns with their values, units and bounds, and at which bound they are."""
     problem = result.problem
     rows: list[tuple[str, ...]] = []
@@ -126,7 +126,7 @@ def _at_bound(value: float, bounds: Bounds) -> str:
     return "at its lower bound" if low else "at its upper bound" if high else ""
 
 
-def constraint_notes(result: FitResult) -> list[str]:
+def constraint_notes(result: FitOutcome) -> list[str]:
     """Return what to try where constraints are violated."""
     violated = [one.name for one in result.constraints if not one.holds]
     if not violated:
@@ -138,7 +138,7 @@ def constraint_notes(result: FitResult) -> list[str]:
     return [f"no design that was found meets all constraints: {wider}, loosen {limits}, or raise --starts"]
 
 
-def parameter_notes(result: FitResult) -> list[str]:
+def parameter_notes(result: FitOutcome) -> list[str]:
     """Return a line for each unknown with no effect on the targets, and for each with bare bounds in another unit.
 
     Also one for unknowns that the targets do not determine.

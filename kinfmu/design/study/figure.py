@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinfmu.design.study.result import StudyResult
+from kinfmu.design.study.rows import StudyRows
 from kinfmu.draw.chart import dress
 from kinfmu.draw.contours import contours, contours_into
 from kinfmu.draw.contributions import Contributed, contributions, contributions_into
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def draw(result: StudyResult, path: str | Path | None, ax: Axes | None, measures: tuple[str, ...]) -> None:
+def draw(result: StudyRows, path: str | Path | None, ax: Axes | None, measures: tuple[str, ...]) -> None:
     """Draw the results of a study into a file or into Axes; measures: which, default: all.
 
     Raises:
@@ -40,7 +40,7 @@ def draw(result: StudyResult, path: str | Path | None, ax: Axes | None, measures
     write(path, lambda: figure_of(result, measures))
 
 
-def figure_of(result: StudyResult, measures: tuple[str, ...] = ()) -> Any:
+def figure_of(result: StudyRows, measures: tuple[str, ...] = ()) -> Any:
     """Return the Figure of matplotlib that shows the results of a study.
 
     Raises:
@@ -68,7 +68,7 @@ def figure_of(result: StudyResult, measures: tuple[str, ...] = ()) -> Any:
     return scatter_matrix(parameters, columns, f"{title}: {len(result)} designs")
 
 
-def _draw_into(ax: Axes, result: StudyResult, measures: tuple[str, ...]) -> None:
+def _draw_into(ax: Axes, result: StudyRows, measures: tuple[str, ...]) -> None:
     """Draw one measure into Axes, or raise a FigureError if the picture has several panels."""
     kind = picture_of(result)
     if len(measures) > 1:
@@ -93,7 +93,7 @@ def _draw_into(ax: Axes, result: StudyResult, measures: tuple[str, ...]) -> None
         into(ax, _column(result, result.parameters[0]), _column(result, name))
 
 
-def _known(result: StudyResult, measures: tuple[str, ...]) -> tuple[str, ...]:
+def _known(result: StudyRows, measures: tuple[str, ...]) -> tuple[str, ...]:
     """Return the names of the measures to draw, or raise a StudyError for an unknown one."""
     for name in measures:
         if name not in result.measures:
@@ -101,7 +101,7 @@ def _known(result: StudyResult, measures: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(measures) or tuple(result.measures)
 
 
-def _fields(result: StudyResult, measures: tuple[str, ...]) -> tuple[Quantities, Quantities, list[Quantities]]:
+def _fields(result: StudyRows, measures: tuple[str, ...]) -> tuple[Quantities, Quantities, list[Quantities]]:
     """Return two parameters with their ascending values (p,) and (q,), and the measures (p, q) on their grid."""
     grids = [np.array(one["values"]) for one in result.definition["parameters"].values()]
     columns = [(_column(result, name), result.display_unit(name).factor) for name in result.parameters]
@@ -115,7 +115,7 @@ def _fields(result: StudyResult, measures: tuple[str, ...]) -> tuple[Quantities,
     return x._replace(values=x.values[sorted_x]), y._replace(values=y.values[sorted_y]), fields
 
 
-def picture_of(result: StudyResult) -> str:
+def picture_of(result: StudyRows) -> str:
     """Return 'response', 'contours', 'contributions' or 'scatter'."""
     if result.nominal.deviations:
         return "contributions"
@@ -123,13 +123,13 @@ def picture_of(result: StudyResult) -> str:
     return {1: "response", 2: "contours"}.get(len(grids), "scatter") if all(grids) else "scatter"
 
 
-def _column(result: StudyResult, name: str) -> Quantities:
+def _column(result: StudyRows, name: str) -> Quantities:
     unit, factor = result.display_unit(name)
     kinds = {reading.name: reading.type for reading in result.mechanism.measures}
     return Quantities(name, unit, result[name] / factor, counted_from(kinds.get(name, "")))
 
 
-def _contributed(result: StudyResult, name: str) -> Contributed:
+def _contributed(result: StudyRows, name: str) -> Contributed:
     parts = result.nominal.contributions(name)
     known = parts if np.isfinite(list(parts.values())).all() else {}
     unit, factor = result.display_unit(name)

@@ -14,7 +14,8 @@ from kinfmu import VERSION
 from kinfmu.design.study.definition import SAMPLES, SEED, Study, define
 from kinfmu.design.study.job import Job, nominal, run_chunk
 from kinfmu.design.study.parts import PartsFolder, check_replaceable, remove_finished, write_synced
-from kinfmu.design.study.result import StudyResult, study_in
+from kinfmu.design.study.result import StudyResult
+from kinfmu.design.study.rows import study_in
 from kinfmu.design.study.sampling import METHODS
 from kinfmu.design.study.table import (
     CSV,

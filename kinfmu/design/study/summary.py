@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import isfinite
 
-from kinfmu.design.study.result import StudyResult
+from kinfmu.design.study.rows import StudyRows
 from kinfmu.display import aligned
 from kinfmu.errors import listed
 
@@ -17,7 +17,7 @@ ROUNDING = 1e-9  # of the value; smaller deviations are rounding
 _FIRST_ORDER = "first order"
 
 
-def summary(result: StudyResult) -> str:
+def summary(result: StudyRows) -> str:
     """Return the summary table of a study, and for tolerances what each contributes."""
     lines = [about(result), "", *aligned(measure_rows(result), left=2)]
     if result.nominal.reason:
@@ -29,7 +29,7 @@ def summary(result: StudyResult) -> str:
     return "\n".join(lines)
 
 
-def disagreement(result: StudyResult) -> str:
+def disagreement(result: StudyRows) -> str:
     """Return a warning, as a line, of the measures that are not linear within the tolerances; '' if all are.
 
     Such a measure has a deviation, or a shift of the mean, in the samples that first order does not explain.
@@ -53,7 +53,7 @@ def disagreement(result: StudyResult) -> str:
     )
 
 
-def failures(result: StudyResult) -> str:
+def failures(result: StudyRows) -> str:
     """Return how many designs lack a measure, and why the first does, as a line; '' if none does."""
     if result.first_failure is None:
         return ""
@@ -61,7 +61,7 @@ def failures(result: StudyResult) -> str:
     return f"{count} of {len(result)} designs lack a measure, the first is design {first}: {reason}"
 
 
-def about(result: StudyResult) -> str:
+def about(result: StudyRows) -> str:
     """Return what was studied, as a line."""
     definition = result.definition
     how = {"grid": "on a grid", "sobol": "Sobol points", "latin_hypercube": "a Latin hypercube"}[definition["sampling"]]
@@ -71,7 +71,7 @@ def about(result: StudyResult) -> str:
     return f"{result.mechanism.name}: {count} ({how}{seed}) over {varied}; {definition['motion']['over']}"
 
 
-def measure_rows(result: StudyResult) -> list[tuple[str, ...]]:
+def measure_rows(result: StudyRows) -> list[tuple[str, ...]]:
     """Return the header of the summary table, and a row for each measure."""
     has_tolerances = bool(result.nominal.deviations)
     header = list(_HEADER)
@@ -88,7 +88,7 @@ def measure_rows(result: StudyResult) -> list[tuple[str, ...]]:
     return rows
 
 
-def _contributions(result: StudyResult, measure: str) -> tuple[str, ...]:
+def _contributions(result: StudyRows, measure: str) -> tuple[str, ...]:
     """Return a line: the largest contributions to a measure, and how its derivatives were found."""
     found = result.nominal.contributions(measure)
     method = f"(by {result.nominal.measures[measure].method})"

@@ -26,7 +26,8 @@ from kinfmu.design.fit import (
 from kinfmu.design.fit.argument import crossings, nearest
 from kinfmu.design.fit.equations import Equations
 from kinfmu.design.fit.fit import Found, Sameness, distinct
-from kinfmu.design.fit.result import Optimum, result_of
+from kinfmu.design.fit.outcome import Optimum
+from kinfmu.design.fit.result import result_of
 from kinfmu.design.fit.text import angle_notes, parameter_rows
 from kinfmu.mechanism import toml_file, toml_text
 from kinfmu.mechanism.measures import Range
