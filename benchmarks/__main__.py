@@ -10,8 +10,7 @@ from pathlib import Path
 import click
 
 from kinfmu.cli.arguments import ArgumentType
-from kinfmu.cli.group import ProgramOfOneCommand
-from kinfmu.cli.messages import Progress
+from kinfmu.cli.group import ProgramOfOneCommand, Progress
 from kinfmu.errors import MissingPackageError, listed, suggestion
 from kinfmu.mechanism import gallery
 

@@ -90,6 +90,7 @@ class MissingPackageError(KinfmuError):
 
 
 MOST_LISTED = 100  # names in a message
+MOST_SHOWN = 24  # names in a line of a report
 OTHER_WORDS = {  # words of other programs and of drawings, with the words of kinfmu
     **dict.fromkeys(
         ("pin", "pinned", "hinge", "pivot", "rotational", "rotary", "pin joint", "hinge joint"), "revolute"
@@ -121,6 +122,26 @@ def listed(names: Iterable[str]) -> str:
     if len(names) > MOST_LISTED:
         names[MOST_LISTED - 1 :] = [f"... ({len(names)} in all)"]
     return ", ".join(names) or "none"
+
+
+def some(names: Iterable[str]) -> str:
+    """Return names as `listed` does; of more than MOST_SHOWN names the first ones, and how many more there are."""
+    names = list(names)
+    more = f" and {len(names) - MOST_SHOWN} more" if len(names) > MOST_SHOWN else ""
+    return listed(names[:MOST_SHOWN]) + more
+
+
+def valid_names(word: str, known: Iterable[str], what: str = "known") -> str:
+    """Return `; did you mean 'coupler'?; bodies: ground, crank, coupler`: the nearest valid name, and all of them.
+
+    Args:
+        word: The name that is not valid.
+        known: Names that are.
+        what: What they are, in the message.
+
+    """
+    known = list(known)
+    return f"{suggestion(word, known)}; {what}: {listed(known)}"
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:

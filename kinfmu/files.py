@@ -42,6 +42,15 @@ def write_whole(path: str | Path, data: bytes) -> None:
 
 
 @contextmanager
+def errors_of_writing(path: str | Path, error: type[Exception]) -> Iterator[None]:
+    """Report an OSError in this block as an error of this type: the file cannot be written."""
+    try:
+        yield
+    except OSError as reason:
+        raise error(f"{path}: cannot be written ({reason.strerror or reason})") from None
+
+
+@contextmanager
 def replacement(target: Path) -> Iterator[Path]:
     """Yield an empty file next to `target` that replaces it when the block ends without an error.
 

@@ -25,7 +25,7 @@ from kinfmu.draw.curves import overview, shown_outputs
 from kinfmu.draw.drawing import sheet_of
 from kinfmu.draw.instant import instant
 from kinfmu.draw.writing import svg_text
-from kinfmu.errors import KinfmuError
+from kinfmu.errors import KinfmuError, some
 from kinfmu.mechanism import Mechanism
 from kinfmu.motion import DesignMeasures, MeasuredValues
 from kinfmu.plan import localized, plan_from
@@ -290,7 +290,6 @@ def fit_svg(result: FitResult) -> str:
     return svg_text("this picture", lambda: fitted.figure_of(content_of(result)))
 
 
-MOST = 24  # names in a cell
 MOST_ROWS = 12  # of a table
 
 
@@ -307,9 +306,3 @@ def picture(draw: Callable[[], str], alternative: str) -> str:
     except KinfmuError as reason:
         return f"<p>{escaped(reason)}</p>"
     return f'<p><img alt="{escaped(alternative)}" style="max-width: 100%" src="data:image/svg+xml;base64,{image}"></p>'
-
-
-def some(names: list[str]) -> str:
-    """Return names separated by commas; of many, the first and the number of others."""
-    more = f" and {len(names) - MOST} more" if len(names) > MOST else ""
-    return ", ".join(names[:MOST]) + more

@@ -25,15 +25,11 @@ class Quantity(NamedTuple):
 Length = Annotated[float, Quantity("length")]
 Radians = Annotated[float, Quantity("angle")]  # inside; files may write degrees
 Number = Annotated[float, Quantity("number")]
-Mass = Annotated[float, Quantity("mass")]
-Inertia = Annotated[float, Quantity("inertia")]
 Force = Annotated[float, Quantity("force")]
-Torque = Annotated[float, Quantity("torque")]
 Stiffness = Annotated[float, Quantity("stiffness")]
 TorsionalStiffness = Annotated[float, Quantity("torsional_stiffness")]
 Damping = Annotated[float, Quantity("damping")]
 TorsionalDamping = Annotated[float, Quantity("torsional_damping")]
-Acceleration = Annotated[float, Quantity("length", 2)]
 
 METRES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "km": 1e3, "in": 0.0254, "ft": 0.3048}
 ANGLES = {"rad": 1.0, "deg": math.pi / 180.0, "rev": 2.0 * math.pi}

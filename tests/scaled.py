@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 from kinfmu import Mechanism
-from kinfmu.mechanism.dimension import Dimension
 from kinfmu.mechanism.members import NumberPath
+from kinfmu.mechanism.operations import Dimension
 from kinfmu.units import Quantity
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.analysis.assembly_search import IN_VAIN, SEED, TRIES, AssemblySearch
-from kinfmu.analysis.held import started
+from kinfmu.analysis.driver_path import started
 from kinfmu.analysis.values import degrees, driver_text
 from kinfmu.arrays import FloatArray
 from kinfmu.errors import AmbiguousStartError, AssemblyError, KinfmuError, listed

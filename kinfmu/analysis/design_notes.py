@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from kinfmu.analysis.driver_path import DriverPath
 from kinfmu.analysis.loops import FourBar, Place, SliderCrank
-from kinfmu.analysis.named_loops import NamedLoop
+from kinfmu.analysis.transmission import NamedLoop
 from kinfmu.analysis.values import law_values
 from kinfmu.errors import listed
 from kinfmu.mechanism import Mechanism

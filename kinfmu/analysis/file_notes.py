@@ -1,34 +1,32 @@
-"""Notes on probable mistakes in a mechanism file: in its numbers, its run, its start poses."""
+"""Notes on probable mistakes in a mechanism file: in its numbers and their units, its run, its start poses."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from kinfmu.analysis.driver_path import follow
 from kinfmu.analysis.singular import DriverRange, driver_range
-from kinfmu.analysis.unit_notes import unit_notes
 from kinfmu.analysis.values import LOOKS, degrees, law_values, value_text
 from kinfmu.errors import KinfmuError, listed
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
-from kinfmu.mechanism.dimension import Dimension
 from kinfmu.mechanism.drivers import AngleDriver, DistanceDriver
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.joints.cam import Cam, CamOscillating
 from kinfmu.mechanism.laws import MotionSequence, Spline
 from kinfmu.mechanism.members import NumberPath, path_text
 from kinfmu.mechanism.number import given_unit
+from kinfmu.mechanism.operations import Dimension
 from kinfmu.mechanism.parameters import dimensions_of
 from kinfmu.mechanism.quantities import AngleBetween
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.equations.start_poses import StartValues, is_in_world_coordinates, open_joints_text, start_from_poses
 from kinfmu.plan.equations.system import System
 from kinfmu.run.solve import solve
-from kinfmu.units import PLAUSIBLE_TURN, Quantity, looks_like_degrees
+from kinfmu.units import METRES, PLAUSIBLE_TURN, Quantity, looks_like_degrees, unit_of
 
 _TABLES = (Spline, MotionSequence)  # laws that keep their last value beyond their end
 
@@ -62,8 +60,7 @@ def _bare_angles(mechanism: Mechanism) -> Iterator[str]:
     """Yield a line for each angle without a unit that is probably in degrees."""
     large: dict[tuple[NumberPath, float], tuple[NumberPath, float]] = {}  # a rise and its return are one mistake
     cams = {joint.name for joint in mechanism.joints if isinstance(joint, Cam)}
-
-    def look(place: NumberPath, value: Any, quantity: Quantity) -> Any:
+    for place, value, quantity in mechanism.members.numbers():
         # Those of laws may be many turns, but for cams; multiples of 15 are probably degrees.
         is_turns = ("law" in place and place[1] not in cams) or place[0] == "drivers"
         if (
@@ -74,9 +71,6 @@ def _bare_angles(mechanism: Mechanism) -> Iterator[str]:
         ):
             owner = place[:2] if "law" in place else place
             large.setdefault((owner, abs(value)), (place, float(value)))
-        return value
-
-    mechanism.members.changed(look)
     for place, value in large.values():
         yield (
             f"{path_text(place)} = {value:.6g} rad is {math.degrees(value):.6g} deg, more than a turn: "
@@ -88,15 +82,11 @@ def _lengths_without_a_unit(mechanism: Mechanism) -> Iterator[str]:
     """Yield a line for each pure number that would be a length in every expression with it: '0.8*crank' of a length."""
     dimensions, length = dimensions_of(mechanism.parameters), Quantity("length")
     places: dict[str, list[tuple[Expression, Quantity]]] = {}
-
-    def look(place: NumberPath, value: Any, quantity: Quantity) -> Any:
+    for place, _, quantity in mechanism.members.numbers():
         if place in mechanism.expressions:
             expression = mechanism.expressions[place]
             for name in expression.names:
                 places.setdefault(name, []).append((expression, quantity))
-        return value
-
-    mechanism.members.changed(look)
     derived = {name for p in mechanism.parameters.values() if p.expression for name in p.expression.names}
     for name, parameter in mechanism.parameters.items():
         value = float(parameter.value)
@@ -235,3 +225,74 @@ def _turned_followers(system: System) -> Iterator[str]:
                     f"[joints.{joint.name}] turns {joint.between[1]} by {degrees(-off)} from its start pose: check "
                     f"offset = {degrees(joint.offset)} and the law"
                 )
+
+
+_USUAL = {  # a bare number is in N/m or N s/m
+    ("stiffness", "mm"): "N/mm",
+    ("stiffness", "cm"): "N/cm",
+    ("stiffness", "in"): "lbf/in",
+    ("damping", "mm"): "N s/mm",
+}
+_EARTH = (9.7, 10.1)  # [m/s2]; what is written for the gravity of the earth
+_SLIP = 1000.0  # between m and mm
+_APART = 100.0  # a length that is farther from all others is probably one in another unit
+_FREE_APART = 20.0  # the same for free lengths, which are like the distances that springs span
+_NEAR = 2.0  # of the others' range, in which the length is then
+_FEWEST = 3  # other lengths that tell
+
+
+def unit_notes(mechanism: Mechanism) -> Iterator[str]:
+    """Yield a line for each bare number that is probably in another unit than its own; mechanism: as written."""
+    unit = mechanism.length_unit
+    lengths: dict[NumberPath, float] = {}
+    bare: dict[NumberPath, tuple[float, Quantity]] = {}
+    for place, value, quantity in mechanism.members.numbers():
+        is_start = place[0] == "bodies" and place[2] == "start"
+        if "law" in place or is_start or place[0] == "measures" or not value:
+            continue
+        if quantity == Quantity("length"):
+            lengths[place] = abs(float(value))
+        if not given_unit(value) and place not in mechanism.expressions:
+            bare[place] = float(value), quantity
+    yield from _gravity(mechanism, bare)
+    for place, (value, quantity) in bare.items():
+        meant = _USUAL.get((quantity.kind, unit))
+        if meant:
+            understood = f"{value:.12g} {unit_of(quantity, unit)}"
+            yield (
+                f"{path_text(place)} = {value:.12g} is {understood}, although the unit of length is {unit}: write "
+                f"'{value:.12g} {meant}' if intended, else '{understood}'"
+            )
+    yield from dict.fromkeys(
+        text for place, (value, _) in bare.items() if place in lengths for text in _lengths(place, value, lengths, unit)
+    )  # once for the two coordinates of a point
+
+
+def _gravity(mechanism: Mechanism, bare: dict[NumberPath, tuple[float, Quantity]]) -> Iterator[str]:
+    """Yield a line for a bare gravity that is the earth's in another unit of length."""
+    size, unit = math.hypot(*(mechanism.gravity or (0.0, 0.0))), mechanism.length_unit
+    places = [place for place in bare if place[0] == "gravity"]
+    near = [one for one in ("m", "mm", "cm", "in", "ft") if _EARTH[0] <= size * METRES[one] <= _EARTH[1]]
+    if places and near and unit not in near:
+        value, _ = bare[places[0]]
+        yield (
+            f"{path_text(places[0])} = {value:.12g} is {value:.12g} {unit}/s2, {size * METRES[unit]:.6g} m/s2 in all: "
+            f"for the gravity of the earth write '{value:.12g} {near[0]}/s2'"
+        )
+
+
+def _lengths(place: NumberPath, value: float, lengths: dict[NumberPath, float], unit: str) -> Iterator[str]:
+    """Yield a line for a length that all others are a thousand times, or a thousandth of."""
+    size, least = abs(value), _FREE_APART if place[-1] == "free_length" else _APART
+    others = [other for other in lengths.values() if max(other, size) > min(other, size) * math.sqrt(least)]
+    if len(others) < _FEWEST or len(others) <= len(lengths) - len(others):
+        return
+    low, high = min(others), max(others)
+    for factor, word in ((_SLIP, "a thousandth of"), (1.0 / _SLIP, "a thousand times")):
+        is_apart = size * least < low if factor > 1.0 else size > high * least
+        meant = [one for one in ("m", "mm") if math.isclose(METRES[one], METRES[unit] * factor)]
+        if is_apart and low / _NEAR <= size * factor <= high * _NEAR and meant:
+            yield (
+                f"{path_text(place)}: {value:.12g} is {value:.12g} {unit}, about {word} the other lengths ({low:.6g} "
+                f"to {high:.6g} {unit}); write '{value:.12g} {meant[0]}' if intended"
+            )

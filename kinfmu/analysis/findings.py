@@ -1,4 +1,4 @@
-"""The findings of a check, and as plain data for programs."""
+"""The findings of a check, also as plain data for programs."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ from typing import Any
 from kinfmu.analysis.cams import CamFindings
 from kinfmu.analysis.design_notes import TogglePosition
 from kinfmu.analysis.drivers import DriverAdvice
-from kinfmu.analysis.dyads import NamedDyad
 from kinfmu.analysis.loading import Loading
 from kinfmu.analysis.measuring import Measurements
-from kinfmu.analysis.named_loops import NamedLoop
 from kinfmu.analysis.singular import DriverRange, SingularPoint
+from kinfmu.analysis.transmission import NamedDyad, NamedLoop
 from kinfmu.errors import KinfmuError
 from kinfmu.mechanism import Mechanism
 from kinfmu.plan import SolvePlan, determinant_formula
@@ -30,8 +29,9 @@ class BlockReport:
 
 @dataclass(frozen=True)
 class Findings:
-    """What a check finds. `problem` is the error that prevents solving or making a cam, None if there is none.
+    """What a check finds.
 
+    problem: the error that prevents solving or making a cam, None if there is none;
     ranges: one per driver, in file order; loops: the four-bars and slider-cranks among the joints; advice: on drivers,
     None where drivers and degrees of freedom match; notes: further findings, one line each;
     measured: values of the measures, None without measures; loading: efforts and reactions, None without masses, loads;

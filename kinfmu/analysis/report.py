@@ -9,15 +9,13 @@ from kinfmu.analysis.cams import cam_findings
 from kinfmu.analysis.design_notes import motion_notes, near_pivots, part_notes, toggle_positions, unused_points
 from kinfmu.analysis.driver_path import follow
 from kinfmu.analysis.drivers import INSTEAD, DriverAdvice, clearer_problem, driver_advice
-from kinfmu.analysis.dyads import find_dyads
 from kinfmu.analysis.file_notes import file_notes, run_notes, start_notes
 from kinfmu.analysis.findings import Findings
 from kinfmu.analysis.loading import loading
-from kinfmu.analysis.matrices import Matrix, pose_matrices
 from kinfmu.analysis.measuring import measurements
-from kinfmu.analysis.named_loops import find_named_loops
-from kinfmu.analysis.singular import driver_range
+from kinfmu.analysis.singular import Matrix, driver_range, pose_matrices
 from kinfmu.analysis.text import lines
+from kinfmu.analysis.transmission import find_dyads, find_named_loops
 from kinfmu.display import Displayed
 from kinfmu.errors import AssemblyError, InconsistentError, KinfmuError, MechanismError, MobilityError, listed
 from kinfmu.mechanism import Mechanism

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sized
 from functools import partial
 from typing import NamedTuple
 
-from kinfmu.analysis.cam_text import cam_lines
+from kinfmu.analysis.cams import cam_lines
 from kinfmu.analysis.findings import Findings
-from kinfmu.analysis.lift_off import LiftOff
-from kinfmu.analysis.loading import ForcePeak, LeftTable, UnknownContact
+from kinfmu.analysis.loading import ForcePeak, LeftTable, LiftOff, UnknownContact
 from kinfmu.analysis.loops import FourBar, Link, SliderCrank
-from kinfmu.analysis.named_loops import NamedLoop
 from kinfmu.analysis.singular import DriverRange, LimitPosition
-from kinfmu.analysis.transmission import TransmissionRange
-from kinfmu.analysis.values import degrees, driver_text, multiple_of_pi, value_text
-from kinfmu.errors import listed
+from kinfmu.analysis.transmission import NamedLoop, TransmissionRange
+from kinfmu.analysis.values import degrees, driver_text, multiple_of_pi, place_text, value_text
+from kinfmu.errors import MOST_SHOWN, listed, some
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.measures import counted_from
 from kinfmu.motion import MeasuredValue
@@ -29,7 +27,6 @@ _END = {
     "end": "where the distance is 0",
 }
 _SAME = 1e-9  # [rad or length]; values closer than this are equal
-_MOST_NAMES = 24  # in one line; JSON has all
 
 
 class ReportLine(NamedTuple):
@@ -59,21 +56,20 @@ def lines(report: Findings) -> list[str]:
     return [title(report.mechanism), *(f"  {found.subject:<12}{found.text}" for found in findings(report))]
 
 
-def _names(names: Iterable[str]) -> str:
-    """Return names separated by commas; of very many, the first and the number of others."""
-    names = list(names)
-    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
-    return listed(names[:_MOST_NAMES]) + more
+def _rest(parts: Sized, most: int, what: str) -> Iterator[ReportLine]:
+    """Yield how many more parts there are than the text shows."""
+    if len(parts) > most:
+        yield ReportLine("", f"and {len(parts) - most} more {what}")
 
 
 def _count(report: Findings) -> Iterator[ReportLine]:
     mechanism = report.mechanism
     rows = sum(len(joint.labels) for joint in mechanism.joints)
     yield ReportLine(
-        "bodies", f"{len(mechanism.moving_bodies)} moving: {_names(b.name for b in mechanism.moving_bodies)}"
+        "bodies", f"{len(mechanism.moving_bodies)} moving: {some(b.name for b in mechanism.moving_bodies)}"
     )
     yield ReportLine("joint rows", f"{rows} over {len(mechanism.coordinate_names)} coordinates")
-    driven = [f"driven by {_names(driver.name for driver in mechanism.drivers)}"] if mechanism.drivers else []
+    driven = [f"driven by {some(driver.name for driver in mechanism.drivers)}"] if mechanism.drivers else []
     invalid = [name for name in report.left_out if name.startswith("[drivers")]
     without = [f"without {listed(invalid)}"] if invalid else []
     mobility = f"{report.mobility}" if report.mobility >= 0 else "none: the joints do not close"
@@ -102,18 +98,17 @@ def _plan(report: Findings) -> Iterator[ReportLine]:
         return
     unit = report.mechanism.length_unit
     drivers, assembled = report.mechanism.drivers, plan.anchor.u.tolist()
-    yield ReportLine("start", _names(map(partial(driver_text, unit=unit), drivers, report.starts)))
+    yield ReportLine("start", some(map(partial(driver_text, unit=unit), drivers, report.starts)))
     if any(abs(u - start) > _SAME for u, start in zip(assembled, report.starts, strict=True)):
-        yield ReportLine("assembled", _names(map(partial(driver_text, unit=unit), drivers, assembled)))
-    yield ReportLine("coordinates", _names(plan.coordinates))
+        yield ReportLine("assembled", some(map(partial(driver_text, unit=unit), drivers, assembled)))
+    yield ReportLine("coordinates", some(plan.coordinates))
     if plan.fixed:
-        yield ReportLine("fixed", _names(f"{name} = {value:.6g}" for name, value in plan.fixed.items()))
-    for k, block in enumerate(report.blocks[:_MOST_NAMES], start=1):
+        yield ReportLine("fixed", some(f"{name} = {value:.6g}" for name, value in plan.fixed.items()))
+    for k, block in enumerate(report.blocks[:MOST_SHOWN], start=1):
         size = f"{len(block.rows)} x {len(block.unknowns)}"
         determinant = f", determinant {block.determinant}" if block.determinant else ""
         yield ReportLine(f"block {k}", f"{size}: {listed(block.unknowns)} from {listed(block.rows)}{determinant}")
-    if len(report.blocks) > _MOST_NAMES:
-        yield ReportLine("", f"and {len(report.blocks) - _MOST_NAMES} more blocks")
+    yield from _rest(report.blocks, MOST_SHOWN, "blocks")
 
 
 def _advice(report: Findings) -> Iterator[ReportLine]:
@@ -128,7 +123,7 @@ def _advice(report: Findings) -> Iterator[ReportLine]:
         more = (
             f"{advice.missing} more driver{'s' * (advice.missing > 1)} needed" if report.mobility else "nothing drives"
         )
-        yield ReportLine("loose", f"{_names(advice.loose)}: {more}")
+        yield ReportLine("loose", f"{some(advice.loose)}: {more}")
     for name in advice.stiff:
         yield ReportLine("could be", f'[joints.{name}] type = "revolute" in place of "fixed", which leaves no motion')
     if advice.idle:
@@ -155,8 +150,7 @@ def _loops(report: Findings) -> Iterator[ReportLine]:
             yield ReportLine("", _slider_crank_class(named, loop))
         for angle in named.transmission:
             yield ReportLine("", _transmission(angle, unit))
-    if len(report.loops) > _MOST_LOOPS:
-        yield ReportLine("", f"and {len(report.loops) - _MOST_LOOPS} more four-bars and slider-cranks")
+    yield from _rest(report.loops, _MOST_LOOPS, "four-bars and slider-cranks")
 
 
 def _dyads(report: Findings) -> Iterator[ReportLine]:
@@ -173,8 +167,7 @@ def _dyads(report: Findings) -> Iterator[ReportLine]:
             yield ReportLine("dyad", f"{first} {unit} between {bodies} and the slide {dyad.second.name}")
         for angle in named.transmission:
             yield ReportLine("", _transmission(angle, unit))
-    if len(report.dyads) > _MOST_LOOPS:
-        yield ReportLine("", f"and {len(report.dyads) - _MOST_LOOPS} more dyads")
+    yield from _rest(report.dyads, _MOST_LOOPS, "dyads")
 
 
 def _sized(role: str, link: Link) -> str:
@@ -262,8 +255,7 @@ def _toggles(report: Findings) -> Iterator[ReportLine]:
     for k, toggle in enumerate(report.toggles[:_MOST_LOOPS]):
         at = value_text(toggle.value, report.mechanism.length_unit, toggle.kind)
         yield ReportLine("" if k else "toggle", f"{toggle.happens} at {toggle.driver} = {at}")
-    if len(report.toggles) > _MOST_LOOPS:
-        yield ReportLine("", f"and {len(report.toggles) - _MOST_LOOPS} more toggle positions")
+    yield from _rest(report.toggles, _MOST_LOOPS, "toggle positions")
 
 
 def _cams(report: Findings) -> Iterator[ReportLine]:
@@ -322,15 +314,14 @@ def _forces(report: Findings) -> Iterator[ReportLine]:
         others = [row for row in rows if row in redundant]
         joints = {redundant[row] for row in others}
         shared = [name for name in names if name.partition(".")[0] not in joints]
-        yield ReportLine("", f"statically indeterminate: {_names(shared)} share the load with {_names(others)}")
+        yield ReportLine("", f"statically indeterminate: {some(shared)} share the load with {some(others)}")
 
 
 def _left_table_text(one: LeftTable) -> str:
     """Return what a load does beyond its table."""
 
     def extent(ends: tuple[float, float]) -> str:
-        low, high = (degrees(end) if one.unit == "rad" else f"{end:.6g} {one.unit}" for end in ends)
-        return f"from {low} to {high}"
+        return f"from {place_text(ends[0], one.unit)} to {place_text(ends[1], one.unit)}"
 
     (first, last), (low, high) = one.table, one.reached
     kept = [f"{one.kept[0]:.6g} {one.effort_unit} before it"] if low < first else []
@@ -347,16 +338,13 @@ def _without_loads(report: Findings) -> str:
 
 def contact_text(contact: UnknownContact) -> str:
     """Return why the contact force of a cam is unknown, and which reactions have no value for this reason."""
-    loaded = _names(contact.reactions)
+    loaded = some(contact.reactions)
     return f"{contact.joint}: contact force unknown, {contact.reason}; without a value: {loaded}"
 
 
 def _lift_off_text(lift: LiftOff) -> str:
     """Return where a follower lifts off, and the tension that would hold it."""
-
-    def at(value: float) -> str:
-        return degrees(value) if lift.at_unit == "rad" else f"{value:.6g} {lift.at_unit}"
-
+    at = partial(place_text, unit=lift.at_unit)
     parts = listed([f"{at(begin)} to {at(end)}" for begin, end in lift.parts])
     extents = {"turn": f"at every angle of {lift.driver}", "motion": "in the whole motion"}
     where = extents.get(lift.extent, f"from {parts} of {lift.driver}")
@@ -372,8 +360,7 @@ def _peak_text(peak: ForcePeak) -> str:
     """Return a peak with its unit and where it occurs: '-12.3 N m (crank at 45 deg)'."""
     if not math.isfinite(peak.value):
         return "without a finite value"
-    at = degrees(peak.at) if peak.at_unit == "rad" else f"{peak.at:.6g} {peak.at_unit}"
-    return f"{peak.value:.6g} {peak.unit} ({peak.driver} at {at})"
+    return f"{peak.value:.6g} {peak.unit} ({peak.driver} at {place_text(peak.at, peak.at_unit)})"
 
 
 def _no_value(name: str, reason: str) -> str:
@@ -383,7 +370,7 @@ def _no_value(name: str, reason: str) -> str:
 def measured_text(value: MeasuredValue) -> str:
     """Return a value with its unit and the driver values where it occurs."""
     number = value_text(value.value, value.unit, "angle" if value.unit == "rad" else "length")
-    at = [degrees(u) if value.at_unit == "rad" else f"{u:.6g} {value.at_unit}" for u in value.at]
+    at = [place_text(u, value.at_unit) for u in value.at]
     places = f" ({value.driver} at {' and '.join(at)})" if at else ""
     return f"{number.removesuffix(' 1')}{counted_from(value.type)}{places}"
 
@@ -397,7 +384,7 @@ def _change_points(report: Findings, reach: DriverRange, several: bool) -> Itera
     ends = (reach.low, reach.high)
     changes = [point.value for point in reach.points if point.kind == "change point" and point.value not in ends]
     if changes:
-        places = _names(value_text(value, report.mechanism.length_unit, reach.kind) for value in changes)
+        places = some(value_text(value, report.mechanism.length_unit, reach.kind) for value in changes)
         every = "k pi: " if reach.turns == 1 and _all_multiples_of_pi(changes) else ""
         goes_on = "with several drivers no run can cross it" if several else "the motion goes on (bridged)"
         yield ReportLine("singular", f"{reach.driver} = {every}{places}; branches cross, {goes_on}")
@@ -445,4 +432,4 @@ def _limit_reason(report: Findings, reach: DriverRange, limit: LimitPosition) ->
         for angle in found:
             if angle.driver == reach.driver and limit.value in angle.in_line_at:
                 return _in_line(angle)
-    return f"{_names(limit.bodies)} can move while {reach.driver} is fixed"
+    return f"{some(limit.bodies)} can move while {reach.driver} is fixed"

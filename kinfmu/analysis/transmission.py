@@ -1,16 +1,29 @@
-"""Transmission angle between coupler and output, over the range of a driver."""
+"""Named loops and dyads with their transmission angles, over the range of a driver."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from kinfmu.analysis.driver_path import DriverPath
-from kinfmu.analysis.loops import Dyad, FourBar, Place, SliderCrank
+from kinfmu.analysis.loops import (
+    Dyad,
+    FourBar,
+    Grashof,
+    Place,
+    SliderCrank,
+    dyads,
+    four_bar_class,
+    named_loops,
+    slider_crank_class,
+)
+from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.drivers import AngleDriver
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.equations.redundancy import Redundancy
 from kinfmu.solver.python import Pose
 
 POOR = math.radians(40.0)  # [rad]; the usual lower bound
@@ -273,3 +286,122 @@ def _extremes(
             found.append((value, limit.u[0]))
     least, most = ((cosine, path.within_cycle(u)) for cosine, u in (min(found), max(found)))
     return least, most, tuple(in_line)
+
+
+MOST = 200  # coordinates; transmission angles of larger mechanisms are not computed
+
+
+@dataclass(frozen=True)
+class NamedLoop:
+    """A four-bar or slider-crank with its class and its transmission angle over the path of each driver.
+
+    assembly: of a four-bar in the assembled pose, 'open' or 'crossed'; '' for others, or without a pose.
+    """
+
+    loop: FourBar | SliderCrank
+    grashof: Grashof
+    transmission: tuple[TransmissionRange, ...] = ()
+    assembly: str = ""
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the loop as plain data."""
+        loop, kind = self.loop, self.grashof
+        if isinstance(loop, FourBar):
+            lengths = dict(zip(("ground", *loop.links), loop.lengths, strict=True))
+            sizes: dict[str, Any] = {"kind": "four-bar", "links": list(loop.links), "lengths": lengths}
+        else:
+            lengths = {link.name: link.length for link in (loop.crank, loop.rod)}
+            sizes = {"kind": "slider-crank", "links": list(loop.links), "lengths": lengths, "offset": loop.offset}
+        return {
+            **sizes,
+            "class": kind.name,
+            "shape": kind.shape or None,
+            "assembly": self.assembly or None,
+            "sums": [kind.small, kind.large],
+            "transmission": [angle.as_json() for angle in self.transmission],
+        }
+
+
+def find_named_loops(
+    mechanism: Mechanism, redundancy: Redundancy, paths: Sequence[DriverPath]
+) -> tuple[NamedLoop, ...]:
+    """Return the four-bars and slider-cranks of a mechanism, each read from its driven end.
+
+    Joints with a row set aside are ignored: they form no loop of their own. Large mechanisms have no
+    transmission angles.
+    """
+    four_bars, slider_cranks = named_loops(mechanism, {row.row.owner for row in redundancy.dependent})
+    followed = paths if len(mechanism.coordinate_names) <= MOST else ()
+    return (*_four_bars(mechanism, four_bars, paths, followed), *_slider_cranks(slider_cranks, followed))
+
+
+def _four_bars(
+    mechanism: Mechanism, loops: Sequence[FourBar], paths: Sequence[DriverPath], followed: Sequence[DriverPath]
+) -> Iterator[NamedLoop]:
+    driven = {driver.of for driver in mechanism.drivers if isinstance(driver, AngleDriver)}
+    for loop in loops:
+        from_last = any(is_led_by_last(path.plan, loop) for path in paths) if paths else loop.last.name in driven
+        read = loop.turned_round() if from_last and loop.first.name not in driven else loop
+        angles = (transmission_angle(path, read) for path in followed)
+        kind, assembly = four_bar_class(*read.lengths), ""
+        if paths:
+            pose = paths[0].coordinates(paths[0].solver.anchor)
+            assembly = "crossed" if read.is_crossed(pose) else "open"
+        if kind.shape == "parallelogram" and assembly == "crossed":
+            kind = replace(kind, shape="antiparallelogram")
+        yield NamedLoop(read, kind, tuple(angle for angle in angles if angle is not None), assembly)
+
+
+def _slider_cranks(loops: Sequence[SliderCrank], followed: Sequence[DriverPath]) -> Iterator[NamedLoop]:
+    for loop in loops:
+        angles = (transmission_angle(path, loop) for path in followed)
+        kind = slider_crank_class(loop.crank.length, loop.rod.length, loop.offset)
+        yield NamedLoop(loop, kind, tuple(angle for angle in angles if angle is not None))
+
+
+@dataclass(frozen=True)
+class NamedDyad:
+    """A dyad that is part of no four-bar or slider-crank, with its transmission angle over the path of each driver.
+
+    pins: the places of its pins: of the first link, where the links meet, of the second link; of a link on a slide, of
+    its pin and of the point that slides.
+    """
+
+    dyad: Dyad
+    pins: tuple[Place, ...]
+    transmission: tuple[TransmissionRange, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the dyad as plain data."""
+        dyad = self.dyad
+        links = [dyad.first] if dyad.direction is not None else [dyad.first, dyad.second]
+        return {
+            "links": [dyad.first.name, dyad.second.name],
+            "lengths": {link.name: link.length for link in links},
+            "joint": dyad.joint or None,
+            "between": [place.body for place in (self.pins[0], *self.pins[2:])],
+            "transmission": [angle.as_json() for angle in self.transmission],
+        }
+
+
+def find_dyads(
+    mechanism: Mechanism, redundancy: Redundancy, paths: Sequence[DriverPath], loops: Sequence[NamedLoop]
+) -> tuple[NamedDyad, ...]:
+    """Return the dyads that a driver moves and whose transmission angle is that of no loop.
+
+    Large mechanisms have no transmission angles.
+    """
+    if len(mechanism.coordinate_names) > MOST or not paths:
+        return ()
+    known = {frozenset((angle.coupler, angle.output)) for loop in loops for angle in loop.transmission}
+    return tuple(_found(dyads(mechanism, {row.row.owner for row in redundancy.dependent}), paths, known))
+
+
+def _found(candidates: Sequence[Dyad], paths: Sequence[DriverPath], known: set[frozenset[str]]) -> Iterator[NamedDyad]:
+    for dyad in candidates:
+        key = frozenset((dyad.first.name, dyad.second.name))
+        results = [] if key in known else [dyad_angle(path, dyad) for path in paths]
+        found = [result for result in results if result is not None]
+        if found:
+            known.add(key)
+            yield NamedDyad(dyad, found[0][1], tuple(angle for angle, _ in found))

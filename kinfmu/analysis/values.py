@@ -19,6 +19,11 @@ def value_text(value: float, unit: str, kind: str) -> str:
     return f"{multiple_of_pi(value) or f'{value:.9g} rad'} ({round(math.degrees(value), 8) + 0.0:.9g} deg)"
 
 
+def place_text(value: float, unit: str) -> str:
+    """Return where something occurs as text: '41.41 deg' for an angle in rad, '0.35 m', '1.2 s'."""
+    return degrees(value) if unit == "rad" else f"{value:.6g} {unit}"
+
+
 def driver_text(driver: Driver, value: float, unit: str) -> str:
     """Return a driver with its value as text: 'crank = pi (180 deg)'."""
     return f"{driver.name} = {value_text(value, unit, driver.quantity.kind)}"

@@ -1,24 +1,9 @@
 """The command line, `kinfmu`: `list`, `new`, `check`, `solve`, `fit`, `study` and others.
 
-One command per file; importing a file adds its command to the group `main`.
+Importing a file adds its commands to the group `main`.
 """
 
-from kinfmu.cli import (  # noqa: F401  for the commands that they add
-    build,
-    check,
-    export,
-    fit,
-    listing,
-    new,
-    play,
-    recover,
-    review,
-    schema,
-    simulate,
-    solve,
-    study,
-    verify,
-)
+from kinfmu.cli import build, check, design, export, gallery, play, records, simulate, solve  # noqa: F401  add commands
 from kinfmu.cli.group import main
 
 __all__ = ["main"]

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kinfmu.cli.arguments import OutputFile, mechanism_argument
+from kinfmu.cli.arguments import OutputFile, driver_value, mechanism_argument
 from kinfmu.cli.group import errors_of, main
-from kinfmu.cli.quantities import driver_value
 from kinfmu.cli.settings import checked_settings, set_option
 from kinfmu.errors import KinfmuError, MechanismError, listed
 from kinfmu.mechanism import gallery
@@ -95,7 +94,7 @@ def _print_part(path: str, problem: MechanismError, *, as_json: bool) -> None:
     """Print what can be found of an invalid mechanism file; nothing if its bodies or joints are invalid."""
     from kinfmu.analysis import check as checked
     from kinfmu.analysis.report import leaving_out
-    from kinfmu.mechanism.partial_file import read_partially
+    from kinfmu.mechanism.toml_file import read_partially
 
     part = read_partially(path)
     if part is None:

@@ -2,113 +2,74 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Callable
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from kinfmu.cli.arguments import STANDARD_OUTPUT, InputFile, OutputFile, RecordOrMechanism, names_in
-from kinfmu.cli.cams import export_cam
+from kinfmu.cli.arguments import STANDARD_OUTPUT, InputFile, OutputFile, RecordOrMechanism
+from kinfmu.cli.export_formats import (
+    PAGES,
+    Options,
+    mechanism_of,
+    samples_between,
+    write_animation,
+    write_cam,
+    write_drawing,
+    write_page,
+    write_plot,
+    write_table,
+)
 from kinfmu.cli.group import errors_of, main
-from kinfmu.cli.pages import PAGES, mechanism_of, write_page
-from kinfmu.cli.quantities import on_axis
-from kinfmu.cli.settings import checked_settings, set_option
-from kinfmu.cli.tables import csv_form, table_options
-from kinfmu.errors import RequestError, listed
+from kinfmu.cli.settings import checked_settings, csv_form, set_option, table_options
+from kinfmu.errors import listed
 from kinfmu.files import suffix_of
 from kinfmu.mechanism import gallery
 
 if TYPE_CHECKING:
     from kinfmu.run import Run
 
-
-TABLES, PLOTS, ANIMATIONS = (".csv", ".parquet", ".npz"), (".svg", ".png", ".pdf"), (".gif", ".mp4")
-DRAWING = ".dxf"
-FORMATS = (*TABLES, *PLOTS, *ANIMATIONS, DRAWING)
+RECORD = ".mcap"
 
 
-def _write(run: Run, path: Path, columns: Sequence[str], *, width: int | None, **how: Any) -> None:
-    """Write a run in the format of the path's suffix."""
-    if suffix_of(path) in TABLES:
-        from kinfmu.log import write_table
+class Format(NamedTuple):
+    """A kind of file that shows a run.
 
-        write_table(run, path, columns or None, **how)
-    elif suffix_of(path) in PLOTS:
-        from kinfmu.draw import plot
+    name: in messages; write: its writer; options: parameters of the command that belong to it; also: others that it
+    takes, which messages attribute to another format.
+    """
 
-        plot(run, path, columns, **how)
-    else:
-        from kinfmu.draw import animate
-
-        animate(run, path, width=width)
+    name: str
+    suffixes: tuple[str, ...]
+    write: Callable[[Run, Path, Options], None]
+    options: tuple[str, ...]
+    also: tuple[str, ...] = ()
 
 
-def _write_svaj(run: Run, output: Path, name: str, *, degrees: bool, **form: Any) -> None:
-    """Write displacement, velocity, acceleration and jerk as a table."""
-    from kinfmu.log.table import write_columns
-    from kinfmu.motion.motion_curve import svaj_columns
-    from kinfmu.run.tables import csv_lines
-
-    columns = svaj_columns(run, name, degrees=degrees)
-    if output == STANDARD_OUTPUT:
-        for line in csv_lines(columns, **form):
-            click.echo(line, nl=False)
-        return
-    write_columns(run, columns, output, **form)
-    click.echo(f"written: {output}")
-
-
-def _between(run: Run, start: str | None, stop: str | None) -> Run:
-    """Return the samples from start to stop on the axis of the run, both included; all by default."""
-    if start is None and stop is None:
-        return run
-    import numpy as np
-
-    from kinfmu.run.axis import axis_of
-
-    axis = axis_of(run)
-
-    def end(option: str, text: str | None, default: float) -> float:
-        if text is None:
-            return default
-        return on_axis(option, text, axis.label, axis.unit, f", {axis.range()}") / axis.factor
-
-    first, last = end("--start", start, -math.inf), end("--stop", stop, math.inf)
-    edge = 0.0
-    if len(run) and not axis.is_time:  # driver values are rounded: 30 deg in radians, and back
-        edge = 1e-9 * max(abs(axis.values[0]), abs(axis.values[-1]))
-    rows = (axis.values >= first - edge) & (axis.values <= last + edge)
-    if not rows.any():
-        unit = f" {axis.unit}".rstrip()
-        asked = f"from {first:g} to {last:g}{unit}"
-        if stop is None:
-            asked = f"from {first:g}{unit} on"
-        elif start is None:
-            asked = f"up to {last:g}{unit}"
-        available = axis.range() or "none"
-        raise RequestError(f"--start, --stop: the run has no samples {asked}; its samples: {available}")
-    kept = run.t[rows]
-    low, high = (first, last) if axis.is_time else (np.min(kept), np.max(kept))
-    return run.part(rows, events=tuple(event for event in run.events if low <= event.t <= high))
-
-
-def _check_width(width: int) -> None:
-    """Raise a UsageError for a width that no animation has."""
-    from kinfmu.draw.animation import LARGEST, NARROWEST
-
-    if not NARROWEST <= width <= LARGEST:
-        raise click.UsageError(f"--width {width}: must be {NARROWEST} to {LARGEST} pixels")
-
-
-def _on_axis_of(run: Run, text: str) -> float:
-    """Return a value of --at, in the unit of the axis of the run."""
-    from kinfmu.run.axis import axis_of
-
-    axis = axis_of(run)
-    return on_axis("--at", text, axis.label, axis.unit, f", {axis.range()}") / axis.factor
+TABLES = Format("tables", (".csv", ".parquet", ".npz"), write_table, ("columns",), also=("svaj", "degrees"))
+PLOTS = Format(
+    "plots",
+    (".svg", ".png", ".pdf"),
+    write_plot,
+    ("across", "overlay", "polar", "other", "svaj", "degrees", "columns"),
+)
+ANIMATIONS = Format("animations", (".gif", ".mp4"), write_animation, ("width",))
+DRAWINGS = Format("", (".dxf",), write_drawing, ("at",))
+KINDS = (TABLES, PLOTS, ANIMATIONS, DRAWINGS)
+FORMATS = tuple(suffix for kind in KINDS for suffix in kind.suffixes)
+_LABELS = {  # of parameters, in messages, before their values where these are shown
+    "across": "--x",
+    "overlay": "--overlay",
+    "polar": "--polar",
+    "other": "a second run",
+    "svaj": "--svaj",
+    "degrees": "--degrees",
+    "at": "--at {}",
+    "width": "--width {}",
+    "columns": "--columns {}",
+}
 
 
 @main.command(epilog="Example: kinfmu export logs/crank_rocker.mcap -o run.svg --columns tracer.x,tracer.y")
@@ -173,27 +134,7 @@ def _on_axis_of(run: Run, text: str) -> float:
 )
 @table_options
 @set_option
-def export(
-    run: str,
-    other: Path | None,
-    output: Path,
-    columns: str | None,
-    across: str | None,
-    overlay: bool,
-    polar: bool,
-    svaj: str | None,
-    degrees: bool,
-    start: str | None,
-    stop: str | None,
-    at: str | None,
-    width: int | None,
-    cam: str | None,
-    tolerance: str | None,
-    units: bool,
-    separator: str | None,
-    decimal: str | None,
-    settings: tuple[tuple[str, str], ...],
-) -> None:
+def export(run: str, output: Path, cam: str | None, settings: tuple[tuple[str, str], ...], **options: Any) -> None:
     """Write a run as a table, as plots, as an animation or as a page; or a mechanism as a page.
 
     A page (.html) is the mechanism, to be dragged in a browser, with the parameters and the time of the run; it is one
@@ -205,106 +146,105 @@ def export(
     .mp4 shows the moving linkage, a .dxf the pose at a value as a CAD drawing. With --cam, a mechanism or a record
     gives the profile of a cam as .csv, .dxf or a figure. --set is for mechanisms: a record has the values of its run.
     """
-    if settings and suffix_of(run) == ".mcap":
+    is_record = suffix_of(run) == RECORD
+    if settings and is_record:
         raise click.UsageError(
             f"--set {settings[0][0]}: only for mechanisms; {run} has the values of its run: use solve --set or "
             "simulate --set"
         )
-    if width is not None:
-        _check_width(width)
+    if options["width"] is not None:
+        _check_width(options["width"])
+    about = ""
     if cam is not None:
-        given: dict[str, Any] = {"units": units, "separator": separator, "decimal": decimal}
-        export_cam(run, output, cam, tolerance, settings, degrees=degrees, **given)
-        return
-    if tolerance is not None:
-        raise click.UsageError(f"--tolerance {tolerance}: only for the .dxf of a cam, with --cam")
-    if suffix_of(output) in PAGES or suffix_of(run) != ".mcap":
-        _export_page(run, output, start, stop, settings)
-        return
-    from kinfmu.log import read
-    from kinfmu.log.table import columns_of
-    from kinfmu.run.tables import csv_lines
+        _check_options_of_cam(cam)
+        about = write_cam(run, output, cam, settings, options)
+    elif options["tolerance"] is not None:
+        raise click.UsageError(f"--tolerance {options['tolerance']}: only for the .dxf of a cam, with --cam")
+    elif suffix_of(output) in PAGES or not is_record:
+        _write_page(run, output, settings, options)
+    else:
+        suffix = ".csv" if output == STANDARD_OUTPUT else suffix_of(output)
+        form = csv_form(suffix, TABLES.suffixes, options)
+        _refuse_other_formats(suffix, options)
+        from kinfmu.log import read
 
-    suffix = ".csv" if output == STANDARD_OUTPUT else suffix_of(output)
-    form = csv_form(suffix, TABLES, units=units, separator=separator, decimal=decimal)
-    plot_only = {
-        "--x": across,
-        "--overlay": overlay,
-        "--polar": polar,
-        "a second run": other,
-    }
-    if suffix not in TABLES:
-        plot_only |= {"--svaj": svaj, "--degrees": degrees}
-    asked = [name for name, value in plot_only.items() if value]
-    if asked and suffix not in PLOTS:
-        also = "".join(f"; {name} also for tables" for name in asked if name in ("--svaj", "--degrees"))
-        raise click.UsageError(f"{listed(asked)}: only for plots, {listed(PLOTS)}, not {suffix}{also}")
-    excluded = [name for name in asked if name not in ("--svaj", "--degrees")] + ["--columns"] * (columns is not None)
-    if svaj and excluded:
-        raise click.UsageError(f"--svaj excludes {listed(excluded)}")
-    if at is not None and suffix != DRAWING:
-        raise click.UsageError(f"--at {at}: only for {DRAWING}, not {suffix}")
-    if width is not None and suffix not in ANIMATIONS:
-        raise click.UsageError(f"--width {width}: only for animations, {listed(ANIMATIONS)}, not {suffix}")
-    if columns is not None and suffix in (*ANIMATIONS, DRAWING):
-        valid = listed((*TABLES, *PLOTS))
-        raise click.UsageError(f"--columns {columns}: only for tables and plots, {valid}, not {suffix}")
-    part = _between(read(Path(run)), start, stop)
-    if svaj and suffix in TABLES:
-        _write_svaj(part, output, svaj, degrees=degrees, **form)
-        return
-    if output == STANDARD_OUTPUT:
-        for line in csv_lines(columns_of(part, names_in(columns), degrees=degrees), **form):
-            click.echo(line, nl=False)
-        return
-    if suffix == DRAWING:
-        from kinfmu.draw import dxf
-
-        dxf(part, output, None if at is None else _on_axis_of(part, at))
-        click.echo(f"written: {output}")
-        return
-    if svaj:
-        from kinfmu.draw import svaj as drawn
-
-        drawn(part, output, svaj, degrees=degrees)
-        click.echo(f"written: {output}")
-        return
-    how: dict[str, Any] = {"degrees": degrees}
-    how |= form if suffix in TABLES else {"x": names_in(across) or (), "overlaid": overlay, "polar": polar}
-    if other is not None:
-        how |= {"other": _between(read(other), start, stop), "names": (Path(run).stem, other.stem)}
-    _write(part, output, names_in(columns) or (), width=width, **how)
-    click.echo(f"written: {output}")
+        part = samples_between(read(Path(run)), options["start"], options["stop"])
+        kind = next(kind for kind in KINDS if suffix in kind.suffixes)
+        kind.write(part, output, {**options, "run": run, "form": form})
+    if output != STANDARD_OUTPUT:
+        click.echo(f"written: {output}{about}")
 
 
-def _record_command(mechanism: str) -> str:
-    """Return the command that makes a record of a mechanism, to follow 'a record (.mcap)'; '' for a record."""
-    if suffix_of(mechanism) == ".mcap":
-        return ""
-    name = mechanism.replace(":", "_") if gallery.has(mechanism) else mechanism
-    return f": kinfmu solve {quote(mechanism)} -o {quote(str(Path(name).with_suffix('.mcap')))}"
+def _label(name: str) -> str:
+    """Return a parameter of the command as messages name it, without its value."""
+    return _LABELS.get(name, f"--{name}").removesuffix(" {}")
 
 
-def _export_page(
-    given: str, output: Path, start: str | None, stop: str | None, settings: Sequence[tuple[str, str]]
-) -> None:
+def _check_width(width: int) -> None:
+    """Raise a UsageError for a width that no animation has."""
+    from kinfmu.draw.animation import LARGEST, NARROWEST
+
+    if not NARROWEST <= width <= LARGEST:
+        raise click.UsageError(f"--width {width}: must be {NARROWEST} to {LARGEST} pixels")
+
+
+def _others_than(*valid: str) -> list[str]:
+    """Return the parameters that the command line gives, without the valid ones."""
+    return [name for name, value in click.get_current_context().params.items() if value and name not in valid]
+
+
+def _check_options_of_cam(joint: str) -> None:
+    """Raise a UsageError for options that do not belong to the profile of a cam."""
+    of_table = ("degrees", "units", "separator", "decimal")
+    others = _others_than("run", "output", "cam", "tolerance", "settings", *of_table)
+    if others:
+        raise click.UsageError(f"--cam {joint} excludes {listed(map(_label, others))}")
+
+
+def _refuse_other_formats(suffix: str, options: Options) -> None:
+    """Raise a UsageError for options that belong to other formats than that of a suffix, or exclude each other."""
+    refused: dict[tuple[Format, ...], list[str]] = {}
+    for name in _LABELS:
+        takers = [kind for kind in KINDS if name in (*kind.options, *kind.also)]
+        if options[name] not in (None, False) and not any(suffix in kind.suffixes for kind in takers):
+            refused.setdefault(tuple(kind for kind in KINDS if name in kind.options), []).append(name)
+    for kinds, names in refused.items():
+        shown = listed(_LABELS[name].format(options[name]) for name in names)
+        title = " and ".join(kind.name for kind in kinds)
+        valid = listed(filter(None, [title, *(one for kind in kinds for one in kind.suffixes)]))
+        others = [(name, kind.name) for name in names for kind in KINDS if name in kind.also]
+        also = "".join(f"; {_label(name)} also for {kind_name}" for name, kind_name in others)
+        raise click.UsageError(f"{shown}: only for {valid}, not {suffix}{also}")
+    if options["svaj"]:
+        excluded = [name for name in PLOTS.options if name not in ("svaj", "degrees") and options[name]]
+        if excluded:
+            raise click.UsageError(f"--svaj excludes {listed(map(_label, excluded))}")
+
+
+def _write_page(given: str, output: Path, settings: tuple[tuple[str, str], ...], options: Options) -> None:
     """Write the page of a record, from start to stop, or of a mechanism."""
-    is_record = suffix_of(given) == ".mcap"
-    valid = {"run", "output", *(("start", "stop") if is_record else ("settings",))}
-    others = [name for name, value in click.get_current_context().params.items() if value and name not in valid]
-    if others or suffix_of(output) not in PAGES:
-        options = f"no other options than {'--start and --stop' if is_record else '--set'}"
+    is_record = suffix_of(given) == RECORD
+    taken = ("start", "stop") if is_record else ("settings",)
+    if suffix_of(output) not in PAGES or _others_than("run", "output", *taken):
+        only = f"no other options than {'--start and --stop' if is_record else '--set'}"
         raise click.UsageError(
-            f"{given}: of a mechanism only a page (.html) is written, or with --cam a cam; a page has {options}; a "
+            f"{given}: of a mechanism only a page (.html) is written, or with --cam a cam; a page has {only}; a "
             f"table, plot or animation needs a record (.mcap){_record_command(given)}"
         )
     if is_record:
         from kinfmu.log import read
 
-        run = _between(read(Path(given)), start, stop)
+        run = samples_between(read(Path(given)), options["start"], options["stop"])
         write_page(mechanism_of(run), output, run)
     else:
         mechanism = checked_settings(gallery.load(given), settings).mechanism()
         with errors_of(given):
             write_page(mechanism, output)
-    click.echo(f"written: {output}")
+
+
+def _record_command(mechanism: str) -> str:
+    """Return the command that makes a record of a mechanism, to follow 'a record (.mcap)'; '' for a record."""
+    if suffix_of(mechanism) == RECORD:
+        return ""
+    name = mechanism.replace(":", "_") if gallery.has(mechanism) else mechanism
+    return f": kinfmu solve {quote(mechanism)} -o {quote(str(Path(name).with_suffix(RECORD)))}"

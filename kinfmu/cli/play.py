@@ -8,8 +8,7 @@ import webbrowser
 import click
 
 from kinfmu.cli.arguments import mechanism_argument
-from kinfmu.cli.group import main
-from kinfmu.cli.messages import note, patience
+from kinfmu.cli.group import main, note, patience
 
 
 @main.command(epilog="Example: kinfmu play mine.toml")

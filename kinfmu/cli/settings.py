@@ -1,20 +1,21 @@
-"""Values of --set: parameters of a mechanism, constants of its laws, settings of a run."""
+"""Options of several commands: values of --set, and the form of tables."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from kinfmu.cli.arguments import ArgumentType
-from kinfmu.cli.messages import note
-from kinfmu.errors import MechanismError, RequestError
+from kinfmu.cli.group import note
+from kinfmu.errors import MechanismError, RequestError, listed
 from kinfmu.units import Quantity, in_turns, looks_like_degrees
 
 if TYPE_CHECKING:
     from kinfmu.mechanism import Mechanism
+
 
 TOLERANCE = "solver.tolerance"
 DRIVEN_BY_TIME = "driven_by_time"
@@ -144,3 +145,50 @@ def _value(text: str) -> float | str:
 def _note_degrees(name: str, value: float) -> None:
     if looks_like_degrees(value):
         note(f"{name} = {value:.12g} rad, {in_turns(value)}; write {name}={value:.12g}deg for degrees")
+
+
+CSV = ".csv"
+SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t"}
+
+
+def table_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add --units, --separator and --decimal, which `csv_form` checks."""
+    for option in (
+        click.option("--decimal", type=click.Choice([".", ","]), help="Decimal sign of a CSV file; default: a point."),
+        click.option(
+            "--separator",
+            type=click.Choice(list(SEPARATORS)),
+            help="Between the columns of a CSV file; default: a comma. Spreadsheets of many countries need "
+            "--separator ';' --decimal ','.",
+        ),
+        click.option(
+            "--units",
+            is_flag=True,
+            help="Write units into the first line of a CSV file: coupler.x [m]. Other tables always hold them.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def csv_form(suffix: str, tables: tuple[str, ...], options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the form of a CSV file, as arguments of `write_table`; raise a UsageError for other files.
+
+    Args:
+        suffix: Of the file.
+        tables: Suffixes of tables, which may be written with units.
+        options: Of the command, with those of `table_options`.
+
+    """
+    units, separator, decimal = (options[name] for name in ("units", "separator", "decimal"))
+    of_csv = [f"--{name} '{options[name]}'" for name in ("separator", "decimal") if options[name]]
+    asked = of_csv + ["--units"] * units
+    if suffix not in tables and asked:
+        valid = tables[0] if len(tables) == 1 else f"tables, {listed(tables)}"
+        raise click.UsageError(f"{listed(asked)}: only for {valid}, not {suffix}")
+    if suffix != CSV and of_csv:
+        raise click.UsageError(f"{listed(asked)}: only for {CSV}, not {suffix}")
+    form = {"separator": SEPARATORS[separator or ","], "decimal": decimal or "."}
+    if form["separator"] == form["decimal"]:
+        raise click.UsageError("--decimal ',' needs another separator than the comma: --separator ';'")
+    return {"units": units, **form}

@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kinfmu.cli.arguments import InputFile, ModelName, OutputFile
-from kinfmu.cli.group import errors_as, errors_of, main, on_interrupt
-from kinfmu.cli.messages import Progress, report
-from kinfmu.cli.quantities import Time
+from kinfmu.cli.arguments import InputFile, ModelName, OutputFile, Time
+from kinfmu.cli.group import Progress, errors_as, errors_of, main, on_interrupt, report
 from kinfmu.cli.settings import (
     DRIVEN_BY_TIME,
     INTEGRATOR_TOLERANCE,

@@ -9,12 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kinfmu.cli.arguments import OutputFile, mechanism_argument, names_in, outputs_option
-from kinfmu.cli.group import errors_of, main, on_interrupt
-from kinfmu.cli.messages import note, report, warn
-from kinfmu.cli.quantities import RangeArgument, driver_value, is_bare
-from kinfmu.cli.settings import TOLERANCE, Settings, checked_settings, set_option, tolerance_of
-from kinfmu.cli.tables import csv_form, table_options
+from kinfmu.cli.arguments import (
+    OutputFile,
+    RangeArgument,
+    driver_value,
+    is_bare,
+    mechanism_argument,
+    names_in,
+    outputs_option,
+)
+from kinfmu.cli.group import errors_of, main, note, on_interrupt, report, warn
+from kinfmu.cli.settings import TOLERANCE, Settings, checked_settings, csv_form, set_option, table_options, tolerance_of
 from kinfmu.errors import listed
 from kinfmu.files import suffix_of
 from kinfmu.mechanism import gallery
@@ -79,12 +84,10 @@ def solve(
     speed: str | None,
     wrap: bool,
     degrees: bool,
-    units: bool,
-    separator: str | None,
-    decimal: str | None,
     settings: tuple[tuple[str, str], ...],
     outputs: str | None,
     engine: str,
+    **of_table: Any,
 ) -> None:
     """Solve a mechanism at times or driver values.
 
@@ -101,7 +104,7 @@ def solve(
     for option, value in (("--wrap", wrap), (f"--speed {speed}", speed)):
         if value and not angle:
             raise click.UsageError(f"{option} needs --angle")
-    form = csv_form(suffix_of(output), TABLES, units=units, separator=separator, decimal=decimal)
+    form = csv_form(suffix_of(output), TABLES, of_table)
     if degrees and suffix_of(output) == RECORD:
         raise click.UsageError(f"--degrees: only for tables, {listed(TABLES)}; export writes those of a record")
     mech = gallery.load(mechanism)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from kinfmu.errors import FmuError
 from kinfmu.files import temporary_folder
-from kinfmu.mechanism.toml_file import LARGEST_FILE
+from kinfmu.mechanism.toml_document import LARGEST_FILE
 from kinfmu.mechanism.valid import quoted
 
 LARGEST = 2**29  # [bytes] unpacked; the largest FMUs of kinfmu take a tenth of it

@@ -1,17 +1,106 @@
-"""Bodies, their points and masses, gravity, and the settings of a run."""
+"""Bodies, their points and masses, also of uniform rods and plates, gravity, and the settings of a run."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations, pairwise
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.errors import MechanismError, valid_names
 from kinfmu.mechanism.expression import Computed, Expression
-from kinfmu.mechanism.uniform import MassProperties, bar, crossing, has_area, plate
+from kinfmu.mechanism.quantities.arithmetic import Value, sqrt
 from kinfmu.mechanism.valid import check_number, is_number, quoted
 from kinfmu.units import METRES
+
+FLAT = 1e-12  # area of corners on a line, of the square of their distance
+
+
+class MassProperties(NamedTuple):
+    """Mass [kg], centre of mass (x, y) in the body's frame [length], moment of inertia about it [kg m2]."""
+
+    mass: Value
+    x: Value
+    y: Value
+    inertia: Value
+
+
+Place = Sequence[Value]  # (x, y) in the body's frame [length]
+
+
+def bar(ends: Sequence[Place], width: Value, mass: Value, per_area: Value, metre: float) -> MassProperties:
+    """Return a uniform bar, a rectangle around the line between two points that ends at them; a rod has no width.
+
+        m = mass + per_area L w,   I = m (L^2 + w^2) / 12
+
+    Args:
+        ends: The two points.
+        width: Its width w [length].
+        mass: Its mass [kg], or 0 with a mass by area.
+        per_area: Mass by area [kg/m2], or 0 with a mass.
+        metre: Unit of length [m].
+
+    """
+    (a_x, a_y), (b_x, b_y) = ends
+    d_x, d_y, square_metre = b_x - a_x, b_y - a_y, metre * metre
+    square = d_x * d_x + d_y * d_y
+    total = mass + per_area * width * sqrt(square) * square_metre
+    inertia = total * (square + width * width) * (square_metre / 12.0)
+    return MassProperties(total, 0.5 * (a_x + b_x), 0.5 * (a_y + b_y), inertia)
+
+
+def plate(corners: Sequence[Place], mass: Value, per_area: Value, metre: float) -> MassProperties:
+    """Return a uniform plate with straight edges, by Green's theorem, seen from its first corner:
+
+        2 A = sum c_k,   c_k = x_k y_k+1 - x_k+1 y_k,   6 A x_C = sum c_k (x_k + x_k+1)
+        12 A I / m = sum c_k (x_k^2 + x_k x_k+1 + x_k+1^2 + y_k^2 + y_k y_k+1 + y_k+1^2) - 12 A |r_C|^2
+
+    Args:
+        corners: Its corners, in either direction.
+        mass: Its mass [kg], or 0 with a mass by area.
+        per_area: Mass by area [kg/m2], or 0 with a mass.
+        metre: Unit of length [m].
+
+    """
+    (x_0, y_0), *others = corners
+    seen = [(x - x_0, y - y_0) for x, y in others]  # edges at the first corner add nothing
+    area = moment_x = moment_y = turning = 0.0  # type: Value
+    for (a_x, a_y), (b_x, b_y) in pairwise(seen):
+        cross = a_x * b_y - b_x * a_y
+        area = area + cross
+        moment_x, moment_y = moment_x + cross * (a_x + b_x), moment_y + cross * (a_y + b_y)
+        turning = turning + cross * (a_x * a_x + a_x * b_x + b_x * b_x + a_y * a_y + a_y * b_y + b_y * b_y)
+    c_x, c_y = moment_x / (3.0 * area), moment_y / (3.0 * area)
+    total = mass + per_area * sqrt(area * area) * (0.5 * metre * metre)
+    inertia = total * (turning / (6.0 * area) - (c_x * c_x + c_y * c_y)) * (metre * metre)
+    return MassProperties(total, x_0 + c_x, y_0 + c_y, inertia)
+
+
+def has_area(corners: Sequence[tuple[float, float]]) -> bool:
+    """Return True if corners do not lie on one line, to round-off."""
+    (x_0, y_0), *others = corners
+    seen = [(x - x_0, y - y_0) for x, y in others]
+    area = sum(a_x * b_y - b_x * a_y for (a_x, a_y), (b_x, b_y) in pairwise(seen))
+    return abs(area) > FLAT * max(x * x + y * y for x, y in seen)
+
+
+def crossing(corners: Sequence[tuple[float, float]]) -> tuple[int, int] | None:
+    """Return the first corners of two edges of a plate that cross or touch; None if there are none."""
+    count = len(corners)
+    edges = [(corners[k], corners[(k + 1) % count]) for k in range(count)]
+
+    def side(a: tuple[float, float], b: tuple[float, float], p: tuple[float, float]) -> float:
+        return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
+
+    for i, j in combinations(range(count), 2):
+        if j - i in (1, count - 1):
+            continue  # neighbours share a corner
+        (a, b), (c, d) = edges[i], edges[j]
+        if side(a, b, c) * side(a, b, d) <= 0.0 and side(c, d, a) * side(c, d, b) <= 0.0:
+            return i, j
+    return None
+
 
 GROUND_NAME = "ground"
 MASS_KEYS = (  # of a body's table
@@ -95,10 +184,12 @@ class Body:
         object.__setattr__(self, "points", MappingProxyType(points))
         object.__setattr__(self, "start", Start(*self.start))
         object.__setattr__(self, "center_of_mass", self._point("center_of_mass", self.center_of_mass))
-        if self.rod is not None:
-            object.__setattr__(self, "rod", self._rod(self.rod))
-        if self.plate is not None:
-            object.__setattr__(self, "plate", self._plate(self.plate))
+        for key, valid in (
+            ("rod", "two points of the body, such as ['A', 'B']"),
+            ("plate", "three or more points of the body, such as ['A', 'B', 'C']"),
+        ):
+            if getattr(self, key) is not None:
+                object.__setattr__(self, key, self._names(key, getattr(self, key), valid))
 
     def _point(self, key: str, point: Iterable[float]) -> Point:
         try:
@@ -107,22 +198,13 @@ class Body:
         except (TypeError, ValueError):
             raise MechanismError(f"[bodies.{self.name}] {key} = {quoted(point)} must be two numbers [x, y]") from None
 
-    def _rod(self, rod: Iterable[str]) -> tuple[str, str]:
-        ends = () if isinstance(rod, str | Mapping) or not isinstance(rod, Iterable) else tuple(rod)
-        if len(ends) != 2 or not all(isinstance(end, str) for end in ends):
-            raise MechanismError(
-                f"[bodies.{self.name}] rod = {quoted(rod)} must be two points of the body, such as ['A', 'B']"
-            )
-        return ends
-
-    def _plate(self, corners: Iterable[str]) -> tuple[str, ...]:
-        names = () if isinstance(corners, str | Mapping) or not isinstance(corners, Iterable) else tuple(corners)
-        if len(names) < 3 or not all(isinstance(name, str) for name in names):
-            raise MechanismError(
-                f"[bodies.{self.name}] plate = {quoted(corners)} must be three or more points of the body, "
-                f"such as ['A', 'B', 'C']"
-            )
-        return names
+    def _names(self, key: str, names: Any, valid: str) -> tuple[str, ...]:
+        """Return the points of a rod, two, or of a plate, three or more; valid: what they must be, in messages."""
+        found = () if isinstance(names, str | Mapping) or not isinstance(names, Iterable) else tuple(names)
+        is_enough = len(found) == 2 if key == "rod" else len(found) >= 3
+        if not is_enough or not all(isinstance(name, str) for name in found):
+            raise MechanismError(f"[bodies.{self.name}] {key} = {quoted(names)} must be {valid}")
+        return found
 
     @property
     def given_masses(self) -> dict[str, Any]:
@@ -221,8 +303,8 @@ class Body:
         for name in names:
             if name not in self.points:
                 raise MechanismError(
-                    f"{where} {key}: body '{self.name}' has no point {quoted(name)}{suggestion(name, self.points)}; "
-                    f"its points: {listed(self.points)}"
+                    f"{where} {key}: body '{self.name}' has no point {quoted(name)}"
+                    f"{valid_names(name, self.points, 'its points')}"
                 )
         places = [self.points[name] for name in names]
         what = f"{where} {key} = {quoted(list(names))}"

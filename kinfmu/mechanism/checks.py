@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
-from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.errors import MechanismError, listed, suggestion, valid_names
 from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.mechanism.declared import keys_of
 from kinfmu.mechanism.drivers import Driver
@@ -14,8 +14,7 @@ from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.force_names import measured_forces
 from kinfmu.mechanism.joints import Joint
 from kinfmu.mechanism.loads import Load
-from kinfmu.mechanism.measures import Reading
-from kinfmu.mechanism.measures.extremes import Maximum, Minimum, Peak, PeakAcceleration, PeakSpeed, Range
+from kinfmu.mechanism.measures import READINGS, Reading
 from kinfmu.mechanism.members import Bodies, Members, NumberPath, path_text
 from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.quantities import PoseQuantity
@@ -26,7 +25,6 @@ from kinfmu.units import METRES, CoordinateName, factors
 NO_DRIVER = "[drivers] there is no driver: "  # before a measure that needs one
 _EFFORTS = ("torque", "force", "power")  # nouns of forces of drivers; joints have forces, too
 _OF_MECHANISM = ("shaking_force", "shaking_moment", "kinetic_energy", "potential_energy")
-OF_FORCES = (Minimum, Maximum, Range, Peak)  # measures that read forces
 _KEY = re.compile(r"^.*\.|_\d+$")  # what a key has around its word: 'rise' of 'law.rise_1'
 MOST_BODIES = 20_000  # fits into the memory of an ordinary computer
 
@@ -45,8 +43,7 @@ def check_header(name: str, title: str, length_unit: str) -> None:
     """Raise a MechanismError for an invalid unit, name or title."""
     if length_unit not in METRES:
         raise MechanismError(
-            f"[units] length = {quoted(length_unit)} is not a unit of length"
-            f"{suggestion(length_unit, METRES)}; known: {listed(METRES)}"
+            f"[units] length = {quoted(length_unit)} is not a unit of length{valid_names(length_unit, METRES)}"
         )
     check_name("name =", name)
     check_line("title", title)
@@ -107,7 +104,7 @@ def check_outputs(members: Members, points: Mapping[str, str], coordinates: str 
         if name not in known:
             raise MechanismError(
                 f"[outputs] coordinates: {quoted(name)} is not a coordinate of this mechanism"
-                f"{suggestion(name, known)}; coordinates: {listed(known)}"
+                f"{valid_names(name, known, 'coordinates')}"
             )
     if len(set(coordinates)) < len(coordinates):
         raise MechanismError("[outputs] coordinates names a coordinate twice")
@@ -137,11 +134,11 @@ def _check_reading(members: Members, known: Mapping[str, Any], reading: Reading)
             continue
         if not isinstance(value, str):
             raise MechanismError(f"{where}{key.name} = {quoted(value)} must be a coordinate or a measured quantity")
-        is_point = isinstance(reading, PeakSpeed | PeakAcceleration) and value in members.body_points
+        is_point = reading.reads_points and value in members.body_points
         forces = measured_forces(members)
         if value in forces and value not in known:
-            if not isinstance(reading, OF_FORCES):
-                valid = listed(cls.type for cls in OF_FORCES)
+            if not reading.reads_forces:
+                valid = listed(cls.type for cls in READINGS if cls.reads_forces)
                 raise MechanismError(
                     f"{where}{key.name}: {quoted(value)} is a force, which has no rates; types for forces: {valid}"
                 )
@@ -283,7 +280,7 @@ def _check_body(bodies: Bodies, where: str, name: str) -> None:
         raise MechanismError(f"{where}: {quoted(name)} must be a body; did you mean '{body}'?")
     if name not in bodies:
         raise MechanismError(
-            f"{where}: body {quoted(name)} is not in the mechanism{suggestion(name, bodies)}; bodies: {listed(bodies)}"
+            f"{where}: body {quoted(name)} is not in the mechanism{valid_names(name, bodies, 'bodies')}"
         )
 
 
@@ -295,6 +292,5 @@ def _check_point(bodies: Bodies, where: str, name: str) -> None:
     known = bodies[body_name].points
     if point not in known:
         raise MechanismError(
-            f"{where}: body '{body_name}' has no point {quoted(point)}{suggestion(point, known)}; "
-            f"its points: {listed(known)}"
+            f"{where}: body '{body_name}' has no point {quoted(point)}{valid_names(point, known, 'its points')}"
         )

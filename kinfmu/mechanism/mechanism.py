@@ -27,10 +27,9 @@ from kinfmu.mechanism.loads import Load
 from kinfmu.mechanism.measures import Reading
 from kinfmu.mechanism.members import Members, NumberPath, texts_of
 from kinfmu.mechanism.metres import in_metres
-from kinfmu.mechanism.parameters import Parameter, parameter_values
+from kinfmu.mechanism.parameters import Parameter, parameter_values, resolve
 from kinfmu.mechanism.quantities.arithmetic import Value
 from kinfmu.mechanism.quantities.placement import body_of
-from kinfmu.mechanism.resolve import resolve
 from kinfmu.mechanism.settings import LawConstant, Settable, law_constants, with_law_constants
 from kinfmu.units import OTHER_SPELLINGS, CoordinateName, Quantity
 
@@ -210,16 +209,12 @@ class Mechanism(Live):
     @property
     def _other_numbers(self) -> dict[str, str]:
         """Tables of the numbers of joints and loads that cannot be set by name, by '<member>.<key>'."""
-        found: dict[str, str] = {}
-
-        def look(place: NumberPath, value: Any, _: Quantity) -> Any:
+        tables: dict[str, str] = {}
+        for place, *_ in self.members.numbers():
             if place[0] in ("joints", "loads"):
                 keys = (key for key in place[2:] if isinstance(key, str) and key != "law")
-                found[".".join((str(place[1]), *keys))] = f"[{place[0]}.{place[1]}]"
-            return value
-
-        self.members.changed(look)
-        return found
+                tables[".".join((str(place[1]), *keys))] = f"[{place[0]}.{place[1]}]"
+        return tables
 
     def with_parameters(self, values: Mapping[str, float | str]) -> Mechanism:
         """Return the mechanism with other values of some parameters.

@@ -78,6 +78,17 @@ class Members:
         """What the value of the driver is, of which measures choose a part: time where several drivers move."""
         return self.drivers[0].quantity.kind if len(self.drivers) == 1 else "time"
 
+    def numbers(self) -> list[tuple[NumberPath, Any, Quantity]]:
+        """Return each number with its path and its quantity, in the order of the file."""
+        numbers: list[tuple[NumberPath, Any, Quantity]] = []
+
+        def look(place: NumberPath, value: Any, quantity: Quantity) -> Any:
+            numbers.append((place, value, quantity))
+            return value
+
+        self.changed(look)
+        return numbers
+
     def changed(self, change: Change) -> Members:
         """Return the members with each number replaced by change(path, value, quantity); equal parts stay identical."""
         run = {key: change(("run", key), getattr(self.run, key), TIME) for key in RUN_TIMES}

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from decimal import Decimal
 from typing import Any
 
-from kinfmu.mechanism.dimension import NUMBER, Dimension, DimensionError
 from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.members import Members, NumberPath
-from kinfmu.mechanism.operations import OPERATIONS, ExpressionStep
+from kinfmu.mechanism.operations import NUMBER, OPERATIONS, Dimension, DimensionError, ExpressionStep
 from kinfmu.mechanism.parameters import NUMBER as PURE
 from kinfmu.mechanism.parameters import Parameter, dimensions_of
 from kinfmu.units import METRES, Quantity, every_unit, length_power
 
 _SUM, _PRODUCT, _POWER, _ATOM = range(4)  # precedence of a text
+Part = tuple[str, int]  # text of a part of an expression, and its precedence
 _PRECEDENCE = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 
 
@@ -72,24 +72,22 @@ def _text(expression: Expression, dimensions: Mapping[str, Dimension], needed: D
     if expression.alone or _terms_have_units(expression, dimensions, needed):
         return expression.text
     unit, units = expression.length_unit, every_unit(expression.length_unit)
-    stack: list[tuple[str, int]] = []  # texts with their precedence
-    for step in expression.steps:
+
+    def leaf(step: ExpressionStep) -> Part:
         if step.operation == "number":
             power = length_power(units[step.unit][0]) if step.unit else 0
-            stack.append((repr(float(Decimal(repr(step.value)) * Decimal(repr(METRES[unit])) ** -power)), _ATOM))
-        elif step.operation == "name":
-            known = dimensions[step.value]
-            over = _power_text(unit, int(known.length) if known.is_known and not known.is_open else 0)
-            stack.append((f"({step.value}/{over})", _ATOM) if over else (step.value, _ATOM))
-        else:
-            first = len(stack) - OPERATIONS[step.operation].arity
-            stack[first:] = [_applied(step, stack[first:])]
+            return repr(float(Decimal(repr(step.value)) * Decimal(repr(METRES[unit])) ** -power)), _ATOM
+        known = dimensions[step.value]
+        over = _power_text(unit, int(known.length) if known.is_known and not known.is_open else 0)
+        return (f"({step.value}/{over})" if over else step.value), _ATOM
+
+    whole = expression.evaluated(leaf, _applied)
     found = expression.dimension(dimensions)
     times = _power_text(unit, bare if found.is_open else int(needed.length))
-    return f"{_inside(stack[0], _PRODUCT)}*{times}" if times else stack[0][0]
+    return f"{_inside(whole, _PRODUCT)}*{times}" if times else whole[0]
 
 
-def _applied(step: ExpressionStep, operands: list[tuple[str, int]]) -> tuple[str, int]:
+def _applied(step: ExpressionStep, operands: Sequence[Part]) -> Part:
     """Return the text of an operation on texts."""
     if step.operation in _PRECEDENCE:
         own = _PRECEDENCE[step.operation]
@@ -103,7 +101,7 @@ def _applied(step: ExpressionStep, operands: list[tuple[str, int]]) -> tuple[str
     return (f"{step.operation}({arguments})" if operands else step.operation), _ATOM
 
 
-def _inside(operand: tuple[str, int], least: int) -> str:
+def _inside(operand: Part, least: int) -> str:
     text, precedence = operand
     return text if precedence >= least else f"({text})"
 
@@ -115,20 +113,18 @@ def _power_text(unit: str, power: int) -> str:
 
 def _terms_have_units(expression: Expression, dimensions: Mapping[str, Dimension], needed: Dimension) -> bool:
     """Return True if all dimensions are compatible although numbers without a unit have none."""
-    stack: list[Dimension] = []
-    for step in expression.steps:
-        if step.operation in ("number", "name"):
-            known = step.dimension if step.operation == "number" else dimensions[step.value]
-            stack.append(known if known.is_known else NUMBER)
-            continue
-        operation = OPERATIONS[step.operation]
-        first = len(stack) - operation.arity
-        operands, exponent = stack[first:], (step.value,) if step.operation == "power" else ()
+
+    def leaf(step: ExpressionStep) -> Dimension:
+        known = step.dimension if step.operation == "number" else dimensions[step.value]
+        return known if known.is_known else NUMBER
+
+    def apply(step: ExpressionStep, operands: Sequence[Dimension]) -> Dimension:
         is_sum, has_mass = step.operation in ("+", "-"), any(one.mass for one in operands)
         if not (is_sum and (has_mass or all(one.is_open for one in operands))):  # such a number is in N in every file
             operands = [replace(one, is_bare=False) if one.is_open else one for one in operands]
-        try:
-            stack[first:] = [operation.dimension(*operands, *exponent)]
-        except DimensionError:
-            return False
-    return stack[0].powers == needed.powers
+        return OPERATIONS[step.operation].dimension(*operands, *step.exponent)
+
+    try:
+        return expression.evaluated(leaf, apply).powers == needed.powers
+    except DimensionError:
+        return False

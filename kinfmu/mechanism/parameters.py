@@ -1,21 +1,26 @@
-"""Parameters of a mechanism: the numbers that geometry refers to by name."""
+"""Parameters of a mechanism, and the conversion of texts with a unit and of expressions of parameters into numbers.
+
+Inside an expression all numbers belong to one system of units: kilogram, the file's unit of length, second. So
+"m*l**2/12" is right in a file in mm: the moment of inertia comes out in kg mm2, and the last step makes it kg m2. A
+parameter such as "10 N" enters as 10000 kg mm/s2. In files in metres nothing is converted.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from graphlib import CycleError, TopologicalSorter
-from typing import Any
+from itertools import chain
+from typing import Any, NamedTuple
 
 from kinfmu.errors import MechanismError, listed
-from kinfmu.mechanism.conversion import converted
-from kinfmu.mechanism.dimension import UNKNOWN, Dimension
 from kinfmu.mechanism.expression import Computed, Expression
-from kinfmu.mechanism.number import NumberWithUnit, given_unit, read_number
-from kinfmu.mechanism.operations import WORDS
+from kinfmu.mechanism.members import Members, NumberPath, path_text
+from kinfmu.mechanism.number import NumberWithUnit, expression_error, given_unit, read_number
+from kinfmu.mechanism.operations import OPERATIONS, UNKNOWN, WORDS, Dimension, ExpressionStep
 from kinfmu.mechanism.quantities.arithmetic import Value
 from kinfmu.mechanism.valid import check_line, check_name, check_number, quoted
-from kinfmu.units import Quantity, every_unit
+from kinfmu.units import KINDS, METRES, Quantity, every_unit, length_power
 
 NUMBER = Quantity("number")
 _MOST_LISTED = 8  # names of a circle in a message
@@ -180,3 +185,136 @@ def in_order(names: Iterable[str], expressions: Mapping[str, Expression]) -> lis
         circle = error.args[1][::-1]
         shown = circle if len(circle) <= _MOST_LISTED else [*circle[: _MOST_LISTED - 1], "...", circle[-1]]
         raise MechanismError(f"[parameters] {circle[0]} needs itself: {' -> '.join(shown)}") from None
+
+
+Converted = tuple[Dimension, list[ExpressionStep]]  # of a part of an expression
+
+
+def converted(
+    where: str,
+    expression: Expression,
+    quantities: Mapping[str, Quantity | None],
+    dimensions: Mapping[str, Dimension],
+    wanted: Quantity | None,
+) -> Expression:
+    """Return the expression with steps that convert its operands and its result; itself if there is nothing to do.
+
+    Args:
+        where: The key in messages.
+        expression: As written.
+        quantities: Quantities of the parameters.
+        dimensions: Dimensions of the parameters.
+        wanted: The quantity of the result.
+
+    Raises:
+        MechanismError: The result has a mass in it and no operand has a unit, so that its unit is unknown.
+
+    """
+    metre = METRES[expression.length_unit]
+    found = expression.dimension(dimensions)
+    result = 0 if wanted is None or found.is_open else length_power(wanted)
+    name = expression.alone
+    if metre == 1.0 or (name and result == _power(quantities.get(name))):
+        return expression
+    if result and wanted and not found.is_known and not _has_a_unit(expression, dimensions):
+        raise MechanismError(
+            f"{where} = {quoted(expression.text)} has no unit, and the file is in {expression.length_unit}: "
+            f"give a number or a parameter ({listed(expression.names)}) its unit, such as '1 {KINDS[wanted.kind].unit}'"
+        )
+    units = every_unit(expression.length_unit)
+
+    def leaf(step: ExpressionStep) -> Converted:
+        if step.operation == "number":
+            dimension, quantity = step.dimension, units[step.unit][0] if step.unit else None
+        else:
+            dimension, quantity = dimensions.get(step.value, UNKNOWN), quantities.get(step.value)
+        return dimension, [step, *_times(metre, -_power(quantity), step.at)]
+
+    def apply(step: ExpressionStep, operands: Sequence[Converted]) -> Converted:
+        if step.operation in ("+", "-"):
+            for (dimension, part), (other, _) in zip(operands, reversed(operands), strict=True):
+                power = int(other.length) if dimension.is_open and other.is_known and other.mass else 0
+                part += _times(metre, -power, step.at)  # a number without a unit is in N, like the other term
+        dimension = OPERATIONS[step.operation].dimension(*(one for one, _ in operands), *step.exponent)
+        return dimension, [*chain(*(part for _, part in operands)), step]
+
+    _, own_steps = expression.evaluated(leaf, apply)
+    steps = [*own_steps, *_times(metre, result, len(expression.text))]
+    if len(steps) == len(expression.steps):
+        return expression
+    return replace(expression, steps=tuple(steps), is_converted=True)
+
+
+def _power(quantity: Quantity | None) -> int:
+    return 0 if quantity is None else length_power(quantity)
+
+
+def _times(metre: float, power: int, at: int) -> tuple[ExpressionStep, ...]:
+    """Return the steps that multiply by a power of the unit of length [m]."""
+    factor = metre**power if power >= 0 else 1.0 / metre**-power
+    return (ExpressionStep("number", at, factor), ExpressionStep("*", at)) if power else ()
+
+
+def _has_a_unit(expression: Expression, dimensions: Mapping[str, Dimension]) -> bool:
+    """Return True if the dimension of a number or a parameter in the expression is known."""
+    known = [step.dimension for step in expression.steps if step.operation == "number"]
+    known += [dimensions[name] for name in expression.names]
+    return any(one.is_known and not one.is_open for one in known)
+
+
+MOST_PARAMETERS = 10_000
+
+
+class Resolved(NamedTuple):
+    """Members with numbers only, parameters with their values, and the expressions by their paths."""
+
+    members: Members
+    parameters: dict[str, Parameter]
+    expressions: dict[NumberPath, Expression]
+
+
+def resolve(members: Members, given: Mapping[str, Parameter], unit: str) -> Resolved:
+    """Replace texts with units and expressions by numbers, and list the expressions.
+
+    Args:
+        members: Bodies, joints, drivers, run, measures, gravity and loads as written.
+        given: Parameters as written.
+        unit: Unit of length.
+
+    Raises:
+        MechanismError: A value is not a number, a name is not a parameter, or a quantity does not fit its key.
+
+    """
+    if len(given) > MOST_PARAMETERS:
+        raise MechanismError(f"[parameters] holds {len(given)} parameters; {MOST_PARAMETERS} at most")
+    read = {name: read_parameter(name, parameter, unit) for name, parameter in given.items()}
+    expressions: dict[NumberPath, Expression] = {}
+    alone: dict[str, set[Quantity]] = {}
+
+    def as_written(place: NumberPath, value: Any, quantity: Quantity) -> Any:
+        number = read_number(path_text(place), value, quantity, unit)
+        if isinstance(number, Expression):
+            expressions[place] = number
+            if number.alone_or_negative:
+                alone.setdefault(number.alone_or_negative, set()).add(quantity)
+        return number
+
+    members = members.changed(as_written)
+    parameters = resolve_parameters(read, alone)
+    values = {name: float(parameter.value) for name, parameter in parameters.items()}
+    dimensions = dimensions_of(parameters)
+    quantities = {name: parameter.quantity for name, parameter in parameters.items()}
+
+    def computed(place: NumberPath, value: Any, quantity: Quantity) -> Any:
+        if not isinstance(value, Expression):
+            return value
+        where = path_text(place)
+        try:
+            value.refuse_unknown(values)
+        except MechanismError as error:
+            raise expression_error(where, value.text, quantity, unit, error) from None
+        dimension_of(where, value, dimensions, Dimension.of(quantity))
+        expressions[place] = converted(where, value, quantities, dimensions, quantity)
+        return compute(where, expressions[place], values)
+
+    return Resolved(members.changed(computed), parameters, expressions)

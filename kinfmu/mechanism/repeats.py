@@ -22,8 +22,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.mechanism.toml_tables import check_keys, named_tables, named_values
+from kinfmu.errors import MechanismError, valid_names
+from kinfmu.mechanism.toml_document import check_keys, named_tables, named_values
 from kinfmu.mechanism.valid import quoted
 
 COUNTS, REPEAT = "counts", "repeat"
@@ -90,9 +90,8 @@ def _count(where: str, value: object, counts: Mapping[str, int]) -> int:
             raise MechanismError(f"{where} = {quoted(value)} must be a whole number")
         number = _sum(value, counts)
         if number is None:
-            near = suggestion(value, counts)
             valid = f"a whole number or a count, such as '{next(iter(counts))}'"
-            raise MechanismError(f"{where} = {quoted(value)} must be {valid}{near}; counts: {listed(counts)}")
+            raise MechanismError(f"{where} = {quoted(value)} must be {valid}{valid_names(value, counts, 'counts')}")
     if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number <= LARGEST_COUNT:
         raise MechanismError(f"{where} = {quoted(value)} must be a whole number from 0 to {LARGEST_COUNT}")
     return number
@@ -129,10 +128,9 @@ def _text(where: str, text: str, numbers: Mapping[str, int]) -> str:
     def number(match: re.Match[str]) -> str:
         value = _sum(match[1], numbers)
         if value is None:
-            near = suggestion(match[1], numbers)
             raise MechanismError(
                 f"{where}: {quoted(match[0])} is not a count or the number of a repeat, such as '{{k}}' or "
-                f"'{{k+1}}'{near}; known here: {listed(numbers)}"
+                f"'{{k+1}}'{valid_names(match[1], numbers, 'known here')}"
             )
         if value < 0:
             raise MechanismError(f"{where}: {quoted(match[0])} is {value}, and names cannot hold a minus sign")

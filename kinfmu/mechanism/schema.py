@@ -12,7 +12,7 @@ from typing import Any
 from kinfmu.mechanism.body import GROUND_NAME, MEASURED_OVER
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
 from kinfmu.mechanism.drivers import DRIVERS
-from kinfmu.mechanism.expression_text import LONGEST
+from kinfmu.mechanism.expression import LONGEST
 from kinfmu.mechanism.joints import JOINTS
 from kinfmu.mechanism.laws import LAWS, RISES, External, Law, LawQuantity, Spline
 from kinfmu.mechanism.laws.sequence import DWELL
@@ -22,7 +22,7 @@ from kinfmu.mechanism.number import EXAMPLES
 from kinfmu.mechanism.quantities import POSE_QUANTITIES
 from kinfmu.mechanism.quantities.placement import Reference
 from kinfmu.mechanism.repeats import LARGEST_COUNT, REPEATED
-from kinfmu.mechanism.toml_tables import table_keys
+from kinfmu.mechanism.toml_document import table_keys
 from kinfmu.units import METRES, Quantity
 
 Schema = dict[str, Any]

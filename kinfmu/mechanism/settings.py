@@ -8,14 +8,22 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
-from kinfmu.errors import MechanismError, RequestError, listed, suggestion
-from kinfmu.mechanism.display_unit import DisplayUnit, display_unit, written_unit
+from kinfmu.errors import MechanismError, RequestError, listed, valid_names
 from kinfmu.mechanism.drivers import Driver
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.loads import Load
 from kinfmu.mechanism.loads.following import Following
 from kinfmu.mechanism.members import NumberPath
-from kinfmu.mechanism.number import given_unit, in_unit_of, read_constant, read_number, unit_advice
+from kinfmu.mechanism.number import (
+    DisplayUnit,
+    display_unit,
+    given_unit,
+    in_unit_of,
+    read_constant,
+    read_number,
+    unit_advice,
+    written_unit,
+)
 from kinfmu.mechanism.parameters import NUMBER, Parameter
 from kinfmu.mechanism.quantities.arithmetic import Value
 from kinfmu.mechanism.valid import is_number, quoted
@@ -100,6 +108,10 @@ class Settable:
         self._expressions = expressions
         self._length_unit, self._others = length_unit, others
 
+    def __getitem__(self, name: str) -> Parameter | LawConstant:
+        """Return a parameter or a law constant by its name."""
+        return self.constants.get(name) or self.parameters[name]
+
     def check_name(self, name: str) -> None:
         """Raise a RequestError for a name that is neither a parameter nor a law constant."""
         if name not in self.parameters and name not in self.constants:
@@ -117,9 +129,7 @@ class Settable:
                 f"there is no parameter {quoted(name)}: it is a number of {table}; to set it, give it as {key} in "
                 f'[parameters] and write "{key}" in its place; parameters: {listed(known)}'
             )
-        return RequestError(
-            f"there is no parameter {quoted(name)}{suggestion(name, known)}; parameters: {listed(known)}"
-        )
+        return RequestError(f"there is no parameter {quoted(name)}{valid_names(name, known, 'parameters')}")
 
     def parameter(self, name: str, value: object) -> Parameter:
         """Return a parameter with another value: a number, text with a unit, or an expression of other parameters.
@@ -141,7 +151,7 @@ class Settable:
             RequestError: The value is no number, is too large, has a wrong unit, or is not positive and must be.
 
         """
-        setting = self.constants.get(name) or self.parameters[name]
+        setting = self[name]
         with _as_request(), unit_advice(name, setting.value, self._length_unit):
             number = read_constant(name, value, setting.quantity or NUMBER, self._length_unit)
         if isinstance(setting, LawConstant) and setting.is_positive and not number > 0.0:
@@ -150,12 +160,12 @@ class Settable:
 
     def as_in_file(self, name: str, value: float) -> float:
         """Return a value of a parameter or law constant in the unit of the mechanism file, rounded there."""
-        setting = self.constants.get(name) or self.parameters[name]
+        setting = self[name]
         return in_unit_of(setting.value, value, setting.quantity or NUMBER, self._length_unit)
 
     def note_on_bare(self, name: str, values: Iterable[object]) -> str:
         """Return a note if one of the values is bare and the file writes the setting in another unit; else ''."""
-        setting = self.constants.get(name) or self.parameters.get(name)
+        setting = self[name] if name in self.names else None
         if setting is None or not setting.quantity:
             return ""
         unit, taken = _unit_in_file(setting), unit_of(setting.quantity, self._length_unit)
@@ -176,7 +186,7 @@ class Settable:
                 mechanism file, or the unit used inside.
 
         """
-        setting = self.constants.get(name) or self.parameters[name]
+        setting = self[name]
         unit = written_unit(values, self._length_unit) or _unit_in_file(setting)
         return display_unit(setting.quantity, self._length_unit, unit)
 

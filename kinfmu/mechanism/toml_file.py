@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from kinfmu.errors import MechanismError, listed
 from kinfmu.mechanism.body import MASS_KEYS, RUN_TIMES, Body, Gravity, RunSettings, Start
+from kinfmu.mechanism.checks import NO_DRIVER
 from kinfmu.mechanism.declared import REQUIRED, Takes, keys_of
 from kinfmu.mechanism.drivers import DRIVERS
 from kinfmu.mechanism.joints import JOINTS
@@ -20,34 +20,23 @@ from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.quantities import POSE_QUANTITIES, PoseQuantity
 from kinfmu.mechanism.repeats import COUNTS, REPEAT, expanded
-from kinfmu.mechanism.table_file import read_table
-from kinfmu.mechanism.toml_hints import explained
-from kinfmu.mechanism.toml_tables import (
+from kinfmu.mechanism.toml_document import (
+    LARGEST_FILE,
     check_keys,
     class_of_type,
+    document_of,
     named_tables,
     named_values,
+    read_table,
     refuse_other_kind,
     subtable,
     table_keys,
     table_of,
+    text_in,
     text_of,
 )
 from kinfmu.mechanism.valid import check_name, quoted
 
-LARGEST_FILE = 4_000_000  # [bytes]; a chain of ten thousand links has less
-DEEPEST_KEY = 50  # parts of a dotted key; the time that the standard library takes grows with their square
-_MANY_DOTS = re.compile(rf"^(?:[^.\n]*+\.){{{DEEPEST_KEY}}}", re.MULTILINE)  # what a line with such a key holds
-_PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"?+|'[^'\n]*+'?+)"""  # of a key, or a text on one line
-_TOKEN = re.compile(
-    r"#[^\n]*+"  # a comment
-    r'|"""(?:[^"\\]++|\\.|"(?!""))*(?:"{3,5}|\Z)'  # texts on several lines
-    r"|'''(?:[^']++|'(?!''))*(?:'{3,5}|\Z)"  # before 3.11.5, Python's possessive groups of alternatives fail
-    rf"|(?P<deep>(?:{_PART}[ \t]*+\.[ \t]*+){{{DEEPEST_KEY}}})"
-    rf"|(?:{_PART}[ \t]*+(?:\.[ \t]*+)?+)++"  # other keys and values
-    r"""|[^\w"'#-]++""",
-    re.DOTALL,
-)
 _QUANTITY = '{ measure = "angle", of = "rocker" }'  # in messages
 _SEGMENT = ("law", "rise", "duration")
 _TABLES = (
@@ -75,21 +64,6 @@ def read(path: str | Path) -> Mechanism:
     return parse(text_in(path, "a mechanism file"), str(path), path.parent)
 
 
-def text_in(path: Path, what: str) -> str:
-    """Return the text of a file, or raise a MechanismError; what: 'a mechanism file'."""
-    try:
-        with path.open("rb") as file:
-            content = file.read(LARGEST_FILE + 1)  # a device or a pipe has no size to ask for
-    except (OSError, ValueError) as error:  # ValueError: a name that no file can have
-        raise MechanismError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
-    if len(content) > LARGEST_FILE:
-        raise MechanismError(f"{path}: too large for {what} (largest: {LARGEST_FILE} bytes)")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise MechanismError(f"{path}: not a text file (byte {error.start} is not UTF-8)") from None
-
-
 def parse(text: str, where: str = "mechanism", folder: str | Path | None = None) -> Mechanism:
     """Return the mechanism that TOML text describes.
 
@@ -109,29 +83,6 @@ def parse(text: str, where: str = "mechanism", folder: str | Path | None = None)
         return mechanism_of(document, None if folder is None else Path(folder))
     except MechanismError as error:
         raise type(error)(f"{where}: {error}", **error.data) from None
-
-
-def document_of(text: str, where: str) -> dict[str, Any]:
-    """Return the tables of TOML text; a MechanismError states the line."""
-    deep = _deep_key(text)
-    if deep is not None:
-        line = text.count("\n", 0, deep) + 1
-        raise MechanismError(f"{where}: not valid: a key of more than {DEEPEST_KEY} parts (at line {line})")
-    try:
-        return tomllib.loads(text.replace("\r\n", "\n"))
-    except RecursionError:
-        raise MechanismError(f"{where}: not valid TOML: nested too deeply") from None
-    except tomllib.TOMLDecodeError as error:
-        raise MechanismError(f"{where}: not valid TOML: {explained(text, error)}") from None
-    except ValueError:  # Python refuses whole numbers of thousands of digits
-        raise MechanismError(f"{where}: not valid TOML: a number has too many digits") from None
-
-
-def _deep_key(text: str) -> int | None:
-    """Return the position of the first key of more than DEEPEST_KEY parts, outside comments and texts."""
-    if not _MANY_DOTS.search(text):
-        return None
-    return next((token.start() for token in _TOKEN.finditer(text) if token.lastgroup), None)
 
 
 def mechanism_of(document: dict[str, Any], folder: Path | None) -> Mechanism:
@@ -158,14 +109,8 @@ def mechanism_of(document: dict[str, Any], folder: Path | None) -> Mechanism:
         title=text_of("title", document.get("title", "")),
         length_unit=text_of("[units] length", units.get("length", "m")),
         bodies=tuple(_body(name, body) for name, body in named_tables(document, "bodies")),
-        joints=tuple(
-            _member(f"[joints.{name}]", name, joint, JOINTS, laws_of_joints, folder)
-            for name, joint in named_tables(document, "joints")
-        ),
-        drivers=tuple(
-            _member(f"[drivers.{name}]", name, driver, DRIVERS, LAWS, folder)
-            for name, driver in named_tables(document, "drivers")
-        ),
+        joints=_members(document, "joints", JOINTS, laws_of_joints, folder),
+        drivers=_members(document, "drivers", DRIVERS, LAWS, folder),
         points={
             name: text_of(f"[points] {name}", target, "text such as 'body.point'")
             for name, target in named_values(document, "points")
@@ -175,18 +120,22 @@ def mechanism_of(document: dict[str, Any], folder: Path | None) -> Mechanism:
         run=_run(table_of(document, "run")),
         measures=read_measures(document, folder),
         gravity=_gravity(document),
-        loads=tuple(
-            _member(f"[loads.{name}]", name, load, LOADS, LAWS, folder)
-            for name, load in named_tables(document, "loads")
-        ),
+        loads=_members(document, "loads", LOADS, LAWS, folder),
     )
 
 
 def read_measures(document: Mapping[str, Any], folder: Path | None) -> tuple[Reading, ...]:
     """Return the measures of the tables [measures.NAME]; a mechanism checks them."""
+    return _members(document, "measures", READINGS, (), folder)
+
+
+def _members(
+    document: Mapping[str, Any], table: str, classes: Iterable[Any], laws: Iterable[type[Law]], folder: Path | None
+) -> tuple[Any, ...]:
+    """Return the joints, drivers, loads or measures of the tables [table.NAME]."""
     return tuple(
-        _member(f"[measures.{name}]", name, reading, READINGS, (), folder)
-        for name, reading in named_tables(document, "measures")
+        _member(f"[{table}.{name}]", name, member, classes, laws, folder)
+        for name, member in named_tables(document, table)
     )
 
 
@@ -320,3 +269,101 @@ def _parameter(name: str, value: Any) -> Parameter:
     if "value" not in value:
         raise MechanismError(f"{where} needs the key 'value'; keys: value, description")
     return Parameter(value["value"], description=text_of(f"{where} description", value.get("description", "")))
+
+
+_MASSES = "masses"  # of bodies, which have no table of their own
+_STEPS = (  # what is left out, until the rest is valid
+    ("measures",),
+    ("measures", "loads", "gravity", _MASSES),
+    ("measures", "loads", "gravity", _MASSES, "drivers", "run", "points", "outputs"),
+)
+_FORCES = ("loads", "gravity", _MASSES)  # all or none of them where a mass or gravity is invalid
+_ENTRY = re.compile(rf"(?:{re.escape(NO_DRIVER)})?" r"\[(?:(measures|drivers|loads)\.|(points)\] )([\w-]+)")
+_TABLE = re.compile(rf"\[(?:bodies\.[\w-]+\] (?:{'|'.join(MASS_KEYS)})\b|(loads|gravity|run|outputs)\b)")
+_MOST_ENTRIES = 20  # left out one by one
+
+
+class PartialFile(NamedTuple):
+    """The valid part of a mechanism file, and names of what is left out, such as '[measures.peak]' and 'masses'."""
+
+    mechanism: Mechanism
+    left_out: tuple[str, ...]
+
+
+def read_partially(path: str | Path) -> PartialFile | None:
+    """Return the valid part of a mechanism file that `toml_file.read` refuses; None if bodies or joints are invalid."""
+    path = Path(path)
+    try:
+        document = expanded(document_of(text_in(path, "a mechanism file"), str(path)))
+    except MechanismError:
+        return None
+    found = _without_entries(document, path.parent)
+    if found is not None:
+        return found
+    for names in _STEPS:
+        there = _present(document, names)
+        try:
+            mechanism = mechanism_of(_without(document, there), path.parent)
+        except MechanismError:
+            continue
+        return PartialFile(mechanism, tuple(map(_title, there)))
+    return None
+
+
+def _without_entries(document: Mapping[str, Any], folder: Path) -> PartialFile | None:
+    """Return a file without the measures, drivers, loads, points and tables that its errors name; None for others."""
+    left_out: list[str] = []
+    rest = dict(document)
+    for _ in range(_MOST_ENTRIES):
+        try:
+            return PartialFile(mechanism_of(rest, folder), tuple(left_out))
+        except MechanismError as problem:
+            message = str(problem)
+        if entry := _ENTRY.match(message):
+            table, name = entry[1] or entry[2], entry[3]
+            entries = rest.get(table)
+            if not isinstance(entries, Mapping) or name not in entries:
+                return None
+            rest[table] = {key: value for key, value in entries.items() if key != name}
+            left_out.append(f"[points] {name}" if table == "points" else f"[{table}.{name}]")
+        elif part := _TABLE.match(message):
+            names = ("run", "measures") if part[1] == "run" else ("outputs",) if part[1] == "outputs" else _FORCES
+            there = _present(rest, names)
+            if not there:
+                return None
+            rest = _without(rest, there)
+            left_out += map(_title, there)
+        else:
+            return None
+    return None
+
+
+def _present(document: Mapping[str, Any], names: Collection[str]) -> list[str]:
+    """Return those of the tables that a document has."""
+    return [name for name in names if name in document or (name == _MASSES and _has_masses(document))]
+
+
+def _title(name: str) -> str:
+    return name if name == _MASSES else f"[{name}]"
+
+
+def _has_masses(document: Mapping[str, Any]) -> bool:
+    return any(key in body for body in _bodies(document).values() for key in MASS_KEYS)
+
+
+def _bodies(document: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    bodies = document.get("bodies")
+    found = bodies.items() if isinstance(bodies, Mapping) else ()
+    return {name: body for name, body in found if isinstance(body, Mapping)}
+
+
+def _without(document: Mapping[str, Any], names: Collection[str]) -> dict[str, Any]:
+    """Return the document without some tables, and without masses if they are among the names."""
+    kept = {name: table for name, table in document.items() if name not in names}
+    if _MASSES in names:
+        lighter = {
+            name: {key: value for key, value in body.items() if key not in MASS_KEYS}
+            for name, body in _bodies(document).items()
+        }
+        kept["bodies"] = {**document["bodies"], **lighter}
+    return kept

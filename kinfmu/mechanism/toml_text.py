@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from typing import Any
 
@@ -30,10 +30,10 @@ def text(mechanism: Mechanism, *, as_written: bool = False) -> str:
     parts = mechanism.members
     if as_written:
         parts = parts.changed(lambda _, value, quantity: _as_written(value, quantity, mechanism.length_unit))
-    lines = [f"name = {_toml(mechanism.name)}"]
+    lines = [f"name = {toml_value(mechanism.name)}"]
     if mechanism.title:
-        lines.append(f"title = {_toml(mechanism.title)}")
-    lines += ["", "[units]", f"length = {_toml(mechanism.length_unit)}"]
+        lines.append(f"title = {toml_value(mechanism.title)}")
+    lines += ["", "[units]", f"length = {toml_value(mechanism.length_unit)}"]
     if mechanism.parameters:
         lines += [
             "",
@@ -41,30 +41,35 @@ def text(mechanism: Mechanism, *, as_written: bool = False) -> str:
             *(_parameter(name, p, mechanism, as_written) for name, p in mechanism.parameters.items()),
         ]
     lines += ["", "[run]"]
-    lines += [f"{key} = {_toml(getattr(parts.run, key))}" for key in RUN_TIMES]
+    lines += [f"{key} = {toml_value(getattr(parts.run, key))}" for key in RUN_TIMES]
     if parts.run.over:
-        lines.append(f"over = {_toml(parts.run.over)}")
+        lines.append(f"over = {toml_value(parts.run.over)}")
     for body in parts.bodies:
         lines += ["", f"[bodies.{body.name}]"]
-        points = ", ".join(f"{name} = {_toml(point)}" for name, point in body.points.items())
+        points = ", ".join(f"{name} = {toml_value(point)}" for name, point in body.points.items())
         lines.append(f"points = {{ {points} }}" if points else "points = {}")
-        start = ", ".join(f"{key} = {_toml(value)}" for key, value in body.start._asdict().items() if value is not None)
+        start = ", ".join(
+            f"{key} = {toml_value(value)}" for key, value in body.start._asdict().items() if value is not None
+        )
         if start:
             lines.append(f"start = {{ {start} }}")
-        lines += [f"{key} = {_toml(value)}" for key, value in body.given_masses.items()]
-    for table, members in (("joints", parts.joints), ("drivers", parts.drivers)):
-        for member in members:
-            lines += ["", f"[{table}.{member.name}]", f"type = {_toml(member.type)}", *_keys(member)]
+        lines += [f"{key} = {toml_value(value)}" for key, value in body.given_masses.items()]
+    lines += _tables("joints", parts.joints)
+    lines += _tables("drivers", parts.drivers)
     if parts.gravity is not None:
-        lines += ["", "[gravity]", *(f"{key} = {_toml(value)}" for key, value in parts.gravity._asdict().items())]
-    for load in parts.loads:
-        lines += ["", f"[loads.{load.name}]", f"type = {_toml(load.type)}", *_keys(load)]
+        lines += ["", "[gravity]", *(f"{key} = {toml_value(value)}" for key, value in parts.gravity._asdict().items())]
+    lines += _tables("loads", parts.loads)
     if mechanism.points:
-        lines += ["", "[points]", *(f"{name} = {_toml(target)}" for name, target in mechanism.points.items())]
-    lines += ["", "[outputs]", f"coordinates = {_toml(mechanism.coordinates)}"]
-    for reading in parts.measures:
-        lines += ["", f"[measures.{reading.name}]", f"type = {_toml(reading.type)}", *_keys(reading)]
+        lines += ["", "[points]", *(f"{name} = {toml_value(target)}" for name, target in mechanism.points.items())]
+    lines += ["", "[outputs]", f"coordinates = {toml_value(mechanism.coordinates)}"]
+    lines += _tables("measures", parts.measures)
     return "\n".join(lines) + "\n"
+
+
+def _tables(table: str, members: Iterable[Any]) -> Iterator[str]:
+    """Yield the lines of joints, drivers, loads or measures."""
+    for member in members:
+        yield from ("", f"[{table}.{member.name}]", f"type = {toml_value(member.type)}", *_keys(member))
 
 
 def _keys(member: Any) -> Iterator[str]:
@@ -73,16 +78,16 @@ def _keys(member: Any) -> Iterator[str]:
     for key in keys_of(cls):
         value = getattr(member, key.name)
         if key.takes == "law":
-            yield f"law = {_toml(value.type)}"
+            yield f"law = {toml_value(value.type)}"
             yield from _keys(value)
         elif key.takes == "segments":
             yield "segments = ["
             for law, duration, rise in value:
-                of_rise = f"rise = {_toml(rise)}, " if law != DWELL else ""
-                yield f"    {{ law = {_toml(law)}, {of_rise}duration = {_toml(duration)} }},"
+                of_rise = f"rise = {toml_value(rise)}, " if law != DWELL else ""
+                yield f"    {{ law = {toml_value(law)}, {of_rise}duration = {toml_value(duration)} }},"
             yield "]"
         elif value is not None:
-            yield f"{key.name} = {_toml(value)}"
+            yield f"{key.name} = {toml_value(value)}"
 
 
 def _as_written(value: Any, quantity: Quantity | None, length_unit: str) -> Any:
@@ -103,22 +108,23 @@ def _parameter(name: str, parameter: Parameter, mechanism: Mechanism, as_written
     elif parameter.expression is None and parameter.quantity and parameter.kind != "number":
         value = f"{float(parameter.value)!r} {unit_of(parameter.quantity, mechanism.length_unit)}"
     if not parameter.description:
-        return f"{name} = {_toml(value)}"
-    return f"{name} = {{ value = {_toml(value)}, description = {_toml(parameter.description)} }}"
+        return f"{name} = {toml_value(value)}"
+    return f"{name} = {{ value = {toml_value(value)}, description = {toml_value(parameter.description)} }}"
 
 
-def _toml(value: object) -> str:
+def toml_value(value: object) -> str:
+    """Return a value of a key as TOML."""
     if isinstance(value, Computed):
         value = value.expression.text
     if isinstance(value, PoseQuantity):
         keys = {key.name: getattr(value, key.name) for key in keys_of(type(value))}
         table = {"measure": value.type} | {key: part for key, part in keys.items() if part is not None}
-        return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in table.items()) + " }"
+        return "{ " + ", ".join(f"{key} = {toml_value(part)}" for key, part in table.items()) + " }"
     if isinstance(value, str):
         escaped = value.replace("\\", "\\\\").replace('"', '\\"')
         return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08X}" for c in escaped) + '"'
-    if isinstance(value, tuple):
-        return "[" + ", ".join(_toml(item) for item in value) + "]"
+    if isinstance(value, tuple | list):
+        return "[" + ", ".join(toml_value(item) for item in value) + "]"
     if isinstance(value, bool):
         return "true" if value else "false"
     return repr(float(value))  # type: ignore[arg-type]  # all else is a number; numpy's print their type

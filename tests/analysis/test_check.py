@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu.analysis.matrices import row_reduced
+from kinfmu.analysis.singular import row_reduced
 from kinfmu.mechanism.gallery.chains import fourbar_chain
 from tests.mechanisms import bar_as_body, five_bar, fourbar, reference_fourbar, six_bar, slider_crank
 

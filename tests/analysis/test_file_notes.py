@@ -8,8 +8,7 @@ from dataclasses import replace
 import pytest
 
 from kinfmu.analysis import check
-from kinfmu.analysis.file_notes import file_notes
-from kinfmu.analysis.unit_notes import unit_notes
+from kinfmu.analysis.file_notes import file_notes, unit_notes
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism import gallery
 from kinfmu.mechanism.joints.cam import CamOscillating

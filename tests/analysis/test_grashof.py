@@ -11,8 +11,7 @@ import pytest
 
 import kinfmu
 from kinfmu import Angle, AngleDriver, Body, Coordinate, Distance, PointOnLine, Revolute
-from kinfmu.analysis.grashof import four_bar_class, slider_crank_class
-from kinfmu.analysis.loops import named_loops
+from kinfmu.analysis.loops import four_bar_class, named_loops, slider_crank_class
 from tests.analysis.linkages import digger, pinned_by_coordinates, pushed_crank
 from tests.mechanisms import bar_as_body, bar_linkage, five_bar, fourbar, reference_fourbar, six_bar, slider_crank
 

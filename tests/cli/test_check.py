@@ -10,25 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinfmu.mechanism import gallery
 from tests.cli.conftest import Command
-
-
-def test_the_check_of_the_fourbar_reports_its_properties(command: Command) -> None:
-    result = command("check", "fourbar")
-    assert result.exit_code == 0
-    assert result.stderr == ""
-    for line in (
-        "fourbar: Four-bar crank with a redundant constraint",
-        "mobility    1, driven by crank",
-        "Gruebler's count gives 0",
-        "redundant   AB (row AB.length): at every pose it follows from O, P, C, Q",
-        "coordinates crank.phi, coupler.x, coupler.y, coupler.phi, rocker.phi",
-        "fixed       crank.x = 0, crank.y = 0, rocker.x = 1, rocker.y = 0",
-        "2 x 2: coupler.phi, rocker.phi from Q.x, Q.y, determinant sin(coupler.phi - rocker.phi)",
-        "singular    crank = k pi: 0 (0 deg), pi (180 deg)",
-    ):
-        assert line in result.stdout
 
 
 def test_the_check_as_json_has_the_findings_by_name(command: Command) -> None:
@@ -51,15 +33,6 @@ def test_the_check_as_json_has_the_findings_by_name(command: Command) -> None:
     assert [point["value"] for point in found["singular"]] == pytest.approx([0.0, math.pi], abs=1e-9)
     assert found["problem"] is None
     assert "matrices" not in found
-
-
-def test_matrices_are_printed_plain_and_row_reduced(command: Command) -> None:
-    result = command("check", "fourbar", "--matrices")
-    assert result.exit_code == 0
-    assert "Phi_K,q at crank = pi/3 (60 deg): 5 x 5, rank 4" in result.stdout
-    assert "singular point: 5 x 5, rank 4" in result.stdout
-    assert "after a small turn: 5 x 5, rank 5" in result.stdout
-    assert result.stdout.count("\nrow-reduced\n") == result.stdout.count(", rank ") == 6
 
 
 def test_the_check_of_the_fourbar_with_its_matrices_is_the_golden_file(
@@ -119,16 +92,6 @@ def test_a_bar_of_a_wrong_length_is_reported_by_name_and_gap(
     assert f"{path}: {found['problem']}" == message
 
 
-@pytest.mark.parametrize("arguments", [("solve", "-o", "run.csv"), ("build", "-o", "mine.fmu"), ("simulate",)])
-def test_every_command_names_the_file_whose_bar_is_wrong(
-    arguments: tuple[str, ...], fails: Callable[..., str], fourbar_file: Callable[..., Path], tmp_path: Path
-) -> None:
-    path = fourbar_file("length = 1\n", "length = 1.01\n")
-    verb, *rest = arguments
-    assert fails(verb, path, *rest).startswith(f"{path}: [joints.AB] contradicts the other joints")
-    assert not [made.name for made in tmp_path.iterdir() if made.suffix in (".csv", ".fmu")]
-
-
 def test_a_driver_too_many_or_too_few_is_reported(fails: Callable[..., str], fourbar_file: Callable[..., Path]) -> None:
     second = '[drivers.two]\ntype = "angle"\nof = "rocker"\nlaw = "constant_speed"\n[points]'
     path = fourbar_file("[points]", second)
@@ -139,24 +102,6 @@ def test_a_driver_too_many_or_too_few_is_reported(fails: Callable[..., str], fou
         f"{path}: [drivers] mobility is 1 but there is no driver: "
         "crank, coupler, rocker can still move; add 1 driver, or joints"
     )
-
-
-def test_a_mistake_in_the_file_is_reported_with_its_place(
-    fails: Callable[..., str], fourbar_file: Callable[..., Path]
-) -> None:
-    path = fourbar_file("length = 1\n", "lenght = 1\n")
-    message = fails("check", path)
-    assert message.startswith(f"{path}: [joints.AB] lenght: unknown key; did you mean 'length'?")
-
-
-def test_a_name_that_is_nowhere_is_wrong_usage(refuses: Callable[..., str]) -> None:
-    assert refuses("check", "forbar") == (
-        "Invalid value for 'MECH': 'forbar' is not in the gallery; did you mean 'fourbar'?; "
-        f"gallery: {', '.join(gallery.names())}; files end in .toml"
-    )
-    assert refuses("check", "none.toml").endswith("none.toml: there is no such file")
-    assert refuses("check", "n" * 5000 + ".toml").endswith(": there is no such file")
-    assert refuses("check") == "Missing argument 'MECH'."
 
 
 _DRIVER = """[drivers.crank]

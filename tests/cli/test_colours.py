@@ -13,7 +13,7 @@ import pytest
 pty = pytest.importorskip("pty", reason="pseudo-terminals are those of POSIX")
 
 COLOUR = re.compile(rb"\x1b\[[0-9;:]*m")
-PROGRESS = "from kinfmu.cli.messages import Progress\nwith Progress('solving', 1) as show:\n    show(1, 2); show(2, 2)"
+PROGRESS = "from kinfmu.cli.group import Progress\nwith Progress('solving', 1) as show:\n    show(1, 2); show(2, 2)"
 MODULE = ("-m", "kinfmu")
 
 

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu.cli.export import FORMATS
 from kinfmu.draw import animation
 from kinfmu.errors import RequestError
 from kinfmu.log import read, write_mcap
@@ -46,21 +45,6 @@ def test_parquet_holds_the_units(record: Path, command: Command, tmp_path: Path)
     assert command("export", record, "-o", "run.parquet").exit_code == 0
     schema = parquet.read_schema(tmp_path / "run.parquet")
     assert schema.field("coupler.vx").metadata == {b"unit": b"m/s"}
-
-
-@pytest.mark.parametrize("suffix", FORMATS)
-def test_every_format_says_where_it_cannot_be_written(suffix: str, record: Path, refuses: Callable[..., str]) -> None:
-    name = f"{record}/run{suffix}"
-    assert refuses("export", record, "-o", name).endswith(f"{name}: '{record}' is a file, not a folder")
-
-
-def test_what_cannot_be_exported_is_reported(
-    record: Path, refuses: Callable[..., str], fails: Callable[..., str]
-) -> None:
-    assert "run.xls: its name must end in one of .csv, .parquet" in refuses("export", record, "-o", "run.xls")
-    assert "none.mcap: there is no such file" in refuses("export", "none.mcap", "-o", "run.csv")
-    record.write_text("no record")
-    assert "not a whole MCAP file" in fails("export", record, "-o", "run.csv")
 
 
 def test_plots_and_moving_pictures_are_made_of_a_record(

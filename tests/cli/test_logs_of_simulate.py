@@ -39,13 +39,6 @@ def test_none_leaves_no_logs(command: Command, refuses: Callable[..., str], tmp_
     assert message == "--channels none leaves nothing to write to run.mcap"
 
 
-def test_wrong_channels_and_rates_are_wrong_usage(refuses: Callable[..., str]) -> None:
-    assert "channel 'resdual' is not known; did you mean 'residual'?" in refuses(
-        "simulate", "fourbar", "--channels", "q,resdual"
-    )
-    assert "0" in refuses("simulate", "fourbar", "--rate", "0")
-
-
 @pytest.mark.parametrize(
     ("model", "name"), [("fourbar_chain:2", "fourbar_chain_2"), ("mine.toml", "mine"), ("other.fmu", "other")]
 )

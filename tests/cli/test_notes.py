@@ -14,7 +14,7 @@ import pytest
 
 import kinfmu
 from kinfmu import RunSettings, log
-from kinfmu.cli.messages import patience
+from kinfmu.cli.group import patience
 from kinfmu.mechanism import toml_text
 from tests.cli.conftest import Command, read_csv
 from tests.mechanisms import fourbar

@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import urllib.request
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -29,11 +28,3 @@ def test_play_prints_the_address_of_the_page_and_ends_with_ctrl_c(tmp_path: Path
         finally:
             play.kill()  # else leaving the block waits for a program that does not end
         assert play.returncode == 0
-
-
-def test_play_reports_a_mechanism_that_cannot_be_played(
-    refuses: Callable[..., str], fails: Callable[..., str], tmp_path: Path
-) -> None:
-    assert "there is no such file" in refuses("play", "none.toml")
-    (tmp_path / "bad.toml").write_text("name = ", "utf-8")
-    assert fails("play", "bad.toml", "--no-browser").startswith("bad.toml: not valid TOML")

@@ -140,12 +140,6 @@ def test_a_name_or_number_that_the_mechanism_does_not_have_is_reported(
     assert refuses("solve", "fourbar", "-o", "run.csv", *arguments).startswith(message)
 
 
-def test_a_file_in_place_of_a_folder_is_reported(refuses: Callable[..., str]) -> None:
-    Path("none").touch()
-    message = refuses("solve", "fourbar", "-o", "none/deep/run.csv", "--times", "0:1:1")
-    assert message == "Invalid value for '-o': none/deep/run.csv: 'none' is a file, not a folder"
-
-
 @pytest.mark.parametrize(
     ("option", "value", "message"),
     [
@@ -169,26 +163,6 @@ def test_a_value_of_an_option_that_is_invalid_is_wrong_usage(
     called = "'--angle' / '--position'" if option == "--angle" else f"'{option}'"
     assert refuses("solve", "fourbar", "-o", "run.csv", option, value) == f"Invalid value for {called}: {message}"
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ((), "Missing option '-o'."),
-        (("-o", "run.xyz"), "Invalid value for '-o': run.xyz: its name must end in one of .csv, .parquet, .npz, .mcap"),
-        (("-o", "run"), "Invalid value for '-o': run: its name must end in one of .csv, .parquet, .npz, .mcap"),
-        (("-o", "run.csv", "--times", "0:1:1", "--angle", "0:1:2"), "--times and --angle exclude each other"),
-    ],
-)
-def test_options_that_do_not_fit_are_wrong_usage_and_nothing_is_written(
-    arguments: tuple[str, ...], message: str, refuses: Callable[..., str], tmp_path: Path
-) -> None:
-    assert refuses("solve", "fourbar", *arguments) == message
-    assert not list(tmp_path.iterdir())
-
-
-def test_an_engine_that_is_not_there_is_reported(refuses: Callable[..., str]) -> None:
-    assert "'magic' is not one of" in refuses("solve", "fourbar", "-o", "run.csv", "--engine", "magic")
 
 
 def test_a_run_of_too_many_samples_in_the_file_is_reported(

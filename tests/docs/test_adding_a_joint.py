@@ -54,7 +54,8 @@ def run(project: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.long
 def test_the_contract_tests_pick_the_new_joint_up_and_pass(project: Path) -> None:
-    done = run(project, "-m", "pytest", "tests/mechanism/joints/test_contract.py", "-q", "-k", "opposed")
+    files = ("tests/mechanism/joints/test_contract.py", "tests/mechanism/test_members.py")
+    done = run(project, "-m", "pytest", *files, "-q", "-k", "opposed")
     assert done.returncode == 0, done.stdout + done.stderr
     (passed,) = re.findall(r"(\d+) passed", done.stdout)
     assert int(passed) >= 7

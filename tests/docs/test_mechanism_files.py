@@ -14,12 +14,13 @@ from kinfmu.errors import MechanismError
 from kinfmu.mechanism import RunSettings
 from kinfmu.mechanism.checks import MOST_BODIES
 from kinfmu.mechanism.drivers import DRIVERS
-from kinfmu.mechanism.expression_text import DEEPEST, LONGEST
+from kinfmu.mechanism.expression import DEEPEST, LONGEST
 from kinfmu.mechanism.joints import JOINTS
 from kinfmu.mechanism.laws import LAWS
 from kinfmu.mechanism.loads import LOADS
-from kinfmu.mechanism.resolve import MOST_PARAMETERS
-from kinfmu.mechanism.toml_file import LARGEST_FILE, parse
+from kinfmu.mechanism.parameters import MOST_PARAMETERS
+from kinfmu.mechanism.toml_document import LARGEST_FILE
+from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.valid import LARGEST_NUMBER
 from tests.docs.key_tables import filled
 

@@ -26,7 +26,7 @@ import numpy as np
 
 import kinfmu
 from kinfmu.cli import main
-from kinfmu.cli.schema import schema
+from kinfmu.cli.gallery import schema
 from kinfmu.errors import KinfmuError, LogError
 from kinfmu.fmu import build
 from kinfmu.log import McapLog, read, recover, write_mcap

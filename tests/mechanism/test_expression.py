@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism import toml_file
-from kinfmu.mechanism.dimension import Dimension
-from kinfmu.mechanism.expression import Expression
-from kinfmu.mechanism.expression_text import DEEPEST, LARGEST_POWER, LONGEST
+from kinfmu.mechanism.expression import DEEPEST, LARGEST_POWER, LONGEST, Expression
 from kinfmu.mechanism.number import given_unit, read_number
+from kinfmu.mechanism.operations import Dimension
 from kinfmu.plan.equations.graph import Graph, evaluate
 from kinfmu.plan.equations.taylor import Taylor
 from kinfmu.units import Quantity, spelled

@@ -21,8 +21,8 @@ from kinfmu import (
 )
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism.laws import Law
+from kinfmu.mechanism.toml_document import table_keys
 from kinfmu.mechanism.toml_file import parse, read
-from kinfmu.mechanism.toml_tables import table_keys
 from kinfmu.mechanism.toml_text import text
 
 ARM = """name = "arm"

@@ -9,8 +9,9 @@ import pytest
 
 from kinfmu.errors import MechanismError
 from kinfmu.fmu.host import input_table
-from kinfmu.mechanism import number, table_file, toml_file
-from kinfmu.mechanism.toml_file import DEEPEST_KEY, parse
+from kinfmu.mechanism import number, toml_document
+from kinfmu.mechanism.toml_document import DEEPEST_KEY
+from kinfmu.mechanism.toml_file import parse
 from kinfmu.units import Quantity
 
 LONG = 200_000  # characters
@@ -42,9 +43,9 @@ def _numbers(text: str) -> None:
 
 PATTERNS: dict[str, Callable[[str], object]] = {
     "a number": _numbers,
-    "a unit of a table": table_file._unit,
+    "a unit of a table": toml_document._unit,
     "a title of inputs": input_table._title,
-    "keys": toml_file._deep_key,
+    "keys": toml_document._deep_key,
 }
 REPEATED = (
     " ",

@@ -10,7 +10,8 @@ import pytest
 
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism import gallery
-from kinfmu.mechanism.toml_file import LARGEST_FILE, parse, read
+from kinfmu.mechanism.toml_document import LARGEST_FILE
+from kinfmu.mechanism.toml_file import parse, read
 
 FOURBAR = (gallery.folder() / "fourbar" / "mechanism.toml").read_text(encoding="utf-8")
 

@@ -55,54 +55,22 @@ CHANGES = {
         "",
         "[joints.Q] between: body 'rocker' is not in the mechanism; bodies: ground, crank, coupler",
     ),
-    "a body that is misspelt": ('"crank.O"]', '"krank.O"]', "[joints.O] between: body 'krank' is not in the mechanism"),
-    "a point that is missing": ('"crank.P"', '"crank.R"', "[joints.P] between: body 'crank' has no point 'R'"),
-    "a point of interest of an unknown body": (
-        '"coupler.tip"',
-        '"copler.tip"',
-        "[points] tip: body 'copler' is not in the mechanism; did you mean 'coupler'?",
-    ),
     "a key that is misspelt": ("stop =", "stopp =", "[run] stopp: unknown key; did you mean 'stop'?"),
     "a table that is misspelt": ("[drivers]", "[driver]", "[driver]: unknown key; did you mean 'drivers'?"),
-    "a table that is there twice": ("[run]", "[bodies.crank]\n[run]", "'bodies.crank' is written twice, first in line"),
     "a key that is there twice": ("stop = 6.3", "stop = 6.3\nstop = 7", "'run.stop' is written twice, first in line"),
     "a table that is a list": ("[joints]", "[[joints]]", "[[joints]] must be tables with names of their own"),
-    "a unit of another kind": ('phi = "60 deg"', 'phi = "60 mm"', "start.phi = '60 mm': unit 'mm' must be one of rad"),
-    "a unit that is unknown": ('phi = "60 deg"', 'phi = "60 grad"', "unit 'grad' must be one of rad, deg, rev"),
     "a unit of length that is unknown": (
         "[parameters]",
         'units = { length = "inches" }\n[parameters]',
         "[units] length = 'inches' is not a unit of length; did you mean 'in'?; known: m, mm",
-    ),
-    "a parameter of another kind": (
-        "crank = 1.0",
-        'crank = "1 s"',
-        "[bodies.crank] points.P = 'crank' is a time and must be a length",
-    ),
-    "parameters in a circle": (
-        "crank = 1.0",
-        'crank = "a"\na = "2*crank"',
-        "[parameters] crank needs itself: crank -> a -> crank",
-    ),
-    "a parameter that is a word": (
-        "crank = 1.0",
-        'crank = "long"',
-        "[parameters] crank = 'long', character 1: no par",
     ),
     "an expression with an unknown name": (
         POINT,
         '["crnk/2", 0]',
         "[bodies.crank] points.P = 'crnk/2', character 1: no parameter 'crnk'; did you mean 'crank'?",
     ),
-    "an expression that breaks off": (
-        POINT,
-        '["2*(crank +", 0]',
-        "points.P = '2*(crank +', character 11: expected a number",
-    ),
     "an expression that is Python": (POINT, "[\"__import__('os')\", 0]", "character 1: no function '__import__'"),
     "a division by zero": (POINT, '["1/(crank - 1)", 0]', "'1/(crank - 1)', character 2: division by zero"),
-    "a root of a negative number": (POINT, '["sqrt(-crank)", 0]', "character 1: sqrt of -1.0 is undefined"),
-    "an expression of deep parentheses": (POINT, f'["{"(" * 500}", 0]', "parentheses more than 40 deep"),
     "an expression without an end": (POINT, f'["{"1 + " * 100_000}1", 0]', "is too long for an expression"),
     "two drivers of one freedom": (
         "[points]",
@@ -127,8 +95,6 @@ CHANGES = {
         'Q = { type = "distance", between = ["coupler.Q", "rocker.Q"], length = "crank - 3 m" }\n',
         "[joints.Q] length = -2.0 must be a positive number, 1e-30 or more (length = 'crank - 3 m', crank = 1.0)",
     ),
-    "a number that is none": ("C = [4, 0]", "C = [nan, 0]", "[bodies.ground] points.C = nan must be a finite number"),
-    "a number too large": ("C = [4, 0]", "C = [1e300, 0]", "[bodies.ground] points.C = 1e+300 is too large"),
     "a number of too many digits": ("C = [4, 0]", f"C = [{'9' * 5000}, 0]", "a number has too many digits"),
     "a truth in place of a number": ("C = [4, 0]", "C = [true, 0]", "[bodies.ground] points.C = true must be a number"),
     "a date in place of a number": ("stop = 6.3", "stop = 1979-05-27", "[run] stop = 1979-05-27 must be a number"),
@@ -259,13 +225,6 @@ def test_a_separate_process_reports_the_same_line(case: str, tmp_path: Path) -> 
     assert done.stderr.splitlines() == [done.stderr.rstrip("\n")]
     assert expected in done.stderr
     assert "Traceback" not in done.stdout + done.stderr
-
-
-@pytest.mark.parametrize("arguments", [["none.toml"], ["forbar"], ["."], ["fourbar.tml"]])
-def test_a_file_that_is_not_there_is_wrong_usage(arguments: list[str]) -> None:
-    result = CliRunner().invoke(main, ["check", *arguments])
-    assert result.exit_code == 2
-    assert result.stderr.splitlines()[-1].startswith("Error: Invalid value for 'MECH': ")
 
 
 def test_insufficient_memory_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:

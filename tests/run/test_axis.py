@@ -158,16 +158,16 @@ def test_an_unknown_axis_of_a_record_is_time(sweep: Run) -> None:
     ("start", "stop", "count"), [("30deg", "60deg", 31), (None, "1rad", 58), ("0.5rev", None, 181)]
 )
 def test_a_part_of_a_sweep_is_chosen_by_its_driver(sweep: Run, start: str | None, stop: str | None, count: int) -> None:
-    from kinfmu.cli.export import _between
+    from kinfmu.cli.export_formats import samples_between
 
-    assert len(_between(sweep, start, stop)) == count
+    assert len(samples_between(sweep, start, stop)) == count
 
 
 def test_a_part_that_a_sweep_has_not_is_refused(sweep: Run) -> None:
-    from kinfmu.cli.export import _between
+    from kinfmu.cli.export_formats import samples_between
 
     with pytest.raises(RequestError, match=r"no samples from 720 deg on; its samples: crank = 0 to 360 deg"):
-        _between(sweep, "720deg", None)
+        samples_between(sweep, "720deg", None)
 
 
 def test_the_largest_numbers_have_the_default_range() -> None:

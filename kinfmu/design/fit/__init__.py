@@ -5,13 +5,19 @@ problem (targets, unknowns, constraints) -> equations (residuals, Jacobian) -> s
 
 from __future__ import annotations
 
-from kinfmu.design.fit.constraints import GrashofConstraint, MarginConstraint, MeasureConstraint
 from kinfmu.design.fit.fit import fit
-from kinfmu.design.fit.fit_file import read_problem
 from kinfmu.design.fit.outcome import Optimum
-from kinfmu.design.fit.problem import FitProblem
+from kinfmu.design.fit.problem import FitProblem, read_problem
 from kinfmu.design.fit.result import FitResult
-from kinfmu.design.fit.targets import FunctionTarget, MeasureTarget, PathTarget, PoseTarget
+from kinfmu.design.fit.targets import (
+    FunctionTarget,
+    GrashofConstraint,
+    MarginConstraint,
+    MeasureConstraint,
+    MeasureTarget,
+    PathTarget,
+    PoseTarget,
+)
 
 __all__ = [
     "FitProblem",

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from kinfmu.arrays import FloatArray
+from kinfmu.design.fit.argument import NotReachedError, crossings, modulo, nearest
 from kinfmu.design.fit.measuring import Aim
-from kinfmu.design.fit.nearest import NotReachedError, crossings, modulo, nearest
 from kinfmu.design.fit.numbers import Bounds
 from kinfmu.design.fit.problem import FitProblem
 from kinfmu.design.fit.sampled import Sampled

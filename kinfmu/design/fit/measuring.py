@@ -11,10 +11,9 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.design.fit.argument import Argument
-from kinfmu.design.fit.constraints import Constraint, MarginConstraint, MeasureConstraint
 from kinfmu.design.fit.numbers import read_weights
-from kinfmu.design.fit.targets import MeasureTarget, Target
-from kinfmu.errors import KinfmuError, MechanismError, listed, suggestion
+from kinfmu.design.fit.targets import Constraint, MarginConstraint, MeasureConstraint, MeasureTarget, Target
+from kinfmu.errors import KinfmuError, MechanismError, valid_names
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.laws import ConstantSpeed
 from kinfmu.mechanism.measures import LowestMargin, Reading, TransmissionAngle
@@ -219,8 +218,7 @@ def _reading(where: str, one: Any, mechanism: Mechanism) -> Reading:
         return next(iter(replace(mechanism, measures=(one.of,)).measures))  # texts become numbers
     own = {reading.name: reading for reading in mechanism.measures}
     if one.of not in own:
-        near = suggestion(one.of, own)
-        raise MechanismError(f"{where} of = {quoted(one.of)} is not a measure{near}; measures: {listed(own)}")
+        raise MechanismError(f"{where} of = {quoted(one.of)} is not a measure{valid_names(one.of, own, 'measures')}")
     return own[one.of]
 
 

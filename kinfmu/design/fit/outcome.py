@@ -1,16 +1,24 @@
-"""What a fit found: the mechanism, its errors, how far constraints are met, and the other optima."""
+"""What a fit found: errors of the targets, how far constraints are met, the other optima; the units that show them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from kinfmu.arrays import FloatArray
+from kinfmu.design.fit.equations import Evaluation
+from kinfmu.design.fit.measuring import Aim
+from kinfmu.design.fit.numbers import flat
 from kinfmu.design.fit.problem import FitProblem
+from kinfmu.design.fit.sampled import Sampled
 from kinfmu.mechanism import Mechanism
-from kinfmu.mechanism.display_unit import DisplayUnit
-from kinfmu.units import unit_of
+from kinfmu.mechanism.measures import counted_from
+from kinfmu.mechanism.number import DisplayUnit, display_unit, written_unit
+from kinfmu.units import Quantity, quantity_in, unit_of
 
 
 @dataclass(frozen=True)
@@ -44,13 +52,10 @@ class TargetErrors:
         units: Their units.
         argument: Name of the driver, or 'time'.
         at: (m,) its values at the points; empty for a measure.
-        wanted: (m, d) targets, in `units`.
         reached: (m, d) what the mechanism reaches, in `units`.
         errors: (m, d) reached minus wanted; of angles without whole turns.
         sizes: (m,) sizes of the points' errors, in the unit of the first column; angles of poses count times their
             length.
-        rms: Root of the mean of their squares.
-        largest: Largest error of a point.
         display: The units of the columns in reports.
 
     """
@@ -61,13 +66,25 @@ class TargetErrors:
     units: tuple[str, ...]
     argument: str
     at: FloatArray
-    wanted: FloatArray
     reached: FloatArray
     errors: FloatArray
     sizes: FloatArray
-    rms: float
-    largest: float
     display: tuple[DisplayUnit, ...]
+
+    @property
+    def wanted(self) -> FloatArray:
+        """Targets (m, d), in `units`."""
+        return self.reached - self.errors
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean of the squares of the sizes."""
+        return float(np.sqrt((self.sizes**2).mean()))
+
+    @property
+    def largest(self) -> float:
+        """Largest error of a point."""
+        return float(self.sizes.max())
 
 
 @dataclass(frozen=True)
@@ -119,6 +136,78 @@ class FitOutcome:
         return all(one.holds for one in self.constraints)
 
 
+_LENGTH, _ANGLE = Quantity("length"), Quantity("angle")
+
+
+def unit_of_unknown(problem: FitProblem, name: str) -> DisplayUnit:
+    """Return the unit of an unknown: of its bounds, else of the mechanism file."""
+    if name in problem.unknowns:
+        return problem.mechanism.settable.display_unit(name, flat(problem.unknowns[name]))
+    own, _, key = name.rpartition(".")
+    target: Any = next(one for one in problem.targets if one.name == own)
+    length = problem.mechanism.length_unit
+    return display_unit(problem.quantity(name), length, written_unit(flat(getattr(target, key)), length))
+
+
+def units_of_columns(problem: FitProblem, sampled: Sampled) -> tuple[DisplayUnit, ...]:
+    """Return the units of the columns of a path, function or poses: of its points, all lengths in the first one."""
+    target: Any = next(one for one in problem.targets if one.name == sampled.name)
+    rows = [list(row) for row in (target.poses if sampled.type == "poses" else target.points)]
+    length, found = problem.mechanism.length_unit, []
+    for is_angle in sampled.angles:
+        places = [k for k, angle in enumerate(sampled.angles) if angle is is_angle]
+        places = [1] if sampled.type == "function" else places
+        written = written_unit([row[k] for row in rows for k in places], length)
+        if not written and sampled.type == "function":
+            written = written_unit(flat(target.offset), length)
+        found.append(display_unit(_ANGLE if is_angle else _LENGTH, length, written))
+    return tuple(found)
+
+
+def unit_of_measure(problem: FitProblem, name: str, unit: str) -> DisplayUnit:
+    """Return the unit of a measure: of its value or limits; `unit`: that used inside."""
+    if unit == "1":
+        return DisplayUnit()
+    one: Any = next(one for one in (*problem.targets, *problem.constraints) if one.name == name)
+    length = problem.mechanism.length_unit
+    written = written_unit((getattr(one, key, None) for key in ("value", "minimum", "maximum")), length)
+    return display_unit(quantity_in(unit, length), length, written)
+
+
 def argument_unit(problem: FitProblem) -> str:
     """Return the unit of the argument of the motion."""
     return unit_of(problem.argument.quantity, problem.mechanism.length_unit)
+
+
+HOLDS = 1e-6  # violation relative to the limit, or to 1, up to which a constraint holds
+
+
+def constraint_results(problem: FitProblem, found: Evaluation) -> list[ConstraintResult]:
+    """Return how far the constraints of a problem are met by a design, Grashof's conditions first."""
+    unit, constraints = problem.mechanism.length_unit, []
+    for one, met in zip(problem.lengths, found.excess, strict=True):
+        gap = float(met[: one.gaps].min()) + one.gap
+        text = f"p + q - s - l = {gap:.6g} {unit}, at least {one.gap:.6g} {unit}"
+        if one.shortest is not None:
+            others = float(met[one.gaps :].min())
+            text += f"; the other links exceed {one.links[one.shortest].text} by {others:.6g} {unit} or more"
+        violation = max(0.0, -float(met.min()))
+        holds = violation <= HOLDS * max(1.0, abs(one.gap))
+        constraints.append(ConstraintResult(one.name, text, violation, holds, DisplayUnit(unit)))
+    limited: dict[str, list[tuple[Aim, float]]] = {}
+    for aim, value in zip(problem.measuring.aims if problem.measuring else (), found.measured.tolist(), strict=True):
+        if aim.value is None:
+            limited.setdefault(aim.owner, []).append((aim, value))
+    for name, parts in limited.items():
+        aim, value = max(parts, key=lambda part: part[0].excess(part[1])[0])
+        display = unit_of_measure(problem, name, aim.unit)
+        limits = [f"at least {aim.minimum / display.factor:.6g}"] if aim.minimum is not None else []
+        limits += [f"at most {aim.maximum / display.factor:.6g}"] if aim.maximum is not None else []
+        violation = max(0.0, aim.excess(value)[0])
+        size = max(1.0, *(abs(limit) for limit in (aim.minimum, aim.maximum) if limit is not None))
+        shown = display.suffix
+        datum = counted_from(aim.reading.type)
+        number = f"{value / display.factor:.6g}{shown}{datum}"
+        text = f"{aim.reading.type} = {number}, {' and '.join(limits)}{shown}"
+        constraints.append(ConstraintResult(name, text, violation, violation <= HOLDS * size, display))
+    return constraints

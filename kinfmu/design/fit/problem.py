@@ -1,28 +1,50 @@
-"""FitProblem: a mechanism, its unknowns, what it shall do, and the conditions it shall meet."""
+"""FitProblem: a mechanism, its unknowns, what it shall do, and the conditions it shall meet; also from a file."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import MISSING, dataclass, field, fields, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.design.fit.argument import Argument, argument_of
-from kinfmu.design.fit.constraints import CONSTRAINTS, Constraint, GrashofConstraint
 from kinfmu.design.fit.lengths import Lengths
 from kinfmu.design.fit.measuring import Measuring, measuring_of
 from kinfmu.design.fit.numbers import Bounds, read_bounds
 from kinfmu.design.fit.sampled import Sampled, TracedPoints, sampled
-from kinfmu.design.fit.targets import TARGETS, MeasureTarget, Target
+from kinfmu.design.fit.targets import (
+    CONSTRAINTS,
+    TARGETS,
+    Constraint,
+    FunctionTarget,
+    GrashofConstraint,
+    MeasureTarget,
+    PathTarget,
+    Target,
+)
 from kinfmu.errors import MechanismError, RequestError, listed
+from kinfmu.files import suffix_of
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.gallery.load import load_named_in
 from kinfmu.mechanism.measures import Reading
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.mechanism.number import unit_advice
 from kinfmu.mechanism.parameters import NUMBER
+from kinfmu.mechanism.toml_document import (
+    check_keys,
+    class_of_type,
+    document_of,
+    named_tables,
+    read_table,
+    refuse_other_kind,
+    table_of,
+    text_in,
+    text_of,
+)
 from kinfmu.mechanism.valid import check_name, quoted
 from kinfmu.units import CoordinateName, Quantity
 
@@ -138,8 +160,7 @@ class FitProblem:
         settable = self.mechanism.settable
         values: dict[str, float | None] = dict.fromkeys(self.bounds)
         for name in self.parameters:
-            setting = settable.constants.get(name) or self.mechanism.parameters[name]
-            values[name] = min(max(float(setting.value), self.bounds[name].low), self.bounds[name].high)
+            values[name] = min(max(float(settable[name].value), self.bounds[name].low), self.bounds[name].high)
         return values
 
     @property
@@ -160,8 +181,7 @@ class FitProblem:
 
         """
         if name in self.unknowns:
-            settable = self.mechanism.settable
-            return (settable.constants.get(name) or settable.parameters[name]).quantity or NUMBER
+            return self.mechanism.settable[name].quantity or NUMBER
         own, _, key = name.rpartition(".")
         sampled = next(one for one in self.sampled if one.name == own)
         return sampled.argument if key == "start" else Quantity("angle" if sampled.angles[0] else "length")
@@ -217,3 +237,65 @@ def _from_text(text: str, *rest: Any) -> FitProblem:
     from kinfmu.mechanism import toml_file
 
     return FitProblem(toml_file.parse(text, "the mechanism of the fit"), *rest)
+
+
+KEYS = ("mechanism", "over", "unknowns", "targets", "constraints")
+_WITH_FILE = (PathTarget, FunctionTarget)  # their points can be in a CSV file
+
+
+def read_problem(path: str | Path) -> FitProblem:
+    """Return the problem of a fit file.
+
+    Args:
+        path: The file (.toml). A relative path of a mechanism in it starts in its folder.
+
+    Raises:
+        MechanismError: The file cannot be read or is invalid; the message states file, table and key.
+
+    """
+    path = Path(path)
+    document = document_of(text_in(path, "a fit file"), str(path))
+    try:
+        return _problem(document, path.parent)
+    except (MechanismError, RequestError) as error:
+        raise MechanismError(f"{path}: {error}", **error.data) from None
+
+
+def mechanism_file(path: Path) -> Path | None:
+    """Return the mechanism file that a fit file names; None for a mechanism of the gallery."""
+    name = document_of(text_in(path, "a fit file"), str(path)).get("mechanism")
+    return path.parent / name if isinstance(name, str) and suffix_of(name) == ".toml" else None
+
+
+def _problem(document: Mapping[str, Any], folder: Path) -> FitProblem:
+    refuse_other_kind(document, "fit", KEYS)
+    check_keys("", document, KEYS)
+    over = document.get("over")
+    return FitProblem(
+        load_named_in(document, folder),
+        table_of(document, "unknowns"),
+        tuple(_members(document, "targets", TARGETS, folder)),
+        tuple(_members(document, "constraints", CONSTRAINTS, folder)),
+        None if over is None else text_of("over", over),
+    )
+
+
+def _members(document: Mapping[str, Any], table: str, classes: Iterable[Any], folder: Path) -> Iterable[Any]:
+    """Yield the targets or constraints."""
+    for name, values in named_tables(document, table):
+        where = f"[{table}.{name}]"
+        cls = class_of_type(where, values, "type", classes)
+        own = [one for one in fields(cls) if one.name != "name"]
+        with_file = cls in _WITH_FILE
+        check_keys(where, values, ("type", *(one.name for one in own), *(("file",) if with_file else ())))
+        keys = {key: value for key, value in values.items() if key not in ("type", "file")}
+        if with_file and "file" in values:
+            if "points" in values:
+                raise MechanismError(f"{where} has both 'points' and 'file'; give one of them")
+            keys["points"] = read_table(f"{where} file", values["file"], folder)
+        for one in own:
+            if one.default is MISSING and one.name not in keys:
+                names = listed(key.name for key in own)
+                or_file = " or 'file'" if one.name == "points" else ""
+                raise MechanismError(f"{where} needs the key '{one.name}'{or_file}; keys: {names}")
+        yield cls(name=name, **keys)

@@ -11,10 +11,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.design.fit import display_units
-from kinfmu.design.fit.constraint_results import constraint_results
 from kinfmu.design.fit.equations import Equations, Evaluation, NotAssembledError
-from kinfmu.design.fit.outcome import FitOutcome, Optimum, TargetErrors
+from kinfmu.design.fit.outcome import (
+    FitOutcome,
+    Optimum,
+    TargetErrors,
+    constraint_results,
+    unit_of_measure,
+    units_of_columns,
+)
 from kinfmu.design.fit.problem import FitProblem
 from kinfmu.design.fit.text import report
 from kinfmu.display import Displayed
@@ -24,6 +29,7 @@ from kinfmu.run.continued import continued
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
 
 _NO_EFFECT = 1e-9  # of the largest effect: round-off
 _FREE = 1e-4  # of the largest singular value; differences of measures have an error of 1e-6
@@ -203,48 +209,37 @@ def _undetermined(
 
 def _errors(problem: FitProblem, found: Evaluation) -> list[TargetErrors]:
     unit, argument = problem.mechanism.length_unit, problem.argument.name
-    result = []
-    for row in found.rows:
-        target = row.target
-        sizes = np.sqrt(((row.errors * target.scale) ** 2).sum(axis=1))
-        result.append(
-            TargetErrors(
-                target.name,
-                target.type,
-                target.shown,
-                tuple("rad" if is_angle else unit for is_angle in target.angles),
-                argument,
-                row.arguments,
-                row.reached - row.errors,
-                row.reached,
-                row.errors,
-                sizes,
-                float(np.sqrt((sizes**2).mean())),
-                float(sizes.max()),
-                display_units.of_columns(problem, target),
-            )
+    errors = [
+        TargetErrors(
+            name=row.target.name,
+            type=row.target.type,
+            names=row.target.shown,
+            units=tuple("rad" if is_angle else unit for is_angle in row.target.angles),
+            argument=argument,
+            at=row.arguments,
+            reached=row.reached,
+            errors=row.errors,
+            sizes=np.sqrt(((row.errors * row.target.scale) ** 2).sum(axis=1)),
+            display=units_of_columns(problem, row.target),
         )
+        for row in found.rows
+    ]
     aims: Any = problem.measuring.aims if problem.measuring else ()
     for aim, value in zip(aims, found.measured, strict=True):
         if aim.value is not None:
-            error = np.array([[float(value) - aim.value]])
-            size = abs(float(error[0, 0]))
-            reached = np.array([[float(value)]])
-            result.append(
+            error = float(value) - aim.value
+            errors.append(
                 TargetErrors(
-                    aim.owner,
-                    "measure",
-                    (aim.owner,),
-                    (aim.unit,),
-                    "",
-                    np.empty(0),
-                    reached - error,
-                    reached,
-                    error,
-                    np.array([size]),
-                    size,
-                    size,
-                    (display_units.of_measure(problem, aim.owner, aim.unit),),
+                    name=aim.owner,
+                    type="measure",
+                    names=(aim.owner,),
+                    units=(aim.unit,),
+                    argument="",
+                    at=np.empty(0),
+                    reached=np.array([[float(value)]]),
+                    errors=np.array([[error]]),
+                    sizes=np.array([abs(error)]),
+                    display=(unit_of_measure(problem, aim.owner, aim.unit),),
                 )
             )
-    return result
+    return errors

@@ -13,7 +13,7 @@ from kinfmu.arrays import FloatArray
 from kinfmu.design.fit.argument import Argument
 from kinfmu.design.fit.numbers import Bounds, read_free, read_rows, read_weights
 from kinfmu.design.fit.targets import FunctionTarget, PathTarget, PoseTarget
-from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.errors import MechanismError, valid_names
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.number import read_constant
 from kinfmu.mechanism.valid import quoted
@@ -97,9 +97,7 @@ class TracedPoints:
             return tuple(CoordinateName(of, axis) for axis in "xy")
         if of not in known:
             names = [*self._written.points, *known]
-            raise MechanismError(
-                f"{where} = {quoted(of)} is not a point{suggestion(of, names)}; points: {listed(names)}"
-            )
+            raise MechanismError(f"{where} = {quoted(of)} is not a point{valid_names(of, names, 'points')}")
         name = next((name for name, target in self.points.items() if target == of), "")
         if not name:
             taken = {*self.points, *(body.name for body in self._written.bodies)}
@@ -149,9 +147,8 @@ def sampled(
         outputs = tuple(CoordinateName(str(target.of), axis) for axis in ("x", "y", "phi"))
         if outputs[2] not in coordinates:
             bodies = sorted({name.owner for name in coordinates.values() if name.is_angle})
-            near = suggestion(target.of, bodies)
             raise MechanismError(
-                f"{where} of = {quoted(target.of)} is not a moving body{near}; bodies: {listed(bodies)}"
+                f"{where} of = {quoted(target.of)} is not a moving body{valid_names(target.of, bodies, 'bodies')}"
             )
         wanted = read_rows(f"{where} poses", target.poses, (LENGTH, LENGTH, ANGLE), unit, "[[x, y, phi], ...]")
         length = read_constant(f"{where} length", target.length, LENGTH, unit)
@@ -183,8 +180,8 @@ def _function(
     """Return a function in the common form."""
     for key, name in (("of", target.of), ("over", target.over)):
         if name is not None and name not in coordinates:
-            near = suggestion(name, coordinates)
-            raise MechanismError(f"{where} {key} = {quoted(name)} is not an output{near}; valid: {listed(coordinates)}")
+            valid = valid_names(name, coordinates, "valid")
+            raise MechanismError(f"{where} {key} = {quoted(name)} is not an output{valid}")
     x = argument.quantity if target.over is None else coordinates[target.over].quantity()
     of = coordinates[target.of]
     y = of.quantity()

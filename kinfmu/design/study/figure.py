@@ -23,7 +23,7 @@ from kinfmu.draw.study import (
     scatter_matrix,
 )
 from kinfmu.draw.writing import check_suffix, check_target, write
-from kinfmu.errors import FigureError, StudyError, listed, suggestion
+from kinfmu.errors import FigureError, StudyError, listed, valid_names
 from kinfmu.mechanism.measures import counted_from
 
 if TYPE_CHECKING:
@@ -105,8 +105,7 @@ def _known(result: StudyRows, measures: tuple[str, ...]) -> tuple[str, ...]:
     """Return the names of the measures to draw, or raise a StudyError for an unknown one."""
     for name in measures:
         if name not in result.measures:
-            near = suggestion(name, result.measures)
-            raise StudyError(f"the study has no measure '{name}'{near}; measures: {listed(result.measures)}")
+            raise StudyError(f"the study has no measure '{name}'{valid_names(name, result.measures, 'measures')}")
     return tuple(measures) or tuple(result.measures)
 
 

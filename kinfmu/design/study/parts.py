@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from kinfmu.design.study.definition import Study
-from kinfmu.errors import KinfmuError, StudyError
-from kinfmu.files import BeingWrittenError, check_is_free, lock_for_writing, make_folder, replacement
+from kinfmu.errors import StudyError
+from kinfmu.files import BeingWrittenError, check_is_free, errors_of_writing, lock_for_writing, make_folder, replacement
 
 SUFFIX = ".parts"
 _MANIFEST = "study.json"
@@ -38,7 +38,7 @@ class PartsFolder:
         self._study = study
         self._manifest = self.folder / _MANIFEST
         self._lock: int | None = None
-        with _as_study_error(self.folder):
+        with errors_of_writing(self.folder, StudyError):
             make_folder(self.folder)
             self._take(restart=restart)
 
@@ -95,7 +95,7 @@ class PartsFolder:
 
     def write(self, first: int, data: bytes) -> None:
         """Write a part."""
-        with _as_study_error(self.path(first)):
+        with errors_of_writing(self.path(first), StudyError):
             write_synced(self.path(first), data)
 
     def remove(self) -> None:
@@ -159,16 +159,6 @@ def write_synced(path: Path, data: bytes) -> None:
         file.write(data)
         file.flush()
         os.fsync(file.fileno())
-
-
-@contextmanager
-def _as_study_error(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except KinfmuError:
-        raise
-    except OSError as error:
-        raise StudyError(f"{path}: cannot be written ({error.strerror or error})") from None
 
 
 def _difference(found: dict[str, Any], own: dict[str, Any]) -> str:

@@ -1,17 +1,18 @@
-"""`study`: measure many designs of a mechanism, and go on where a study was ended."""
+"""`study`: measure many designs, in this process, on all cores or on a cluster, and go on where a study was ended."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from numpy.typing import ArrayLike
 
 from kinfmu import VERSION
-from kinfmu.design.study.chunk import Job, run_chunk
 from kinfmu.design.study.definition import SAMPLES, SEED, Study, define
-from kinfmu.design.study.nominal import nominal
+from kinfmu.design.study.job import Job, nominal, run_chunk
 from kinfmu.design.study.parts import PartsFolder, check_replaceable, remove_finished, write_synced
 from kinfmu.design.study.result import StudyResult
 from kinfmu.design.study.rows import study_in
@@ -31,12 +32,11 @@ from kinfmu.design.study.table import (
     write_csv,
     write_parquet,
 )
-from kinfmu.design.study.workers import results
-from kinfmu.errors import MechanismError, RequestError, StudyError, listed
-from kinfmu.files import replacement, suffix_of, temporary_folder
+from kinfmu.errors import MechanismError, MissingPackageError, RequestError, StudyError, listed
+from kinfmu.files import errors_of_writing, replacement, suffix_of, temporary_folder
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.measures import Reading
-from kinfmu.processes import cores, require_workers
+from kinfmu.processes import WorkerLostError, cores, processes, require_workers, without_main
 
 Progress = Callable[[int, int], None]
 
@@ -157,15 +157,12 @@ def _run(study: Study, path: Path, workers: int, dask: str | None, progress: Pro
     """Measure the parts that are missing, and join all parts in a file."""
     with PartsFolder(path, study, restart=restart) as parts:
         layout, rows = _measured(study, parts, workers, dask, progress)
-        try:
-            with replacement(path) as temporary:
-                if suffix_of(path) == CSV:
-                    write_csv(rows, layout, temporary)
-                    write_synced(about_file(path), layout.as_json().encode())
-                else:
-                    write_parquet(rows, layout, temporary)
-        except OSError as error:
-            raise StudyError(f"{path}: cannot be written ({error.strerror or error})") from None
+        with errors_of_writing(path, StudyError), replacement(path) as temporary:
+            if suffix_of(path) == CSV:
+                write_csv(rows, layout, temporary)
+                write_synced(about_file(path), layout.as_json().encode())
+            else:
+                write_parquet(rows, layout, temporary)
         parts.remove()
 
 
@@ -191,3 +188,113 @@ def _measured(
 
 def _quiet(_done: int, _count: int) -> None:
     """Show no progress."""
+
+
+AHEAD = 3  # parts given to each core before they are due; more would only fill the memory
+LOCAL = "local"
+
+Call = Callable[..., Any]
+
+
+def results(
+    call: Call, arguments: Callable[[int], tuple[Any, ...]], parts: Sequence[int], workers: int, dask: str | None
+) -> Iterator[tuple[int, Any]]:
+    """Yield each part with what `call(*arguments(part))` returns, in the order in which they are done.
+
+    Args:
+        call: A function of a module.
+        arguments: Its arguments for a part.
+        parts: The parts to do.
+        workers: Number of processes on this machine; 1: this process.
+        dask: Address of a Dask scheduler, or 'local' for a cluster on this machine; None: no Dask.
+
+    Raises:
+        StudyError: Workers end unexpectedly, or the cluster cannot be reached.
+        MissingPackageError: `distributed` is not installed.
+
+    """
+    if dask is None and (workers == 1 or len(parts) == 1):
+        for part in parts:
+            yield part, call(*arguments(part))
+        return
+    if not parts:  # a study that was ended before its parts were joined
+        return
+    with _cluster(dask, workers) if dask is not None else _processes(min(workers, len(parts))) as (pool, count):
+        yield from _in_pool(pool, count * AHEAD, call, arguments, parts)
+
+
+def _in_pool(
+    pool: Executor, ahead: int, call: Call, arguments: Callable[[int], tuple[Any, ...]], parts: Sequence[int]
+) -> Iterator[tuple[int, Any]]:
+    """Yield results as they are done, with at most so many parts under way."""
+    waiting, under_way = iter(parts), dict[Future[Any], int]()
+    while True:
+        for part in waiting:
+            with without_main():
+                under_way[pool.submit(call, *arguments(part))] = part
+            if len(under_way) >= ahead:
+                break
+        if not under_way:
+            return
+        done, _ = wait(under_way, return_when=FIRST_COMPLETED)
+        for future in done:
+            yield under_way.pop(future), future.result()
+
+
+@contextmanager
+def _processes(count: int) -> Iterator[tuple[Executor, int]]:
+    try:
+        with processes(count) as pool:
+            yield pool, count
+    except WorkerLostError as error:
+        raise StudyError(f"{error}; finished parts are kept, and the same command goes on from there") from None
+
+
+@contextmanager
+def _cluster(address: str, workers: int) -> Iterator[tuple[Executor, int]]:
+    try:
+        import distributed
+    except ImportError:
+        raise MissingPackageError("--dask needs distributed: pip install 'kinfmu[dask]'") from None
+
+    cluster = None
+    try:
+        if address == LOCAL:
+            with without_main():
+                cluster = distributed.LocalCluster(
+                    n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=50
+                )
+        client = distributed.Client(cluster or address, timeout="10s")
+    except (OSError, ValueError) as error:  # a scheduler that does not answer, an address of another form
+        if cluster is not None:
+            cluster.close()
+        raise StudyError(
+            f"the Dask scheduler at '{address}' cannot be reached ({error or type(error).__name__})"
+        ) from None
+    try:
+        with client:
+            yield client.get_executor(pure=False), max(1, sum(client.ncores().values()))
+    except ModuleNotFoundError as error:
+        raise StudyError(f"the workers of the Dask cluster need kinfmu {VERSION} ({error}): install it there") from None
+    except distributed.KilledWorker as error:
+        raise StudyError(f"Dask workers ended several times at the same part: {error}") from None
+    except (CancelledError, TypeError, ValueError) as error:
+        if not (isinstance(error, CancelledError) or _is_from_executor(error)):
+            raise
+        raise StudyError(
+            "the Dask cluster was lost; the same command goes on with the parts that are missing"
+        ) from None
+    finally:
+        if cluster is not None:
+            cluster.close()
+
+
+def _is_from_executor(error: Exception) -> bool:
+    """Return whether an error is one of Dask's executor itself: it expects the error of a task where there is none.
+
+    This happens where the connection is lost between two looks of the executor at a task.
+    """
+    traceback = error.__traceback__
+    while traceback is not None and traceback.tb_next is not None:
+        traceback = traceback.tb_next
+    return traceback is not None and traceback.tb_frame.f_globals.get("__name__") == "distributed.cfexecutor"

@@ -1,16 +1,225 @@
-"""The parameters of every design of a study, decided by the seed and the number of the design alone."""
+"""How parameters vary over the designs of a study, and the parameters of every design."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.arrays import FloatArray
-from kinfmu.design.study.variation import Grid, Tolerance, UniformRange, Variation
+from kinfmu.errors import MechanismError, listed, valid_names
+from kinfmu.mechanism import LawConstant, Mechanism
+from kinfmu.mechanism.number import read_constant, unit_advice
+from kinfmu.mechanism.parameters import NUMBER
+from kinfmu.mechanism.toml_document import check_keys
+from kinfmu.mechanism.valid import is_number, quoted
+from kinfmu.units import unit_of
+
+KEYS = ("values", "from", "to", "count", "tolerance", "distribution", "deviations", "nominal")
+DISTRIBUTIONS = ("normal", "uniform")
+MOST_DESIGNS = 10**9
+MOST_OF_A_GRID = 10**6  # values, which are part of the definition of the study
+_EXAMPLE = '{ from = 1, to = 2, count = 5 }, { from = 1, to = 2 } or { tolerance = 0.1, distribution = "normal" }'
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A parameter that takes given values.
+
+    Attributes:
+        name: The parameter or law constant.
+        unit: Its unit.
+        values: The values, in this order.
+        display_unit: The unit in which people wrote them.
+
+    """
+
+    name: str
+    unit: str
+    values: tuple[float, ...]
+    display_unit: str = field(default="", compare=False)
+
+    def as_json(self) -> dict[str, Any]:
+        return {"unit": self.unit, "values": list(self.values)}
+
+
+@dataclass(frozen=True)
+class UniformRange:
+    """A parameter that is sampled evenly between two values.
+
+    Attributes:
+        name: The parameter or law constant.
+        unit: Its unit.
+        low: Lower end.
+        high: Upper end.
+        display_unit: The unit in which people wrote them.
+
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    display_unit: str = field(default="", compare=False)
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return the values at points of the unit interval."""
+        return self.low + points * (self.high - self.low)
+
+    def as_json(self) -> dict[str, Any]:
+        return {"unit": self.unit, "from": self.low, "to": self.high}
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """A parameter that scatters about its nominal value.
+
+    Attributes:
+        name: The parameter or law constant.
+        unit: Its unit.
+        nominal: Its value without deviation.
+        tolerance: Half of the tolerance zone: nominal - tolerance to nominal + tolerance.
+        distribution: 'normal', or 'uniform' over the zone.
+        deviations: Of a normal distribution: how many standard deviations the tolerance is.
+        display_unit: The unit in which people wrote it.
+
+    """
+
+    name: str
+    unit: str
+    nominal: float
+    tolerance: float
+    distribution: Literal["normal", "uniform"]
+    deviations: float
+    display_unit: str = field(default="", compare=False)
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation."""
+        return self.tolerance / (math.sqrt(3.0) if self.distribution == "uniform" else self.deviations)
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return the values at points of the open unit interval: the inverse of the distribution function."""
+        if self.distribution == "uniform":
+            return self.nominal + (2.0 * points - 1.0) * self.tolerance
+        from scipy.special import ndtri
+
+        return np.asarray(self.nominal + self.deviation * ndtri(points))
+
+    def as_json(self) -> dict[str, Any]:
+        own = {"deviations": self.deviations} if self.distribution == "normal" else {}
+        return {
+            "unit": self.unit,
+            "nominal": self.nominal,
+            "tolerance": self.tolerance,
+            "distribution": self.distribution,
+            **own,
+        }
+
+
+Variation = Grid | UniformRange | Tolerance
+
+
+def read_variation(where: str, name: str, table: Mapping[str, Any], mechanism: Mechanism) -> Variation:
+    """Return how a parameter varies, from a table of a study file or of a call.
+
+    Args:
+        where: The table in messages, such as '[parameters.crank]'.
+        name: The parameter or law constant.
+        table: Its keys: `values`; or `from`, `to` and `count`; or `from` and `to`; or `tolerance`, `distribution`,
+            `deviations` and `nominal`. Numbers are bare or have units, as in mechanism files.
+        mechanism: The mechanism.
+
+    Raises:
+        MechanismError: A key or a value is invalid.
+        RequestError: The mechanism has no such parameter.
+
+    """
+    settable = mechanism.settable
+    if not isinstance(name, str):
+        raise MechanismError(f"{where}: parameters have names, not {quoted(name)}")
+    settable.check_name(name)
+    if not isinstance(table, Mapping):
+        raise MechanismError(f"{where} = {quoted(table)} must be a table such as {_EXAMPLE}")
+    check_keys(where, table, KEYS)
+    setting = settable[name]
+    quantity, length = setting.quantity or NUMBER, mechanism.length_unit
+    is_positive = isinstance(setting, LawConstant) and setting.is_positive
+
+    def number(key: str, value: object, *, above: float | None = None) -> float:
+        with unit_advice(name, setting.value, length):
+            found = read_constant(f"{where} {key}", value, quantity, length)
+        if above is not None and not found > above:
+            raise MechanismError(f"{where} {key} = {quoted(value)} must be more than {above:g}")
+        if is_positive and not found > 0.0:
+            raise MechanismError(f"{where} {key} = {quoted(value)} must be positive")
+        return found
+
+    unit = unit_of(quantity, length)
+    values = table.get("values", ())
+    given = [table.get(key) for key in ("from", "to", "tolerance", "nominal")]
+    shown = settable.display_unit(name, [*(values if isinstance(values, list | tuple) else ()), *given]).unit
+    kinds = [key for key in ("values", "from", "tolerance") if key in table]
+    if len(kinds) != 1:
+        what = (
+            f"has {' and '.join(kinds)}, which exclude each other" if kinds else "needs 'values', 'from' or 'tolerance'"
+        )
+        raise MechanismError(f"{where} {what}; give one of {_EXAMPLE}")
+    (kind,) = kinds
+    _refuse_others(where, table, kind)
+    if kind == "values":
+        if not isinstance(values, list | tuple | np.ndarray) or not len(values):
+            raise MechanismError(f"{where} values = {quoted(values)} must be a list of numbers")
+        return Grid(name, unit, tuple(number("values", value) for value in values), shown)
+    if kind == "from":
+        if "to" not in table:
+            raise MechanismError(f"{where} needs the key 'to'")
+        low, high = number("from", table["from"]), number("to", table["to"])
+        if "count" in table:
+            count = whole_number(f"{where} count", table["count"], 2, MOST_OF_A_GRID)
+            return Grid(name, unit, tuple(np.linspace(low, high, count).tolist()), shown)
+        if low == high:
+            raise MechanismError(f"{where}: 'from' and 'to' are equal: {low:.9g}")
+        return UniformRange(name, unit, min(low, high), max(low, high), shown)
+    written = setting.value
+    nominal = number("nominal", table.get("nominal", float(written)))
+    tolerance = number("tolerance", table["tolerance"], above=0.0)
+    distribution = table.get("distribution", "normal")
+    if distribution not in DISTRIBUTIONS:
+        raise MechanismError(
+            f"{where} distribution = {quoted(distribution)} is not known{valid_names(str(distribution), DISTRIBUTIONS)}"
+        )
+    deviations = table.get("deviations", 3.0)
+    if not (is_number(deviations) and deviations > 0.0 and math.isfinite(deviations)):
+        raise MechanismError(f"{where} deviations = {quoted(deviations)} must be a positive number")
+    if "deviations" in table and distribution != "normal":
+        raise MechanismError(f"{where} deviations: only a normal distribution has them")
+    return Tolerance(name, unit, nominal, tolerance, distribution, float(deviations), shown)
+
+
+def whole_number(where: str, value: object, least: int, most: int = MOST_DESIGNS) -> int:
+    """Return a whole number from `least` to `most`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
+        raise MechanismError(f"{where} = {quoted(value)} must be a whole number from {least} to {most}")
+    return int(value)
+
+
+def _refuse_others(where: str, table: Mapping[str, Any], kind: str) -> None:
+    """Raise a MechanismError for a key that belongs to another kind of variation."""
+    own = {
+        "values": {"values"},
+        "from": {"from", "to", "count"},
+        "tolerance": {"tolerance", "distribution", "deviations", "nominal"},
+    }[kind]
+    for key in table:
+        if key not in own:
+            raise MechanismError(f"{where} {key}: does not go with '{kind}'; keys with it: {listed(sorted(own))}")
+
 
 METHODS = ("sobol", "latin_hypercube")
 _BITS = 30  # of a number of a Sobol point

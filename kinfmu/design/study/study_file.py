@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 
 from kinfmu.design.study.definition import SAMPLES, SEED, Study, define
-from kinfmu.design.study.sampling import METHODS
-from kinfmu.design.study.variation import whole_number
+from kinfmu.design.study.sampling import METHODS, whole_number
 from kinfmu.errors import KinfmuError, MechanismError, StudyError
 from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.mechanism.gallery.load import load_named_in
 from kinfmu.mechanism.number import read_constant
-from kinfmu.mechanism.toml_file import document_of, read_measures, text_in
-from kinfmu.mechanism.toml_tables import check_keys, refuse_other_kind, table_of
+from kinfmu.mechanism.toml_document import check_keys, document_of, refuse_other_kind, table_of, text_in
+from kinfmu.mechanism.toml_file import read_measures
 from kinfmu.mechanism.valid import quoted
 from kinfmu.motion.history import FEWEST
 from kinfmu.run import MOST_SAMPLES

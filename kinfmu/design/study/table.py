@@ -21,9 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu import VERSION
-from kinfmu.design.study.chunk import Columns, places
 from kinfmu.design.study.definition import DESIGN, REASON, STATUS, Study
-from kinfmu.design.study.nominal import Nominal
+from kinfmu.design.study.job import Columns, Nominal, places
 from kinfmu.errors import MissingPackageError, StudyError
 
 CSV, PARQUET = ".csv", ".parquet"

@@ -15,7 +15,7 @@ import numpy as np
 from kinfmu.errors import FmuError, RequestError, listed, suggestion
 from kinfmu.fmu.interface import Interface
 from kinfmu.mechanism import RunSettings
-from kinfmu.mechanism.table_file import read_decimal
+from kinfmu.mechanism.toml_document import read_decimal
 from kinfmu.mechanism.valid import quoted
 from kinfmu.run import MOST_SAMPLES, Event
 from kinfmu.run.driving import is_long, numbers_of, unwrap

@@ -140,7 +140,7 @@ def _of_mechanism(mechanism: Mechanism) -> Iterator[tuple[str, _Setting]]:
     """Yield what can be set of a mechanism, in the units of its file, angles of records in degrees and rpm too."""
     settable = mechanism.settable
     for name in (*mechanism.own_parameters, *settable.constants):
-        setting = settable.constants.get(name) or mechanism.parameters[name]
+        setting = settable[name]
         unit, factor = settable.display_unit(name)
         units = [("" if unit == "1" else unit, factor)]
         usual = _USUAL.get(setting.quantity) if setting.quantity else None

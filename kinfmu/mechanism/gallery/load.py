@@ -7,12 +7,12 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from kinfmu.errors import MechanismError, RequestError, listed, suggestion
-from kinfmu.files import suffix_of, write_whole
+from kinfmu.errors import MechanismError, RequestError, valid_names
+from kinfmu.files import errors_of_writing, suffix_of, write_whole
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.gallery.chains import CHAINS, chain
+from kinfmu.mechanism.toml_document import text_of
 from kinfmu.mechanism.toml_file import read
-from kinfmu.mechanism.toml_tables import text_of
 from kinfmu.mechanism.toml_text import text
 from kinfmu.mechanism.valid import quoted
 
@@ -56,7 +56,7 @@ def load(mechanism: str | Path) -> Mechanism:
         known = names()
         if mechanism not in known:
             raise RequestError(
-                f"{quoted(mechanism)} is not in the gallery{suggestion(mechanism, known)}; gallery: {listed(known)}; "
+                f"{quoted(mechanism)} is not in the gallery{valid_names(mechanism, known, 'gallery')}; "
                 f"files end in .toml"
             )
         return read(folder() / mechanism / "mechanism.toml")
@@ -99,8 +99,6 @@ def save(mechanism: Mechanism, path: str | Path) -> Path:
 
     """
     path = Path(path)
-    try:
+    with errors_of_writing(path, MechanismError):
         write_whole(path, text(mechanism, as_written=True).encode())
-    except OSError as error:
-        raise MechanismError(f"{path}: cannot be written ({error.strerror})") from None
     return path

@@ -1,4 +1,4 @@
-"""Cams with a lift law: the position of a follower depends on the angle of a cam."""
+"""Cams with a lift law: the position of a follower depends on the angle of a cam. What touches the cam."""
 
 from __future__ import annotations
 
@@ -8,16 +8,43 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from kinfmu.errors import MechanismError, listed
-from kinfmu.mechanism.joints.follower_element import FaceNormal, RollerRadius, check_element, roller_conditions
 from kinfmu.mechanism.joints.joint import Condition, Joint
 from kinfmu.mechanism.laws import Law, MotionSequence
-from kinfmu.mechanism.laws.law import NEARLY, TURN
+from kinfmu.mechanism.laws.law import NEARLY, TURN, values_by_degree
 from kinfmu.mechanism.quantities import AngleBetween, PoseQuantity, PositionAlong
 from kinfmu.mechanism.quantities.arithmetic import Value
 from kinfmu.mechanism.quantities.placement import BodyName, BodyPair, Placement, PointPair, Reference, body_of
-from kinfmu.units import Length, Radians
+from kinfmu.units import Length, Quantity, Radians
+
+RollerRadius = Annotated[
+    float | None,
+    Quantity("length"),
+    "radius of the roller, 0 for a knife edge [length]; default: unknown, and then there is no profile",
+]
+FaceNormal = Annotated[
+    float | None,
+    Quantity("angle"),
+    "direction of the normal of a flat face, away from the cam, in the follower's frame [rad]; default: no flat face",
+]
+
+
+def roller_conditions(radius: float | None) -> tuple[Condition, ...]:
+    """Return the condition on the radius of a roller, none without one."""
+    return () if radius is None else (Condition("roller_radius", radius, "0 or more"),)
+
+
+def check_element(name: str, radius: float | None, normal: float | None = None) -> None:
+    """Raise a MechanismError for a negative radius, or for both a roller and a flat face."""
+    if radius is not None and not radius >= 0.0:
+        raise MechanismError(f"[joints.{name}] roller_radius = {radius!r} must be 0 or more", joint=name)
+    if radius is not None and normal is not None:
+        raise MechanismError(
+            f"[joints.{name}] has both 'roller_radius' and 'normal'; a follower has a roller or a flat face", joint=name
+        )
+
 
 _SAMPLES = 24  # angles in a turn at which the size of a lift is sampled
+_SAMPLES_OF_CURVE = 360  # angles at which a distance is sampled, one per degree
 
 
 class Cam(Joint):
@@ -109,6 +136,45 @@ def _why_not_periodic(law: Law, led: str) -> str:
 def closing(law: Law) -> tuple[Condition, ...]:
     """Return the conditions for a law of an angle to be periodic over a turn."""
     return tuple(Condition(f"law: {key}", value, "0") for key, value in law.zeros().items())
+
+
+class CamCurve(Joint):
+    """A follower on a curve that is fixed in the cam: a law gives its distance from a pole over a turn.
+
+    Leaves define what the distance is, and where it is taken.
+    """
+
+    between: tuple[str, str]  # the pole on the cam, then a point of the follower
+    law: Law
+    distance: ClassVar[str]  # in messages
+    curve: ClassVar[str]
+
+    @property
+    def law_kinds(self) -> tuple[str, str]:
+        """Kinds of the law's output and of its input."""
+        return "length", "angle"
+
+    def bodies(self) -> tuple[str, ...]:
+        return tuple(map(body_of, self.between))
+
+    def reach(self) -> float:
+        return max(float(self.law.at(k * TURN / _SAMPLES_OF_CURVE)) for k in range(_SAMPLES_OF_CURVE))
+
+    def conditions(self) -> tuple[Condition, ...]:
+        return closing(self.law)
+
+    def check(self) -> None:
+        where = f"[joints.{self.name}]"
+        self.law.check(where)
+        why = self.law.why_not_periodic()
+        if why:
+            raise MechanismError(f"{where} law: {why}; a {self.curve} must close", joint=self.name)
+        for degrees, distance in enumerate(values_by_degree(self.law)):
+            if not distance > 0.0:
+                raise MechanismError(
+                    f"{where} law: the {self.distance} is {distance:.6g} at {degrees} deg; it must be positive",
+                    joint=self.name,
+                )
 
 
 @dataclass(frozen=True)

@@ -4,20 +4,15 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-from kinfmu.errors import MechanismError
-from kinfmu.mechanism.joints.cam import closing
-from kinfmu.mechanism.joints.follower_element import RollerRadius, check_element, roller_conditions
-from kinfmu.mechanism.joints.joint import Condition, Joint
+from kinfmu.mechanism.joints.cam import CamCurve, RollerRadius, check_element, roller_conditions
+from kinfmu.mechanism.joints.joint import Condition
 from kinfmu.mechanism.laws import Law
-from kinfmu.mechanism.laws.law import TURN, values_by_degree
 from kinfmu.mechanism.quantities.arithmetic import Value, atan2, sqrt
 from kinfmu.mechanism.quantities.placement import Placement, PointPair, body_of
 
-_SAMPLES = 360  # angles at which the radius is sampled, one per degree
-
 
 @dataclass(frozen=True)
-class CamRoller(Joint):
+class CamRoller(CamCurve):
     """A roller on a cam: the roller's centre stays on the pitch curve.
 
         Phi = |d| - f(angle of d in the cam's frame),   d = r_j + A_j s_b - r_i - A_i s_a        (1 row, scale 1)
@@ -27,6 +22,8 @@ class CamRoller(Joint):
 
     type: ClassVar[str] = "cam_roller"
     labels: ClassVar[tuple[str, ...]] = ("radius",)
+    distance: ClassVar[str] = "radius of the pitch curve"
+    curve: ClassVar[str] = "pitch curve"
 
     name: str
     between: Annotated[
@@ -40,14 +37,6 @@ class CamRoller(Joint):
     ]
     roller_radius: RollerRadius = None
 
-    @property
-    def law_kinds(self) -> tuple[str, str]:
-        """Kinds of the law's output and of its input."""
-        return "length", "angle"
-
-    def bodies(self) -> tuple[str, ...]:
-        return tuple(map(body_of, self.between))
-
     def residual(self, at: Placement) -> tuple[Value, ...]:
         law, angle = self.led_by(at)
         d_x, d_y = at.vector(self.between)
@@ -58,22 +47,9 @@ class CamRoller(Joint):
         (e_x, e_y), (n_x, n_y) = (at.direction(body_of(self.between[0]), angle) for angle in (0.0, 0.5 * math.pi))
         return self.law, atan2(n_x * d_x + n_y * d_y, e_x * d_x + e_y * d_y)
 
-    def reach(self) -> float:
-        return max(float(self.law.at(k * TURN / _SAMPLES)) for k in range(_SAMPLES))
-
     def conditions(self) -> tuple[Condition, ...]:
-        return (*closing(self.law), *roller_conditions(self.roller_radius))
+        return (*super().conditions(), *roller_conditions(self.roller_radius))
 
     def check(self) -> None:
-        where = f"[joints.{self.name}]"
-        self.law.check(where)
         check_element(self.name, self.roller_radius)
-        why = self.law.why_not_periodic()
-        if why:
-            raise MechanismError(f"{where} law: {why}; a pitch curve must close", joint=self.name)
-        for degrees, radius in enumerate(values_by_degree(self.law)):
-            if not radius > 0.0:
-                raise MechanismError(
-                    f"{where} law: the radius of the pitch curve is {radius:.6g} at {degrees} deg; it must be positive",
-                    joint=self.name,
-                )
+        super().check()

@@ -20,38 +20,20 @@ Points = Annotated[PointPair, "the two points 'body.point'"]
 MEET = 1e-9  # of the distance of the points from their bodies' origins; nearer points have no line between them
 
 
-def refuse_meeting(name: str, between: tuple[str, str], at: Placement) -> None:
-    """Raise a MechanismError if two points are in the same place: there is no line along which a load could act."""
-    d_x, d_y = at.vector(between)
-    largest = max(abs(one) for point in between for one in (*at.points[point], *at.point(point)))
-    if math.hypot(d_x, d_y) <= MEET * largest:
-        raise MechanismError(
-            f"[loads.{name}] between: {between[0]} and {between[1]} are in the same place at the start, so the force "
-            f"has no direction; move a point or the start pose",
-            load=name,
-        )
-
-
-class BetweenPoints(Load):
+class AlongLine(Load):
     """A load along the line between two points; its quantity is their distance.
 
-        s = |d|,   d = r_j + A_j s_b - r_i - A_i s_a
-
-    Leaves are springs and dampers.
+    s = |d|,   d = r_j + A_j s_b - r_i - A_i s_a
     """
 
-    columns: ClassVar[tuple[str, ...]] = ("force", "length")
     between: tuple[str, str]
 
     @property
     def needs_direction(self) -> bool:
         return True
 
-    def bodies(self) -> tuple[str, ...]:
-        return tuple(map(body_of, self.between))
-
     def acts_on(self) -> tuple[str, ...]:
-        return self.bodies()
+        return tuple(map(body_of, self.between))
 
     def measured(self, at: Placement) -> tuple[Value, ...]:
         return (DistanceBetween(self.between).value(at),)
@@ -60,7 +42,24 @@ class BetweenPoints(Load):
         return ("length",)
 
     def check_start(self, at: Placement) -> None:
-        refuse_meeting(self.name, self.between, at)
+        d_x, d_y = at.vector(self.between)
+        first, second = self.between
+        largest = max(abs(one) for point in self.between for one in (*at.points[point], *at.point(point)))
+        if math.hypot(d_x, d_y) <= MEET * largest:
+            raise MechanismError(
+                f"[loads.{self.name}] between: {first} and {second} are in the same place at the start, so the force "
+                f"has no direction; move a point or the start pose",
+                load=self.name,
+            )
+
+
+class BetweenPoints(AlongLine):
+    """A spring or a damper along the line between two points, whose force and length are results."""
+
+    columns: ClassVar[tuple[str, ...]] = ("force", "length")
+
+    def bodies(self) -> tuple[str, ...]:
+        return self.acts_on()
 
 
 @dataclass(frozen=True)
@@ -191,7 +190,7 @@ class GasSpring(BetweenPoints):
 
 
 @dataclass(frozen=True)
-class ForceBetween(Following):
+class ForceBetween(AlongLine, Following):
     """A force between two points along their line, by a law or an input; positive pushes them apart.
 
         e = f(x)   along   s = |d|,   d = r_j + A_j s_b - r_i - A_i s_a
@@ -205,19 +204,3 @@ class ForceBetween(Following):
     between: Points
     law: Annotated[Law, "the force f [N]"]
     over: Over = None
-
-    @property
-    def needs_direction(self) -> bool:
-        return True
-
-    def acts_on(self) -> tuple[str, ...]:
-        return tuple(map(body_of, self.between))
-
-    def measured(self, at: Placement) -> tuple[Value, ...]:
-        return (DistanceBetween(self.between).value(at),)
-
-    def kinds(self) -> tuple[str, ...]:
-        return ("length",)
-
-    def check_start(self, at: Placement) -> None:
-        refuse_meeting(self.name, self.between, at)

@@ -15,11 +15,25 @@ from kinfmu.mechanism.quantities.placement import BodyName, Placement, PointName
 from kinfmu.units import Force, Radians
 
 Axes = Annotated[BodyName, "the body with which the direction turns; ground: it is fixed in the world"]
-BOTH = ("length", "length")
+
+
+class AtPoint(Load):
+    """A force at a point: its quantities are the point's coordinates."""
+
+    at: str
+
+    def acts_on(self) -> tuple[str, ...]:
+        return (body_of(self.at),)
+
+    def measured(self, at: Placement) -> tuple[Value, ...]:
+        return at.point(self.at)
+
+    def kinds(self) -> tuple[str, ...]:
+        return "length", "length"
 
 
 @dataclass(frozen=True)
-class ForceAt(Load):
+class ForceAt(AtPoint):
     """A constant force at a point, such as a weight.
 
         e = A_k (f_x, f_y)   along   s = r_i + A_i s_a        (k: the body of `axes`)
@@ -38,22 +52,13 @@ class ForceAt(Load):
     def bodies(self) -> tuple[str, ...]:
         return tuple(dict.fromkeys((body_of(self.at), self.axes)))
 
-    def acts_on(self) -> tuple[str, ...]:
-        return (body_of(self.at),)
-
-    def measured(self, at: Placement) -> tuple[Value, ...]:
-        return at.point(self.at)
-
-    def kinds(self) -> tuple[str, ...]:
-        return BOTH
-
     def efforts(self, at: Placement, s: Sequence[Value], sd: Sequence[Value], x: Value) -> tuple[Value, ...]:  # noqa: ARG002
         frame = at.poses[self.axes]
         return frame.c * self.x - frame.s * self.y, frame.s * self.x + frame.c * self.y
 
 
 @dataclass(frozen=True)
-class ForceAlong(Following):
+class ForceAlong(AtPoint, Following):
     """A force at a point along a direction, by a law or an input: the gas force on a piston.
 
         e = f(x) (cos(phi_k + angle), sin(phi_k + angle))   along   s = r_i + A_i s_a        (k: the body of `axes`)
@@ -70,17 +75,8 @@ class ForceAlong(Following):
     axes: Axes = "ground"
     over: Over = None
 
-    def acts_on(self) -> tuple[str, ...]:
-        return (body_of(self.at),)
-
     def frames(self) -> tuple[str, ...]:
         return (self.axes,)
-
-    def measured(self, at: Placement) -> tuple[Value, ...]:
-        return at.point(self.at)
-
-    def kinds(self) -> tuple[str, ...]:
-        return BOTH
 
     def efforts(self, at: Placement, s: Sequence[Value], sd: Sequence[Value], x: Value) -> tuple[Value, ...]:  # noqa: ARG002
         force = self.effort(x)

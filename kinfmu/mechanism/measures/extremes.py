@@ -27,6 +27,7 @@ class Minimum(_OfQuantity):
     """The smallest value of a quantity."""
 
     type: ClassVar[str] = "minimum"
+    reads_forces: ClassVar[bool] = True
 
     def read(self, motion: Motion) -> Finding:
         low = motion.history(self.of).minimum()
@@ -38,6 +39,7 @@ class Maximum(_OfQuantity):
     """The largest value of a quantity."""
 
     type: ClassVar[str] = "maximum"
+    reads_forces: ClassVar[bool] = True
 
     def read(self, motion: Motion) -> Finding:
         high = motion.history(self.of).maximum()
@@ -52,6 +54,7 @@ class Range(_OfQuantity):
     """
 
     type: ClassVar[str] = "range"
+    reads_forces: ClassVar[bool] = True
 
     def read(self, motion: Motion) -> Finding:
         history = motion.history(self.of)
@@ -64,6 +67,7 @@ class Peak(_OfQuantity):
     """The largest size of a quantity: the peak torque of a driver, the largest force on a pin."""
 
     type: ClassVar[str] = "peak"
+    reads_forces: ClassVar[bool] = True
 
     def read(self, motion: Motion) -> Finding:
         peak = motion.history(self.of).largest_size()
@@ -75,6 +79,7 @@ class PeakSpeed(_OfQuantity):
     """The largest size of the speed of a quantity, or of a point 'body.point'."""
 
     type: ClassVar[str] = "peak_speed"
+    reads_points: ClassVar[bool] = True
 
     def read(self, motion: Motion) -> Finding:
         peak = motion.derivative(self.of, 1).largest_size()
@@ -86,6 +91,7 @@ class PeakAcceleration(_OfQuantity):
     """The largest size of the acceleration of a quantity, or of a point 'body.point'."""
 
     type: ClassVar[str] = "peak_acceleration"
+    reads_points: ClassVar[bool] = True
 
     def read(self, motion: Motion) -> Finding:
         peak = motion.derivative(self.of, 2).largest_size()

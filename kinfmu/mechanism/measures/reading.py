@@ -48,6 +48,8 @@ class Reading(ABC):
 
     type: ClassVar[str]  # its name in mechanism files
     counted_from: ClassVar[str] = ""  # what its value is a deviation from, where that is not 0
+    reads_forces: ClassVar[bool] = False  # True if `of` may be a force
+    reads_points: ClassVar[bool] = False  # True if `of` may be a point of a body
     compares_rates: ClassVar[bool] = False  # with each other: geometry, which does not depend on the driver's speed
     name: str
     begin: float | None = None

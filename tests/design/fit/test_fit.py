@@ -23,13 +23,12 @@ from kinfmu.design.fit import (
     PathTarget,
     PoseTarget,
 )
-from kinfmu.design.fit.angle_notes import angle_notes
+from kinfmu.design.fit.argument import crossings, nearest
 from kinfmu.design.fit.equations import Equations
-from kinfmu.design.fit.nearest import crossings, nearest
+from kinfmu.design.fit.fit import Found, Sameness, distinct
 from kinfmu.design.fit.outcome import Optimum
 from kinfmu.design.fit.result import result_of
-from kinfmu.design.fit.search import Found, Sameness, distinct
-from kinfmu.design.fit.text import parameter_rows
+from kinfmu.design.fit.text import angle_notes, parameter_rows
 from kinfmu.mechanism import toml_file, toml_text
 from kinfmu.mechanism.measures import Range
 from kinfmu.mechanism.parameters import Parameter

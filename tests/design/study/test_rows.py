@@ -13,8 +13,7 @@ from scipy.stats import kstest, qmc
 import kinfmu
 from kinfmu.design.study import StudyResult
 from kinfmu.design.study.definition import define
-from kinfmu.design.study.sampling import Sampling
-from kinfmu.design.study.variation import Tolerance, UniformRange
+from kinfmu.design.study.sampling import Sampling, Tolerance, UniformRange
 from kinfmu.errors import MissingPackageError, StudyError
 from kinfmu.mechanism import toml_file
 from kinfmu.mechanism.measures import Minimum, Range

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 import kinfmu
 from kinfmu.cli import main
 from kinfmu.design.study import read_study
-from kinfmu.design.study.variation import Grid, Tolerance, UniformRange
+from kinfmu.design.study.sampling import Grid, Tolerance, UniformRange
 from kinfmu.errors import KinfmuError, RequestError, StudyError
 from tests.design.study.linkage import linkage, write
 

@@ -16,8 +16,8 @@ import pytest
 
 import kinfmu
 from kinfmu.design.study import run_study
-from kinfmu.design.study.chunk import Job, run_chunk
 from kinfmu.design.study.definition import define
+from kinfmu.design.study.job import Job, run_chunk
 from kinfmu.errors import StudyError
 from tests.design.study.linkage import RANGES, linkage
 

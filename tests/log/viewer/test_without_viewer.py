@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from kinfmu.log import read
 
 BASE = (  # a process in which the packages of the extras cannot be imported

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import kinfmu.mechanism.drivers
 from kinfmu.mechanism.drivers import DRIVERS, Driver
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text
@@ -27,18 +24,6 @@ from tests.power_series import Series
 
 every_driver = pytest.mark.parametrize("cls", DRIVERS, ids=lambda cls: cls.type)
 ROUNDING = 1e-14
-
-
-def test_types_are_all_different() -> None:
-    assert len({cls.type for cls in DRIVERS}) == len(DRIVERS)
-
-
-@every_driver
-def test_a_driver_is_a_frozen_dataclass_that_is_exported_and_shows_its_equation(cls: type[Driver]) -> None:
-    assert dataclasses.is_dataclass(cls)
-    assert cls.__dataclass_params__.frozen
-    assert cls.__name__ in kinfmu.mechanism.drivers.__all__
-    assert "Phi = " in (cls.__doc__ or "")
 
 
 @every_driver

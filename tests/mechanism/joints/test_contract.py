@@ -12,7 +12,6 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-import kinfmu.mechanism.joints
 from kinfmu.arrays import FloatArray
 from kinfmu.mechanism.joints import JOINTS, CamRoller, Coupling, Joint
 from kinfmu.mechanism.quantities.placement import Reference
@@ -58,20 +57,6 @@ def closed(data: st.DataObject, cls: type[Joint], **given: st.SearchStrategy[Any
     q, gap = close(system, data.draw(poses(system)), NO_DRIVERS)
     assume(gap <= CLOSED)
     return system, q
-
-
-def test_types_are_all_different() -> None:
-    assert len({cls.type for cls in JOINTS}) == len(JOINTS)
-
-
-@every_joint
-def test_a_joint_is_a_frozen_dataclass_that_is_exported_and_shows_its_equation(cls: type[Joint]) -> None:
-    assert dataclasses.is_dataclass(cls)
-    assert dataclasses.fields(cls)[0].name == "name"
-    assert cls.__dataclass_params__.frozen  # type: ignore[attr-defined]
-    assert cls.__name__ in kinfmu.mechanism.joints.__all__
-    assert "Phi = " in (cls.__doc__ or "")
-    assert len(set(cls.labels)) == len(cls.labels) > 0
 
 
 @every_joint

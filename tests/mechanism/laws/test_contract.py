@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -17,11 +16,8 @@ import kinfmu
 import kinfmu.mechanism.laws
 from kinfmu import AngleDriver, Body, Mechanism, Revolute
 from kinfmu.errors import MechanismError
-from kinfmu.mechanism.drivers import DRIVERS
-from kinfmu.mechanism.joints import JOINTS
 from kinfmu.mechanism.laws import LAWS, RISES, Harmonic, Law, MotionSequence, Polynomial, Spline
 from kinfmu.mechanism.toml_file import parse
-from kinfmu.mechanism.toml_tables import table_keys
 from kinfmu.mechanism.toml_text import text
 from kinfmu.plan.equations.graph import Graph, evaluate
 from kinfmu.solver.python.status import Status
@@ -40,25 +36,6 @@ def driven(law: Law) -> Mechanism:
         (Revolute("O", ("ground.O", "arm.O")),),
         (AngleDriver("arm", "arm", law),),
     )
-
-
-def test_types_are_all_different() -> None:
-    assert len({cls.type for cls in LAWS}) == len(LAWS)
-
-
-@every_law
-def test_a_law_is_a_frozen_dataclass_that_is_exported_and_shows_its_equation(cls: type[Law]) -> None:
-    assert dataclasses.is_dataclass(cls)
-    assert cls.__dataclass_params__.frozen
-    assert cls.__name__ in kinfmu.mechanism.laws.__all__
-    assert cls.__name__ in kinfmu.__all__
-    assert "u = " in (cls.__doc__ or "")
-
-
-@every_law
-def test_no_key_of_a_law_is_a_key_of_a_joint_or_driver(cls: type[Law]) -> None:
-    theirs = {field.name for member in (*JOINTS, *DRIVERS) for field in dataclasses.fields(member)}  # type: ignore[arg-type]
-    assert not set(table_keys(cls)) & (theirs | {"type", "law"})
 
 
 @every_law

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from dataclasses import replace
 from typing import Any
@@ -12,15 +11,12 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-import kinfmu
-import kinfmu.mechanism.loads
 from kinfmu.mechanism import Body, Mechanism, Point
 from kinfmu.mechanism.declared import keys_of
-from kinfmu.mechanism.laws import LAWS, ConstantValue, External
+from kinfmu.mechanism.laws import ConstantValue, External
 from kinfmu.mechanism.loads import LOADS, Damper, Following, ForceAlong, ForceAt, Load, Spring, TorsionDamper
 from kinfmu.mechanism.quantities.placement import GROUND, BodyFrame, Placement
 from kinfmu.mechanism.toml_file import parse
-from kinfmu.mechanism.toml_tables import table_keys
 from kinfmu.mechanism.toml_text import text
 from kinfmu.plan.equations.graph import evaluate
 from kinfmu.plan.equations.system import placement
@@ -34,26 +30,6 @@ every_load = pytest.mark.parametrize("cls", LOADS, ids=lambda cls: cls.type)
 every_pair = pytest.mark.parametrize("cls", [cls for cls in LOADS if cls not in AT_A_POINT], ids=lambda cls: cls.type)
 poses = st.lists(coordinates, min_size=9, max_size=9).map(np.array)
 ROUNDING = 1e-12
-
-
-def test_types_are_all_different() -> None:
-    assert len({cls.type for cls in LOADS}) == len(LOADS)
-
-
-@every_load
-def test_a_load_is_a_frozen_dataclass_that_is_exported_and_shows_its_equation(cls: type[Load]) -> None:
-    assert dataclasses.is_dataclass(cls)
-    assert dataclasses.fields(cls)[0].name == "name"
-    assert cls.__dataclass_params__.frozen
-    assert cls.__name__ in kinfmu.mechanism.loads.__all__
-    assert cls.__name__ in kinfmu.__all__
-    assert "\n        e = " in (cls.__doc__ or "")
-
-
-@every_load
-def test_no_key_of_a_law_is_a_key_of_a_load(cls: type[Load]) -> None:
-    laws = {key for law in LAWS for key in table_keys(law)}
-    assert not laws & set(table_keys(cls))
 
 
 @every_load

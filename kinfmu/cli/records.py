@@ -1,4 +1,4 @@
-"""kinfmu review: show runs in the Rerun viewer."""
+"""kinfmu review: show runs in the Rerun viewer; kinfmu recover: the samples of a killed run as a complete record."""
 
 from __future__ import annotations
 
@@ -7,14 +7,38 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kinfmu.cli.arguments import InputFile, OutputFile
-from kinfmu.cli.group import main
-from kinfmu.cli.messages import note
-from kinfmu.cli.quantities import on_axis
+from kinfmu.cli.arguments import InputFile, OutputFile, on_axis
+from kinfmu.cli.group import main, note
 from kinfmu.errors import listed
 
 if TYPE_CHECKING:
     from kinfmu.log.viewer.timeline import Timeline
+
+
+@main.command(epilog="Example: kinfmu recover logs/crank_rocker.mcap")
+@click.argument("run", type=InputFile())
+@click.option(
+    "-o",
+    "output",
+    type=OutputFile(".mcap"),
+    help="The record to write; default: <RUN>-recovered.mcap in the folder of RUN.",
+)
+def recover(run: Path, output: Path | None) -> None:
+    """Write the samples of a killed run as a complete record.
+
+    RUN is a truncated or damaged record (.mcap). It is not changed.
+    """
+    from kinfmu.cli.group import printable
+    from kinfmu.log import recover as recovered
+    from kinfmu.run.axis import axis_of
+    from kinfmu.run.verdict import sentence
+
+    target = output or run.with_name(f"{run.stem}-recovered.mcap")
+    found = recovered(run, target)
+    for event in found.events[-1:]:
+        if event.level == "warning":
+            click.echo(printable(f"at {axis_of(found).place(event.t)}: {event.text}"))
+    click.echo(f"{sentence(found)}; written to {target}")
 
 
 @main.command(epilog="Example: kinfmu review logs/crank_rocker.mcap --screenshot run.png --at 0.5")
