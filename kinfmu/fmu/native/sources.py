@@ -10,11 +10,8 @@ from pathlib import Path
 from types import MappingProxyType
 
 from kinfmu.codegen.c import compiler, emit
-from kinfmu.codegen.c.dormand_prince import dormand_prince
-from kinfmu.codegen.c.forces import emit_forces
 from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
-from kinfmu.codegen.forces import STAGES, places_of_symbols
-from kinfmu.codegen.python.forces import solves
+from kinfmu.codegen.forces import STAGES, emit_c_forces, places_of_symbols, solves
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.errors import MissingPackageError
 from kinfmu.fmu import dormand_prince as pair
@@ -25,8 +22,8 @@ from kinfmu.fmu.owned_motion import units_in_si
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.led_laws import LedLaws
-from kinfmu.plan.meeting import distance_steps, meeting_messages
 from kinfmu.plan.trace import parameter_symbol
+from kinfmu.plan.undetermined import distance_steps, meeting_messages
 
 RUNTIME = Path(__file__).with_name("runtime")
 _NO_VARIABLE = "0xfffffffeu"
@@ -91,21 +88,21 @@ def sources(
     }
     if inertia is not None:
         instance["inertia.c"] = "\n".join(
-            [emit_forces(plan, inertia, "inertia"), *array("double kf_in_si", units_in_si(plan)), ""]
+            [emit_c_forces(plan, inertia, "inertia"), *array("double kf_in_si", units_in_si(plan)), ""]
         )
         counts = laws.counts if laws else ()
         instance["laws.h"] = _laws_header(counts)
         if laws and counts:
-            instance["laws.c"] = emit_forces(plan, laws.steps, "laws")
-        instance["dormand_prince.h"] = dormand_prince(pair.C, pair.A, b=pair.B, e3=pair.E3, e5=pair.E5)
+            instance["laws.c"] = emit_c_forces(plan, laws.steps, "laws")
+        instance["dormand_prince.h"] = _dormand_prince()
     if forces:
         if any(map(solves, forces.values())):
             instance |= compiler.sources(["solutions.c"])
-        instance |= {f"{stage}.c": emit_forces(plan, steps, stage) for stage, steps in forces.items()}
+        instance |= {f"{stage}.c": emit_c_forces(plan, steps, stage) for stage, steps in forces.items()}
         distances = distance_steps(plan)
         if distances.results:
             messages = [string(message) for message in meeting_messages(plan, distances)]
-            lines = [emit_forces(plan, distances, "distances"), *array("char *const kf_meeting", messages), ""]
+            lines = [emit_c_forces(plan, distances, "distances"), *array("char *const kf_meeting", messages), ""]
             instance["distances.c"] = "\n".join(lines)
     tables = {"interface.h": _header(plan, variables, version, token), "interface.c": _tables(variables)}
     tables |= {"step.c": _step(version, motion), "events.c": _events(plan, owns=inertia is not None)}
@@ -125,6 +122,23 @@ def _laws_header(counts: Sequence[int]) -> str:
     if counts:
         lines.append(f"#define KF_LAW_NUMBERS {sum(counts) + 4 * len(counts)}")
         lines += array("static int kf_law_breaks", counts)
+    return "\n".join([*lines, "", "#endif", ""])
+
+
+def _dormand_prince() -> str:
+    """Return dormand_prince.h: the coefficients of the integrator."""
+    count = len(pair.C)
+    lines = [
+        "/* Dormand and Prince, order 8 with error estimates of orders 5 and 3: generated from a table. */",
+        "#ifndef KF_DORMAND_PRINCE_H",
+        "#define KF_DORMAND_PRINCE_H",
+        "",
+        f"#define KF_STAGES {count} /* the derivatives at the end of the step follow */",
+        *array("static double kf_dp_c", pair.C),
+        *array("static double kf_dp_a", [value for row in pair.A for value in (*row, *(0.0,) * (count - len(row)))]),
+    ]
+    for name, row in {"b": pair.B, "e3": pair.E3, "e5": pair.E5}.items():
+        lines += array(f"static double kf_dp_{name}", row[:count])
     return "\n".join([*lines, "", "#endif", ""])
 
 
