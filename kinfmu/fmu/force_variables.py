@@ -13,8 +13,7 @@ from kinfmu.mechanism.joints import CamFlatFace, CamOscillating, CamRoller, CamT
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.equations.graph import Node, symbols
 from kinfmu.plan.forces import ForceSteps, force_names, force_steps
-from kinfmu.plan.reactions import reaction_names_of, reaction_steps
-from kinfmu.plan.shaking import shaking_steps
+from kinfmu.plan.reactions import reaction_names_of, reaction_steps, shaking_steps
 from kinfmu.plan.steps import Assignment, derivative_name, law_symbol
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.plan.undetermined import shared_reactions, unknown_contacts, why_unknown

@@ -25,10 +25,8 @@ from importlib.metadata import distribution
 from importlib.resources import files
 from types import MappingProxyType
 
-from kinfmu.codegen.forces import STAGES
+from kinfmu.codegen.forces import STAGES, emit_jumps, emit_python_forces, solves
 from kinfmu.codegen.python import emit
-from kinfmu.codegen.python.forces import emit_forces, solves
-from kinfmu.codegen.python.jumps import emit_jumps
 from kinfmu.codegen.python.stage import has_roots
 from kinfmu.errors import FmuError
 from kinfmu.fmu import description
@@ -42,7 +40,7 @@ from kinfmu.mechanism import toml_text
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.efforts import units_in_si
 from kinfmu.plan.forces import ForceSteps
-from kinfmu.plan.meeting import distance_steps, meeting_messages
+from kinfmu.plan.undetermined import distance_steps, meeting_messages
 
 CAPABILITIES = {
     "needsExecutionTool": True,  # Python, in the process of the host
@@ -132,10 +130,12 @@ def archive(
     meets = bool(forces and distances.results)
     contents = _contents(plan, variables, version, in_si, meets=meets)
     stages = dict(forces) | ({"inertia": owned.inertia} if owned else {})
-    contents |= {f"kinfmu/solver/{stage}.py": emit_forces(plan, steps).encode() for stage, steps in stages.items()}
+    contents |= {
+        f"kinfmu/solver/{stage}.py": emit_python_forces(plan, steps).encode() for stage, steps in stages.items()
+    }
     if meets:
         stages["distances"] = distances
-        text = f"{emit_forces(plan, distances)}\n\nMEETING = {meeting_messages(plan, distances)!r}\n"
+        text = f"{emit_python_forces(plan, distances)}\n\nMEETING = {meeting_messages(plan, distances)!r}\n"
         contents["kinfmu/solver/distances.py"] = text.encode()
     if any(map(has_roots, (*stages.values(), *([owned.laws.steps] if owned else [])))):
         contents["kinfmu/solver/roots.py"] = files("kinfmu.codegen.python").joinpath("roots.py").read_bytes()
@@ -143,7 +143,7 @@ def archive(
         contents["kinfmu/solver/solutions.py"] = files("kinfmu.codegen.python").joinpath("solutions.py").read_bytes()
     if owned:
         contents["kinfmu/solver/jumps.py"] = emit_jumps(plan).encode()
-        laws = f"{emit_forces(plan, owned.laws.steps)}\n\nCOUNTS = {owned.laws.counts!r}\n"
+        laws = f"{emit_python_forces(plan, owned.laws.steps)}\n\nCOUNTS = {owned.laws.counts!r}\n"
         contents["kinfmu/solver/laws.py"] = laws.encode()
         contents |= _modules("kinfmu.solver.python.torque", "kinfmu/solver/torque")
     else:

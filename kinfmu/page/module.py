@@ -14,17 +14,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from kinfmu.codegen.c import compiler, emit
-from kinfmu.codegen.c.forces import SIGNATURE, emit_forces
 from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
-from kinfmu.codegen.forces import load_inputs
-from kinfmu.codegen.python.forces import solves
+from kinfmu.codegen.forces import SIGNATURE, emit_c_forces, load_inputs, solves
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import reaction_names_of, shaking_names
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.forces import ForceSteps, force_names, force_steps, loaded_coordinates
-from kinfmu.plan.reactions import reaction_steps
-from kinfmu.plan.shaking import shaking_steps
+from kinfmu.plan.reactions import reaction_steps, shaking_steps
 from kinfmu.plan.trace import Tracer, parameter_symbol
 from kinfmu.plan.undetermined import undetermined_reactions
 
@@ -122,7 +119,7 @@ def page_sources(plan: SolvePlan, points: Sequence[str], labels: Mapping[str, st
         files |= compiler.sources(["solutions.c"])
     lines = ["/* The whole module as one unit. Files included here are not compiled separately. */"]
     lines += [f'#include "{name}"' for name in sorted(files) if name.endswith(".c")]
-    files |= {f"{stage}.c": emit_forces(plan, steps, stage, are_loads_open=False) for stage, steps in stages.items()}
+    files |= {f"{stage}.c": emit_c_forces(plan, steps, stage, are_loads_open=False) for stage, steps in stages.items()}
     return files | {"page.c": "\n".join(lines) + "\n"}
 
 

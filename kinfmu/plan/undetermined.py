@@ -1,4 +1,8 @@
-"""Reactions without a value: redundant rows share their load, or they carry the unknown contact force of a cam."""
+"""Forces without a value.
+
+Reactions: redundant rows share their load, or they carry the unknown contact force of a cam. Loads along the line
+between two points: where these are in the same place, the load has no direction.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +11,16 @@ import numpy as np
 from kinfmu.arrays import FloatArray
 from kinfmu.mechanism.force_names import reaction_names_of
 from kinfmu.mechanism.joints.cam import Cam
-from kinfmu.plan.contacts import follower_of, known_contacts, supports
 from kinfmu.plan.equations.closing import motion_samples, null_space
 from kinfmu.plan.equations.part import Part
 from kinfmu.plan.equations.system import System
+from kinfmu.plan.forces import ForceSteps
+from kinfmu.plan.mechanics import Mechanics
 from kinfmu.plan.origin import localized
 from kinfmu.plan.plan import SolvePlan
-from kinfmu.units import ForceName
+from kinfmu.plan.reactions import follower_of, known_contacts, supports
+from kinfmu.plan.steps import needed_steps
+from kinfmu.units import ForceName, Quantity
 
 _POSES = 4  # of the motion, as a row may happen to carry nothing at a single pose
 _CARRIES = 1e-7  # weight of a row in a balance of unit size from which on it takes part
@@ -100,3 +107,27 @@ def _pushes(system: System, cam: Cam, pose: FloatArray) -> FloatArray:
             x, y, _ = pose[k : k + 3] / system.size
             pushes[:, k : k + 3] = sense * np.array([[1.0, 0.0, y], [0.0, 1.0, -x], [0.0, 0.0, 1.0]])
     return pushes
+
+
+def distance_steps(plan: SolvePlan) -> ForceSteps:
+    """Return the steps to the distances [m] between the ends of loads that need a direction; 0: they have none.
+
+    Args:
+        plan: The plan, as `Mechanics` takes it.
+
+    """
+    mechanics = Mechanics(plan, coefficients="given")
+    loads = [load for load in mechanics.members.loads if load.needs_direction]
+    nodes = [node for load in loads for node in mechanics.measured(load)]
+    names = tuple(ForceName(load.name, "distance", Quantity("length")) for load in loads)
+    return ForceSteps(needed_steps(nodes, mechanics.steps), names, nodes)
+
+
+def meeting_messages(plan: SolvePlan, steps: ForceSteps) -> tuple[str, ...]:
+    """Return what is reported where the distance is 0, for each load of `distance_steps`."""
+    types = {load.name: load.type.replace("_", " ") for load in plan.mechanism.loads}
+    return tuple(
+        f"forces have no value: the ends of {types[name.owner]} '{name.owner}' are in the same place, "
+        f"so that it has no direction"
+        for name in steps.names
+    )

@@ -15,13 +15,11 @@ from kinfmu.codegen.python.stage import CompiledStage, load_stage
 from kinfmu.mechanism.force_names import shaking_names
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.forces import force_names, force_steps, loaded_coordinates
-from kinfmu.plan.meeting import distance_steps, meeting_messages
 from kinfmu.plan.origin import localized
-from kinfmu.plan.reactions import reaction_names_of, reaction_steps
-from kinfmu.plan.shaking import shaking_steps
+from kinfmu.plan.reactions import reaction_names_of, reaction_steps, shaking_steps
 from kinfmu.plan.steps import derivative_name, law_symbol
 from kinfmu.plan.trace import parameter_symbol
-from kinfmu.plan.undetermined import undetermined_reactions
+from kinfmu.plan.undetermined import distance_steps, meeting_messages, undetermined_reactions
 from kinfmu.run import Run
 from kinfmu.run.arguments import Setting
 from kinfmu.run.designs import Solvable

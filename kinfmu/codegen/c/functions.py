@@ -12,8 +12,7 @@ from collections.abc import Iterable, Sequence
 from kinfmu.codegen.c.stage_cache import StageCache
 from kinfmu.codegen.c.text import FUNCTIONS, array, function, repeated, string
 from kinfmu.codegen.c.units import Units
-from kinfmu.codegen.kinds import UnitRun
-from kinfmu.codegen.lists import LISTS, Lists
+from kinfmu.codegen.lists import LISTS, Lists, UnitRun
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.equations.graph import Node

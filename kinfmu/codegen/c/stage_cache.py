@@ -12,8 +12,7 @@ from functools import cached_property
 from itertools import accumulate
 from typing import Protocol
 
-from kinfmu.codegen.kinds import UnitRun
-from kinfmu.codegen.lists import Lists
+from kinfmu.codegen.lists import Lists, UnitRun
 from kinfmu.plan.equations.graph import Node
 
 

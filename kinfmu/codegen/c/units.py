@@ -14,8 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from kinfmu.codegen.c.text import FUNCTIONS, function, indented
-from kinfmu.codegen.kinds import Kind, UnitRun, positions
-from kinfmu.codegen.lists import LISTS
+from kinfmu.codegen.lists import LISTS, Kind, UnitRun, positions
 from kinfmu.codegen.newton import (
     ITERATIONS,
     before_newton,

@@ -11,8 +11,7 @@ from collections.abc import Collection, Iterable, Sequence
 
 from kinfmu.codegen.c.text import assigned, declared
 from kinfmu.codegen.c.units import places, row_type
-from kinfmu.codegen.kinds import Kind, positions
-from kinfmu.codegen.lists import LISTS
+from kinfmu.codegen.lists import LISTS, Kind, positions
 from kinfmu.codegen.newton import (
     before_newton,
     determinant,

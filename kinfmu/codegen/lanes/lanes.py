@@ -13,9 +13,8 @@ from kinfmu.codegen.c.functions import block_of, index
 from kinfmu.codegen.c.stage_cache import StageCache
 from kinfmu.codegen.c.text import array, indented, repeated
 from kinfmu.codegen.c.units import rows_of
-from kinfmu.codegen.kinds import Kind
 from kinfmu.codegen.lanes.lane_units import LISTED, VECTORS, LaneUnit, is_turned, through
-from kinfmu.codegen.lists import LISTS, Lists
+from kinfmu.codegen.lists import LISTS, Kind, Lists
 from kinfmu.codegen.newton import is_small
 from kinfmu.codegen.writer import Names, Writer
 from kinfmu.plan import SolvePlan

@@ -20,7 +20,7 @@ from kinfmu.codegen.writer import identifier
 from kinfmu.errors import KinfmuError
 from kinfmu.plan.steps import LinearSolve
 
-HEADERS = ("stage.h", "stream.h", "vectors.h")
+HEADERS = ("stream.h", "vectors.h", "sincos.h")  # of the run time
 FUNCTIONS = {"sin": "kf_sin_lane", "cos": "kf_cos_lane", "atan2": "kf_atan2"}
 LINE = 8  # numbers in a line of the caches
 ITEM = 8  # [bytes] of a number
@@ -177,8 +177,8 @@ def load_native_stage(stage: CompiledStage) -> Callable[[Sequence[Given], FloatA
         CompilerError: There is no compiler, or it fails.
 
     """
-    texts = {name: (Path(__file__).parent / name).read_text("utf-8") for name in HEADERS}
-    files = {"evaluate.c": stage_source(stage)} | texts | compiler.sources(("sincos.h",))
+    head = Path(__file__).with_name("stage.h").read_text("utf-8")
+    files = {"evaluate.c": stage_source(stage), "stage.h": head} | compiler.sources(HEADERS)
     if stage_curves(stage.steps):
         files |= compiler.sources(("curve.h", "curve.c"))
     evaluate = compiler.load(files, compiler.VECTORIZED).kf_evaluate

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from kinfmu.codegen.kinds import UnitRun
-from kinfmu.codegen.lists import LISTS, Lists
+from kinfmu.codegen.lists import LISTS, Lists, UnitRun
 from kinfmu.codegen.newton import ROUND_OFF
 from kinfmu.codegen.python.block_code import indented, tupled
 from kinfmu.codegen.python.header import bound, curve_names, differences, drive, header, law_steps

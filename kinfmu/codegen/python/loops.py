@@ -16,8 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from kinfmu.codegen.kinds import Kind, positions
-from kinfmu.codegen.lists import LISTS
+from kinfmu.codegen.lists import LISTS, Kind, positions
 from kinfmu.codegen.newton import jacobian_text
 from kinfmu.codegen.python.block_code import (
     assigned_lines,

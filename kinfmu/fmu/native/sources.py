@@ -3,33 +3,31 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from itertools import accumulate
 from pathlib import Path
 from types import MappingProxyType
 
 from kinfmu.codegen.c import compiler, emit
-from kinfmu.codegen.c.dormand_prince import dormand_prince
-from kinfmu.codegen.c.forces import emit_forces
 from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
-from kinfmu.codegen.forces import STAGES, places_of_symbols
-from kinfmu.codegen.python.forces import solves
+from kinfmu.codegen.forces import STAGES, emit_c_forces, places_of_symbols, solves
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.errors import MissingPackageError
 from kinfmu.fmu.estimated_rates import Rates
-from kinfmu.fmu.interface import Interface
+from kinfmu.fmu.interface import Interface, Variable
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.efforts import units_in_si
 from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.led_laws import LedLaws
-from kinfmu.plan.meeting import distance_steps, meeting_messages
 from kinfmu.plan.trace import parameter_symbol
+from kinfmu.plan.undetermined import distance_steps, meeting_messages
 from kinfmu.solver.python.torque import dormand_prince as pair
 
 RUNTIME = Path(__file__).with_name("runtime")
 _NO_VARIABLE = "0xfffffffeu"
+_NOT_REAL_BIT = "0x80000000u"
 NOT_REAL = ("counts", "ok", "drive", "rate_source", "message", "time")  # parts after those of Real variables
 HEADERS = {
     "2.0": ("fmi2TypesPlatform.h", "fmi2FunctionTypes.h", "fmi2Functions.h"),
@@ -42,7 +40,6 @@ _STEP = (
     "pose.c",
     "trusted_step.c",
     "solver.c",
-    "drive.c",
     "requested_pose.c",
     "stepping.c",
     "time_derivatives.c",
@@ -55,12 +52,9 @@ _HINTS = (  # in short steps, vector loads of values just stored stall, and bran
     '#pragma GCC optimize("no-tree-vectorize", "no-tree-slp-vectorize", "no-if-conversion")',
     "#endif",
 )
-_OF_FORCES = re.compile(r"^#if KF_FORCES\n.*?^#endif\n", re.DOTALL | re.MULTILINE)  # left out where there are none
-_BY_OWNER = re.compile(
-    r"^#if (?P<negated>!)?KF_TORQUE\n(?P<first>.*?)(?:^#else\n(?P<second>.*?))?^#endif\n", re.DOTALL | re.MULTILINE
-)
-_OF_TORQUE = ("equation_of_motion.c", "limits.c", "breaks.c", "torque.c")
-_HEADER_OF_TORQUE = "torque.h"
+_BY_INPUTS = ("drive.c", "motion_by_inputs.c")  # what implements motion.h, of which an FMU has one or the other
+_BY_EFFORTS = ("equation_of_motion.c", "limits.c", "breaks.c", "torque.c", "motion_by_efforts.c")
+_HEADERS_OF = {_BY_INPUTS: "drive.h", _BY_EFFORTS: "torque.h"}
 _OTHER_VERSION = {"2.0": "fmi3.c", "3.0": "fmi2.c"}
 
 
@@ -85,36 +79,33 @@ def sources(
         laws: Laws over quantities with breaks, at which it restarts its integrator.
 
     """
-    owns = inertia is not None
-    instance = {file.name: file.read_text("utf-8") for file in sorted(RUNTIME.iterdir()) if file.suffix in (".c", ".h")}
-    instance = {name: _chosen(text, owns=owns) for name, text in instance.items()}
-    del instance[_OTHER_VERSION[version]]
-    if inertia is None:
-        for name in (*_OF_TORQUE, _HEADER_OF_TORQUE):
-            del instance[name]
-    else:
+    motion, other = (_BY_INPUTS, _BY_EFFORTS) if inertia is None else (_BY_EFFORTS, _BY_INPUTS)
+    left_out = {_OTHER_VERSION[version], *other, _HEADERS_OF[other]}
+    instance = {
+        file.name: file.read_text("utf-8")
+        for file in sorted(RUNTIME.iterdir())
+        if file.suffix in (".c", ".h") and file.name not in left_out
+    }
+    if inertia is not None:
         instance["inertia.c"] = "\n".join(
-            [emit_forces(plan, inertia, "inertia"), *array("double kf_in_si", units_in_si(plan)), ""]
+            [emit_c_forces(plan, inertia, "inertia"), *array("double kf_in_si", units_in_si(plan)), ""]
         )
         counts = laws.counts if laws else ()
         instance["laws.h"] = _laws_header(counts)
         if laws and counts:
-            instance["laws.c"] = emit_forces(plan, laws.steps, "laws")
-        instance["dormand_prince.h"] = dormand_prince(pair.C, pair.A, b=pair.B, e3=pair.E3, e5=pair.E5)
-    if not (forces or owns):
-        del instance["forces_at.c"]
-        instance = {name: _OF_FORCES.sub("", text) for name, text in instance.items()}
-    else:
+            instance["laws.c"] = emit_c_forces(plan, laws.steps, "laws")
+        instance["dormand_prince.h"] = _dormand_prince()
+    if forces:
         if any(map(solves, forces.values())):
             instance |= compiler.sources(["solutions.c"])
-        instance |= {f"{stage}.c": emit_forces(plan, steps, stage) for stage, steps in forces.items()}
+        instance |= {f"{stage}.c": emit_c_forces(plan, steps, stage) for stage, steps in forces.items()}
         distances = distance_steps(plan)
-        if forces and distances.results:
+        if distances.results:
             messages = [string(message) for message in meeting_messages(plan, distances)]
-            lines = [emit_forces(plan, distances, "distances"), *array("char *const kf_meeting", messages), ""]
+            lines = [emit_c_forces(plan, distances, "distances"), *array("char *const kf_meeting", messages), ""]
             instance["distances.c"] = "\n".join(lines)
     tables = {"interface.h": _header(plan, variables, version, token), "interface.c": _tables(variables)}
-    tables |= {"step.c": _step(version, owns=owns), "events.c": _events(plan, owns=owns)}
+    tables |= {"step.c": _step(version, motion), "events.c": _events(plan, owns=inertia is not None)}
     files = emit(plan) | compiler.sources(compiler.SOLVER) | instance | tables
     return dict(sorted(_prefixed(files, version).items()))
 
@@ -134,21 +125,28 @@ def _laws_header(counts: Sequence[int]) -> str:
     return "\n".join([*lines, "", "#endif", ""])
 
 
-def _chosen(text: str, *, owns: bool) -> str:
-    """Return a file of the runtime with the lines for an FMU that owns the motion of its drivers, or for any other."""
+def _dormand_prince() -> str:
+    """Return dormand_prince.h: the coefficients of the integrator."""
+    count = len(pair.C)
+    lines = [
+        "/* Dormand and Prince, order 8 with error estimates of orders 5 and 3: generated from a table. */",
+        "#ifndef KF_DORMAND_PRINCE_H",
+        "#define KF_DORMAND_PRINCE_H",
+        "",
+        f"#define KF_STAGES {count} /* the derivatives at the end of the step follow */",
+        *array("static double kf_dp_c", pair.C),
+        *array("static double kf_dp_a", [value for row in pair.A for value in (*row, *(0.0,) * (count - len(row)))]),
+    ]
+    for name, row in {"b": pair.B, "e3": pair.E3, "e5": pair.E5}.items():
+        lines += array(f"static double kf_dp_{name}", row[:count])
+    return "\n".join([*lines, "", "#endif", ""])
 
-    def choice(match: re.Match[str]) -> str:
-        yes, no = match["first"], match["second"] or ""
-        return yes if (match["negated"] is None) == owns else no
 
-    return _BY_OWNER.sub(choice, text)
-
-
-def _step(version: str, *, owns: bool = False) -> str:
+def _step(version: str, motion: Sequence[str]) -> str:
     """Return step.c, which joins the files that a step uses, so that the compiler can inline small functions."""
     lines = ["/* The functions of set, step and get as one unit. Files included here are not compiled separately. */"]
     lines += _HINTS
-    lines += [f'#include "{name}"' for name in (*_STEP, *(_OF_TORQUE if owns else ()), f"fmi{version[0]}.c")]
+    lines += [f'#include "{name}"' for name in (*_STEP[:5], *motion, *_STEP[5:], f"fmi{version[0]}.c")]
     return "\n".join(lines) + "\n"
 
 
@@ -178,22 +176,13 @@ def headers(version: str) -> dict[str, str]:
 def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> str:
     """Return interface.h: numbers and places of the variables."""
     references = variables.value_references()
-    names = [part.name for part in variables.parts if part.name not in NOT_REAL]
-    real = sum(len(variables.part(name)) for name in names)
+    parts = _real_parts(variables)
+    counts = {name: len(members) for name, members in parts.items()}
+    states = 2 * len(plan.drivers) if "states" in parts else 0
+    inputs = len(plan.drivers) + len(variables.inputs("loads")) if states else counts["inputs"]
+    aliases = {"INPUTS": "STATES", "DRIVEN": "STATES", "MOVERS": "EFFORTS"} if states else {"MOVERS": "INPUTS"}
+    meeting = len(distance_steps(plan).results) if any(counts[stage] for stage in STAGES) else 0
     words = _WORDS[version]
-    counts = {stage: len(variables.part(stage)) for stage in STAGES}
-    owns = bool(variables.part("states"))
-    total = sum(counts.values()) or int(owns)
-    forces = [f"#define KF_FORCES {total} /* of all stages */"]
-    forces += [f"#define KF_STAGE_{stage.upper()} {count}" for stage, count in counts.items()]
-    loads = len(variables.part("loads"))
-    forces += [f"#define KF_LOADS {loads} /* efforts of external loads, then constants of the laws of loads */"]
-    forces += [f"#define KF_LOAD_INPUTS {len(variables.inputs('loads'))}"]
-    meeting = len(distance_steps(plan).results) if sum(counts.values()) else 0
-    forces += [f"#define KF_MEETING {meeting} /* loads between points that may meet */"] if total else []
-    forces += ["#define KF_PART_INPUTS KF_PART_STATES"] if owns else []
-    forces = [*forces, ""] if total else []
-    bits, not_real = ("unsigned", 1 << 31) if forces else ("unsigned short", 1 << 15)
     lines = [
         f"/* Variables of the FMU of {variables.name}: generated from its mechanism, not to be edited. */",
         "#ifndef KF_INTERFACE_H",
@@ -203,13 +192,21 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
         "",
         f"#define KF_TOKEN {string(token)}",
         f"#define KF_VARIABLES {len(references)}",
-        f"#define KF_REALS {real} /* they come first; value references count all variables from 1 */",
+        f"#define KF_REALS {sum(counts.values())} /* they come first; value references count all variables from 1 */",
         "",
         "/* Parts: variables that are computed together and are neighbours. */",
         "enum {",
-        *(f"    KF_PART_{name.upper()}," for name in names),
-        "    KF_PARTS",
+        *(f"    KF_PART_{name.upper()}," for name in parts),
+        "    KF_PARTS,",
+        *(f"    KF_PART_{name} = KF_PART_{other}," for name, other in aliases.items()),
         "};",
+        "",
+        f"#define KF_STATES {states} /* of model exchange */",
+        f"#define KF_INPUTS {inputs} /* whose derivatives a step can follow */",
+        *(f"#define KF_STAGE_{stage.upper()} {counts[stage]}" for stage in STAGES),
+        f"#define KF_LOADS {counts['loads']} /* efforts of external loads, then constants of the laws of loads */",
+        f"#define KF_LOAD_INPUTS {len(variables.inputs('loads'))}",
+        f"#define KF_MEETING {meeting} /* loads between points that may meet */",
         "",
         f"#define KF_STATUS {references['solver.status']}",
         f"#define KF_ITERATIONS {references['solver.iterations']}",
@@ -225,12 +222,11 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
         f'#define KF_ENUMERATION_WORD "{words[1]}"',
         f'#define KF_ITERATIONS_WORD "{words[2]}"',
         "",
-        *forces,
         "extern const char *const kf_variable_names[KF_VARIABLES];",
-        *array("static int kf_part_first", [0, *accumulate(len(variables.part(name)) for name in names)]),
+        *array("static int kf_part_first", [0, *accumulate(counts.values())]),
         "extern const unsigned char kf_part_of[KF_REALS];",
-        f"#define KF_NOT_REAL {not_real:#x}u",
-        f"extern const {bits} kf_bit_of[KF_VARIABLES + 1]; /* 1 << kf_part_of, or KF_NOT_REAL */",
+        f"#define KF_NOT_REAL {_NOT_REAL_BIT}",
+        "extern const unsigned kf_bit_of[KF_VARIABLES + 1]; /* 1 << kf_part_of, or KF_NOT_REAL */",
         "extern const double kf_real_starts[KF_REALS];",
         "extern const bool kf_real_is_positive[KF_REALS];",
         "extern const bool kf_driven_by_time_start;",
@@ -244,13 +240,11 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
 
 def _tables(variables: Interface) -> str:
     """Return interface.c: names, start values and limits of the variables."""
-    parts = [part for part in variables.parts if part.name not in NOT_REAL]
-    real = [variable for part in parts for variable in part.variables]
+    parts = _real_parts(variables)
+    real = [variable for members in parts.values() for variable in members]
     drives = [variable.start for variable in variables.part("drive")] or [False]
     rates = [variable.start for variable in variables.part("rate_source")] or [Rates.WIRED]
-    place = _numbers(len(part.variables) for part in parts)
-    has_forces = any(variables.part(stage) for stage in (*STAGES, "states"))
-    bits, not_real = ("unsigned", "0x80000000u") if has_forces else ("unsigned short", 1 << 15)
+    place = [number for number, members in enumerate(parts.values()) for _ in members]
     positive = [v.causality == "parameter" and v.minimum is not None and v.minimum >= 0.0 for v in real]
     lines = [
         f"/* Variables of the FMU of {variables.name}: generated from its mechanism, not to be edited. */",
@@ -258,7 +252,9 @@ def _tables(variables: Interface) -> str:
         "",
         *array("char *const kf_variable_names", [string(variable.name) for variable in variables]),
         *array("unsigned char kf_part_of", place),
-        *array(f"{bits} kf_bit_of", [1 << k for k in place] + [not_real] * (len(list(variables)) - len(real) + 1)),
+        *array(
+            "unsigned kf_bit_of", [1 << k for k in place] + [_NOT_REAL_BIT] * (len(list(variables)) - len(real) + 1)
+        ),
         *array("double kf_real_starts", [float(variable.start or 0.0) for variable in real]),
         *array("bool kf_real_is_positive", booleans(positive)),
         f"const bool kf_driven_by_time_start = {'true' if drives[0] else 'false'};",
@@ -268,9 +264,10 @@ def _tables(variables: Interface) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _numbers(counts: Iterable[int]) -> list[int]:
-    """Return as many 0 as the first count, as many 1 as the second, and so on."""
-    return [number for number, count in enumerate(counts) for _ in range(count)]
+def _real_parts(variables: Interface) -> dict[str, Sequence[Variable]]:
+    """Return the Real variables by part; the parts of forces are empty where no force is an output."""
+    parts = {part.name: part.variables for part in variables.parts if part.name not in NOT_REAL}
+    return parts | {name: () for name in ("loads", *STAGES) if name not in parts}
 
 
 def _events(plan: SolvePlan, *, owns: bool) -> str:

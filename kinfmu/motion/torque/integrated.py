@@ -7,8 +7,8 @@ from itertools import pairwise
 from math import inf, nan
 from typing import NamedTuple
 
+from kinfmu.codegen.forces import load_forces
 from kinfmu.codegen.python import load_model
-from kinfmu.codegen.python.forces import load_forces
 from kinfmu.errors import RequestError, listed
 from kinfmu.motion.torque.efforts import Efforts
 from kinfmu.motion.torque.radau import Radau

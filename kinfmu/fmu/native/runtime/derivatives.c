@@ -17,17 +17,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define STEP 2e-3    /* [rad, sizes], far from singular points: rounding and truncation errors are both near 1e-13 */
 #define SMALLEST 0.1 /* margin below which the step is reduced by its square, since curvature grows so near singular points */
-#define TRIES 12     /* halvings of the step where a trial has no solution */
 
-static const double weights[3] = {45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0};
-
-/* A direction: of the drivers, of the parameters. */
-typedef struct {
-    double du[KF_DRIVERS], dv[KF_DRIVERS], da[KF_DRIVERS];
-} kf_direction;
-
+const double kf_sixth_order[3] = {45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0};
 static const double at_rest[KF_DRIVERS];
 
 /* rates += R(v) */
@@ -42,7 +34,7 @@ static void add_rates(kf_state *s, const double *v, double *rates)
 }
 
 /* The largest rate of a driver, over its reach. */
-static double largest_rate(const double *v)
+double kf_largest_rate(const double *v)
 {
     double largest = 0.0;
     int k;
@@ -52,11 +44,18 @@ static double largest_rate(const double *v)
     return largest;
 }
 
+/* Return the step of differences along a direction of the drivers at unit rate, at the pose shown. */
+double kf_trial_step(kf_state *s)
+{
+    const double margin = fmax(kf_margin(&s->solver, kf_shown(s)), SMALLEST);
+    return KF_TRIAL * margin * margin;
+}
+
 /* row += factor H(v, w), by H(v + w, v + w) - H(v - w, v - w) = 4 H(v, w) with v and w made equally long */
 static void add_bilinear(kf_state *s, const double *v, const double *w, double factor, double *row)
 {
     double sum[KF_DRIVERS], difference[KF_DRIVERS], plus[KF_ROOM(KF_OUTPUTS)], minus[KF_ROOM(KF_OUTPUTS)];
-    const double of_v = largest_rate(v), of_w = largest_rate(w);
+    const double of_v = kf_largest_rate(v), of_w = kf_largest_rate(w);
     int k;
     if (of_v == 0.0 || of_w == 0.0) {
         return;
@@ -72,118 +71,6 @@ static void add_bilinear(kf_state *s, const double *v, const double *w, double f
     }
 }
 
-#if KF_TORQUE
-/* The accelerations of the drivers by differences along states, efforts, loads and time. */
-static kf_answer direction_of_states(kf_instance *instance, const double *seed, double time_seed, kf_direction *direction)
-{
-    kf_state *const s = &instance->now;
-    double u[KF_DRIVERS], ud[KF_DRIVERS], udd[KF_DRIVERS], efforts[KF_DRIVERS], loads[KF_ROOM(KF_LOADS)];
-    const double margin = fmax(kf_margin(&s->solver, kf_shown(s)), SMALLEST);
-    double fastest, h;
-    int k, j, sign, tries;
-    bool done = false;
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        direction->du[k] = seed[3 * k];
-        direction->dv[k] = seed[3 * k + 1];
-    }
-    fastest = largest_rate(direction->du);
-    h = fastest > 0.0 ? STEP * margin * margin / fastest : 1.0;
-    if (time_seed != 0.0) {
-        h = fmin(h, STEP / fabs(time_seed));
-    }
-    h = kf_step_along_laws(KF_REAL(s, KF_PART_LOADS), seed + kf_part_first[KF_PART_LOADS], h);
-    for (tries = 0; tries < TRIES && !done; ++tries, h *= 0.5) {
-        memset(direction->da, 0, sizeof direction->da);
-        done = true;
-        for (j = 1; j <= 3 && done; ++j) {
-            for (sign = -1; sign <= 1 && done; sign += 2) {
-                const double by = sign * j * h;
-                kf_pose *pose = kf_shown(s);
-                for (k = 0; k < KF_DRIVERS; ++k) {
-                    u[k] = s->u[k] + by * seed[3 * k];
-                    ud[k] = s->ud[k] + by * seed[3 * k + 1];
-                    efforts[k] = KF_REAL(s, KF_PART_EFFORTS)[k] + by * seed[kf_part_first[KF_PART_EFFORTS] + k];
-                }
-                for (k = 0; k < KF_LOADS; ++k) {
-                    loads[k] = KF_REAL(s, KF_PART_LOADS)[k] + by * seed[kf_part_first[KF_PART_LOADS] + k];
-                }
-                if (fastest > 0.0) {
-                    pose = &instance->track[0];
-                    done = KF_GOOD(kf_solve(&s->solver, &s->poses[s->committed], u, pose));
-                }
-                done = done && kf_accelerations(&s->solver, pose, s->time + by * time_seed, ud, efforts, loads, udd);
-                for (k = 0; done && k < KF_DRIVERS; ++k) {
-                    direction->da[k] += sign * weights[j - 1] / h * udd[k];
-                }
-            }
-        }
-    }
-    if (fastest > 0.0 && s->asked != s->committed) { /* the trials may have overwritten maps of the pose shown */
-        s->solved = false;
-        kf_ask(instance);
-    }
-    return done ? KF_DONE : kf_answered(instance, KF_DISCARD,
-                                        "there is no directional derivative: no pose near this one can be reached");
-}
-#else
-/* Return how the drivers move with the inputs; estimated rates follow the values that they are estimated from. */
-static void direction_of_inputs(kf_state *s, const double *seed, kf_direction *direction)
-{
-    kf_sample still[KF_SAMPLES];
-    double dv[KF_DRIVERS], da[KF_DRIVERS], u[KF_DRIVERS], t;
-    const bool has_inputs = s->model_exchange || s->rates != KF_RATES_ESTIMATED; /* of rates that are used */
-    int k;
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        direction->du[k] = seed[3 * k];
-        direction->dv[k] = has_inputs ? seed[3 * k + 1] : 0.0;
-        direction->da[k] = has_inputs ? seed[3 * k + 2] : 0.0;
-    }
-    if (s->model_exchange || (s->ended && !s->touched)) { /* no estimates, or they come from samples alone */
-        return;
-    }
-    memcpy(still, s->history, sizeof still);
-    for (k = 0; k < s->samples; ++k) {
-        memset(still[k].u, 0, sizeof still[k].u);
-    }
-    kf_moment(s, &t, u);
-    kf_estimated_rates(still, s->samples, t, direction->du, dv, da);
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        direction->dv[k] += s->sources[3 * k + 1] ? 0.0 : dv[k];
-        direction->da[k] += s->sources[3 * k + 2] ? 0.0 : da[k];
-    }
-}
-
-/* Return how the drivers move with time and with the constants of their laws, by differences of the laws. */
-static void direction_of_time(kf_state *s, const double *seed, double time_seed, kf_direction *direction)
-{
-    const double *const constants = KF_REAL(s, KF_PART_CONSTANTS);
-    double moved[KF_ROOM(KF_CONSTANTS)], u[KF_DRIVERS], ud[KF_DRIVERS], udd[KF_DRIVERS], fastest, h;
-    int k, j, sign;
-    fastest = fabs(time_seed);
-    for (k = 0; k < KF_CONSTANTS; ++k) {
-        fastest = fmax(fastest, fabs(seed[k]) / (constants[k] != 0.0 ? fabs(constants[k]) : 1.0));
-    }
-    if (fastest == 0.0) {
-        return;
-    }
-    h = STEP / fastest;
-    for (j = 1; j <= 3; ++j) {
-        for (sign = -1; sign <= 1; sign += 2) {
-            const double weight = sign * weights[j - 1] / h;
-            for (k = 0; k < KF_CONSTANTS; ++k) {
-                moved[k] = constants[k] + sign * j * h * seed[k];
-            }
-            kf_drive(&s->solver.model, s->time + sign * j * h * time_seed, moved, u, ud, udd);
-            for (k = 0; k < KF_DRIVERS; ++k) {
-                direction->du[k] += weight * u[k];
-                direction->dv[k] += weight * ud[k];
-                direction->da[k] += weight * udd[k];
-            }
-        }
-    }
-}
-
-#endif
 /* Evaluate the parts at driver values u, with speeds and accelerations, by a solver from a start. */
 static bool try_at(kf_solver *solver, kf_pose *start, kf_pose *pose, const double *const drive[3], unsigned parts,
                    double *row)
@@ -241,30 +128,17 @@ static bool add_differences(kf_instance *instance, const double *du, kf_solver *
             if (other && !kf_solver_bind(other, moved)) {
                 return false;
             }
-            if (other && s->driven_by_time) { /* drivers may depend on parameters, too */
-                kf_drive(&other->model, s->time, KF_REAL(s, KF_PART_CONSTANTS), u, ud, udd);
+            if (other && !kf_drive_of_trial(instance, other, pose, u, ud, udd)) {
+                return false;
             }
-#if KF_TORQUE
-            if (other) { /* accelerations depend on parameters, too */
-                if (!KF_GOOD(kf_solve(solver, start, u, pose)) ||
-                    !kf_accelerations(solver, pose, s->time, ud, KF_REAL(s, KF_PART_EFFORTS), KF_REAL(s, KF_PART_LOADS), udd)) {
-                    return false;
-                }
-                for (k = 0; k < KF_DRIVERS; ++k) {
-                    instance->trial[3 * k + 2] = udd[k];
-                }
-            }
-#endif
             if (!try_at(solver, start, pose, drive, parts, instance->trial)) {
                 return false;
             }
-#if KF_FORCES
             if (parts & KF_FORCE_PARTS) {
                 kf_forces_of_trial(s, solver, pose, drive, parts, instance->trial);
             }
-#endif
             for (k = 0; k < KF_REALS; ++k) {
-                total[k] += sign * weights[j - 1] / h * instance->trial[k];
+                total[k] += sign * kf_sixth_order[j - 1] / h * instance->trial[k];
             }
         }
     }
@@ -280,12 +154,11 @@ static kf_answer differences(kf_instance *instance, const double *du, kf_solver 
                              unsigned parts)
 {
     kf_state *const s = &instance->now;
-    const double margin = fmax(kf_margin(&s->solver, kf_shown(s)), SMALLEST);
-    double h = STEP * margin * margin / fastest;
+    double h = kf_trial_step(s) / fastest;
     bool done = false;
     int k;
     memset(instance->trial, 0, sizeof instance->trial);
-    for (k = 0; k < TRIES && !done; ++k, h *= 0.5) {
+    for (k = 0; k < KF_TRIES && !done; ++k, h *= 0.5) {
         done = add_differences(instance, du, other, seed, h, parts);
     }
     if (s->asked != s->committed) { /* the trials overwrote the pose; it is solved again when needed */
@@ -331,22 +204,15 @@ static kf_answer along(kf_instance *instance, double time_seed, unsigned parts)
     kf_state *const s = &instance->now;
     double *const seed = instance->seed, *const slope = instance->slope;
     kf_direction direction;
-    kf_answer answer = KF_DONE;
+    double fastest;
+    kf_answer answer;
     int k;
     memset(&direction, 0, sizeof direction);
     memset(slope, 0, sizeof instance->slope);
-#if KF_TORQUE
-    answer = direction_of_states(instance, seed, time_seed, &direction);
+    answer = kf_direction_of_drivers(instance, seed, time_seed, &direction);
     if (answer != KF_DONE) {
         return answer;
     }
-#else
-    if (s->driven_by_time) {
-        direction_of_time(s, seed + kf_part_first[KF_PART_CONSTANTS], time_seed, &direction);
-    } else {
-        direction_of_inputs(s, seed, &direction);
-    }
-#endif
     add_rates(s, direction.du, slope + kf_part_first[KF_PART_VALUES]);
     add_rates(s, direction.dv, slope + kf_part_first[KF_PART_RATES]);
     add_bilinear(s, s->ud, direction.du, 1.0, slope + kf_part_first[KF_PART_RATES]);
@@ -358,20 +224,15 @@ static kf_answer along(kf_instance *instance, double time_seed, unsigned parts)
         driven[1] = direction.dv[k];
         driven[2] = direction.da[k];
     }
-#if KF_FORCES
     if (parts & KF_FORCE_PARTS) { /* before the trials, which overwrite the pose */
         kf_add_force_slopes(s, direction.dv, direction.da, seed + kf_part_first[KF_PART_LOADS], time_seed, parts, slope);
     }
-#endif
-    if (largest_rate(direction.du) > 0.0 && (parts & ~linear)) {
-        answer = differences(instance, direction.du, NULL, NULL, largest_rate(direction.du), parts & ~linear & ~KF_BIT(KF_PART_DRIVEN));
+    fastest = kf_largest_rate(direction.du);
+    if (fastest > 0.0 && (parts & ~linear)) {
+        answer = differences(instance, direction.du, NULL, NULL, fastest, parts & ~linear & ~KF_BIT(KF_PART_DRIVEN));
     }
     if (answer == KF_DONE) {
-#if KF_TORQUE
         answer = along_parameters(instance, seed + kf_part_first[KF_PART_PARAMETERS], parts);
-#else
-        answer = along_parameters(instance, seed + kf_part_first[KF_PART_PARAMETERS], parts & ~KF_BIT(KF_PART_DRIVEN));
-#endif
     }
     return answer;
 }
@@ -391,13 +252,7 @@ static bool is_known(const kf_state *s, unsigned reference)
     if (place >= KF_REALS) {
         return reference == KF_TIME;
     }
-#if KF_TORQUE
-    if (kf_part_of[place] == KF_PART_STATES) {
-        return place % 3 != 2;
-    }
-#endif
-    return (KF_BIT(kf_part_of[place]) & KF_GIVEN_PARTS) != 0 &&
-           (kf_part_of[place] != KF_PART_PARAMETERS || s->mode <= KF_INITIALIZATION);
+    return kf_is_given(place) && (kf_part_of[place] != KF_PART_PARAMETERS || s->mode <= KF_INITIALIZATION);
 }
 
 kf_answer kf_directional(kf_instance *instance, const unsigned *unknowns, size_t unknown_count, const unsigned *knowns,
@@ -431,14 +286,12 @@ kf_answer kf_directional(kf_instance *instance, const unsigned *unknowns, size_t
     if (!KF_GOOD(kf_ask(instance))) {
         return kf_answered(instance, KF_DISCARD, "at t = %g s: %s", s->time, s->message);
     }
-#if !KF_TORQUE
     /* The derivative is that of setting an input now, even if the pose shown still is that of the last commit. */
     is_held = !s->driven_by_time && !s->model_exchange && s->samples && !s->touched && !s->ended;
     if (is_held) {
         s->touched = true;
         s->drive_known = false;
     }
-#endif
     kf_find_drive(s);
     answer = along(instance, time_seed, parts);
     if (is_held) {

@@ -4,7 +4,7 @@
  *
  * See kinfmu/fmu/estimated_rates.py and kinfmu/solver/python/estimate.py.
  */
-#include "instance.h"
+#include "drive.h"
 
 #include <float.h>
 #include <math.h>
@@ -48,8 +48,8 @@ void kf_estimated_rates(const kf_sample *samples, int count, double t, const dou
  * adds, and the rounding of the differences. An acceleration from three samples has no estimate, nor has any rate from two:
  * infinite.
  */
-void kf_errors_of_estimated_rates(const kf_sample *samples, int count, double t, const double *u, double ahead,
-                                  double *of_ud, double *of_udd)
+static void errors_of_estimated_rates(const kf_sample *samples, int count, double t, const double *u, double ahead,
+                                      double *of_ud, double *of_udd)
 {
     int k, i, order;
     while (count && samples[count - 1].t >= t) {
@@ -86,27 +86,6 @@ void kf_errors_of_estimated_rates(const kf_sample *samples, int count, double t,
             of_udd[k] = of_udd[k] < INFINITY ? of_udd[k] : INFINITY;
         }
     }
-}
-
-/* The time and u of the sample that rates are estimated at, and how many seconds later they hold: 0, but a step at the end
- * of a step that followed derivatives of inputs. Extrapolated values are not samples.
- */
-double kf_moment(const kf_state *s, double *t, double *u)
-{
-    int k;
-    if (s->touched || !s->samples) {
-        *t = s->time;
-        for (k = 0; k < KF_DRIVERS; ++k) {
-            u[k] = s->real[3 * k];
-        }
-    } else { /* nothing set since the commit: still the committed sample, at the time of its step */
-        *t = s->history[s->samples - 1].t;
-        memcpy(u, s->history[s->samples - 1].u, KF_DRIVERS * sizeof *u);
-        if (s->ended) {
-            return s->ended_step;
-        }
-    }
-    return 0.0;
 }
 
 /* Find the source of the speed (order 1) and the acceleration (order 2) of each driver, by the parameter `rates`. By
@@ -223,11 +202,8 @@ void kf_law(const kf_state *s, double t, double *u, double *ud, double *udd)
 }
 
 /* u, ud, udd of the requested pose. */
-void kf_asked_drive(const kf_state *s, double *u, double *ud, double *udd)
+void kf_asked_drive(kf_state *s, double *u, double *ud, double *udd)
 {
-#if KF_TORQUE
-    kf_state_drive((kf_state *)s, u, ud, udd);
-#else
     if (s->driven_by_time) {
         kf_drive(&s->solver.model, s->time, KF_REAL(s, KF_PART_CONSTANTS), u, ud, udd);
     } else if (s->ended && !s->touched) {
@@ -237,11 +213,10 @@ void kf_asked_drive(const kf_state *s, double *u, double *ud, double *udd)
         kf_moment(s, &t, u);
         by_inputs(s, s->real, t, u, ud, udd);
     }
-#endif
 }
 
 /* u, ud, udd of the last commit, from which the last good values come; at rest before the first. */
-static void committed_drive(const kf_state *s, double *u, double *ud, double *udd)
+void kf_committed_drive(const kf_state *s, double *u, double *ud, double *udd)
 {
     const kf_sample *const last = s->samples ? &s->history[s->samples - 1] : NULL;
     if (last == NULL) {
@@ -258,33 +233,18 @@ static void committed_drive(const kf_state *s, double *u, double *ud, double *ud
     }
 }
 
-/* u, ud, udd of the pose shown. */
-void kf_find_drive(kf_state *s)
-{
-    if (!s->drive_known) {
-        s->drive_known = true;
-        if (KF_GOOD(s->status)) {
-            kf_asked_drive(s, s->u, s->ud, s->udd);
-        } else {
-            committed_drive(s, s->u, s->ud, s->udd);
-        }
-    }
-}
-
-/* Estimated errors of q, qd, qdd of the pose shown, with the errors of estimated rates; infinite if unknown. */
-static void find_errors(kf_state *s, double errors[3])
+/* Add to the errors of qd and qdd those of estimated rates; infinite if unknown. */
+void kf_add_rate_errors(kf_state *s, double errors[3])
 {
     kf_pose *const pose = kf_shown(s);
     double rates[2][KF_ROOM(KF_OUTPUTS)], accelerations[2][KF_ROOM(KF_OUTPUTS)];
     double of_ud[KF_DRIVERS], of_udd[KF_DRIVERS], u[KF_DRIVERS], t, ahead;
     int k;
-    kf_find_drive(s);
-    kf_errors(&s->solver, pose, s->ud, s->udd, errors);
     if (!KF_GOOD(s->status) || s->driven_by_time || s->model_exchange) {
         return;
     }
     ahead = kf_moment(s, &t, u);
-    kf_errors_of_estimated_rates(s->history, s->samples, t, u, ahead, of_ud, of_udd);
+    errors_of_estimated_rates(s->history, s->samples, t, u, ahead, of_ud, of_udd);
     kf_motion(&s->solver, pose, s->ud, s->udd, NULL, rates[0], accelerations[0]);
     for (k = 0; k < KF_DRIVERS; ++k) {
         const double ud = s->ud[k], udd = s->udd[k];
@@ -308,19 +268,4 @@ static void find_errors(kf_state *s, double errors[3])
         s->udd[k] = udd;
         errors[2] += kf_largest_gap(accelerations[1], accelerations[0]);
     }
-}
-
-/* Many hosts cannot record an infinity. */
-void kf_bound_errors(double errors[3])
-{
-    int order;
-    for (order = 0; order < 3; ++order) {
-        errors[order] = errors[order] < KF_UNKNOWN_ERROR ? errors[order] : KF_UNKNOWN_ERROR;
-    }
-}
-
-void kf_find_errors(kf_state *s, double errors[3])
-{
-    find_errors(s, errors);
-    kf_bound_errors(errors);
 }

@@ -89,22 +89,3 @@ int kf_massless(const kf_solver *solver, kf_pose *pose, double t, const double *
     }
     return 0;
 }
-
-/* Read u and ud from the states and compute udd, NaN where the reduced inertia does not determine it. */
-void kf_state_drive(kf_state *s, double *u, double *ud, double *udd)
-{
-    int k;
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        u[k] = s->real[3 * k];
-        ud[k] = s->real[3 * k + 1];
-    }
-    if (!KF_GOOD(s->status) || !kf_accelerations(&s->solver, kf_shown(s), s->time, ud, KF_REAL(s, KF_PART_EFFORTS),
-                                                 KF_REAL(s, KF_PART_LOADS), udd)) {
-        for (k = 0; k < KF_DRIVERS; ++k) {
-            udd[k] = NAN;
-        }
-    }
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        s->real[3 * k + 2] = udd[k];
-    }
-}

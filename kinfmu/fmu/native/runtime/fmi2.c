@@ -87,19 +87,12 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     return instance;
 }
 
-#if KF_TORQUE
-/* In co-simulation the tolerance is that of the integrator. */
-#else
-/* Newton always goes to round-off, whatever the tolerance. */
-#endif
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
                                fmi2Boolean stopTimeDefined, fmi2Real stopTime)
 {
-#if KF_TORQUE
     if (c && toleranceDefined) {
         kf_set_tolerance(common(c), tolerance);
     }
-#endif
     return c ? (fmi2Status)kf_set_experiment(common(c), startTime, stopTimeDefined != fmi2False, stopTime) : fmi2Error;
 }
 

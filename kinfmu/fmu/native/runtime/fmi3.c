@@ -12,9 +12,7 @@ typedef struct {
     kf_instance common; /* first: a pointer to one is a pointer to the other */
     fmi3LogMessageCallback logger;
     fmi3InstanceEnvironment environment;
-#if KF_TORQUE
     fmi3IntermediateUpdateCallback update;
-#endif
 } instance3;
 
 static void send(const void *host, kf_answer answer, const char *category, const char *message)
@@ -23,7 +21,6 @@ static void send(const void *host, kf_answer answer, const char *category, const
     instance->logger(instance->environment, (fmi3Status)answer, category, message);
 }
 
-#if KF_TORQUE
 /* Ask the host for the inputs at a time in its step, if it named some of them as intermediate variables. */
 static void update(const void *host, double time)
 {
@@ -32,7 +29,6 @@ static void update(const void *host, double time)
     fmi3Float64 at = time;
     instance->update(instance->environment, time, fmi3True, fmi3False, fmi3False, fmi3False, &returns, &at);
 }
-#endif
 
 static kf_instance *common(fmi3Instance instance)
 {
@@ -108,12 +104,10 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
 {
     fmi3Instance instance = instantiate(instantiationToken, instanceEnvironment, logMessage,
                                         eventModeUsed ? "this FMU has no event mode in co-simulation" : NULL, false);
-#if KF_TORQUE
     if (instance && intermediateUpdate && nRequiredIntermediateVariables) {
         ((instance3 *)instance)->update = intermediateUpdate;
         common(instance)->update = update;
     }
-#endif
     return instance;
 }
 
@@ -128,22 +122,15 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
                        "this FMU is for co-simulation and model exchange, not for scheduled execution", false);
 }
 
-#if KF_TORQUE
-/* In co-simulation the tolerance is that of the integrator. */
-#else
-/* Newton always goes to round-off, whatever the tolerance. */
-#endif
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
 {
     if (instance == NULL) {
         return fmi3Error;
     }
-#if KF_TORQUE
     if (toleranceDefined) {
         kf_set_tolerance(common(instance), tolerance);
     }
-#endif
     if (kf_set_experiment(common(instance), startTime, stopTimeDefined, stopTime) != KF_DONE) {
         return fmi3Error;
     }
@@ -298,11 +285,7 @@ fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference 
     return unsupported(instance, "activateModelPartition: this FMU is not for scheduled execution");
 }
 
-#if KF_TORQUE
-/* Events are jumps of loads over time and changes of status. */
-#else
-/* Events are jumps of drivers over time and changes of status; there are no continuous states. */
-#endif
+/* Events are jumps of laws over time and changes of status. */
 
 fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance)
 {
@@ -328,31 +311,22 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     return instance ? fmi3OK : fmi3Error;
 }
 
-static fmi3Status zero(fmi3Instance instance, size_t *count)
-{
-    if (instance == NULL || count == NULL) {
-        return fmi3Error;
-    }
-    *count = 0;
-    return fmi3OK;
-}
-
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators)
 {
-    return zero(instance, nEventIndicators);
+    if (instance == NULL || nEventIndicators == NULL) {
+        return fmi3Error;
+    }
+    *nEventIndicators = 0;
+    return fmi3OK;
 }
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nContinuousStates)
 {
-#if KF_TORQUE
-    const fmi3Status status = zero(instance, nContinuousStates);
-    if (status == fmi3OK) {
-        *nContinuousStates = 2 * KF_DRIVERS;
+    if (instance == NULL || nContinuousStates == NULL) {
+        return fmi3Error;
     }
-    return status;
-#else
-    return zero(instance, nContinuousStates);
-#endif
+    *nContinuousStates = KF_STATES;
+    return fmi3OK;
 }
 
 /* Co-simulation. */

@@ -72,7 +72,7 @@ FMI(Status) FMI(ExitInitializationMode)(void *c)
 
 FMI(Status) FMI(Terminate)(void *c)
 {
-    return c ? (FMI(Status))kf_enter(common(c), KF_TERMINATED, "terminate") : FMI(Error);
+    return c ? (FMI(Status))kf_enter(common(c), KF_TERMINATED, KF_TERMINATE) : FMI(Error);
 }
 
 FMI(Status) FMI(Reset)(void *c)
@@ -124,20 +124,18 @@ FMI(Status) FMI(DeserializeFMUState)(void *c, const FMI(Byte) bytes[], size_t si
     return c ? (FMI(Status))kf_deserialize(common(c), (const unsigned char *)bytes, size, state) : FMI(Error);
 }
 
-#if KF_TORQUE
-/* Model exchange: value and speed of each driver are states; events are jumps of loads over time and changes of status. */
-#else
-/* Model exchange: there are no continuous states; events are jumps of drivers over time and changes of status. */
-#endif
+/* Model exchange: value and speed of each driver are states if efforts drive; events are jumps of laws over time and changes
+ * of status.
+ */
 
 FMI(Status) FMI(EnterEventMode)(void *c)
 {
-    return c ? (FMI(Status))kf_enter(common(c), KF_EVENTS, "enterEventMode") : FMI(Error);
+    return c ? (FMI(Status))kf_enter(common(c), KF_EVENTS, KF_ENTER_EVENTS) : FMI(Error);
 }
 
 FMI(Status) FMI(EnterContinuousTimeMode)(void *c)
 {
-    return c ? (FMI(Status))kf_enter(common(c), KF_CONTINUOUS, "enterContinuousTimeMode") : FMI(Error);
+    return c ? (FMI(Status))kf_enter(common(c), KF_CONTINUOUS, KF_ENTER_CONTINUOUS) : FMI(Error);
 }
 
 static void put(FMI(Boolean) *place, bool value)
@@ -153,11 +151,7 @@ FMI(Status) FMI(CompletedIntegratorStep)(void *c, FMI(Boolean) noSetFMUStatePrio
     bool wants_event = false;
     const kf_answer answer = c ? kf_complete_integrator_step(common(c), &wants_event) : KF_ERROR;
     put(enterEventMode, wants_event);
-#if KF_TORQUE
     put(terminateSimulation, c && common(c)->now.terminated);
-#else
-    put(terminateSimulation, false);
-#endif
     return (FMI(Status))answer;
 }
 
@@ -166,20 +160,9 @@ FMI(Status) FMI(SetTime)(void *c, double time)
     return c ? (FMI(Status))kf_set_time(common(c), time) : FMI(Error);
 }
 
-#if KF_TORQUE
 FMI(Status) FMI(SetContinuousStates)(void *c, const double states[], size_t count)
 {
     return c ? (FMI(Status))kf_set_states(common(c), states, count) : FMI(Error);
-}
-
-FMI(Status) FMI(GetContinuousStateDerivatives)(void *c, double derivatives[], size_t count)
-{
-    return c ? (FMI(Status))kf_get_state_derivatives(common(c), derivatives, count) : FMI(Error);
-}
-
-FMI(Status) FMI(GetEventIndicators)(void *c, double indicators[], size_t count)
-{
-    return count == 0 && c ? FMI(OK) : unsupported(c, "there are no event indicators");
 }
 
 FMI(Status) FMI(GetContinuousStates)(void *c, double states[], size_t count)
@@ -187,45 +170,24 @@ FMI(Status) FMI(GetContinuousStates)(void *c, double states[], size_t count)
     return c ? (FMI(Status))kf_get_states(common(c), states, count) : FMI(Error);
 }
 
+FMI(Status) FMI(GetContinuousStateDerivatives)(void *c, double derivatives[], size_t count)
+{
+    return c ? (FMI(Status))kf_get_state_derivatives(common(c), derivatives, count) : FMI(Error);
+}
+
 FMI(Status) FMI(GetNominalsOfContinuousStates)(void *c, double nominals[], size_t count)
 {
     size_t k;
-    if (c == NULL || nominals == NULL || count != 2 * KF_DRIVERS) {
-        return unsupported(c, "there are two continuous states for each driver");
+    if (c == NULL || count != KF_STATES || (count && nominals == NULL)) {
+        return unsupported(c, KF_STATES ? "there are two continuous states for each driver" : KF_NO_STATES);
     }
     for (k = 0; k < count; ++k) {
         nominals[k] = kf_driver_is_angle[k / 2] ? 1.0 : kf_size;
     }
     return FMI(OK);
 }
-#else
-static FMI(Status) no_states(void *c, size_t count)
-{
-    return count == 0 && c ? FMI(OK) : unsupported(c, "there are no continuous states and no event indicators");
-}
-
-FMI(Status) FMI(SetContinuousStates)(void *c, const double states[], size_t count)
-{
-    return no_states(c, count);
-}
-
-FMI(Status) FMI(GetContinuousStateDerivatives)(void *c, double derivatives[], size_t count)
-{
-    return no_states(c, count);
-}
 
 FMI(Status) FMI(GetEventIndicators)(void *c, double indicators[], size_t count)
 {
-    return no_states(c, count);
+    return count == 0 && c ? FMI(OK) : unsupported(c, KF_STATES ? "there are no event indicators" : KF_NO_STATES);
 }
-
-FMI(Status) FMI(GetContinuousStates)(void *c, double states[], size_t count)
-{
-    return no_states(c, count);
-}
-
-FMI(Status) FMI(GetNominalsOfContinuousStates)(void *c, double nominals[], size_t count)
-{
-    return no_states(c, count);
-}
-#endif

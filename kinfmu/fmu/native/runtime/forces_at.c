@@ -161,7 +161,6 @@ double kf_step_along_laws(const double *loads, const double *seed, double longes
 void kf_add_force_slopes(kf_state *s, const double *dv, const double *da, const double *loads, double dt,
                          unsigned parts, double *slope)
 {
-    static const double weights[3] = {45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0};
     double ud[KF_DRIVERS], udd[KF_DRIVERS], moved[KF_ROOM(KF_LOADS)], trial[KF_REALS];
     const double *drive[3], *efforts;
     const double t = shown_at(s, &efforts), h = kf_step_along_laws(efforts, loads, dt != 0.0 ? 2e-3 / fabs(dt) : 1.0);
@@ -182,7 +181,7 @@ void kf_add_force_slopes(kf_state *s, const double *dv, const double *da, const 
             kf_forces_at(&s->solver, kf_shown(s), t + by * dt, drive, moved, parts, trial);
             for (part = KF_PART_FORCES; part <= KF_PART_SHAKING; ++part) {
                 for (k = kf_part_first[part]; (parts >> part & 1u) && k < kf_part_first[part + 1]; ++k) {
-                    slope[k] += sign * weights[j - 1] / h * trial[k];
+                    slope[k] += sign * kf_sixth_order[j - 1] / h * trial[k];
                 }
             }
         }

@@ -34,21 +34,38 @@ void kf_start(kf_instance *instance, bool model_exchange)
     kf_forget(s);
 }
 
-static bool is_fresh(const kf_instance *instance)
-{
-    return instance->now.mode == KF_INSTANTIATED;
-}
+#define RUNNING (KF_BIT(KF_EVENTS) | KF_BIT(KF_CONTINUOUS))
+#define ALIVE (KF_BIT(KF_INSTANTIATED) | KF_BIT(KF_INITIALIZATION) | KF_BIT(KF_STEPPING) | RUNNING)
 
-static KF_RARE kf_answer not_fresh(const kf_instance *instance)
+/* The modes in which each call is possible, a bit each, and the answer in all others. */
+static const struct {
+    unsigned modes;
+    const char *refusal;
+} calls[] = {
+    [KF_SET_UP] = {KF_BIT(KF_INSTANTIATED), "the instance is initialized already; reset it first"},
+    [KF_EXIT_INITIALIZATION] = {KF_BIT(KF_INITIALIZATION),
+                                "exitInitializationMode: the instance is not in initialization mode"},
+    [KF_SET_VARIABLES] = {ALIVE, "nothing can be set after terminate"},
+    [KF_DO_STEP] = {KF_BIT(KF_STEPPING), "doStep before the end of initialization, or after terminate"},
+    [KF_ENTER_EVENTS] = {RUNNING, "enterEventMode: not possible now"},
+    [KF_ENTER_CONTINUOUS] = {RUNNING, "enterContinuousTimeMode: not possible now"},
+    [KF_SET_TIME] = {ALIVE, "setTime: not possible after terminate"},
+    [KF_SET_STATES] = {KF_BIT(KF_CONTINUOUS), "setContinuousStates: the instance is not in continuous-time mode"},
+    [KF_COMPLETE_STEP] = {RUNNING, "completedIntegratorStep: the instance is not in continuous-time mode"},
+    [KF_TERMINATE] = {KF_BIT(KF_STEPPING) | RUNNING, "terminate: not possible now"},
+};
+
+kf_answer kf_possible(const kf_instance *instance, kf_call call)
 {
-    return kf_answered(instance, KF_ERROR, "the instance is initialized already; reset it first");
+    const bool is_possible = calls[call].modes >> instance->now.mode & 1u;
+    return is_possible ? KF_DONE : kf_answered(instance, KF_ERROR, "%s", calls[call].refusal);
 }
 
 kf_answer kf_set_experiment(kf_instance *instance, double start_time, bool has_stop_time, double stop_time)
 {
     kf_state *const s = &instance->now;
-    if (!is_fresh(instance)) {
-        return not_fresh(instance);
+    if (kf_possible(instance, KF_SET_UP) != KF_DONE) {
+        return KF_ERROR;
     }
     if (!isfinite(start_time)) {
         return kf_answered(instance, KF_ERROR, "the start time %g s is not a finite number", start_time);
@@ -64,18 +81,18 @@ kf_answer kf_set_experiment(kf_instance *instance, double start_time, bool has_s
 
 kf_answer kf_enter_initialization(kf_instance *instance)
 {
-    if (!is_fresh(instance)) {
-        return not_fresh(instance);
+    const kf_answer answer = kf_possible(instance, KF_SET_UP);
+    if (answer == KF_DONE) {
+        instance->now.mode = KF_INITIALIZATION;
     }
-    instance->now.mode = KF_INITIALIZATION;
-    return KF_DONE;
+    return answer;
 }
 
 kf_answer kf_exit_initialization(kf_instance *instance)
 {
     kf_state *const s = &instance->now;
-    if (s->mode != KF_INITIALIZATION) {
-        return kf_answered(instance, KF_ERROR, "exitInitializationMode: the instance is not in initialization mode");
+    if (kf_possible(instance, KF_EXIT_INITIALIZATION) != KF_DONE) {
+        return KF_ERROR;
     }
     if (s->unbound) {
         kf_bind_parameters(instance);
@@ -86,15 +103,9 @@ kf_answer kf_exit_initialization(kf_instance *instance)
     if (!KF_GOOD(kf_ask(instance))) {
         return kf_answered(instance, KF_ERROR, "initialization fails: at t = %g s: %s", s->time, s->message);
     }
-#if KF_TORQUE
-    kf_find_drive(s);
-    if (!isfinite(s->udd[0])) {
-        const int k = kf_massless(&s->solver, kf_shown(s), s->time, s->ud, KF_REAL(s, KF_PART_LOADS));
-        return kf_answered(instance, KF_ERROR, "initialization fails: driver %s: its reduced inertia is 0, so that efforts do "
-                      "not determine its motion; give a body that it moves a mass or an inertia", kf_driver_names[k]);
+    if (kf_begin_motion(instance) != KF_DONE) {
+        return KF_ERROR;
     }
-    kf_commit(s, s->time, 0.0);
-#endif
     s->mode = s->model_exchange ? KF_EVENTS : KF_STEPPING;
     return KF_DONE;
 }
@@ -113,45 +124,34 @@ bool kf_holds(const kf_state *s)
     return s->mode == KF_CONTINUOUS;
 }
 
-kf_answer kf_enter(kf_instance *instance, kf_mode mode, const char *function)
+kf_answer kf_enter(kf_instance *instance, kf_mode mode, kf_call call)
 {
-    kf_state *const s = &instance->now;
-    const bool running = s->mode == KF_EVENTS || s->mode == KF_CONTINUOUS;
-    if (mode == KF_TERMINATED ? !(running || s->mode == KF_STEPPING) : !running) {
-        return kf_answered(instance, KF_ERROR, "%s: not possible now", function);
+    if (kf_possible(instance, call) != KF_DONE) {
+        return KF_ERROR;
     }
     if (mode == KF_CONTINUOUS) {
         hold_discrete(instance);
     }
-    s->mode = mode;
+    instance->now.mode = mode;
     return KF_DONE;
-}
-
-static void move_to(kf_state *s, double time)
-{
-    if (time != s->time) {
-        s->time = time;
-        if (s->driven_by_time) {
-            kf_forget(s);
-        }
-#if KF_TORQUE
-        kf_forget_motion(s); /* loads may depend on time */
-#endif
-    }
 }
 
 kf_answer kf_set_time(kf_instance *instance, double time)
 {
-    if (!instance->now.model_exchange) {
+    kf_state *const s = &instance->now;
+    if (!s->model_exchange) {
         return kf_answered(instance, KF_ERROR, "setTime: this instance is for co-simulation, where doStep sets the time");
     }
-    if (instance->now.mode == KF_TERMINATED) {
-        return kf_answered(instance, KF_ERROR, "setTime: not possible after terminate");
+    if (kf_possible(instance, KF_SET_TIME) != KF_DONE) {
+        return KF_ERROR;
     }
     if (!isfinite(time)) {
         return kf_answered(instance, KF_ERROR, "setTime: %g s is not a finite number", time);
     }
-    move_to(&instance->now, time);
+    if (time != s->time) {
+        s->time = time;
+        kf_time_changed(s);
+    }
     return KF_DONE;
 }
 
@@ -160,9 +160,10 @@ kf_answer kf_complete_integrator_step(kf_instance *instance, bool *wants_event)
 {
     kf_state *const s = &instance->now;
     const double last = s->samples ? s->history[s->samples - 1].t : s->time;
+    kf_answer answer;
     *wants_event = false;
-    if (s->mode != KF_CONTINUOUS && s->mode != KF_EVENTS) {
-        return kf_answered(instance, KF_ERROR, "completedIntegratorStep: the instance is not in continuous-time mode");
+    if (kf_possible(instance, KF_COMPLETE_STEP) != KF_DONE) {
+        return KF_ERROR;
     }
     if (!KF_GOOD(kf_ask(instance))) { /* the host has accepted the step: a smaller one is no longer possible */
         return kf_answered(instance, KF_ERROR, "at t = %g s: %s", s->time, s->message);
@@ -170,19 +171,12 @@ kf_answer kf_complete_integrator_step(kf_instance *instance, bool *wants_event)
     if (kf_is_past_stop(s, last, s->time - last)) {
         return kf_past_stop(instance, "completedIntegratorStep", last, s->time - last);
     }
-#if KF_TORQUE
-    {
-        double reached;
-        s->terminated = kf_passes_limit(instance, &reached);
-        if (s->terminated) {
-            return kf_answered(instance, KF_WARN, "at t = %g s: %s", reached, s->message);
-        }
-        kf_find_drive(s);
+    answer = kf_accept_step(instance);
+    if (!s->terminated) {
+        *wants_event = kf_holds(s) && s->status != s->held_status;
+        kf_commit(s, s->time, 0.0);
     }
-#endif
-    *wants_event = kf_holds(s) && s->status != s->held_status;
-    kf_commit(s, s->time, 0.0);
-    return kf_warn_of_inputs(instance);
+    return answer;
 }
 
 /* Return a time at which the law is beyond its jump in spite of rounding. */
@@ -196,18 +190,13 @@ static double just_after(double jump, double period, double times)
 bool kf_next_event(const kf_instance *instance, double *time)
 {
     const kf_state *const s = &instance->now;
+    const double *const constants = kf_constants_of_jumps(s);
     double jumps[KF_ROOM(KF_JUMPS)], periods[KF_ROOM(KF_JUMPS)], next = INFINITY;
     int k;
-#if !KF_TORQUE
-    if (!s->driven_by_time) {
+    if (constants == NULL) {
         return false;
     }
-#endif
-#if KF_TORQUE
-    kf_jumps(&s->solver.model, KF_REAL(s, KF_PART_LOADS), jumps, periods);
-#else
-    kf_jumps(&s->solver.model, KF_REAL(s, KF_PART_CONSTANTS), jumps, periods);
-#endif
+    kf_jumps(&s->solver.model, constants, jumps, periods);
     for (k = 0; k < KF_JUMPS; ++k) {
         const double past = periods[k] > 0.0 ? floor((s->time - jumps[k]) / periods[k]) : 0.0;
         double event = just_after(jumps[k], periods[k], past);

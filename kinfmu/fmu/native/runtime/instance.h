@@ -14,6 +14,7 @@
 #define KF_LARGEST 1e100  /* of what a host sets and of rates: the squares of larger numbers are infinite */
 #define KF_SAME_TIME 1e-9 /* of a step: hosts add up time with rounding errors, which move no pose */
 #define KF_INPUT_ORDERS 3 /* derivatives of an input that a step may follow */
+#define KF_NO_STATES "there are no continuous states and no event indicators"
 
 /* Numbered as fmi2Status and fmi3Status are. */
 typedef enum { KF_DONE, KF_WARN, KF_DISCARD, KF_ERROR } kf_answer;
@@ -26,6 +27,20 @@ typedef enum {
     KF_CONTINUOUS,
     KF_TERMINATED
 } kf_mode;
+
+/* Calls that are possible in some modes only. */
+typedef enum {
+    KF_SET_UP,
+    KF_EXIT_INITIALIZATION,
+    KF_SET_VARIABLES,
+    KF_DO_STEP,
+    KF_ENTER_EVENTS,
+    KF_ENTER_CONTINUOUS,
+    KF_SET_TIME,
+    KF_SET_STATES,
+    KF_COMPLETE_STEP,
+    KF_TERMINATE
+} kf_call;
 
 /* Source of a driver's rate: an estimate, its own input, or a given derivative of the driver's value or speed. */
 typedef enum { KF_RATE_ESTIMATED, KF_RATE_INPUT, KF_RATE_OF_VALUE, KF_RATE_OF_SPEED } kf_rate_source;
@@ -69,21 +84,16 @@ typedef struct {
     bool moving;                /* derivatives of inputs were given for the next step */
     bool ended;                 /* the committed pose is the end of a step that followed derivatives of inputs */
     unsigned char orders[3 * KF_DRIVERS]; /* highest order of the derivatives given of each input, 0 if none */
-    double input_rates[3 * KF_DRIVERS][KF_INPUT_ORDERS];
+    double input_rates[KF_INPUTS][KF_INPUT_ORDERS];
     double ended_step, ended_ud[KF_DRIVERS], ended_udd[KF_DRIVERS]; /* of the step that ended so: its size, the rates at its end */
     double committed_u[KF_DRIVERS], committed_inputs[3 * KF_DRIVERS];
-#if KF_FORCES
     double committed_efforts[KF_ROOM(KF_LOADS)]; /* of external loads, and constants of the laws of loads */
-#endif
     int samples;
     kf_sample history[KF_SAMPLES]; /* the last commits, oldest first */
     bool failed, terminated;
     double failed_time, failed_step, last_time;
     double start_time, stop_time; /* of the experiment; the stop time is DBL_MAX if none was given */
-#if KF_TORQUE
     double step_size; /* that the integrator would take next, 0 at the start */
-    double effort_rates[KF_DRIVERS][KF_INPUT_ORDERS], load_rates[KF_ROOM(KF_LOADS)][KF_INPUT_ORDERS]; /* of the next step */
-#endif
     kf_status held_status; /* discrete variables of model exchange, which stay between events */
     int held_iterations;
     char held_message[KF_MESSAGE];
@@ -109,11 +119,9 @@ typedef struct {
     bool silent;
     unsigned muted; /* one bit for each category */
     kf_list list;
-#if KF_TORQUE
     kf_pose track[2]; /* of the integrator */
     void (*update)(const void *host, double time); /* asks the host for the inputs at a time in its step; NULL: it gives none */
     bool updating; /* the host is asked: only efforts and external loads may be set */
-#endif
     double seed[KF_REALS], slope[KF_REALS], total[KF_REALS], trial[KF_REALS]; /* of directional derivatives */
 } kf_instance;
 
@@ -129,16 +137,14 @@ kf_answer kf_set_logging(kf_instance *instance, bool on, size_t count, const cha
 bool kf_token_fits(const char *token);
 void kf_start(kf_instance *instance, bool model_exchange);
 kf_answer kf_set_experiment(kf_instance *instance, double start_time, bool has_stop_time, double stop_time);
-#if KF_TORQUE
-void kf_set_tolerance(kf_instance *instance, double tolerance);
-#endif
 kf_answer kf_enter_initialization(kf_instance *instance);
 kf_answer kf_exit_initialization(kf_instance *instance);
 kf_answer kf_step(kf_instance *instance, double time, double step);
 kf_answer kf_set_time(kf_instance *instance, double time);
 kf_answer kf_complete_integrator_step(kf_instance *instance, bool *wants_event);
 bool kf_next_event(const kf_instance *instance, double *time);
-kf_answer kf_enter(kf_instance *instance, kf_mode mode, const char *function);
+kf_answer kf_enter(kf_instance *instance, kf_mode mode, kf_call call);
+kf_answer kf_possible(const kf_instance *instance, kf_call call); /* or Error, with a message */
 
 /* Variables, by value references: the place in the list, counted from 1 as FMI 2.0 counts the places of variables. So the
  * reference 0 belongs to no variable; as a place it wraps round and is past the end.
@@ -170,36 +176,15 @@ kf_answer kf_deserialize(kf_instance *instance, const unsigned char *bytes, size
 
 /* Shared by the files of the instance. */
 #define KF_BIT(part) (1u << (part))
-#define KF_POSE_PARTS                                                                                                  \
-    (KF_BIT(KF_PART_VALUES) | KF_BIT(KF_PART_RATES) | KF_BIT(KF_PART_ACCELERATIONS) | KF_BIT(KF_PART_ERRORS) |          \
-     KF_BIT(KF_PART_WATCH))
-#define KF_GIVEN_PARTS                                                                                                 \
-    (KF_BIT(KF_PART_INPUTS) | KF_BIT(KF_PART_CONSTANTS) | KF_BIT(KF_PART_PARAMETERS) | KF_BIT(KF_PART_TOLERANCE))
-#if KF_FORCES
 #define KF_FORCE_PARTS (KF_BIT(KF_PART_FORCES) | KF_BIT(KF_PART_REACTIONS) | KF_BIT(KF_PART_SHAKING))
-#undef KF_POSE_PARTS
-#undef KF_GIVEN_PARTS
 #define KF_POSE_PARTS                                                                                                  \
     (KF_BIT(KF_PART_VALUES) | KF_BIT(KF_PART_RATES) | KF_BIT(KF_PART_ACCELERATIONS) | KF_BIT(KF_PART_ERRORS) |          \
      KF_BIT(KF_PART_WATCH) | KF_FORCE_PARTS)
 #define KF_GIVEN_PARTS                                                                                                 \
-    (KF_BIT(KF_PART_INPUTS) | KF_BIT(KF_PART_CONSTANTS) | KF_BIT(KF_PART_PARAMETERS) | KF_BIT(KF_PART_TOLERANCE) |      \
+    (KF_BIT(KF_PART_MOVERS) | KF_BIT(KF_PART_CONSTANTS) | KF_BIT(KF_PART_PARAMETERS) | KF_BIT(KF_PART_TOLERANCE) |      \
      KF_BIT(KF_PART_LOADS))
-#endif
-#if KF_TORQUE
-#undef KF_POSE_PARTS
-#undef KF_GIVEN_PARTS
-#define KF_PART_DRIVEN KF_PART_STATES
-#define KF_POSE_PARTS                                                                                                  \
-    (KF_BIT(KF_PART_VALUES) | KF_BIT(KF_PART_RATES) | KF_BIT(KF_PART_ACCELERATIONS) | KF_BIT(KF_PART_ERRORS) |          \
-     KF_BIT(KF_PART_WATCH) | KF_FORCE_PARTS)
-#define KF_GIVEN_PARTS                                                                                                 \
-    (KF_BIT(KF_PART_CONSTANTS) | KF_BIT(KF_PART_PARAMETERS) | KF_BIT(KF_PART_TOLERANCE) | KF_BIT(KF_PART_EFFORTS) |     \
-     KF_BIT(KF_PART_LOADS))
-#endif
 #define KF_REAL(state, part) ((state)->real + kf_part_first[part])
 
-#if KF_FORCES
 /* Generated, where their part has variables: the forces of one sample. */
 typedef void kf_stage(double time, const double *u, const double *ud, const double *udd, const double *z,
                       const double *zd, const double *zdd, const double *slopes, const double *efforts,
@@ -215,23 +200,6 @@ void kf_forces_of_trial(kf_state *state, const kf_solver *solver, kf_pose *pose,
 double kf_step_along_laws(const double *loads, const double *seed, double longest);
 void kf_add_force_slopes(kf_state *state, const double *dv, const double *da, const double *loads, double dt,
                          unsigned parts, double *slope);
-#endif
-#if KF_TORQUE
-extern const double kf_in_si[KF_DRIVERS]; /* units of the drivers */
-void kf_inertia(double time, const double *u, const double *ud, const double *udd, const double *z, const double *zd,
-                const double *zdd, const double *slopes, const double *efforts, const double *parameters,
-                double *forces); /* generated: bias efforts, then the reduced inertia's upper triangle, row by row */
-bool kf_accelerations(const kf_solver *solver, kf_pose *pose, double t, const double *ud, const double *efforts,
-                      const double *loads, double *udd);
-int kf_massless(const kf_solver *solver, kf_pose *pose, double t, const double *ud, const double *loads);
-void kf_state_drive(kf_state *state, double *u, double *ud, double *udd);
-bool kf_integrate(kf_instance *instance, double end, double *reached);
-void kf_move_efforts(const kf_state *state, double after, double *efforts, double *loads);
-bool kf_passes_limit(kf_instance *instance, double *reached);
-kf_answer kf_set_states(kf_instance *instance, const double *states, size_t count);
-kf_answer kf_get_states(kf_instance *instance, double *states, size_t count);
-kf_answer kf_get_state_derivatives(kf_instance *instance, double *derivatives, size_t count);
-#endif
 void kf_forget(kf_state *state);        /* the driver values may have changed */
 void kf_forget_motion(kf_state *state); /* the rates may have changed */
 bool kf_holds(const kf_state *state);    /* discrete variables keep their values */
@@ -241,28 +209,24 @@ KF_RARE kf_answer kf_bind_parameters(kf_instance *instance);
 void kf_solve_at(kf_state *state, const double *u);
 void kf_commit_pose(kf_state *state);
 void kf_commit(kf_state *state, double t, double step);
-kf_answer kf_warn_of_inputs(kf_instance *instance);
+kf_answer kf_discarded(kf_instance *instance, double time, double step, double at);
 bool kf_is_past_stop(const kf_state *state, double time, double step);
 KF_RARE kf_answer kf_past_stop(const kf_instance *instance, const char *function, double time, double step);
 kf_answer kf_read(kf_instance *instance, unsigned parts);
 void kf_find_drive(kf_state *state);
 /* Times at which drivers jump, and periods after which they jump again, 0 if they do not: events.c. */
 void kf_jumps(const kf_model *model, const double *constants, double *jumps, double *periods);
-#if !KF_TORQUE
-KF_RARE void kf_move_inputs(kf_state *state, double step);
-#endif
-void kf_end_of_step(kf_state *state, double step);
-void kf_drop_input_derivatives(kf_state *state);
-void kf_find_rate_sources(kf_state *state);
 void kf_touch(kf_state *state); /* a variable is set: values shown are those at the current time, not at the commit */
-void kf_law(const kf_state *state, double t, double *u, double *ud, double *udd);
-void kf_asked_drive(const kf_state *state, double *u, double *ud, double *udd);
-void kf_find_errors(kf_state *state, double errors[3]);
 void kf_bound_errors(double errors[3]);
 double kf_moment(const kf_state *state, double *t, double *u);
-void kf_estimated_rates(const kf_sample *samples, int count, double t, const double *u, double *ud, double *udd);
-void kf_errors_of_estimated_rates(const kf_sample *samples, int count, double t, const double *u, double ahead,
-                                  double *of_ud, double *of_udd);
+void kf_find_errors(kf_state *state, double errors[3]);
+
+/* Central differences of sixth order: f' = sum of kf_sixth_order[j - 1] (f(j h) - f(-j h)) / h, j = 1, 2, 3. */
+#define KF_TRIAL 2e-3 /* [rad, sizes], far from singular points: rounding and truncation errors are both near 1e-13 */
+#define KF_TRIES 12   /* halvings of the step where a trial has no solution */
+extern const double kf_sixth_order[3];
+double kf_largest_rate(const double *v);
+double kf_trial_step(kf_state *state);
 
 /* Return whether a call has valid arguments: an instance, and arrays that are not NULL. */
 static inline kf_answer kf_check(const kf_instance *instance, const void *references, const void *values, size_t count)
@@ -273,10 +237,30 @@ static inline kf_answer kf_check(const kf_instance *instance, const void *refere
     return references == NULL || values == NULL ? kf_no_array(instance, count) : KF_DONE;
 }
 
+/* Return whether a variable can be set: the acceleration of a state is computed. */
+static inline bool kf_is_given(unsigned place)
+{
+    return place < KF_REALS && (KF_BIT(kf_part_of[place]) & (KF_GIVEN_PARTS | KF_BIT(KF_PART_INPUTS))) != 0 &&
+           !(KF_STATES && kf_part_of[place] == KF_PART_INPUTS && place % 3 == 2);
+}
+
+/* Return the number of an input whose derivatives a step can follow, -1 for any other variable. */
+static inline int kf_followed(unsigned place)
+{
+    const int part = place < KF_REALS ? kf_part_of[place] : KF_PARTS;
+    const int number = place < KF_REALS ? (int)place - kf_part_first[part] : 0;
+    if (part == KF_PART_MOVERS) {
+        return number;
+    }
+    return KF_STATES && part == KF_PART_LOADS && number < KF_LOAD_INPUTS ? KF_DRIVERS + number : -1;
+}
+
 /* Solve for the requested pose; it may be good or not. */
 static inline kf_status kf_ask(kf_instance *instance)
 {
     return instance->now.solved ? instance->now.status : kf_ask_anew(instance);
 }
+
+#include "motion.h"
 
 #endif

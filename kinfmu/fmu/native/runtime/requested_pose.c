@@ -21,9 +21,7 @@ inline void kf_touch(kf_state *s)
 {
     if (!s->touched) {
         s->touched = true;
-        if (s->ended && !s->moving) {
-            kf_drop_input_derivatives(s);
-        }
+        kf_drop_past_derivatives(s);
         kf_forget_motion(s);
     }
 }
@@ -64,18 +62,11 @@ inline void kf_solve_at(kf_state *s, const double *u)
 kf_status kf_ask_anew(kf_instance *instance)
 {
     kf_state *const s = &instance->now;
-    double u[KF_DRIVERS], ud[KF_DRIVERS], udd[KF_DRIVERS];
+    double u[KF_DRIVERS];
     if (s->unbound) {
         kf_bind_parameters(instance);
     }
-    if (s->driven_by_time) {
-        kf_law(s, s->time, u, ud, udd);
-    } else {
-        int k;
-        for (k = 0; k < KF_DRIVERS; ++k) {
-            u[k] = s->real[3 * k];
-        }
-    }
+    kf_asked_values(s, u);
     kf_solve_at(s, u);
     return s->status;
 }
@@ -90,9 +81,7 @@ void kf_commit_pose(kf_state *s)
 {
     memcpy(s->committed_u, KF_POSE_U(&s->poses[s->asked]), sizeof s->committed_u);
     memcpy(s->committed_inputs, s->real, sizeof s->committed_inputs);
-#if KF_FORCES
     memcpy(s->committed_efforts, KF_REAL(s, KF_PART_LOADS), KF_LOADS * sizeof *s->committed_efforts);
-#endif
     s->committed = s->asked;
     s->committed_status = s->status;
     s->touched = false;
@@ -118,4 +107,56 @@ void kf_commit(kf_state *s, double t, double step)
     memcpy(sample->u, u, sizeof sample->u);
     s->ended = false;
     kf_commit_pose(s);
+}
+
+/* The time and u of the sample that rates are estimated at, and how many seconds later they hold: 0, but a step at the end
+ * of a step that followed derivatives of inputs. Extrapolated values are not samples.
+ */
+double kf_moment(const kf_state *s, double *t, double *u)
+{
+    int k;
+    if (s->touched || !s->samples) {
+        *t = s->time;
+        for (k = 0; k < KF_DRIVERS; ++k) {
+            u[k] = s->real[3 * k];
+        }
+    } else { /* nothing set since the commit: still the committed sample, at the time of its step */
+        *t = s->history[s->samples - 1].t;
+        memcpy(u, s->history[s->samples - 1].u, KF_DRIVERS * sizeof *u);
+        if (s->ended) {
+            return s->ended_step;
+        }
+    }
+    return 0.0;
+}
+
+/* u, ud, udd of the pose shown. */
+void kf_find_drive(kf_state *s)
+{
+    if (!s->drive_known) {
+        s->drive_known = true;
+        if (KF_GOOD(s->status)) {
+            kf_asked_drive(s, s->u, s->ud, s->udd);
+        } else {
+            kf_committed_drive(s, s->u, s->ud, s->udd);
+        }
+    }
+}
+
+/* Many hosts cannot record an infinity. */
+void kf_bound_errors(double errors[3])
+{
+    int order;
+    for (order = 0; order < 3; ++order) {
+        errors[order] = errors[order] < KF_UNKNOWN_ERROR ? errors[order] : KF_UNKNOWN_ERROR;
+    }
+}
+
+/* Estimated errors of q, qd, qdd of the pose shown. */
+void kf_find_errors(kf_state *s, double errors[3])
+{
+    kf_find_drive(s);
+    kf_errors(&s->solver, kf_shown(s), s->ud, s->udd, errors);
+    kf_add_rate_errors(s, errors);
+    kf_bound_errors(errors);
 }

@@ -25,14 +25,8 @@ kf_answer kf_set_input_derivative(kf_instance *instance, unsigned reference, int
 {
     kf_state *const s = &instance->now;
     const char *const name = kf_name_of(reference);
-    const unsigned place = KF_PLACE(reference);
-#if KF_TORQUE
-    const int part = place < KF_REALS ? kf_part_of[place] : KF_PARTS;
-    const int number = place < KF_REALS ? (int)place - kf_part_first[part] : 0;
-    if (part != KF_PART_EFFORTS && !(part == KF_PART_LOADS && number < KF_LOAD_INPUTS)) {
-#else
-    if (place >= 3 * KF_DRIVERS) {
-#endif
+    const int number = kf_followed(KF_PLACE(reference));
+    if (number < 0) {
         return kf_not_settable(instance, reference, KF_REAL_WORD);
     }
     if (s->model_exchange) {
@@ -46,41 +40,8 @@ kf_answer kf_set_input_derivative(kf_instance *instance, unsigned reference, int
         kf_forget(s);
     }
     kf_touch(s);
-#if KF_TORQUE
-    (part == KF_PART_EFFORTS ? s->effort_rates : s->load_rates)[number][order - 1] = value;
+    s->input_rates[number][order - 1] = value;
     s->moving = true;
-#else
-    s->input_rates[place][order - 1] = value;
-    s->orders[place] = order > s->orders[place] ? (unsigned char)order : s->orders[place];
-    s->wired[place] = s->wired[place] || (place % 3 != 0 && value != 0.0);
-    kf_find_rate_sources(s);
-    kf_forget_motion(s);
-    s->moving = true;
-    s->stray = place + 1;
-#endif
+    kf_derivative_set(s, number, order, value);
     return KF_DONE;
 }
-
-#if !KF_TORQUE
-/* Move the inputs along their derivatives to the end of a step: Taylor's formula. There is no pose where an input or its
- * rates exceed KF_LARGEST.
- */
-KF_RARE void kf_move_inputs(kf_state *s, double step)
-{
-    bool usable = true;
-    int k, order;
-    for (k = 0; k < 3 * KF_DRIVERS; ++k) {
-        const double *const rates = s->input_rates[k];
-        double term = 1.0;
-        for (order = 0; order < KF_INPUT_ORDERS; ++order) {
-            term *= step / (order + 1);
-            s->real[k] += rates[order] * term;
-        }
-        usable = usable && fabs(s->real[k]) <= KF_LARGEST &&
-                 fabs(rates[0]) + step * (fabs(rates[1]) + 0.5 * step * fabs(rates[2])) <= KF_LARGEST &&
-                 fabs(rates[1]) + step * fabs(rates[2]) <= KF_LARGEST;
-    }
-    s->real[0] = usable ? s->real[0] : NAN;
-    kf_forget(s);
-}
-#endif

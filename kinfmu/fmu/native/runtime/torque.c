@@ -25,59 +25,6 @@
 #define LEAST 10.0       /* shortest step, in roundings of the time */
 #define MOST 1000000     /* steps of the integrator in one step of the host */
 
-static kf_answer check_count(const kf_instance *instance, const double *numbers, size_t count)
-{
-    if (numbers == NULL || count != KF_NUMBERS) {
-        return kf_answered(instance, KF_ERROR, "%zu numbers for %d continuous states", numbers ? count : 0, KF_NUMBERS);
-    }
-    return KF_DONE;
-}
-
-/* The states of model exchange: value and speed of each driver. */
-kf_answer kf_set_states(kf_instance *instance, const double *states, size_t count)
-{
-    kf_state *const s = &instance->now;
-    kf_answer answer = check_count(instance, states, count);
-    size_t k;
-    if (answer == KF_DONE && s->mode != KF_CONTINUOUS) {
-        answer = kf_answered(instance, KF_ERROR, "setContinuousStates: the instance is not in continuous-time mode");
-    }
-    for (k = 0; answer == KF_DONE && k < KF_NUMBERS; ++k) {
-        if (!(fabs(states[k]) <= KF_LARGEST)) {
-            return kf_answered(instance, KF_DISCARD, "%s = %g is no finite number", kf_variable_names[3 * (k / 2) + k % 2], states[k]);
-        }
-    }
-    for (k = 0; answer == KF_DONE && k < KF_NUMBERS; ++k) {
-        s->real[3 * (k / 2) + k % 2] = states[k];
-    }
-    kf_touch(s);
-    kf_forget(s);
-    return answer;
-}
-
-kf_answer kf_get_states(kf_instance *instance, double *states, size_t count)
-{
-    const kf_answer answer = check_count(instance, states, count);
-    size_t k;
-    for (k = 0; answer == KF_DONE && k < KF_NUMBERS; ++k) {
-        states[k] = instance->now.real[3 * (k / 2) + k % 2];
-    }
-    return answer;
-}
-
-kf_answer kf_get_state_derivatives(kf_instance *instance, double *derivatives, size_t count)
-{
-    kf_answer answer = check_count(instance, derivatives, count);
-    size_t k;
-    if (answer == KF_DONE) {
-        answer = kf_read(instance, KF_BIT(KF_PART_STATES) | KF_BIT(KF_PART_VALUES));
-    }
-    for (k = 0; answer == KF_DONE && k < KF_NUMBERS; ++k) {
-        derivatives[k] = instance->now.real[3 * (k / 2) + k % 2 + 1];
-    }
-    return answer;
-}
-
 /* Follow the last good pose to u; if it is not reached, that one stays. */
 bool kf_follow(kf_course *course, const double *u)
 {
@@ -98,7 +45,7 @@ void kf_move_efforts(const kf_state *s, double after, double *efforts, double *l
     memcpy(efforts, given + kf_part_first[KF_PART_EFFORTS], KF_DRIVERS * sizeof *efforts);
     memcpy(loads, given + kf_part_first[KF_PART_LOADS], KF_LOADS * sizeof *loads);
     for (k = 0; s->moving && k < KF_DRIVERS + KF_LOAD_INPUTS; ++k) {
-        const double *const rates = k < KF_DRIVERS ? s->effort_rates[k] : s->load_rates[k - KF_DRIVERS];
+        const double *const rates = s->input_rates[k];
         double *const value = k < KF_DRIVERS ? &efforts[k] : &loads[k - KF_DRIVERS];
         double term = 1.0;
         for (order = 0; order < KF_INPUT_ORDERS; ++order) {
@@ -335,8 +282,7 @@ bool kf_integrate(kf_instance *instance, double end, double *reached)
         kf_move_efforts(s, end - start, course.efforts, course.loads);
         memcpy(KF_REAL(s, KF_PART_EFFORTS), course.efforts, sizeof course.efforts);
         memcpy(KF_REAL(s, KF_PART_LOADS), course.loads, KF_LOADS * sizeof *course.loads);
-        memset(s->effort_rates, 0, sizeof s->effort_rates);
-        memset(s->load_rates, 0, sizeof s->load_rates);
+        memset(s->input_rates, 0, sizeof s->input_rates);
         s->moving = false;
     }
     s->step_size = course.size < INFINITY ? course.size : 0.0;

@@ -1,4 +1,4 @@
-/* Motion of the drivers under efforts: see torque.c and limits.c. */
+/* Motion of the drivers under efforts: see motion_by_efforts.c, torque.c, equation_of_motion.c and limits.c. */
 #ifndef KF_TORQUE_H
 #define KF_TORQUE_H
 
@@ -39,6 +39,13 @@ typedef struct {
 
 typedef enum { KF_GOES_ON, KF_REPEATS, KF_HOPS, KF_ENDS } kf_verdict;
 
+extern const double kf_in_si[KF_DRIVERS]; /* generated: units of the drivers */
+kf_stage kf_inertia; /* generated: bias efforts, then the reduced inertia's upper triangle, row by row */
+bool kf_accelerations(const kf_solver *solver, kf_pose *pose, double t, const double *ud, const double *efforts,
+                      const double *loads, double *udd);
+int kf_massless(const kf_solver *solver, kf_pose *pose, double t, const double *ud, const double *loads);
+bool kf_integrate(kf_instance *instance, double end, double *reached);
+bool kf_passes_limit(kf_instance *instance, double *reached);
 bool kf_follow(kf_course *course, const double *u);
 kf_verdict kf_search_limit(kf_course *course, const kf_end *before, const kf_end *after);
 bool kf_ends_at(kf_course *course, double t, const double *u, const double *ud);

@@ -33,23 +33,6 @@ kf_answer kf_not_settable(const kf_instance *instance, unsigned reference, const
     return refused(instance, reference, type, " that can be set");
 }
 
-#if KF_TORQUE
-/* Accelerations that no reduced inertia determines are refused. */
-static kf_answer find_motion(kf_instance *instance)
-{
-    kf_state *const s = &instance->now;
-    int k;
-    kf_find_drive(s);
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        if (!isfinite(s->udd[k])) {
-            return kf_answered(instance, KF_DISCARD, "at t = %g s: the reduced inertia is singular, or a number is not finite",
-                               s->time);
-        }
-    }
-    return KF_DONE;
-}
-
-#endif
 /* Compute positions, rates and accelerations together if more than one is wanted: common terms are computed once. */
 static KF_WHOLE void read_motion(kf_state *s, unsigned parts)
 {
@@ -62,40 +45,20 @@ static KF_WHOLE void read_motion(kf_state *s, unsigned parts)
     kf_motion(&s->solver, kf_shown(s), s->ud, s->udd, values, rates, accelerations);
 }
 
-#if !KF_TORQUE
-/* The effective driver values: those requested, even where they are unreachable. */
-static void read_driven(kf_state *s)
-{
-    double *const driven = KF_REAL(s, KF_PART_DRIVEN);
-    double u[KF_DRIVERS], ud[KF_DRIVERS], udd[KF_DRIVERS];
-    int k;
-    kf_asked_drive(s, u, ud, udd);
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        driven[3 * k] = u[k];
-        driven[3 * k + 1] = ud[k];
-        driven[3 * k + 2] = udd[k];
-    }
-}
-
-#endif
 /* Bring parts (a bit each) up to date; Discard if their pose is unreachable: then they keep the last good values. */
 kf_answer kf_read(kf_instance *instance, unsigned parts)
 {
     const unsigned motion = KF_BIT(KF_PART_VALUES) | KF_BIT(KF_PART_RATES) | KF_BIT(KF_PART_ACCELERATIONS);
     kf_state *const s = &instance->now;
     const unsigned missing = parts & ~s->known;
-#if KF_TORQUE
     if (instance->updating && missing) {
         return kf_answered(instance, KF_ERROR, "nothing can be read during a step");
     }
-#endif
     if (missing) {
         kf_ask(instance);
-#if KF_TORQUE
-        if ((missing & (KF_POSE_PARTS | KF_BIT(KF_PART_STATES))) && KF_GOOD(s->status) && find_motion(instance) != KF_DONE) {
+        if (kf_read_drivers(instance, missing) != KF_DONE) {
             return KF_DISCARD;
         }
-#endif
         if (missing & motion) {
             read_motion(s, missing);
         }
@@ -109,20 +72,13 @@ kf_answer kf_read(kf_instance *instance, unsigned parts)
             if (missing & KF_BIT(KF_PART_ERRORS)) {
                 kf_find_errors(s, KF_REAL(s, KF_PART_ERRORS));
             }
-#if KF_FORCES
             if (missing & KF_FORCE_PARTS) {
                 kf_read_forces(s, missing);
                 kf_warn_of_meeting(instance, missing);
             }
-#endif
             if (missing & KF_BIT(KF_PART_WATCH)) {
                 kf_watches(&s->solver.model, &kf_shown(s)->found, KF_REAL(s, KF_PART_WATCH));
             }
-#if !KF_TORQUE
-            if (missing & KF_BIT(KF_PART_DRIVEN)) {
-                read_driven(s);
-            }
-#endif
             if (missing & KF_BIT(KF_PART_FIXED)) {
                 kf_fixed(&s->solver.model, KF_REAL(s, KF_PART_FIXED));
             }
