@@ -266,7 +266,9 @@ def _tables(variables: Interface) -> str:
 
 def _real_parts(variables: Interface) -> dict[str, Sequence[Variable]]:
     """Return the Real variables by part; the parts of forces are empty where no force is an output."""
-    parts = {part.name: part.variables for part in variables.parts if part.name not in NOT_REAL}
+    parts: dict[str, Sequence[Variable]] = {
+        part.name: part.variables for part in variables.parts if part.name not in NOT_REAL
+    }
     return parts | {name: () for name in ("loads", *STAGES) if name not in parts}
 
 
