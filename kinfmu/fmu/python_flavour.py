@@ -33,9 +33,8 @@ from kinfmu.codegen.python.stage import has_roots
 from kinfmu.errors import FmuError
 from kinfmu.fmu import description
 from kinfmu.fmu.archive import digest, token, zipped
-from kinfmu.fmu.documents import Documents
+from kinfmu.fmu.documents import Documents, licence
 from kinfmu.fmu.interface import Drive, Interface
-from kinfmu.fmu.licence import licence
 from kinfmu.fmu.owned_motion import OwnedMotion, units_in_si
 from kinfmu.fmu.variables import interface
 from kinfmu.mechanism import toml_text
