@@ -12,10 +12,10 @@ from collections.abc import Callable
 from math import isfinite
 from typing import NamedTuple
 
-from kinfmu.fmu.layout import Numbers
-from kinfmu.solver.python import Pose, Solver
-from kinfmu.solver.python.linear import factor, lu_solve
-from kinfmu.solver.python.tracks import sample_rates
+from ..solver.python import Pose, Solver
+from ..solver.python.linear import factor, lu_solve
+from ..solver.python.tracks import sample_rates
+from .slave.layout import Numbers
 
 
 class Given(NamedTuple):

@@ -12,7 +12,7 @@ import numpy as np
 from kinfmu.draw.scene.estimates import with_estimates
 from kinfmu.fmu.description import Description
 from kinfmu.fmu.interface import Interface, Variable
-from kinfmu.fmu.layout import UNKNOWN_ERROR
+from kinfmu.fmu.slave.layout import UNKNOWN_ERROR
 from kinfmu.fmu.slaves import LoadedSlave
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import force_names, reaction_names_of

@@ -16,12 +16,12 @@ import numpy as np
 
 from kinfmu.errors import FmuError, RequestError, listed
 from kinfmu.fmu import description
-from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.fmu_settings import as_set, fmu_settings
 from kinfmu.fmu.input_table import InputTable, input_notes, input_table, times, undriven
 from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.interruption import Interruption
 from kinfmu.fmu.samples import DISCARD, ERROR, Samples
+from kinfmu.fmu.slave.estimated_rates import Rates
 from kinfmu.fmu.slaves import LoadedSlave, slave
 from kinfmu.fmu.system.simulate import simulate_system
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, MECHANISM, text_in, unpacked

@@ -12,9 +12,9 @@ from collections.abc import Callable
 from math import inf, sqrt
 from typing import NamedTuple
 
-from kinfmu.fmu.layout import Numbers
-from kinfmu.solver.python import Pose, Solver
-from kinfmu.solver.python.hermite import Hermite
+from ..solver.python import Pose, Solver
+from ..solver.python.hermite import Hermite
+from .slave.layout import Numbers
 
 NEAR = 0.5  # determinant below which steps of several drivers are searched
 DIPS = 0.3  # of the determinants at both ends of a step: a smaller one between may be a limit

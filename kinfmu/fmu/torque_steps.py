@@ -11,13 +11,13 @@ from collections.abc import Callable, Sequence
 from math import floor, inf, sqrt
 from typing import NamedTuple
 
-from kinfmu.fmu import dormand_prince as pair
-from kinfmu.fmu.equation_of_motion import EquationOfMotion, Given
-from kinfmu.fmu.layout import Numbers
-from kinfmu.fmu.torque_limits import Ended, StepEnd, is_arrived, limit_past, suspicion, time_to_rest
-from kinfmu.solver.python import Pose, Solver, Status
-from kinfmu.solver.python.hermite import Hermite
-from kinfmu.solver.python.law_breaks import CUTS, first_crossing, hop, landing, moved_by
+from ..solver.python import Pose, Solver, Status
+from ..solver.python.hermite import Hermite
+from ..solver.python.law_breaks import CUTS, first_crossing, hop, landing, moved_by
+from . import dormand_prince as pair
+from .equation_of_motion import EquationOfMotion, Given
+from .slave.layout import Numbers
+from .torque_limits import Ended, StepEnd, is_arrived, limit_past, suspicion, time_to_rest
 
 SAFETY = 0.9
 SHRINKS = 0.2  # a step is at least so much of the refused one

@@ -8,8 +8,8 @@ from typing import Any, Literal
 from xml.etree import ElementTree as ET
 from xml.etree.ElementTree import Element, SubElement
 
-from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.interface import RATES_TYPE, STATUS_TYPE, Interface, Variable
+from kinfmu.fmu.slave.estimated_rates import Rates
 from kinfmu.mechanism import RunSettings
 from kinfmu.solver.python.status import Status
 from kinfmu.units import KINDS, METRES

@@ -18,10 +18,10 @@ from kinfmu.codegen.python.forces import solves
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.errors import MissingPackageError
 from kinfmu.fmu import dormand_prince as pair
-from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.interface import Interface
-from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.fmu.owned_motion import units_in_si
+from kinfmu.fmu.slave.estimated_rates import Rates
+from kinfmu.fmu.slave.layout import UNKNOWN_ERROR
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.led_laws import LedLaws
@@ -30,7 +30,6 @@ from kinfmu.plan.trace import parameter_symbol
 
 RUNTIME = Path(__file__).with_name("runtime")
 _NO_VARIABLE = "0xfffffffeu"
-NOT_REAL = ("counts", "ok", "drive", "rate_source", "message", "time")  # parts after those of Real variables
 HEADERS = {
     "2.0": ("fmi2TypesPlatform.h", "fmi2FunctionTypes.h", "fmi2Functions.h"),
     "3.0": ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h"),
@@ -178,7 +177,7 @@ def headers(version: str) -> dict[str, str]:
 def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> str:
     """Return interface.h: numbers and places of the variables."""
     references = variables.value_references()
-    names = [part.name for part in variables.parts if part.name not in NOT_REAL]
+    names = [part.name for part in variables.parts if part.type == "Real"]
     real = sum(len(variables.part(name)) for name in names)
     words = _WORDS[version]
     counts = {stage: len(variables.part(stage)) for stage in STAGES}
@@ -244,7 +243,7 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
 
 def _tables(variables: Interface) -> str:
     """Return interface.c: names, start values and limits of the variables."""
-    parts = [part for part in variables.parts if part.name not in NOT_REAL]
+    parts = [part for part in variables.parts if part.type == "Real"]
     real = [variable for part in parts for variable in part.variables]
     drives = [variable.start for variable in variables.part("drive")] or [False]
     rates = [variable.start for variable in variables.part("rate_source")] or [Rates.WIRED]
