@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ...solver.python import Pose, Status
 from ...solver.python.law_breaks import LEAST_TOLERANCE, MOST_TOLERANCE
@@ -20,10 +20,7 @@ from ..torque_limits import Ended
 from ..torque_steps import EmittedLaws, TorqueSteps
 from .base import Fmi2Status
 from .layout import Numbers
-from .motion import ByInputs, Drive
-
-if TYPE_CHECKING:
-    from .slave import MechanismSlave
+from .motion import ByInputs, Drive, Moved
 
 _UNDETERMINED = "the reduced inertia is singular, or a number is not finite"
 
@@ -46,7 +43,7 @@ class ByEfforts(ByInputs):
 
     def __init__(
         self,
-        slave: MechanismSlave,
+        slave: Moved,
         *,
         inertia: Callable[..., Numbers],
         jumps: Callable[[Numbers, Numbers], Sequence[tuple[float, float]]],

@@ -5,26 +5,50 @@ A motion decides which pose is requested, how fast the drivers move there, and w
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
 
-from ...solver.python import Pose, Status
+from ...solver.python import Pose, Solver, Status
 from .base import Fmi2Status
 from .estimated_rates import LARGEST, Sample, errors_of_estimated_rates, estimated_rates
 from .layout import NOT_A_NUMBER, Numbers
-
-if TYPE_CHECKING:
-    from .slave import MechanismSlave
 
 LAST_GOOD = int(Status.BRIDGED)  # compared in every read: faster than `Pose.good`
 SAME_TIME = 1e-9  # of a step: rounding errors of times that hosts add up
 Drive = tuple[Numbers, Numbers, Numbers]  # u, ud, udd of the drivers
 
 
+class Moved(Protocol):
+    """What a motion needs of its slave; see there."""
+
+    model: Any
+    solver: Solver
+    references: Any
+    stages: Any
+    settings: dict[str, Numbers]
+    inputs: list[float]
+    input_starts: list[float]
+    wired: set[int]
+    history: tuple[Sample, ...]
+    committed: Pose
+    committed_inputs: Numbers
+    pose: Pose | None
+    shown: Any
+    time: float
+    touched: bool
+    stray_reported: bool
+    requested: Callable[[], Pose]
+    forget: Callable[[], None]
+    commit: Callable[[Pose, float, float], None]
+    discard: Callable[[Pose, float], bool]
+    refuse: Callable[[str, str], None]
+    log: Callable[..., None]
+
+
 class ByInputs:
     """Motion by inputs: values, with speeds and accelerations that are inputs too, or estimated from the values."""
 
-    def __init__(self, slave: MechanismSlave) -> None:
+    def __init__(self, slave: Moved) -> None:
         self.slave = slave
 
     def setup(self, *rest: float | None) -> None:

@@ -67,7 +67,10 @@ class SlaveVariables(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         starts = {part.name: part.starts for part in self.layout.parts}
-        self.inputs: list[float] = list(starts["states" if self.by_efforts else "inputs"])  # u, ud, udd of each driver
+        starting = (
+            [start + 0.0 for start in starts["states"]] if self.by_efforts else starts["inputs"]
+        )  # a state is no -0
+        self.inputs: list[float] = list(starting)  # value, speed, acceleration of each driver
         self.input_starts = list(self.inputs)
         self._input_count = 0 if self.by_efforts else len(self.inputs)  # of drivers, which come first
         self.settings: dict[str, Numbers] = {part: starts.get(part, ()) for part in SETTINGS}
