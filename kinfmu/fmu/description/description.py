@@ -10,8 +10,8 @@ from xml.etree.ElementTree import Element
 
 from kinfmu.errors import FmuError, KinfmuError, listed
 from kinfmu.fmu.description import fmi2, fmi3
-from kinfmu.fmu.description.common import number, text
-from kinfmu.fmu.interface import Interface, InterfacePart, Variable
+from kinfmu.fmu.description.common import document, number, text
+from kinfmu.fmu.interface import Interface, Part, Variable
 from kinfmu.mechanism import RunSettings
 from kinfmu.mechanism.valid import check_name, quoted
 from kinfmu.units import METRES, read_coordinate, read_inputs
@@ -76,8 +76,7 @@ def write(description: Description, kinds: Mapping[str, Mapping[str, float | boo
         for kind, flags in kinds.items()
     }
     version.write(root, interface, attributes, description.sources)
-    ET.indent(root)
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'.encode()
+    return document(root)
 
 
 def read(data: bytes, where: str) -> Description:
@@ -131,7 +130,7 @@ def _interface(root: Element, parts: Element, variables: Sequence[Variable]) -> 
     groups, first = [], 0
     for part in parts:
         count = int(part.get("variables", "0"))
-        groups.append(InterfacePart(part.get("name", ""), tuple(variables[first : first + count])))
+        groups.append(Part(part.get("name", ""), tuple(variables[first : first + count])))
         first += count
     title, name = root.get("description", ""), root.get("modelName", "")
     return Interface(
