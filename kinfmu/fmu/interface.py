@@ -94,7 +94,7 @@ class Variable:
 
 
 @dataclass(frozen=True)
-class Part:
+class InterfacePart:
     """Neighbouring variables that a slave computes together, such as the rates of all outputs.
 
     Attributes:
@@ -145,7 +145,7 @@ class Interface:
     length_unit: str
     experiment: RunSettings
     coordinate_count: int
-    parts: tuple[Part, ...]
+    parts: tuple[InterfacePart, ...]
 
     def __post_init__(self) -> None:
         twice = [name for name, count in Counter(variable.name for variable in self).items() if count > 1]

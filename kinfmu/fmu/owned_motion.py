@@ -14,7 +14,7 @@ from typing import NamedTuple
 from kinfmu.codegen.forces import STAGES
 from kinfmu.codegen.python import load_model
 from kinfmu.fmu.force_variables import load_variables
-from kinfmu.fmu.interface import Part, Variable
+from kinfmu.fmu.interface import InterfacePart, Variable
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.laws import External
 from kinfmu.mechanism.loads.following import Following
@@ -96,7 +96,9 @@ def depends_on_time(mechanism: Mechanism) -> bool:
     )
 
 
-def with_states(plan: SolvePlan, parts: Iterable[Part], starts: Sequence[float], *, has_time: bool) -> list[Part]:
+def with_states(
+    plan: SolvePlan, parts: Iterable[InterfacePart], starts: Sequence[float], *, has_time: bool
+) -> list[InterfacePart]:
     """Return the parts of an FMU that owns the motion, from those of one that inputs drive.
 
     Args:
@@ -112,7 +114,7 @@ def with_states(plan: SolvePlan, parts: Iterable[Part], starts: Sequence[float],
         added = {"loads": tuple(load_variables(mechanism))} | dict.fromkeys(STAGES, ())
         at = list(by_name).index("fixed") + 1
         items = list(by_name.items())
-        by_name = dict([*items[:at], *((name, Part(name, one)) for name, one in added.items()), *items[at:]])
+        by_name = dict([*items[:at], *((name, InterfacePart(name, one)) for name, one in added.items()), *items[at:]])
     loads = [variable.name for variable in by_name["loads"].variables if variable.causality == "input"]
     moving = [name for driver in plan.drivers for name in driver.inputs[:2]]
     time = ["time"] if has_time and depends_on_time(mechanism) else []
@@ -124,17 +126,17 @@ def with_states(plan: SolvePlan, parts: Iterable[Part], starts: Sequence[float],
         if name in _LEFT_OUT:
             continue
         if name == INPUTS:
-            result.append(Part(STATES, tuple(_states(plan, starts, behind, constants))))
+            result.append(InterfacePart(STATES, tuple(_states(plan, starts, behind, constants))))
         elif name == "constants":  # the laws of drivers have no effect
-            result.append(Part(name, ()))
+            result.append(InterfacePart(name, ()))
         elif name == "tolerance":
-            result.append(Part(name, (*part.variables, INTEGRATOR_TOLERANCE)))
+            result.append(InterfacePart(name, (*part.variables, INTEGRATOR_TOLERANCE)))
         else:
             dropped = {constant.name for constant in plan.law_constants} | set(_GONE)
             found = (_behind(one, behind, constants, dropped) for one in part.variables)
-            result.append(Part(name, tuple(found)))
+            result.append(InterfacePart(name, tuple(found)))
         if name == "fixed":
-            result.append(Part(EFFORTS, tuple(_efforts(plan))))
+            result.append(InterfacePart(EFFORTS, tuple(_efforts(plan))))
     return result
 
 

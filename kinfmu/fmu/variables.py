@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 
 from kinfmu.analysis.singular import DriverRange
 from kinfmu.fmu.force_variables import force_parts, law_constant
-from kinfmu.fmu.interface import RATES_TYPE, STATUS_TYPE, Drive, Interface, Part, Variable
+from kinfmu.fmu.interface import RATES_TYPE, STATUS_TYPE, Drive, Interface, InterfacePart, Variable
 from kinfmu.fmu.owned_motion import with_states
 from kinfmu.fmu.slave.estimated_rates import Rates
 from kinfmu.fmu.slave.layout import UNKNOWN_ERROR
@@ -140,17 +140,17 @@ def interface(
         "rate_source": [_RATES],
         "message": [_MESSAGE],
     }
-    parts = [Part(name, tuple(variables)) for name, variables in lists.items()]
+    parts = [InterfacePart(name, tuple(variables)) for name, variables in lists.items()]
     if drive == "torque":
         parts = with_states(plan, parts, starts, has_time=has_time)
     if has_time:
         owns = drive == "torque"  # then only forces and laws of loads depend on time
         tunable = {variable.name for part in parts for variable in part.variables if variable.variability == "tunable"}
         parts = [
-            Part(part.name, tuple(_in_fmi3(one, tunable, has_time=not owns) for one in part.variables))
+            InterfacePart(part.name, tuple(_in_fmi3(one, tunable, has_time=not owns) for one in part.variables))
             for part in parts
         ]
-        parts.append(Part("time", (_TIME,)))
+        parts.append(InterfacePart("time", (_TIME,)))
     return Interface(
         mechanism.name, mechanism.title, mechanism.length_unit, mechanism.run, len(plan.coordinates), tuple(parts)
     )

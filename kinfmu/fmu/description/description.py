@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 from kinfmu.errors import FmuError, KinfmuError, listed
 from kinfmu.fmu.description import fmi2, fmi3
 from kinfmu.fmu.description.common import document, number, text
-from kinfmu.fmu.interface import Interface, Part, Variable
+from kinfmu.fmu.interface import Interface, InterfacePart, Variable
 from kinfmu.mechanism import RunSettings
 from kinfmu.mechanism.valid import check_name, quoted
 from kinfmu.units import METRES, read_coordinate, read_inputs
@@ -130,7 +130,7 @@ def _interface(root: Element, parts: Element, variables: Sequence[Variable]) -> 
     groups, first = [], 0
     for part in parts:
         count = int(part.get("variables", "0"))
-        groups.append(Part(part.get("name", ""), tuple(variables[first : first + count])))
+        groups.append(InterfacePart(part.get("name", ""), tuple(variables[first : first + count])))
         first += count
     title, name = root.get("description", ""), root.get("modelName", "")
     return Interface(
