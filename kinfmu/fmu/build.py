@@ -10,7 +10,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from kinfmu.errors import CompilerError, FmuError, RequestError, listed, suggestion
-from kinfmu.files import suffix_of, temporary_folder, write_whole
+from kinfmu.files import suffix_of, temporary_folder
+from kinfmu.fmu.archive import write
 from kinfmu.fmu.description import FmiVersion
 from kinfmu.fmu.interface import DRIVES, Drive
 from kinfmu.mechanism import Mechanism
@@ -83,9 +84,8 @@ def build(
     drive = default_drive(mechanism) if drive is None else drive
     flavour = default_flavour(fmi, platforms) if flavour is None else flavour
     _check(flavour, drive, fmi, platforms)
-    from kinfmu.fmu.documents import documents
+    from kinfmu.fmu.documents import attributes, documents
     from kinfmu.fmu.force_variables import chosen_outputs, force_stages
-    from kinfmu.fmu.metadata import attributes
     from kinfmu.plan import compile_plan
     from kinfmu.plan.forces import loaded_coordinates
 
@@ -127,17 +127,17 @@ def _page_of(mechanism: Mechanism) -> str:
 def _written(path: Path, data: bytes, page: str, *, osp: bool) -> Path:
     """Write an FMU, with its page, or the .ssp that holds it, and the description for OSP."""
     if suffix_of(path) == ".ssp":
-        from kinfmu.fmu.ssp import write_ssp
+        from kinfmu.fmu.system_files import write_ssp
 
         with temporary_folder() as folder:
             return write_ssp(_written(folder / "model.fmu", data, page, osp=False), path)
-    _write(path, data)
+    write(path, data)
     if page:
-        from kinfmu.fmu.played import add_page
+        from kinfmu.fmu.documents import add_page
 
         add_page(path, page)
     if osp:
-        from kinfmu.fmu.osp import write_osp
+        from kinfmu.fmu.system_files import write_osp
 
         write_osp(path)
     return path
@@ -214,11 +214,3 @@ def _file(path: str | Path | None, name: str, *, ssp: bool) -> Path:
         what = "a system ends in .ssp" if ssp else "an FMU ends in .fmu"
         raise RequestError(f"{path}: is no folder, and the file of {what}")
     return path
-
-
-def _write(path: Path, data: bytes) -> None:
-    """Write the whole file or none, so that a host never reads an incomplete FMU."""
-    try:
-        write_whole(path, data)
-    except OSError as error:
-        raise FmuError(f"{path}: cannot be written ({error.strerror})") from None

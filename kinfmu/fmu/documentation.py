@@ -9,8 +9,8 @@ from types import MappingProxyType
 
 from kinfmu.analysis.singular import DriverRange
 from kinfmu.fmu.interface import Interface, Variable
-from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.fmu.reference import FOLDER, ReferenceResults
+from kinfmu.fmu.slave.layout import UNKNOWN_ERROR
 from kinfmu.mechanism.drivers import Driver
 from kinfmu.plan import SolvePlan
 from kinfmu.solver.python.status import Status

@@ -95,10 +95,28 @@ class Variable:
 
 @dataclass(frozen=True)
 class InterfacePart:
-    """Neighbouring variables that a slave computes together, such as the rates of all outputs."""
+    """Neighbouring variables that a slave computes together, such as the rates of all outputs.
+
+    Attributes:
+        name: Name, such as "rates".
+        variables: Variables, none if the FMU does not have what the part is for.
+
+    """
 
     name: str
     variables: tuple[Variable, ...]
+
+    @property
+    def type(self) -> str:
+        """Type of the variables; 'Real' if there are none, 'Time' of the independent variable."""
+        first = self.variables[0] if self.variables else None
+        return "Real" if first is None else "Time" if first.causality == "independent" else first.type
+
+    @property
+    def starts(self) -> tuple[float | bool, ...]:
+        """Start values, 0 of a variable without one; none if no variable has one."""
+        starts = [variable.start for variable in self.variables]
+        return tuple([0.0 if start is None else start for start in starts]) if starts.count(None) < len(starts) else ()
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -5,24 +5,26 @@
     binaries/<platform>/<identifier>.so|dll       pythonfmu's, unchanged
     resources/slavemodule.txt                     names the module that holds the slave class
     resources/<package>_slave.py                  the slave class, with its model and layout
-    resources/<package>/solver/                   the solver, and the emitted model; forces, if they are outputs;
+    resources/<package>/solver/python/            the solver, and the emitted model; forces, if they are outputs;
                                                   reduced inertia, if efforts drive
-    resources/<package>/{fmu,pythonfmu}/          the base classes of the slave: kinfmu's and pythonfmu's
+    resources/<package>/fmu/slave/                the base class of the slave
+    resources/<package>/pythonfmu/                pythonfmu's base class
     resources/mechanism.toml
 
 Hosts keep imported modules for the life of the process, and pythonfmu runs a slave's module twice. So the name of every
 module contains the mechanism's name and a hash of the content, and importing it has no effects. The host may hold other
-versions of `kinfmu` and `pythonfmu`, so copies of both are inside, under the name of the package.
+versions of `kinfmu` and `pythonfmu`, so copies of both are inside, under the name of the package. Their
+modules import each other relatively.
 """
 
 from __future__ import annotations
 
 import ast
-import re
 import sys
 from collections.abc import Mapping, Sequence
 from importlib.metadata import distribution
 from importlib.resources import files
+from pathlib import Path
 from types import MappingProxyType
 
 from kinfmu.codegen.forces import STAGES, emit_jumps, emit_python_forces, solves
@@ -31,9 +33,8 @@ from kinfmu.codegen.python.stage import has_roots
 from kinfmu.errors import FmuError
 from kinfmu.fmu import description
 from kinfmu.fmu.archive import digest, token, zipped
-from kinfmu.fmu.documents import Documents
+from kinfmu.fmu.documents import Documents, licence
 from kinfmu.fmu.interface import Drive, Interface
-from kinfmu.fmu.licence import licence
 from kinfmu.fmu.owned_motion import OwnedMotion
 from kinfmu.fmu.variables import interface
 from kinfmu.mechanism import toml_text
@@ -52,14 +53,21 @@ CAPABILITIES = {
     "canSerializeFMUstate": True,
     "providesDirectionalDerivative": False,  # pythonfmu's binary rejects all derivatives
 }
-RUN_TIME = ("slave.py", "slave_settings.py", "slave_outputs.py", "layout.py", "estimated_rates.py")  # of this package
 BASE_CLASS = ("_version.py", "default_experiment.py", "enums.py", "fmi2slave.py", "logmsg.py", "variables.py")
-WITH_FORCES = ("force_slave.py",)
-WITH_EFFORTS = ("torque_slave.py",)
-PARTS_WITH_START = (
-    *("inputs", "constants", "parameters", "tolerance", "fixed", "drive", "rate_source", "loads"),
-    *("states", "efforts"),
-)
+WITH_EFFORTS = ("solver/python/torque/", "fmu/slave/efforts.py")
+_PACKAGES = {  # docstrings of the packages inside
+    "": "The parts of kinfmu that this FMU needs.",
+    "fmu": "The slave.",
+    "pythonfmu": "The base class of pythonfmu.",
+    "solver": "The solver.",
+}
+_BASE = '''"""What a slave takes from pythonfmu: see the copy in this FMU."""
+
+from ...pythonfmu.enums import Fmi2Status
+from ...pythonfmu.fmi2slave import Fmi2Slave
+
+__all__ = ["Fmi2Slave", "Fmi2Status"]
+'''
 
 EXTERNAL_DEPENDENCIES = """\
 This FMU runs Python code in the process of its host. It needs:
@@ -71,19 +79,16 @@ It needs no Python packages: what it imports is the standard library and the mod
 An FMU of the same mechanism that needs none of this is the native one: kinfmu build MECH --flavour native
 """
 
-_IMPORTS = """\
-from {package}.fmu.layout import Layout, PartLayout
-from {package}.fmu.{module} import {base}
-from {package}.fmu.slave import hold
-from {package}.solver import {modules}
-"""
 _ENTRY = '''"""The slave of the FMU '{name}'."""
 
-{imports}
+{imports}from {package}.fmu.slave.layout import Layout, PartLayout
+from {package}.fmu.slave.slave import MechanismSlave, hold
+from {package}.solver.python import {modules}
+
 hold(globals())
 
 
-class Slave({base}):
+class Slave(MechanismSlave):
     """{title}"""
 
     model = model
@@ -95,6 +100,18 @@ class Slave({base}):
         ),
     )
 '''
+
+_BY_EFFORTS = """\
+by_efforts = staticmethod(
+        partial(
+            ByEfforts,
+            inertia=inertia.forces,
+            jumps=jumps.jumps,
+            laws=laws.forces,
+            law_counts=laws.COUNTS,
+            in_si={in_si!r},
+        )
+    )"""
 
 
 def archive(
@@ -128,62 +145,52 @@ def archive(
     in_si = units_in_si(plan) if owned else ()
     distances = distance_steps(plan)
     meets = bool(forces and distances.results)
-    contents = _contents(plan, variables, version, in_si, meets=meets)
+    contents = _contents(plan, variables, version, owned)
     stages = dict(forces) | ({"inertia": owned.inertia} if owned else {})
-    contents |= {
-        f"kinfmu/solver/{stage}.py": emit_python_forces(plan, steps).encode() for stage, steps in stages.items()
-    }
+    emitted = {"model": emit(plan)} | {stage: emit_python_forces(plan, steps) for stage, steps in stages.items()}
     if meets:
         stages["distances"] = distances
-        text = f"{emit_python_forces(plan, distances)}\n\nMEETING = {meeting_messages(plan, distances)!r}\n"
-        contents["kinfmu/solver/distances.py"] = text.encode()
-    if any(map(has_roots, (*stages.values(), *([owned.laws.steps] if owned else [])))):
-        contents["kinfmu/solver/roots.py"] = files("kinfmu.codegen.python").joinpath("roots.py").read_bytes()
-    if any(map(solves, stages.values())):
-        contents["kinfmu/solver/solutions.py"] = files("kinfmu.codegen.python").joinpath("solutions.py").read_bytes()
+        emitted["distances"] = (
+            f"{emit_python_forces(plan, distances)}\n\nMEETING = {meeting_messages(plan, distances)!r}\n"
+        )
     if owned:
-        contents["kinfmu/solver/jumps.py"] = emit_jumps(plan).encode()
-        laws = f"{emit_python_forces(plan, owned.laws.steps)}\n\nCOUNTS = {owned.laws.counts!r}\n"
-        contents["kinfmu/solver/laws.py"] = laws.encode()
-        contents |= _modules("kinfmu.solver.python.torque", "kinfmu/solver/torque")
-    else:
-        del contents["kinfmu/solver/law_breaks.py"]
-    added = (*(WITH_FORCES if stages else ()), *(WITH_EFFORTS if owned else ()))
-    contents |= {f"kinfmu/fmu/{name}": files("kinfmu.fmu").joinpath(name).read_bytes() for name in added}
+        emitted["jumps"] = emit_jumps(plan)
+        emitted["laws"] = f"{emit_python_forces(plan, owned.laws.steps)}\n\nCOUNTS = {owned.laws.counts!r}\n"
+    contents |= {f"kinfmu/solver/python/{name}.py": text.encode() for name, text in emitted.items()}
+    codegen = files("kinfmu.codegen.python")
+    if any(map(has_roots, (*stages.values(), *([owned.laws.steps] if owned else [])))):
+        contents["kinfmu/solver/python/roots.py"] = codegen.joinpath("roots.py").read_bytes()
+    if any(map(solves, stages.values())):
+        contents["kinfmu/solver/python/solutions.py"] = codegen.joinpath("solutions.py").read_bytes()
+    contents["kinfmu_slave.py"] = _entry(variables, "", in_si, meets=meets).encode()
     metadata = documents.metadata if documents else {}
-    named = _named(dict(sorted(contents.items())), variables, version, digest(contents), in_si, metadata, meets=meets)
+    contents = dict(sorted(contents.items()))
+    named = _named(contents, variables, version, digest(contents), in_si, metadata, meets=meets)
     return zipped(named | (documents.files(variables) if documents else {}))
 
 
-def _contents(
-    plan: SolvePlan, variables: Interface, version: str, in_si: Sequence[float], *, meets: bool
-) -> dict[str, bytes]:
-    """Return every file by path in the FMU, still under the names `kinfmu` and `pythonfmu` and without a token."""
+def _contents(plan: SolvePlan, variables: Interface, version: str, owned: OwnedMotion | None) -> dict[str, bytes]:
+    """Return every file but emitted ones by path in the FMU, modules under the names `kinfmu` and `pythonfmu`."""
     import pythonfmu
 
-    fmu, base = files("kinfmu.fmu"), files(pythonfmu)
-    contents = {
+    modules = _modules("solver/python") | _modules("fmu/slave") | {"fmu/slave/base.py": _BASE.encode()}
+    if owned is None:
+        modules = {name: data for name, data in modules.items() if not name.startswith(WITH_EFFORTS)}
+    modules |= {f"pythonfmu/{name}": files(pythonfmu).joinpath(name).read_bytes() for name in BASE_CLASS}
+    modules |= {f"{name}/__init__.py".lstrip("/"): f'"""{text}"""\n'.encode() for name, text in _PACKAGES.items()}
+    return {
         "modelDescription.xml": _description(variables, version, guid=""),
         "resources/mechanism.toml": toml_text.text(plan.mechanism).encode(),
-        "kinfmu/__init__.py": b'"""The parts of kinfmu that this FMU needs."""\n',
-        "kinfmu/fmu/__init__.py": b'"""The slave."""\n',
-        "kinfmu/pythonfmu/__init__.py": b'"""The base class of pythonfmu."""\n',
-        "kinfmu/solver/model.py": emit(plan).encode(),
-        "kinfmu_slave.py": _entry(variables, "", in_si, meets=meets).encode(),
+        **{f"kinfmu/{name}": data for name, data in modules.items()},
+        **{f"binaries/{name}": data for name, data in _binaries(variables.name).items()},
+        **_documents(),
     }
-    contents |= {f"kinfmu/fmu/{name}": fmu.joinpath(name).read_bytes() for name in RUN_TIME}
-    contents |= _modules("kinfmu.solver.python", "kinfmu/solver")
-    contents |= {f"kinfmu/pythonfmu/{name}": base.joinpath(name).read_bytes() for name in BASE_CLASS}
-    contents |= {f"binaries/{name}": data for name, data in _binaries(variables.name).items()}
-    contents |= _documents()
-    return dict(sorted(contents.items()))
 
 
-def _modules(package: str, folder: str) -> dict[str, bytes]:
-    """Return the modules of a package by path in the FMU."""
-    return {
-        f"{folder}/{file.name}": file.read_bytes() for file in files(package).iterdir() if file.name.endswith(".py")
-    }
+def _modules(folder: str) -> dict[str, bytes]:
+    """Return the modules of a package of kinfmu by path."""
+    package = Path(str(files("kinfmu"))) / folder
+    return {f"{folder}/{file.relative_to(package).as_posix()}": file.read_bytes() for file in package.rglob("*.py")}
 
 
 def _documents() -> dict[str, bytes]:
@@ -220,33 +227,29 @@ def _description(
 
 
 def _entry(variables: Interface, token: str, in_si: Sequence[float], package: str = "kinfmu", *, meets: bool) -> str:
-    parts = []
-    for part in variables.parts:
-        starts = tuple(variable.start for variable in part.variables) if part.name in PARTS_WITH_START else ()
-        if part.name == "states":  # accelerations have no start
-            starts = tuple(float(start or 0.0) for start in starts)
-        parts.append(f"            PartLayout({part.name!r}, {part.names!r}, {starts!r}),")
+    parts = [
+        f"            PartLayout({part.name!r}, {part.type!r}, {part.names!r}, {part.starts!r}),"
+        for part in variables.parts
+    ]
     stages = [stage for stage in STAGES if variables.part(stage)]
     modules, attributes = [*stages, "model"], []
+    imports = ""
     if stages or in_si:
         positive = (one.name for one in variables.part("loads") if one.causality == "parameter" and one.minimum == 0.0)
         attributes.append(f"positive = {tuple(positive)!r}")
         attributes.append(f"stages = {{{', '.join(f'{one!r}: {one}.forces' for one in stages)}}}")
     if in_si:
         modules += ["inertia", "jumps", "laws"]
-        attributes += ["inertia = staticmethod(inertia.forces)", "jumps = staticmethod(jumps.jumps)"]
-        attributes += ["law_counts = laws.COUNTS", "laws = staticmethod(laws.forces)"]
-        attributes.append(f"in_si = {tuple(in_si)!r}")
+        imports = f"from functools import partial\n\nfrom {package}.fmu.slave.efforts import ByEfforts\n"
+        attributes.append(_BY_EFFORTS.format(in_si=tuple(in_si)))
     if meets:
         modules.append("distances")
         attributes += ["meeting = distances.MEETING", "distances = staticmethod(distances.forces)"]
-    base, module = ("ForceSlave", "force_slave") if stages else ("MechanismSlave", "slave")
-    if in_si:
-        base, module = "TorqueSlave", "torque_slave"
     return _ENTRY.format(
         name=variables.name,
-        imports=_IMPORTS.format(package=package, module=module, base=base, modules=", ".join(sorted(modules))),
-        base=base,
+        imports=imports,
+        package=package,
+        modules=", ".join(sorted(modules)),
         attributes="".join(f"    {line}\n" for line in attributes),
         title=repr(variables.title or variables.name)[1:-1].replace('"', "'"),
         token=token,
@@ -271,8 +274,7 @@ def _named(
     named = {"modelDescription.xml": _description(variables, version, guid, metadata)}
     for path, data in contents.items():
         if path.startswith("kinfmu/"):
-            module = _renamed(data.decode(), package)
-            named[f"resources/{package}/{path.removeprefix('kinfmu/')}"] = module.encode()
+            named[f"resources/{package}/{path.removeprefix('kinfmu/')}"] = data
         elif path != "modelDescription.xml":
             named[path] = data
     del named["kinfmu_slave.py"]
@@ -280,13 +282,6 @@ def _named(
     named["resources/slavemodule.txt"] = f"{package}_slave".encode()
     _check_imports(named, package)
     return named
-
-
-def _renamed(source: str, package: str) -> str:
-    """Return a module with its imports from kinfmu and pythonfmu changed to imports from `package`."""
-    source = re.sub(r"^(\s*)from kinfmu\.solver\.python(?=[.\s])", r"\1from kinfmu.solver", source, flags=re.MULTILINE)
-    source = re.sub(r"^(\s*)from kinfmu(?=[.\s])", rf"\1from {package}", source, flags=re.MULTILINE)
-    return re.sub(r"^(\s*)from pythonfmu(?=[.\s])", rf"\1from {package}.pythonfmu", source, flags=re.MULTILINE)
 
 
 def _check_imports(contents: Mapping[str, bytes], package: str) -> None:
@@ -299,6 +294,11 @@ def _check_imports(contents: Mapping[str, bytes], package: str) -> None:
                 names = [alias.name for alias in node.names]
             elif isinstance(node, ast.ImportFrom) and not node.level:
                 names = [node.module or ""]
+            elif isinstance(node, ast.ImportFrom):
+                folders = (*path.split("/")[: -node.level], *(node.module or "__init__").split("."))
+                target = "/".join(folders)
+                if not contents.keys() & {f"{target}.py", f"{target}/__init__.py"}:
+                    raise FmuError(f"{path} imports {target}, which is not in the FMU")
             for name in names:
                 if name.partition(".")[0] not in (package, *sys.stdlib_module_names):
                     raise FmuError(f"{path} imports {name}; a python FMU may import the standard library only")

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinfmu.fmu.estimated_rates import errors_of_estimated_rates, estimated_rates
-from kinfmu.fmu.layout import UNKNOWN_ERROR
+from kinfmu.fmu.slave.estimated_rates import errors_of_estimated_rates, estimated_rates
+from kinfmu.fmu.slave.layout import UNKNOWN_ERROR
 from tests.fmu.host import OK, Host
 
 

@@ -284,7 +284,7 @@ def test_outputs_choose_forces(flavour: str, outputs: Sequence[str], stages: Seq
     path = kinfmu.build(press(), tmp_path, flavour=flavour, outputs=outputs)
     with unpacked(path) as folder:
         interface = read(text_in(path, folder, "modelDescription.xml").encode(), str(path)).interface
-        places = ("resources/*/solver/*.py", "sources/*.c")
+        places = ("resources/*/solver/python/*.py", "sources/*.c")
         generated = {file.stem for place in places for file in folder.glob(place)}
     assert generated & set(STAGES) == set(stages)
     coordinates = [name for name in outputs if name == "ram.x"]

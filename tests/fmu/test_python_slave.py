@@ -164,7 +164,8 @@ def _counted(monkeypatch: pytest.MonkeyPatch, host: Host) -> dict[str, int]:
     (solver,) = {
         module.Solver
         for name, module in sys.modules.items()
-        if name.startswith(f"kinfmu_{host.about.interface.name}_{host.about.token[1:9]}") and name.endswith(".solver")
+        if name.startswith(f"kinfmu_{host.about.interface.name}_{host.about.token[1:9]}")
+        and name.endswith("python.solver")
     }
     assert solver is not Solver
     calls: dict[str, int] = {}

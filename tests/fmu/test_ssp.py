@@ -17,7 +17,7 @@ from lxml import etree
 import kinfmu
 from kinfmu.errors import RequestError
 from kinfmu.fmu import build, description, simulate
-from kinfmu.fmu.osp import NAMESPACE, groups
+from kinfmu.fmu.system_files import NAMESPACE, groups
 from tests.fmu.test_si import PRESS
 
 PYTHON = os.environ.get("KINFMU_HOSTS", sys.executable)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu.fmu.linear_inputs import linear_inputs
+from kinfmu.fmu.variables import linear_inputs
 from kinfmu.plan import compile_plan
 from tests.fmu.test_parameters import geared
 from tests.gallery_members import every_member

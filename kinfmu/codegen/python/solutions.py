@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from kinfmu.solver.python.linear import factor, least_norm, lu_solve, qr_factor, qr_solve
+from ...solver.python.linear import factor, least_norm, lu_solve, qr_factor, qr_solve
 
 Entries = Sequence[Sequence[float]]
 

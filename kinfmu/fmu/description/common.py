@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Literal
+from xml.etree import ElementTree as ET
 from xml.etree.ElementTree import Element, SubElement
 
-from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.interface import RATES_TYPE, STATUS_TYPE, Interface, Variable
+from kinfmu.fmu.slave.estimated_rates import Rates
 from kinfmu.mechanism import RunSettings
 from kinfmu.solver.python.status import Status
 from kinfmu.units import KINDS, METRES
@@ -36,10 +37,17 @@ ENUMERATIONS: dict[str, Mapping[Any, str]] = {  # by name of the type: items and
     STATUS_TYPE: _STATUS_WORDS,
     RATES_TYPE: _RATES_WORDS,
 }
+DECLARATION = '<?xml version="1.0" encoding="UTF-8"?>\n'
 UnknownKind = Literal["outputs", "derivatives", "initial"]
 Unknowns = dict[
     str, tuple[tuple[str, str], ...] | None
 ]  # by name: dependencies with their kinds, or None if not listed
+
+
+def document(root: Element) -> bytes:
+    """Return an indented XML document."""
+    ET.indent(root)
+    return f"{DECLARATION}{ET.tostring(root, encoding='unicode')}\n".encode()
 
 
 def text(value: float | bool) -> str:

@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element
 
 from kinfmu.errors import FmuError, KinfmuError, listed
 from kinfmu.fmu.description import fmi2, fmi3
-from kinfmu.fmu.description.common import number, text
+from kinfmu.fmu.description.common import document, number, text
 from kinfmu.fmu.interface import Interface, InterfacePart, Variable
 from kinfmu.mechanism import RunSettings
 from kinfmu.mechanism.valid import check_name, quoted
@@ -76,8 +76,7 @@ def write(description: Description, kinds: Mapping[str, Mapping[str, float | boo
         for kind, flags in kinds.items()
     }
     version.write(root, interface, attributes, description.sources)
-    ET.indent(root)
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'.encode()
+    return document(root)
 
 
 def read(data: bytes, where: str) -> Description:

@@ -13,7 +13,7 @@ from kinfmu.draw.scene.completed import with_estimates
 from kinfmu.fmu.description import Description
 from kinfmu.fmu.host.slaves import LoadedSlave
 from kinfmu.fmu.interface import Interface, Variable
-from kinfmu.fmu.layout import UNKNOWN_ERROR
+from kinfmu.fmu.slave.layout import UNKNOWN_ERROR
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import force_names, reaction_names_of
 from kinfmu.run import Event, Run

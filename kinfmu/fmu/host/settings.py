@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 
 from kinfmu.errors import MechanismError, RequestError
-from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.interface import Interface, Variable
+from kinfmu.fmu.slave.estimated_rates import Rates
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.number import read_constant
 from kinfmu.mechanism.settings import Settable, read_tolerance

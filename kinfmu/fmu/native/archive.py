@@ -14,16 +14,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from xml.etree import ElementTree as ET
 from xml.etree.ElementTree import Element, SubElement
 
 from kinfmu.codegen.c import compiler
 from kinfmu.fmu import description
 from kinfmu.fmu.archive import digest, token, zipped
 from kinfmu.fmu.description import Description, FmiVersion
-from kinfmu.fmu.documents import Documents
+from kinfmu.fmu.description.common import document
+from kinfmu.fmu.documents import Documents, licence
 from kinfmu.fmu.interface import Drive, Interface
-from kinfmu.fmu.licence import licence
 from kinfmu.fmu.native.platforms import PLATFORMS, Platform, host
 from kinfmu.fmu.native.sources import headers, sources
 from kinfmu.fmu.owned_motion import OwnedMotion
@@ -149,8 +148,7 @@ def _build_description(identifier: str, units: tuple[str, ...]) -> bytes:
     files = SubElement(configuration, "SourceFileSet", language="C99", compilerOptions="-ffp-contract=off")
     for name in units:
         SubElement(files, "SourceFile", name=name)
-    ET.indent(root)
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'.encode()
+    return document(root)
 
 
 def _binary(platform: Platform, variables: Interface, fmi: FmiVersion) -> str:

@@ -14,9 +14,9 @@ from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
 from kinfmu.codegen.forces import STAGES, emit_c_forces, places_of_symbols, solves
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.errors import MissingPackageError
-from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.interface import Interface, Variable
-from kinfmu.fmu.layout import UNKNOWN_ERROR
+from kinfmu.fmu.slave.estimated_rates import Rates
+from kinfmu.fmu.slave.layout import UNKNOWN_ERROR
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.efforts import units_in_si
 from kinfmu.plan.forces import ForceSteps
@@ -28,7 +28,6 @@ from kinfmu.solver.python.torque import dormand_prince as pair
 RUNTIME = Path(__file__).with_name("runtime")
 _NO_VARIABLE = "0xfffffffeu"
 _NOT_REAL_BIT = "0x80000000u"
-NOT_REAL = ("counts", "ok", "drive", "rate_source", "message", "time")  # parts after those of Real variables
 HEADERS = {
     "2.0": ("fmi2TypesPlatform.h", "fmi2FunctionTypes.h", "fmi2Functions.h"),
     "3.0": ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h"),
@@ -267,7 +266,7 @@ def _tables(variables: Interface) -> str:
 def _real_parts(variables: Interface) -> dict[str, Sequence[Variable]]:
     """Return the Real variables by part; the parts of forces are empty where no force is an output."""
     parts: dict[str, Sequence[Variable]] = {
-        part.name: part.variables for part in variables.parts if part.name not in NOT_REAL
+        part.name: part.variables for part in variables.parts if part.type == "Real"
     }
     return parts | {name: () for name in ("loads", *STAGES) if name not in parts}
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinfmu.fmu.estimated_rates import Rates
+from kinfmu.fmu.slave.estimated_rates import Rates
 from tests.fmu.conftest import Build
 from tests.fmu.host import DISCARD, OK, Host
 

@@ -13,8 +13,8 @@ from fmpy.fmi1 import FMICallException
 import kinfmu
 from kinfmu.errors import RequestError
 from kinfmu.fmu import simulate
-from kinfmu.fmu.estimated_rates import Rates
-from kinfmu.fmu.layout import UNKNOWN_ERROR
+from kinfmu.fmu.slave.estimated_rates import Rates
+from kinfmu.fmu.slave.layout import UNKNOWN_ERROR
 from tests.fmu.conftest import Build
 from tests.fmu.host import OK, Host
 

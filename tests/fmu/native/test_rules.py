@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.fmu.native.sources import HEADERS, headers
+from kinfmu.fmu.slave.layout import UNKNOWN_ERROR
 from kinfmu.solver.python.status import Status
 from tests import oracle
 from tests.fmu.conftest import Build, Start

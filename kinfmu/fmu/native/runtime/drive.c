@@ -2,7 +2,7 @@
  *
  *     a = 2 (d2 - d1) / (t2 - t0),   v = d2 + (d2 - d1) (t2 - t1) / (t2 - t0),   d1, d2 the two slopes
  *
- * See kinfmu/fmu/estimated_rates.py and kinfmu/solver/python/estimate.py.
+ * See kinfmu/fmu/slave/estimated_rates.py and kinfmu/solver/python/estimate.py.
  */
 #include "drive.h"
 

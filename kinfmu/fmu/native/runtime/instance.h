@@ -1,6 +1,6 @@
 /* An FMU instance of a mechanism: what FMI 2.0 and FMI 3.0 have in common. fmi2.c and fmi3.c are thin layers over it.
  *
- * The protocol is that of the python flavour (kinfmu/fmu/slave.py): a set marks; a get solves from the *committed* pose
+ * The protocol is that of the python flavour (kinfmu/fmu/slave/slave.py): a set marks; a get solves from the *committed* pose
  * and caches; a step (in model exchange: a completed integrator step) commits the pose. Trial values never influence a
  * result, so a host may go back in time.
  */

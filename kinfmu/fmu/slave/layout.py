@@ -1,4 +1,4 @@
-"""The interface as a slave needs it, and how its lists are read. The FMU has a copy: standard library only."""
+"""The interface as a slave needs it, and how its lists are read."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ UNKNOWN_ERROR = 1e30  # of solver.error_q, _qd, _qdd: an error without an estima
 
 
 class PartLayout(NamedTuple):
-    """Variables that are computed together: their names, and start values if they have some."""
+    """Variables that are computed together: their type (Real, or another), names, and start values if any."""
 
     name: str
+    type: str
     variables: tuple[str, ...]
     starts: tuple[Any, ...] = ()
 
@@ -29,8 +30,6 @@ class Layout(NamedTuple):
 class Places:
     """Part and place of the variable of a value reference; value references count the variables from 1."""
 
-    _NOT_REAL = ("counts", "ok", "drive", "rate_source", "message")
-
     def __init__(self, layout: Layout) -> None:
         self._places = [(k, i) for k, part in enumerate(layout.parts) for i in range(len(part.variables))]
         self.layout = layout
@@ -39,9 +38,13 @@ class Places:
         """Return part and place of a Real variable, or (None, 0) if the value reference is of no Real variable."""
         if 1 <= vr <= len(self._places):
             part, place = self._places[vr - 1]
-            if self.layout.parts[part].name not in self._NOT_REAL:
+            if self.layout.parts[part].type == "Real":
                 return part, place
         return None, 0
+
+    def number(self, name: str) -> int:
+        """Return the value reference of a variable."""
+        return 1 + [variable for part in self.layout.parts for variable in part.variables].index(name)
 
     def name(self, vr: int) -> str:
         """Return the name of the variable, or an empty text."""
@@ -52,29 +55,20 @@ class Places:
 
 
 Numbers = tuple[float, ...]
-Reader = Callable[[], Numbers]  # reads the variables of a part
 
 NOT_A_NUMBER = math.nan
-MOTION = "values", "rates", "accelerations"  # parts that the reader "motion" reads together
+MOTION = "values", "rates", "accelerations"  # parts that are computed together, as the part "motion"
 
 
 class Fetch(NamedTuple):
-    """How to read a list of Real variables: read the parts into a row, then pick places of the row."""
+    """How to read a list of Real variables: the numbers of some parts make a row, of which places are picked."""
 
-    read: Reader
-    others: tuple[Reader, ...]
+    parts: tuple[str, ...]
     pick: Callable[[Numbers], Sequence[float]] | None  # None: all of them
 
 
-def plan_fetch(references: Places, vrs: Sequence[int], reader: Callable[[str], Reader]) -> Fetch:
-    """Return how to read a list of value references; those of no Real variable give NaN.
-
-    Args:
-        references: Part and place by value reference.
-        vrs: Value references.
-        reader: Returns the function that reads a part, by its name, or "motion".
-
-    """
+def plan_fetch(references: Places, vrs: Sequence[int]) -> Fetch:
+    """Return how to read a list of value references; those of no Real variable are read from the part "no_number"."""
     layout = references.layout
     places = [references.real(vr) for vr in vrs]
     parts = sorted({part for part, _ in places if part is not None})
@@ -84,10 +78,8 @@ def plan_fetch(references: Places, vrs: Sequence[int], reader: Callable[[str], R
         offsets[part] = width
         width += len(layout.parts[part].variables)
     indices = [width if part is None else offsets[part] + place for part, place in places]
-    readers = [reader(name) for name in _joined([layout.parts[part].name for part in parts])]
-    if width in indices or not readers:
-        readers.append(_no_number)
-    return Fetch(readers[0], tuple(readers[1:]), _picker(indices, width))
+    names = _joined([layout.parts[part].name for part in parts])
+    return Fetch((*names, "no_number") if width in indices else tuple(names), _picker(indices, width))
 
 
 def _joined(names: list[str]) -> list[str]:
@@ -97,10 +89,6 @@ def _joined(names: list[str]) -> list[str]:
         if tuple(names[k : k + count]) == MOTION:
             return [*names[:k], "motion", *names[k + count :]]
     return names
-
-
-def _no_number() -> Numbers:
-    return (NOT_A_NUMBER,)
 
 
 def _picker(indices: list[int], width: int) -> Callable[[Numbers], Sequence[float]] | None:
