@@ -1,6 +1,6 @@
 """Laws: how one quantity follows another, such as a cam follower the cam.
 
-To add one, write a file and add a line here.
+To add one, write a file and add a line here; a rise of cams is a class in rise.py, which `RISES` lists.
 """
 
 from __future__ import annotations
