@@ -102,6 +102,10 @@ class Writer:
         pairs = [(node, found.get(("cos" if op == "sin" else "sin", angle))) for (op, angle), node in found.items()]
         return {node: other for node, other in pairs if other is not None}
 
+    def formulas(self, targets: Sequence[Node]) -> tuple[list[str], list[str]]:
+        """Return statements, and after them each target as an expression."""
+        return self.statements(targets), [self.expression(node) for node in targets]
+
     def _pair(self, node: Node, other: Node, text: dict[Node, tuple[str, int]]) -> str:
         """Return the statement that computes both."""
         sine, cosine = (node, other) if node.op == "sin" else (other, node)

@@ -102,6 +102,18 @@ def solution_lines(
     return [f"{tupled(z)} = {solve}(factors{label}, [{', '.join(f'-{name}' for name in b)}])"]
 
 
+def scaled_residuals(writer: Writer, block: Block) -> tuple[list[str], str]:
+    """Return the statements of a block's residuals relative to the size, and the list of them."""
+    lines, residuals = writer.formulas(block.residuals)
+    scaled = [f"({r}) / {scale!r}" for r, scale in zip(residuals, block.row_scales, strict=True)]
+    return lines, f"[{', '.join(scaled)}]"
+
+
+def extreme(name: str, terms: Sequence[str]) -> str:
+    """Return 'max(a, b)', 'a' or '0.0' for the terms of 'max' or 'min'."""
+    return f"{name}({', '.join(terms)})" if len(terms) > 1 else "".join(terms) or "0.0"
+
+
 def matrix(rows: Sequence[Sequence[str]]) -> str:
     """Return '[[a, b], [c, d]]'."""
     return "[" + ", ".join("[" + ", ".join(row) + "]" for row in rows) + "]"
@@ -114,9 +126,14 @@ def tupled(items: Iterable[str]) -> str:
 
 
 def unpacking(names: Iterable[str], source: str) -> list[str]:
-    """Return the assignment of a tuple's items to names, indented as in a function; no line for no names."""
+    """Return the assignment of a tuple's items to names; no line for no names."""
     names = list(names)
-    return [f"    {tupled(names)} = {source}"] if names else []
+    return [f"{tupled(names)} = {source}"] if names else []
+
+
+def defined(head: str, about: str, lines: Iterable[str], returned: str) -> list[str]:
+    """Return a function with its docstring, between empty lines."""
+    return ["", f"def {head}:", f'    """{about}"""', *indented(lines), f"    return {returned}", ""]
 
 
 def indented(lines: Iterable[str], spaces: int = 4) -> list[str]:

@@ -20,10 +20,12 @@ from kinfmu.codegen.lists import LISTS, Kind, positions
 from kinfmu.codegen.newton import jacobian_text
 from kinfmu.codegen.python.block_code import (
     assigned_lines,
+    defined,
     indented,
     kept_name,
     matrix,
     newton_lines,
+    scaled_residuals,
     solution_lines,
     tupled,
 )
@@ -94,17 +96,9 @@ class Loops:
             arguments += ["z", "held", "enough", "number", "determinants", "largest", "iterations"]
             results += ["largest", "iterations"]
             about = f"{len(solved.residuals)} x {len(solved.unknowns)} from rows {', '.join(solved.row_names)}."
-        return [
-            "",
-            f"def position{label}({', '.join(arguments)}):",
-            f'    """{about}"""',
-            "    holds = []",
-            f"    for {self.row} in run:",
-            *indented(lines, 8),
-            f"        holds.append({tupled(self.hold)})",
-            f"    return {', '.join(results)}",
-            "",
-        ]
+        lines.append(f"holds.append({tupled(self.hold)})")
+        loop = ["holds = []", f"for {self.row} in run:", *indented(lines)]
+        return defined(f"position{label}({', '.join(arguments)})", about, loop, ", ".join(results))
 
     def _loaded(self, writer: Writer, known: Iterable[str]) -> list[str]:
         """Return statements that read from the lists what the written ones use and do not know."""
@@ -182,11 +176,9 @@ class Loops:
 
     def _residuals(self, block: Block) -> list[str]:
         writer = Writer(self.names, self.positions)
-        lines = writer.statements(block.residuals)
-        scaled = zip(block.residuals, block.row_scales, strict=True)
-        row = ", ".join(f"({writer.expression(r)}) / {scale!r}" for r, scale in scaled)
+        lines, row = scaled_residuals(writer, block)
         self._import(writer)
-        return self._later("residual", ["found"], [*lines, f"found.append([{row}])"])
+        return self._later("residual", ["found"], [*lines, f"found.append({row})"])
 
     def _import(self, writer: Writer) -> None:
         """Record what a later function reads from the position stage."""
