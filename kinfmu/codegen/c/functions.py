@@ -10,14 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from kinfmu.codegen.c.stage_cache import StageCache
-from kinfmu.codegen.c.text import FUNCTIONS, array, function, repeated, string
+from kinfmu.codegen.c.text import FUNCTIONS, array, function, loads, model_places, repeated, string
 from kinfmu.codegen.c.units import Units
 from kinfmu.codegen.lists import LISTS, Lists, UnitRun
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.equations.graph import Node
 from kinfmu.plan.path_laws import argument_symbol
-from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.python.continuation import NO_NUMBER
 from kinfmu.solver.python.curve import CurveData
 
@@ -35,7 +34,8 @@ class Parts(Lists):
         self.curves: dict[CurveData, str] = {one: f"&curve_{k}" for k, one in enumerate(data, start=1)}
         self.names = Names((name for block in plan.blocks for name in block.coordinates), self.curves, FUNCTIONS)
         self.solved = [block for block in plan.blocks if block.unknowns]
-        self.units = {k: Units(kind, self.curves, self.parameters, self.derived) for k, kind in self.kinds.items()}
+        self.bound = model_places(self)
+        self.units = {k: Units(kind, self.curves, self.bound) for k, kind in self.kinds.items()}
         self.stage_cache = StageCache(self, self.units)
 
 
@@ -228,27 +228,13 @@ def _laws(parts: Parts) -> list[str]:
 def _expressions(parts: Parts, targets: Sequence[Node]) -> tuple[dict[Node, str], list[str]]:
     """Return each target as an expression, and the statements that come before."""
     writer = Writer(parts.names, [*parts.derived, *parts.stage_cache.nodes])
-    statements = [f"{line};" for line in writer.statements(targets)]
-    texts = {node: writer.expression(node) for node in targets}
-    return texts, [*_loads(parts, writer.used), *statements]
-
-
-def _loads(parts: Parts, used: Iterable[Node]) -> list[str]:
-    """Return assignments of what the statements read from the model, its pose and the lists."""
-    listed = {name: f"{_LISTS[order]}[{k}]" for order in range(3) for name, k in parts.places(order).items()}
-    listed |= {argument_symbol(k): f"arguments[{k}]" for k in range(len(parts.plan.path_laws.turns))}
-    lines = []
-    for node in used:
-        if node in parts.derived:
-            source = f"model->derived[{parts.derived[node]}]"
-        elif node in parts.stage_cache.nodes:
-            source = f"found->hold[{parts.stage_cache.place(node)}]"
-        elif is_parameter(node):
-            source = f"model->parameters[{parts.parameters[node.name]}]"
-        else:
-            source = listed[node.name]
-        lines.append(f"{parts.names.of(node)} = {source};")
-    return lines
+    statements, texts = writer.formulas(targets)
+    places = parts.bound.copy()
+    places |= {name: f"{_LISTS[order]}[{k}]" for order in range(3) for name, k in parts.places(order).items()}
+    places |= {argument_symbol(k): f"arguments[{k}]" for k in range(len(parts.plan.path_laws.turns))}
+    held = parts.stage_cache.place
+    lines = loads(parts.names, writer.used, places, lambda node: f"found->hold[{held(node)}]")
+    return dict(zip(targets, texts, strict=True)), [*lines, *(f"{line};" for line in statements)]
 
 
 _BIND = "bool kf_bind(kf_model *model, const double *parameters, char *why, size_t size)"

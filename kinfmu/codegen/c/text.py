@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+
+from kinfmu.codegen.lists import Lists
+from kinfmu.codegen.writer import Names
+from kinfmu.plan.equations.graph import Node
 
 _WIDTH = 110
 
+Places = dict[Node | str, str]  # where functions find operations, and symbols by their names
 FUNCTIONS = {"sin": "kf_sin", "cos": "kf_cos", "sincos": "kf_sincos", "atan2": "kf_atan2"}  # of solver/c/sincos.h
 
 
@@ -50,6 +55,18 @@ def assigned(lines: Iterable[str]) -> list[str]:
     """Return the names that the statements of a function assign."""
     found = [re.match(r"\s*(\w+) = |\s*kf_sincos\(.*, &(\w+), &(\w+)\);", line) for line in lines]
     return [name for match in found if match for name in match.groups() if name]
+
+
+def model_places(lists: Lists) -> Places:
+    """Return where functions find the parameters, and what depends on them alone."""
+    places: Places = {node: f"model->derived[{k}]" for node, k in lists.derived.items()}
+    return places | {name: f"model->parameters[{k}]" for name, k in lists.parameters.items()}
+
+
+def loads(names: Names, nodes: Iterable[Node], places: Places, held: Callable[[Node], str]) -> list[str]:
+    """Return assignments of what statements read and do not compute; held: gives the places of other operations."""
+    found = [(node, places.get(node.name if node.op == "symbol" else node)) for node in nodes]
+    return [f"{names.of(node)} = {held(node) if place is None else place};" for node, place in found]
 
 
 def indented(lines: Iterable[str]) -> list[str]:

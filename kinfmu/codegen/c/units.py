@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from kinfmu.codegen.c.text import FUNCTIONS, function, indented
+from kinfmu.codegen.c.text import FUNCTIONS, Places, function, indented, loads
 from kinfmu.codegen.lists import LISTS, Kind, UnitRun, positions
 from kinfmu.codegen.newton import (
     ITERATIONS,
@@ -31,24 +31,17 @@ from kinfmu.codegen.newton import (
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.plan import Block
 from kinfmu.plan.equations.graph import Node, reachable
-from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.python.curve import CurveData
 
 
 class Units:
     """The writer of one kind's functions.
 
-    curves: names of the constants that hold the data of curves; parameters: places of the parameters by the names of
-    their symbols; derived: places of what depends on parameters alone.
+    curves: names of the constants that hold the data of curves; bound: where functions find parameters and what depends
+    on them alone.
     """
 
-    def __init__(
-        self,
-        kind: Kind,
-        curves: Mapping[CurveData, str],
-        parameters: Mapping[str, int],
-        derived: Mapping[Node, int],
-    ) -> None:
+    def __init__(self, kind: Kind, curves: Mapping[CurveData, str], bound: Places) -> None:
         self.kind = kind
         self.label = kind.label
         self.names = Names(kind.coordinates, curves, FUNCTIONS)
@@ -56,12 +49,13 @@ class Units:
             for name, motion in block.assigned:
                 self.names.assign(motion[0], name)
         self.positions = reachable([node for group in positions(kind.blocks) for node in group])
-        self.known = {*self.positions, *derived}  # what later functions find computed
-        self.given, self.constants, own = fields(kind)
+        self.derived = [node for node in bound if isinstance(node, Node)]
+        self.known = {*self.positions, *self.derived}  # what later functions find computed
+        _, constants, own = fields(kind)
         self.own = dict(zip(kind.coordinates, own, strict=True))
-        self.parameters = parameters
-        self.derived = derived
-        self.place = places(kind)
+        self.places = bound.copy()
+        self.places |= {name: f"row->{name}" for name in constants}
+        self.places |= {name: f"{LISTS[order]}[row->{field}]" for name, (order, field) in places(kind).items()}
         self.hold: dict[str, Node] = {}  # numbers that later functions take from the position
         self.keeps_determinant = False
         self.later = self._later()
@@ -95,25 +89,15 @@ class Units:
 
     def _loads(self, writer: Writer, found: Iterable[str]) -> list[str]:
         """Return assignments of what the statements read and do not compute."""
-        known = set(found)
-        lines = []
-        for node in writer.used:
+        names = set(found)
+
+        def held(node: Node) -> str:
             name = self.names.of(node)
-            if node in self.derived:
-                lines.append(f"{name} = model->derived[{self.derived[node]}];")
-            elif node.op != "symbol":
-                self.hold.setdefault(name, node)
-                lines.append(f"{name} = <{name}>;")  # replaced when all places are known
-            elif node.name in known:
-                continue
-            elif is_parameter(node):
-                lines.append(f"{name} = model->parameters[{self.parameters[node.name]}];")
-            elif node.name in self.constants:
-                lines.append(f"{name} = row->{name};")
-            else:
-                place = self.place[node.name]
-                lines.append(f"{name} = {LISTS[place[0]]}[row->{place[1]}];")
-        return lines
+            self.hold.setdefault(name, node)
+            return f"<{name}>"  # replaced when all places are known
+
+        read = (node for node in writer.used if node.op != "symbol" or node.name not in names)
+        return loads(self.names, read, self.places, held)
 
     # The functions
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Sequence
 
-from kinfmu.codegen.c.text import assigned, declared
-from kinfmu.codegen.c.units import places, row_type
+from kinfmu.codegen.c.text import Places, assigned, declared, loads
+from kinfmu.codegen.c.units import fields, places, row_type
 from kinfmu.codegen.lists import LISTS, Kind, positions
 from kinfmu.codegen.newton import (
     before_newton,
@@ -25,7 +25,6 @@ from kinfmu.codegen.newton import (
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.plan import Block
 from kinfmu.plan.equations.graph import FUNCTIONS, Node, reachable
-from kinfmu.plan.trace import is_parameter
 
 VECTORS = {"sin": "kf_sin_lane", "cos": "kf_cos_lane"}
 LISTED = {"sin": "sine", "cos": "cosine"}  # lists of the predicted sines and cosines
@@ -41,12 +40,9 @@ class LaneUnit:
     turned: names of the coordinates whose sines and cosines are predicted.
     """
 
-    def __init__(
-        self, kind: Kind, parameters: dict[str, int], derived: dict[Node, int], size: float, turned: set[str]
-    ) -> None:
+    def __init__(self, kind: Kind, bound: Places, size: float, turned: set[str]) -> None:
         self.kind = kind
-        self.parameters = parameters
-        self.derived = derived
+        self.derived = [node for node in bound if isinstance(node, Node)]
         self.size = size
         self.names = Names(kind.coordinates, functions=VECTORS)
         for block in kind.blocks:
@@ -63,6 +59,12 @@ class LaneUnit:
         self.predicted |= {node for turn in self.turning for node in turn[1:]}
         self.assigned = {motion[0]: name for block in kind.blocks for name, motion in block.assigned}
         self.where = places(kind)
+        self.places: Places = {node: f"x_{self.where[name][1]}[i]" for node, name in self.assigned.items() if node.args}
+        for node in self.predicted:
+            self.places[node] = f"{LISTED[node.op]}_{self.where[node.args[0].name][1]}[i]"
+        self.places |= bound
+        self.places |= {name: f"row->{name}" for name in fields(kind)[1]}
+        self.places |= {name: f"{LISTS[order]}_{field}[i]" for name, (order, field) in self.where.items()}
         self.hold: dict[Node | None, int] = {}  # None: the determinant of the block that is solved
 
     def cached(self, node: Node | None) -> int:
@@ -128,27 +130,8 @@ class LaneUnit:
 
     def _loads(self, nodes: Iterable[Node], found: Collection[str]) -> list[str]:
         """Return assignments of what the statements read and do not compute."""
-        lines = []
-        for node in nodes:
-            if node in self.derived:
-                source = f"model->derived[{self.derived[node]}]"
-            elif node in self.predicted:
-                source = f"{LISTED[node.op]}_{self.where[node.args[0].name][1]}[i]"
-            elif node.op != "symbol" and node in self.assigned:
-                source = f"x_{self.where[self.assigned[node]][1]}[i]"
-            elif node.op != "symbol":
-                source = f"hold[{self.cached(node)}][i]"
-            elif node.name in found:
-                continue
-            elif is_parameter(node):
-                source = f"model->parameters[{self.parameters[node.name]}]"
-            elif node.name in self.where:
-                order, field = self.where[node.name]
-                source = f"{LISTS[order]}_{field}[i]"
-            else:
-                source = f"row->{node.name}"
-            lines.append(f"{self.names.of(node)} = {source};")
-        return lines
+        read = (node for node in nodes if node.op != "symbol" or node.name not in found)
+        return loads(self.names, read, self.places, lambda node: f"hold[{self.cached(node)}][i]")
 
     def _function(self, stage: str, factor: str, lines: Sequence[str]) -> list[str]:
         text = "\n".join(lines)
