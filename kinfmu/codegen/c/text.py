@@ -74,16 +74,27 @@ def indented(lines: Iterable[str]) -> list[str]:
     return [f"    {line}" for line in lines]
 
 
-def function(
-    signature: str, lines: Sequence[str], arguments: Iterable[str] = (), variables: Sequence[str] = ()
-) -> list[str]:
+def ended(lines: Iterable[str]) -> list[str]:
+    """Return statements with their ends; those that end in a bracket or a comment have theirs."""
+    return [line if line.endswith((";", "{", "}", ",", "*/")) else f"{line};" for line in lines]
+
+
+def function(signature: str, lines: Sequence[str], variables: Sequence[str] = ()) -> list[str]:
     """Return a function and an empty line; names that its statements assign are declared as double.
 
-    arguments: names of those that it may leave unused, marked as unused if so; variables: further declarations.
+    Arguments that it leaves unused are marked as unused. lines: statements, with or without their ends; variables:
+    further declarations.
     """
+    lines = ended(lines)
     text = "\n".join([*variables, *lines])
+    arguments = re.findall(r"(\w+)[,)]", signature)
     unused = [f"(void){name};" for name in arguments if not re.search(rf"\b{name}\b", text)]
     return [signature, "{", *indented([*declared(assigned(lines)), *variables, *unused, *lines]), "}", ""]
+
+
+def filled(array: str, texts: Iterable[str]) -> list[str]:
+    """Return the assignments of expressions to the items of an array."""
+    return [f"{array}[{k}] = {text}" for k, text in enumerate(texts)]
 
 
 def repeated(count: int, lines: Sequence[str]) -> list[str]:

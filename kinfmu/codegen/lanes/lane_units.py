@@ -9,22 +9,23 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Sequence
 
-from kinfmu.codegen.c.text import Places, assigned, declared, loads
+from kinfmu.codegen.c.text import Places, assigned, declared, ended, loads
 from kinfmu.codegen.c.units import fields, places, row_type
-from kinfmu.codegen.lists import LISTS, Kind, positions
+from kinfmu.codegen.lists import LISTS, Kind
 from kinfmu.codegen.newton import (
     before_newton,
     determinant,
     jacobian_text,
     opposite_solution,
     outright,
-    residual_lines,
+    outright_rates,
+    right_side,
     solution,
     square,
 )
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.plan import Block
-from kinfmu.plan.equations.graph import FUNCTIONS, Node, reachable
+from kinfmu.plan.equations.graph import FUNCTIONS, Node
 
 VECTORS = {"sin": "kf_sin_lane", "cos": "kf_cos_lane"}
 LISTED = {"sin": "sine", "cos": "cosine"}  # lists of the predicted sines and cosines
@@ -44,11 +45,8 @@ class LaneUnit:
         self.kind = kind
         self.derived = [node for node in bound if isinstance(node, Node)]
         self.size = size
-        self.names = Names(kind.coordinates, functions=VECTORS)
-        for block in kind.blocks:
-            for name, motion in block.assigned:
-                self.names.assign(motion[0], name)
-        self.positions = reachable([node for group in positions(kind.blocks) for node in group])
+        self.names = Names.of_blocks(kind.blocks, functions=VECTORS)
+        self.positions = kind.positions
         self.predicted = {node for node in self.positions if is_turned(node, turned)}
         self.turning = [  # unknown angles with the nodes of sine and cosine; the formulas hold at least one of these
             (node.name, node.graph.function("sin", node), node.graph.function("cos", node))
@@ -94,19 +92,19 @@ class LaneUnit:
         for block in self.kind.blocks:
             if block.unknowns:
                 lines += self._closing(writer, block) if held else self._newton(writer, block)
-            lines += [f"{line};" for new, _ in outright(writer, block) for line in new]
+            lines += outright(writer, block)
         corrected = self.kind.solved.unknowns if self.kind.solved is not None and not held else ()
         turning = self.turning if corrected else []
         for unknown, sine, cosine in turning:
             field = self.where[unknown][1]
-            lines += [f"sine_{field}[i] = {self.names.of(sine)};", f"cosine_{field}[i] = {self.names.of(cosine)};"]
+            lines += [f"sine_{field}[i] = {self.names.of(sine)}", f"cosine_{field}[i] = {self.names.of(cosine)}"]
         found = [*corrected, *(name for block in self.kind.blocks for name, _ in block.assigned)]
-        lines += [f"x_{self.where[name][1]}[i] = {identifier(name)};" for name in found]
+        lines += [f"x_{self.where[name][1]}[i] = {identifier(name)}" for name in found]
         held_nodes = {node: k for node, k in self.hold.items() if node is not None}
-        lines += [f"{line};" for line in writer.statements(list(held_nodes))]
-        lines += [f"hold[{k}][i] = {writer.expression(node)};" for node, k in held_nodes.items()]
+        lines += writer.statements(list(held_nodes))
+        lines += [f"hold[{k}][i] = {writer.expression(node)}" for node, k in held_nodes.items()]
         used = dict.fromkeys([*(node for turn in turning for node in turn[1:]), *writer.used])
-        predicted = [f"{identifier(name)} = z_{self.where[name][1]}[i];" for name in corrected]
+        predicted = [f"{identifier(name)} = z_{self.where[name][1]}[i]" for name in corrected]
         factor = " const double factor" if corrected else ""
         return self._function(stage, factor, [*predicted, *self._loads(used, found), *lines])
 
@@ -118,14 +116,12 @@ class LaneUnit:
             for block in self.kind.blocks:
                 if block.unknowns:
                     lines += [] if held else self._linear(writer, block, order)
-                for name, nodes in block.assigned:
-                    lines += [f"{line};" for line in writer.statements([nodes[order]])]
-                    lines.append(f"{identifier(name.derivative(order))} = {writer.expression(nodes[order])};")
+                lines += outright_rates(writer, block, order)
         names = [
             name for block in self.kind.blocks for name in (block.coordinates if not held else dict(block.assigned))
         ]
         rates = [(name.derivative(order), order, self.where[name][1]) for name in names for order in (1, 2)]
-        lines += [f"{LISTS[order]}_{field}[i] = {identifier(name)};" for name, order, field in rates]
+        lines += [f"{LISTS[order]}_{field}[i] = {identifier(name)}" for name, order, field in rates]
         return self._function(stage, "", [*self._loads(writer.used, {name for name, _, _ in rates}), *lines])
 
     def _loads(self, nodes: Iterable[Node], found: Collection[str]) -> list[str]:
@@ -155,43 +151,43 @@ class LaneUnit:
     def _newton(self, writer: Writer, block: Block) -> list[str]:
         """Return statements of one correction of the prediction and of the residual after it."""
         turned = [node for turn in self.turning for node in turn[1:]]
-        lines = [f"{line};" for line in before_newton(writer, block, turned)]
+        lines = before_newton(writer, block, turned)
         known = set(writer.known)
         steps = [f"d{k}" for k in range(len(block.unknowns))]
-        r, evaluated = residual_lines(writer, block, block.entries)
+        r, evaluated = right_side(writer, "r", block.residuals, block.entries)
         jacobian = jacobian_text(writer, block)
         values = [text.replace(" / det", " * per_det") for text in solution(jacobian, r, "det")]
-        lines += [f"{line};" for line in (*evaluated, f"per_det = 1.0 / ({determinant(jacobian)})")]
-        lines += [f"{one} = {text};" for one, text in zip(steps, values, strict=True)]
+        lines += [*evaluated, f"per_det = 1.0 / ({determinant(jacobian)})"]
+        lines += [f"{one} = {text}" for one, text in zip(steps, values, strict=True)]
         for name, one in zip(block.unknowns, steps, strict=True):
             scale = "" if name.is_angle else f" * {1.0 / self.size!r}"
-            lines += [f"{identifier(name)} -= {one};", f"size = fabs({one}){scale};"]
-            lines.append("lanes->moved[i] = size > lanes->moved[i] ? size : lanes->moved[i];")
+            lines += [f"{identifier(name)} -= {one}", f"size = fabs({one}){scale}"]
+            lines.append("lanes->moved[i] = size > lanes->moved[i] ? size : lanes->moved[i]")
             for unknown, sine, cosine in self.turning:
                 if unknown == name:
-                    lines.append(f"kf_rotate(-{one}, &{self.names.of(sine)}, &{self.names.of(cosine)});")
+                    lines.append(f"kf_rotate(-{one}, &{self.names.of(sine)}, &{self.names.of(cosine)})")
         writer.known = set(known)
-        r, evaluated = residual_lines(writer, block, block.entries)
+        r, evaluated = right_side(writer, "r", block.residuals, block.entries)
         jacobian = jacobian_text(writer, block)
         return [
             *lines,
-            *(f"{line};" for line in evaluated),
-            f"det = {determinant(jacobian)};",
-            f"hold[{self.cached(None)}][i] = det;",
-            "size = fabs(det * factor);",
-            "lanes->margin[i] = size < lanes->margin[i] ? size : lanes->margin[i];",
+            *evaluated,
+            f"det = {determinant(jacobian)}",
+            f"hold[{self.cached(None)}][i] = det",
+            "size = fabs(det * factor)",
+            "lanes->margin[i] = size < lanes->margin[i] ? size : lanes->margin[i]",
             *self._left(r, block),
         ]
 
     def _closing(self, writer: Writer, block: Block) -> list[str]:
         """Return statements of the residual of unknowns that are given."""
-        r, evaluated = residual_lines(writer, block, ())
-        return [*(f"{line};" for line in evaluated), *self._left(r, block)]
+        r, evaluated = right_side(writer, "r", block.residuals, ())
+        return [*evaluated, *self._left(r, block)]
 
     def _left(self, r: Sequence[str], block: Block) -> list[str]:
         """Return statements that add the residuals of a block to those of all blocks."""
         return [
-            f"size = {square(r, block.row_scales)};",
+            f"size = {square(r, block.row_scales)}",
             "lanes->error[i] = size > lanes->error[i] || size != size ? size : lanes->error[i]; /* a NaN stays */",
         ]
 
@@ -200,15 +196,13 @@ class LaneUnit:
         right = (block.velocity, block.acceleration)[order - 1]
         many = len(block.unknowns) > 1  # the determinant of one unknown is its Jacobian
         entries = block.entries if many else ()
-        lines = [f"{line};" for line in writer.statements([*right, *entries])]
-        b = [f"b{k}" for k in range(len(right))]
-        lines += [f"{one} = {writer.expression(node)};" for one, node in zip(b, right, strict=True)]
+        b, lines = right_side(writer, "b", right, entries)
         if order == 1:
-            lines.append(f"per_det = 1.0 / hold[{self.cached(None)}][i];")
+            lines.append(f"per_det = 1.0 / hold[{self.cached(None)}][i]")
         z = [identifier(name.derivative(order)) for name in block.unknowns]
         jacobian = [[writer.expression(entry) if many else "" for entry in row] for row in block.jacobian]
         values = opposite_solution(jacobian, b, "* per_det")
-        return lines + [f"{one} = {text};" for one, text in zip(z, values, strict=True)]
+        return lines + [f"{one} = {text}" for one, text in zip(z, values, strict=True)]
 
 
 def is_turned(node: Node, angles: Collection[str]) -> bool:
@@ -220,6 +214,7 @@ def through(lines: Sequence[str]) -> list[str]:
     """Return the statements in a loop over the lanes."""
     if not lines:
         return ["    (void)i;"]
+    lines = ended(lines)
     return [
         "    KF_SIDE_BY_SIDE",
         "    for (i = 0; i < KF_LANES; ++i) {",

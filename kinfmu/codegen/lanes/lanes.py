@@ -199,7 +199,7 @@ class _Lanes(Lists):
         """Return statements for the targets; what the units compute and what is predicted is known."""
         turned = [node for node in reachable(targets) if is_turned(node, self.angles)]
         writer = Writer(self.names, [*self.derived, *self.stage_cache.nodes, *turned])
-        return [f"{line};" for line in writer.statements(targets)], writer
+        return writer.statements(targets), writer
 
 
 def repeats(plan: SolvePlan) -> bool:

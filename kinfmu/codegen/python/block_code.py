@@ -12,7 +12,7 @@ from kinfmu.codegen.newton import (
     jacobian_text,
     opposite_solution,
     outright,
-    residual_lines,
+    right_side,
     settled,
     solution,
     square,
@@ -20,14 +20,7 @@ from kinfmu.codegen.newton import (
 from kinfmu.codegen.writer import Writer, identifier
 from kinfmu.plan import Block
 
-
-def assigned_lines(writer: Writer, block: Block) -> list[str]:
-    """Return statements for the coordinates that a block gives outright, each with its row as a comment."""
-    lines = []
-    for new, row in outright(writer, block):
-        lines += new[:-1]
-        lines += [f"{line}  # {row}" for line in new[-1:]]
-    return lines
+BY_ROW = "  # {}"  # the comment on a coordinate that a row gives outright
 
 
 def newton_lines(writer: Writer, block: Block, label: str, starts: Sequence[str], held: str, number: str) -> list[str]:
@@ -38,8 +31,8 @@ def newton_lines(writer: Writer, block: Block, label: str, starts: Sequence[str]
     The code reads `enough`, the squared residual that it may end at.
     """
     before = before_newton(writer, block)
-    inside = assigned_lines(writer, block)
-    r, lines = residual_lines(writer, block, block.entries)
+    inside = outright(writer, block, BY_ROW)
+    r, lines = right_side(writer, "r", block.residuals, block.entries)
     inside += [*lines, f"error = {square(r, block.row_scales)}"]
     jacobian = jacobian_text(writer, block)
     z = [identifier(name) for name in block.unknowns]

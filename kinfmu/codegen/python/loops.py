@@ -16,10 +16,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from kinfmu.codegen.lists import LISTS, Kind, positions
-from kinfmu.codegen.newton import jacobian_text
+from kinfmu.codegen.lists import LISTS, Kind
+from kinfmu.codegen.newton import jacobian_text, outright, right_side
 from kinfmu.codegen.python.block_code import (
-    assigned_lines,
+    BY_ROW,
     defined,
     indented,
     kept_name,
@@ -31,7 +31,7 @@ from kinfmu.codegen.python.block_code import (
 )
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.plan import Block
-from kinfmu.plan.equations.graph import Node, reachable
+from kinfmu.plan.equations.graph import Node
 from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.python.curve import CurveData
 
@@ -42,11 +42,8 @@ class Loops:
     def __init__(self, kind: Kind, curves: Mapping[CurveData, str]) -> None:
         self.kind = kind
         self.label = kind.label
-        self.names = Names(kind.coordinates, curves)
-        for block in kind.blocks:
-            for name, motion in block.assigned:
-                self.names.assign(motion[0], name)
-        self.positions = reachable([node for group in positions(kind.blocks) for node in group])
+        self.names = Names.of_blocks(kind.blocks, curves)
+        self.positions = kind.positions
         own = {name: f"k{i}" for i, name in enumerate(kind.coordinates)}
         self.row = tupled(
             [*(f"g{i}" for i in range(len(kind.given))), *(f"c{i}" for i in range(kind.constants)), *own.values()]
@@ -81,7 +78,7 @@ class Loops:
         lines: list[str] = []
         for block in self.kind.blocks:
             if not block.unknowns:
-                lines += assigned_lines(writer, block)
+                lines += outright(writer, block, BY_ROW)
                 continue
             starts = [f"z[{self.own[name]}]" for name in block.unknowns]
             lines += newton_lines(writer, block, label, starts, f"({_HELD})", "number")
@@ -135,9 +132,7 @@ class Loops:
     def _solution(self, writer: Writer, block: Block, order: int) -> list[str]:
         """Return the linear solve of a block, or the values given in its place."""
         right = (block.velocity, block.acceleration)[order - 1]
-        lines = writer.statements([*right, *block.entries])
-        b = [f"b{i}" for i in range(len(right))]
-        lines += [f"{one} = {writer.expression(node)}" for one, node in zip(b, right, strict=True)]
+        b, lines = right_side(writer, "b", right, block.entries)
         z = [identifier(unknown.derivative(order)) for unknown in block.unknowns]
         jacobian = jacobian_text(writer, block)
         self.hold.setdefault(kept_name(block, self.label), None)

@@ -6,9 +6,9 @@ import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from kinfmu.codegen.lists import parametric
-from kinfmu.codegen.newton import jacobian_text
+from kinfmu.codegen.newton import jacobian_text, outright, right_side
 from kinfmu.codegen.python.block_code import (
-    assigned_lines,
+    BY_ROW,
     extreme,
     indented,
     kept_name,
@@ -53,12 +53,11 @@ class _Straight:
         self.curves = curve_names(plan)
         self.unknowns = plan.unknowns
         self.places = places(self.solved)
-        self.names = Names((name for block in plan.blocks for name in block.coordinates), self.curves)
+        self.names = Names.of_blocks(plan.blocks, self.curves)
         self.position_nodes: list[Node] = []
         self.formulas: dict[str, Node] = {}  # of rates and accelerations of assigned coordinates
         for block in plan.blocks:
             for name, motion in block.assigned:
-                self.names.assign(motion[0], name)
                 self.formulas |= {name.derivative(order): motion[order] for order in (1, 2)}
             self.position_nodes += [motion[0] for _, motion in block.assigned]
             self.position_nodes += [*block.residuals, *block.entries]
@@ -107,7 +106,7 @@ class _Straight:
                 lines += self._solved(writer, number, block)
                 number += 1
             else:
-                lines += assigned_lines(writer, block)
+                lines += outright(writer, block, BY_ROW)
         z = tupled(identifier(name) for name in self.unknowns)
         values = tupled(self.exports)
         determinants = [f"m{k}" for k in range(1, len(self.solved) + 1)]
@@ -198,11 +197,10 @@ class _Straight:
         lines = []
         for k, block in enumerate(self.solved):
             z = [identifier(name.derivative(order)) for name in block.unknowns]
-            vector, entries = right(block), block.entries
+            vector = right(block)
             lines += definitions.lines(writer, _names(vector), done)
-            lines += writer.statements([*vector, *entries])
-            b = [f"b{i}" for i in range(len(vector))]
-            lines += [f"{name} = {writer.expression(node)}" for name, node in zip(b, vector, strict=True)]
+            b, new = right_side(writer, "b", vector, block.entries)
+            lines += new
             jacobian = jacobian_text(writer, block)
             self.exports.setdefault(kept_name(block, str(k + 1)), None)
             solution = solution_lines(str(k + 1), order, jacobian, b, z)

@@ -294,7 +294,7 @@ def _events(plan: SolvePlan, *, owns: bool) -> str:
         f"/* Jumps of the laws of {plan.mechanism.name}: generated from its mechanism, not to be edited. */",
         '#include "instance.h"',
         "",
-        *function(signature, [*loads, *body], ("model", "constants", "jumps", "periods")),
+        *function(signature, [*loads, *body]),
     ]
     return "\n".join(lines).rstrip("\n") + "\n"
 
