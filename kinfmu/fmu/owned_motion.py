@@ -10,10 +10,9 @@ from kinfmu.mechanism.laws import External
 from kinfmu.mechanism.loads.following import Following
 from kinfmu.mechanism.mechanism import require_masses
 from kinfmu.plan import SolvePlan
-from kinfmu.plan.efforts import effort_inputs, inertia_steps
+from kinfmu.plan.efforts import LedLaws, effort_inputs, inertia_steps, led_laws
 from kinfmu.plan.equations.graph import Node
 from kinfmu.plan.forces import ForceSteps
-from kinfmu.plan.led_laws import LedLaws, led_laws
 from kinfmu.plan.mechanics import Mechanics
 
 

@@ -18,9 +18,8 @@ from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.interface import Interface, Variable
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.plan import SolvePlan
-from kinfmu.plan.efforts import units_in_si
+from kinfmu.plan.efforts import LedLaws, units_in_si
 from kinfmu.plan.forces import ForceSteps
-from kinfmu.plan.led_laws import LedLaws
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.plan.undetermined import distance_steps, meeting_messages
 from kinfmu.solver.python.torque import dormand_prince as pair
