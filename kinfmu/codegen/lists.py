@@ -52,8 +52,9 @@ class Kind:
         return reachable([node for group in positions(self.blocks) for node in group])
 
     @property
-    def has_assigned(self) -> bool:
-        return any(block.assigned for block in self.blocks)
+    def assigned(self) -> tuple[CoordinateName, ...]:
+        """The coordinates that are given outright."""
+        return tuple(name for block in self.blocks for name, _ in block.assigned)
 
 
 class UnitMember(NamedTuple):

@@ -25,7 +25,7 @@ class Parts(Lists):
     """The parts of a plan's model in C, from which its functions are written.
 
     curves: names of the constants that hold the data of curves; solved: the blocks that need Newton; units: by the
-    label of their kind.
+    label of their kind; readable: where functions of the whole model find what they read.
     """
 
     def __init__(self, plan: SolvePlan) -> None:
@@ -37,6 +37,9 @@ class Parts(Lists):
         self.bound = model_places(self)
         self.units = {k: Units(kind, self.curves, self.bound) for k, kind in self.kinds.items()}
         self.stage_cache = StageCache(self, self.units)
+        self.readable = self.bound.copy()
+        self.readable |= {name: f"{_LISTS[order]}[{k}]" for order in range(3) for name, k in self.places(order).items()}
+        self.readable |= {argument_symbol(k): f"arguments[{k}]" for k in range(len(plan.path_laws.turns))}
 
 
 _LOCALS = ("const double *const x = found->x;", "const double *const hold = found->hold;")
@@ -221,11 +224,9 @@ def _formulas(parts: Parts, targets: Sequence[Node]) -> tuple[list[str], list[st
     """Return statements, those that read first, and after them each target as an expression."""
     writer = Writer(parts.names, [*parts.derived, *parts.stage_cache.nodes])
     statements, texts = writer.formulas(targets)
-    places = parts.bound.copy()
-    places |= {name: f"{_LISTS[order]}[{k}]" for order in range(3) for name, k in parts.places(order).items()}
-    places |= {argument_symbol(k): f"arguments[{k}]" for k in range(len(parts.plan.path_laws.turns))}
     held = parts.stage_cache.place
-    return [*loads(parts.names, writer.used, places, lambda node: f"found->hold[{held(node)}]"), *statements], texts
+    read = loads(parts.names, writer.used, parts.readable, lambda node: f"found->hold[{held(node)}]")
+    return [*read, *statements], texts
 
 
 _BIND = "bool kf_bind(kf_model *model, const double *parameters, char *why, size_t size)"

@@ -86,9 +86,8 @@ def function(signature: str, lines: Sequence[str], variables: Sequence[str] = ()
     further declarations.
     """
     lines = ended(lines)
-    text = "\n".join([*variables, *lines])
-    arguments = re.findall(r"(\w+)[,)]", signature)
-    unused = [f"(void){name};" for name in arguments if not re.search(rf"\b{name}\b", text)]
+    words = set(re.findall(r"\w+", " ".join([*variables, *lines])))
+    unused = [f"(void){name};" for name in re.findall(r"(\w+)[,)]", signature) if name not in words]
     return [signature, "{", *indented([*declared(assigned(lines)), *variables, *unused, *lines]), "}", ""]
 
 

@@ -123,8 +123,7 @@ class Units:
         lines: list[str] = []
         for one in self.kind.blocks:
             lines += self._newton(writer, one) if one.unknowns else outright(writer, one, _BY_ROW)
-        found = [name for one in self.kind.blocks for name, _ in one.assigned]
-        lines = self._loads(writer, found) + lines
+        lines = self._loads(writer, self.kind.assigned) + lines
         lines += [f"x[row->{field}] = {identifier(name)}" for name, field in self.own.items()]
         lines += [f"{self._hold(name)} = {name}" for name in self.hold]
         if block is None:

@@ -90,15 +90,18 @@ class LaneUnit:
         writer = Writer(self.names, [*self.derived, *self.predicted])
         lines: list[str] = []
         for block in self.kind.blocks:
-            if block.unknowns:
-                lines += self._closing(writer, block) if held else self._newton(writer, block)
+            if block.unknowns and held:
+                r, closing = right_side(writer, "r", block.residuals, ())
+                lines += [*closing, *self._left(r, block)]
+            elif block.unknowns:
+                lines += self._newton(writer, block)
             lines += outright(writer, block)
         corrected = self.kind.solved.unknowns if self.kind.solved is not None and not held else ()
         turning = self.turning if corrected else []
         for unknown, sine, cosine in turning:
             field = self.where[unknown][1]
             lines += [f"sine_{field}[i] = {self.names.of(sine)}", f"cosine_{field}[i] = {self.names.of(cosine)}"]
-        found = [*corrected, *(name for block in self.kind.blocks for name, _ in block.assigned)]
+        found = (*corrected, *self.kind.assigned)
         lines += [f"x_{self.where[name][1]}[i] = {identifier(name)}" for name in found]
         held_nodes = {node: k for node, k in self.hold.items() if node is not None}
         lines += writer.statements(list(held_nodes))
@@ -117,9 +120,7 @@ class LaneUnit:
                 if block.unknowns:
                     lines += [] if held else self._linear(writer, block, order)
                 lines += outright_rates(writer, block, order)
-        names = [
-            name for block in self.kind.blocks for name in (block.coordinates if not held else dict(block.assigned))
-        ]
+        names = self.kind.assigned if held else self.kind.coordinates
         rates = [(name.derivative(order), order, self.where[name][1]) for name in names for order in (1, 2)]
         lines += [f"{LISTS[order]}_{field}[i] = {identifier(name)}" for name, order, field in rates]
         return self._function(stage, "", [*self._loads(writer.used, {name for name, _, _ in rates}), *lines])
@@ -178,11 +179,6 @@ class LaneUnit:
             "lanes->margin[i] = size < lanes->margin[i] ? size : lanes->margin[i]",
             *self._left(r, block),
         ]
-
-    def _closing(self, writer: Writer, block: Block) -> list[str]:
-        """Return statements of the residual of unknowns that are given."""
-        r, evaluated = right_side(writer, "r", block.residuals, ())
-        return [*evaluated, *self._left(r, block)]
 
     def _left(self, r: Sequence[str], block: Block) -> list[str]:
         """Return statements that add the residuals of a block to those of all blocks."""

@@ -137,7 +137,7 @@ class _Looped(Lists):
         """Return the call that computes what is given outright from what is solved for."""
         lists = ", ".join(LISTS[1 : order + 1])
         name = ("rates", "accelerations")[order - 1]
-        return [f"{name}{run.kind.label}(RUN_{k}, holds{k}, {lists})"] if run.kind.has_assigned else []
+        return [f"{name}{run.kind.label}(RUN_{k}, holds{k}, {lists})"] if run.kind.assigned else []
 
     def _velocity(self) -> list[str]:
         lines = [*self._values(), f"x1 = {self._rest('[*ud]')}", *self._solving(1, "given, held")]

@@ -65,7 +65,7 @@ class Loops:
         if kind.solved:
             later += self._linear("velocity", 1) + self._linear("acceleration", 2)
             later += self._matrices(kind.solved) + self._residuals(kind.solved)
-        if kind.has_assigned:
+        if kind.assigned:
             later += self._assigned("rates", 1) + self._assigned("accelerations", 2)
         parts = self._position()
         hold = tupled(self.hold)
@@ -84,8 +84,7 @@ class Loops:
             lines += newton_lines(writer, block, label, starts, f"({_HELD})", "number")
             lines += ["iterations += iteration", "if error > largest:", "    largest = error"]
             lines += [f"determinants.append(det{label})", "number += 1"]
-        found = [name for block in self.kind.blocks for name, _ in block.assigned]
-        lines = self._loaded(writer, found) + lines
+        lines = self._loaded(writer, self.kind.assigned) + lines
         lines += [f"{self.places[name]} = {identifier(name)}" for name in self.kind.coordinates]
         arguments, results = ["run", "x"], ["holds"]
         about = "Coordinates that are given outright."
@@ -159,7 +158,7 @@ class Loops:
         writer = Writer(self.names, self.positions)
         lines = [line for block in self.kind.blocks for line in self._assignments(writer, block, order)]
         self._import(writer)
-        found = [coordinate.derivative(order) for block in self.kind.blocks for coordinate, _ in block.assigned]
+        found = [coordinate.derivative(order) for coordinate in self.kind.assigned]
         return self._later(name, LISTS[1 : order + 1], self._loaded(writer, [*self.hold, *found]) + lines)
 
     def _matrices(self, block: Block) -> list[str]:
