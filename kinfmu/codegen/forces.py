@@ -15,8 +15,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from kinfmu.codegen.c.model import curve_tables
-from kinfmu.codegen.c.text import FUNCTIONS, function
-from kinfmu.codegen.python.block_code import indented, matrix, tupled
+from kinfmu.codegen.c.text import FUNCTIONS, filled, function
+from kinfmu.codegen.python.block_code import defined, matrix, tupled
 from kinfmu.codegen.python.stage import OF_NUMBERS, given_symbols, has_roots, stage_curves, stage_lines
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.plan import SolvePlan
@@ -79,9 +79,7 @@ def emit_python_forces(plan: SolvePlan, steps: ForceSteps) -> str:
             f"FORCES = {tuple(map(str, steps.names))!r}",
             *(f"{name} = {data!r}" for data, name in curves.items()),
             "",
-            "",
             *_python_function(plan, steps, curves),
-            "",
         ]
     )
 
@@ -100,13 +98,9 @@ def _python_function(plan: SolvePlan, steps: ForceSteps, curves: Mapping[CurveDa
     lines, expressions = stage_lines(steps, given, curves, _solve)
     values = iter(expressions)
     results = ["0.0" if node.constant == 0.0 else next(values) for node in steps.results]
-    return [
-        f"def forces({', '.join(ARGUMENTS)}):",
-        '    """FORCES of one sample, in SI units."""',
-        *(f"    {identifier(name)} = {places[name]}" for name in given if identifier(name) != places[name]),
-        *indented(lines),
-        f"    return {tupled(results)}",
-    ]
+    read = [f"{identifier(name)} = {places[name]}" for name in given if identifier(name) != places[name]]
+    head, about = f"forces({', '.join(ARGUMENTS)})", "FORCES of one sample, in SI units."
+    return defined(head, about, [*read, *lines], tupled(results))
 
 
 def solves(steps: ForceSteps) -> bool:
@@ -125,18 +119,14 @@ def emit_jumps(plan: SolvePlan) -> str:
     pairs = [tupled([writer.expression(at), writer.expression(period)]) for at, period in plan.jumps]
     places = places_of_symbols(plan)
     given = [f"{identifier(node.name)} = {places[node.name]}" for node in writer.used if node.op == "symbol"]
+    about = "Times [s] at which laws of loads jump, each with its period, or 0."
     return "\n".join(
         [
             f'"""Jumps of the laws of {plan.mechanism.name}: generated from its mechanism, not to be edited."""',
             "",
             "from math import atan2, cos, floor, sin, sqrt",
             "",
-            "",
-            "def jumps(efforts, parameters):",
-            '    """Times [s] at which laws of loads jump, each with its period, or 0."""',
-            *indented([*given, *body]),
-            f"    return {tupled(pairs)}",
-            "",
+            *defined("jumps(efforts, parameters)", about, [*given, *body], tupled(pairs)),
         ]
     )
 
@@ -166,16 +156,16 @@ def emit_c_forces(plan: SolvePlan, steps: ForceSteps, stage: str = "forces", *, 
         m, k, count, at = len(rows), len(rows[0]), len(columns), len(buffers)
         sizes = {"a": m * k, "b": m * count, "x": k * count, "factors": 3 * m * k + 2 * (m + k)}
         buffers.append(f"double {', '.join(f'{name}{at}[{size}]' for name, size in sizes.items())};")
-        filled = [f"a{at}[{n}] = {entry}" for n, entry in enumerate(entry for row in rows for entry in row)]
-        filled += [f"b{at}[{n}] = -({entry})" for n, entry in enumerate(entry for one in columns for entry in one)]
+        lines = filled(f"a{at}", (entry for row in rows for entry in row))
+        lines += filled(f"b{at}", (f"-({entry})" for column in columns for entry in column))
         call = f"kf_solutions({m}, {k}, {count}, a{at}, b{at}, factors{at}, x{at})"
-        return [*filled, call, *(f"{name} = x{at}[{n}]" for n, name in enumerate(names))]
+        return [*lines, call, *(f"{name} = x{at}[{n}]" for n, name in enumerate(names))]
 
     lines, found = stage_lines(steps, given, curves, solve, FUNCTIONS)
     values = iter(found)
     results = ["0.0" if node.constant == 0.0 else next(values) for node in steps.results]
-    body = [f"{identifier(name)} = {places[name]};" for name in given if identifier(name) != places[name]]
-    body += [line if line.endswith(";") else f"{line};" for line in lines]
+    body = [f"{identifier(name)} = {places[name]}" for name in given if identifier(name) != places[name]]
+    body += lines
     body += [
         f"forces[{k}] = {result}; /* {name} */"
         for k, (name, result) in enumerate(zip(steps.names, results, strict=True))
@@ -189,6 +179,6 @@ def emit_c_forces(plan: SolvePlan, steps: ForceSteps, stage: str = "forces", *, 
             "#include <math.h>",
             "",
             *curve_tables(curves),
-            *function(SIGNATURE.format(stage=stage), body, ARGUMENTS, buffers),
+            *function(SIGNATURE.format(stage=stage), body, buffers),
         ]
     )

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import groupby
 from typing import NamedTuple
 
@@ -45,9 +46,15 @@ class Kind:
         """The block that is solved by Newton, if there is one."""
         return next((block for block in self.blocks if block.unknowns), None)
 
+    @cached_property
+    def positions(self) -> list[Node]:
+        """The nodes of the position stage."""
+        return reachable([node for group in positions(self.blocks) for node in group])
+
     @property
-    def has_assigned(self) -> bool:
-        return any(block.assigned for block in self.blocks)
+    def assigned(self) -> tuple[CoordinateName, ...]:
+        """The coordinates that are given outright."""
+        return tuple(name for block in self.blocks for name, _ in block.assigned)
 
 
 class UnitMember(NamedTuple):

@@ -5,7 +5,7 @@ Expressions are plain arithmetic on names and mean the same in Python and in C. 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
 from kinfmu.codegen.writer import Writer, identifier
 from kinfmu.plan import Block
@@ -78,12 +78,23 @@ def _product(a: str, b: str) -> str:
     return " * ".join(f"({text})" if any(c in text for c in " -") else text for text in (a, b))
 
 
-def outright(writer: Writer, block: Block) -> Iterator[tuple[list[str], str]]:
-    """Yield for each coordinate that a block gives outright its statements and the row that gives it."""
+def outright(writer: Writer, block: Block, comment: str = "") -> list[str]:
+    """Return statements for the coordinates that a block gives outright; comment: on each, around its row."""
+    lines: list[str] = []
     for (name, motion), row in zip(block.assigned, block.assigned_by, strict=True):
-        lines = writer.statements([motion[0]])
-        given = writer.expression(motion[0])
-        yield lines if given == identifier(name) else [*lines, f"{identifier(name)} = {given}"], row.name
+        new, (position,) = writer.formulas(motion[:1])
+        new += [f"{identifier(name)} = {position}"] if position != identifier(name) else []
+        lines += [*new[:-1], *(f"{line}{comment.format(row.name)}" for line in new[-1:])]
+    return lines
+
+
+def outright_rates(writer: Writer, block: Block, order: int) -> list[str]:
+    """Return statements for the rates (order 1) or accelerations (2) of these coordinates."""
+    lines: list[str] = []
+    for name, motion in block.assigned:
+        lines += writer.statements([motion[order]])
+        lines.append(f"{identifier(name.derivative(order))} = {writer.expression(motion[order])}")
+    return lines
 
 
 def before_newton(writer: Writer, block: Block, turned: Iterable[Node] = ()) -> list[str]:
@@ -94,11 +105,13 @@ def before_newton(writer: Writer, block: Block, turned: Iterable[Node] = ()) -> 
     return writer.statements(writer.independent(looped, [*unknowns, *turned]))
 
 
-def residual_lines(writer: Writer, block: Block, entries: Sequence[Node]) -> tuple[list[str], list[str]]:
-    """Return names of the residuals, and the statements that compute them and entries of the Jacobian."""
-    r = [f"r{k}" for k in range(len(block.residuals))]
-    lines = writer.statements([*block.residuals, *entries])
-    return r, lines + [f"{one} = {writer.expression(node)}" for one, node in zip(r, block.residuals, strict=True)]
+def right_side(
+    writer: Writer, letter: str, nodes: Sequence[Node], entries: Sequence[Node]
+) -> tuple[list[str], list[str]]:
+    """Return names of the entries of a right side, and statements that compute them and entries of the Jacobian."""
+    names = [f"{letter}{k}" for k in range(len(nodes))]
+    lines = writer.statements([*nodes, *entries])
+    return names, lines + [f"{name} = {writer.expression(node)}" for name, node in zip(names, nodes, strict=True)]
 
 
 def jacobian_text(writer: Writer, block: Block) -> Rows:

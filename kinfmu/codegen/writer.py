@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 
+from kinfmu.plan import Block
 from kinfmu.plan.equations.graph import FUNCTIONS, Node
 from kinfmu.solver.python.curve import CurveData
 
@@ -53,10 +54,19 @@ class Names:
                 self._numbered[node] = f"t{self._count}"
         return self._numbered[node]
 
-    def assign(self, node: Node, name: str) -> None:
-        """Name a node after the coordinate that it is; a node that is two coordinates keeps the first name."""
-        if node.op not in ("symbol", "constant"):
-            self._numbered.setdefault(node, identifier(name))
+    @classmethod
+    def of_blocks(
+        cls,
+        blocks: Sequence[Block],
+        curves: Mapping[CurveData, str] | None = None,
+        functions: Mapping[str, str] | None = None,
+    ) -> Names:
+        """Return names that call what a block gives outright after its coordinate, after the first if it is two."""
+        names = cls((name for block in blocks for name in block.coordinates), curves, functions)
+        for name, motion in (assigned for block in blocks for assigned in block.assigned):
+            if motion[0].args:
+                names._numbered.setdefault(motion[0], identifier(name))
+        return names
 
 
 class Writer:
@@ -101,6 +111,10 @@ class Writer:
         found = {(node.op, node.args[0]): node for node in new if node.op in ("sin", "cos")}
         pairs = [(node, found.get(("cos" if op == "sin" else "sin", angle))) for (op, angle), node in found.items()]
         return {node: other for node, other in pairs if other is not None}
+
+    def formulas(self, targets: Sequence[Node]) -> tuple[list[str], list[str]]:
+        """Return statements, and after them each target as an expression."""
+        return self.statements(targets), [self.expression(node) for node in targets]
 
     def _pair(self, node: Node, other: Node, text: dict[Node, tuple[str, int]]) -> str:
         """Return the statement that computes both."""

@@ -20,10 +20,9 @@ from kinfmu.mechanism.laws import External
 from kinfmu.mechanism.loads.following import Following
 from kinfmu.mechanism.mechanism import require_masses
 from kinfmu.plan import SolvePlan
-from kinfmu.plan.efforts import effort_inputs, effort_names, inertia_steps
+from kinfmu.plan.efforts import LedLaws, effort_inputs, effort_names, inertia_steps, led_laws
 from kinfmu.plan.equations.graph import Node
 from kinfmu.plan.forces import ForceSteps, effort_noun
-from kinfmu.plan.led_laws import LedLaws, led_laws
 from kinfmu.plan.mechanics import Mechanics
 from kinfmu.solver.python.law_breaks import LEAST_TOLERANCE, MOST_TOLERANCE, STEP_TOLERANCE
 from kinfmu.units import Quantity, unit_of

@@ -176,6 +176,6 @@ def _points(plan: SolvePlan, points: Sequence[str]) -> str:
         '#include "kinfmu.h"',
         '#include "sincos.h"',
         "",
-        *function("static void kf_points(const kf_model *model, double *points)", [*loads, *body], ("model", "points")),
+        *function("static void kf_points(const kf_model *model, double *points)", [*loads, *body]),
     ]
     return "\n".join(lines) + "\n"

@@ -10,14 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from kinfmu.codegen.c.stage_cache import StageCache
-from kinfmu.codegen.c.text import FUNCTIONS, array, function, repeated, string
+from kinfmu.codegen.c.text import FUNCTIONS, array, filled, function, loads, model_places, repeated, string
 from kinfmu.codegen.c.units import Units
 from kinfmu.codegen.lists import LISTS, Lists, UnitRun
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.equations.graph import Node
 from kinfmu.plan.path_laws import argument_symbol
-from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.python.continuation import NO_NUMBER
 from kinfmu.solver.python.curve import CurveData
 
@@ -26,7 +25,7 @@ class Parts(Lists):
     """The parts of a plan's model in C, from which its functions are written.
 
     curves: names of the constants that hold the data of curves; solved: the blocks that need Newton; units: by the
-    label of their kind.
+    label of their kind; readable: where functions of the whole model find what they read.
     """
 
     def __init__(self, plan: SolvePlan) -> None:
@@ -35,8 +34,12 @@ class Parts(Lists):
         self.curves: dict[CurveData, str] = {one: f"&curve_{k}" for k, one in enumerate(data, start=1)}
         self.names = Names((name for block in plan.blocks for name in block.coordinates), self.curves, FUNCTIONS)
         self.solved = [block for block in plan.blocks if block.unknowns]
-        self.units = {k: Units(kind, self.curves, self.parameters, self.derived) for k, kind in self.kinds.items()}
+        self.bound = model_places(self)
+        self.units = {k: Units(kind, self.curves, self.bound) for k, kind in self.kinds.items()}
         self.stage_cache = StageCache(self, self.units)
+        self.readable = self.bound.copy()
+        self.readable |= {name: f"{_LISTS[order]}[{k}]" for order in range(3) for name, k in self.places(order).items()}
+        self.readable |= {argument_symbol(k): f"arguments[{k}]" for k in range(len(plan.path_laws.turns))}
 
 
 _LOCALS = ("const double *const x = found->x;", "const double *const hold = found->hold;")
@@ -63,11 +66,11 @@ def _positions(parts: Parts) -> list[str]:
             call = [
                 f"if (!position{run.kind.label}(model, {unit}, z, held && held[{block}],",
                 f"                &found->determinants[{block}], newton)) {{",
-                f"    return {block};",
+                f"    return {block}",
                 "}",
             ]
         else:
-            call = [f"position{run.kind.label}(model, {unit});"]
+            call = [f"position{run.kind.label}(model, {unit})"]
         calls += repeated(len(run.members), call)
     signature = (
         "inline int kf_solve_blocks(const kf_model *model, const double *z, const bool *held, kf_found *found,\n"
@@ -75,7 +78,7 @@ def _positions(parts: Parts) -> list[str]:
     )
     variables = ["double *const x = found->x;", "double *const hold = found->hold;"]
     variables += ["int k;"] if any(index(run) == "k" for run in parts.runs) else []
-    return function(signature, [*calls, "return -1;"], ("z", "held", "newton"), variables)
+    return function(signature, [*calls, "return -1"], variables)
 
 
 def _rates(parts: Parts, name: str, order: int) -> list[str]:
@@ -85,7 +88,7 @@ def _rates(parts: Parts, name: str, order: int) -> list[str]:
     for number, run in parts.numbered():
         solving = ["given", f"held && held[{block_of(run)}]"] if run.kind.solved else []
         arguments = ["model", _unit(parts, number, index(run)), *solving, *LISTS[1:order], out]
-        calls += repeated(len(run.members), [f"{name}{run.kind.label}({', '.join(arguments)});"])
+        calls += repeated(len(run.members), [f"{name}{run.kind.label}({', '.join(arguments)})"])
     ready = " const double *x1," if order == 2 else ""
     signature = (
         f"inline void kf_{name}(const kf_model *model, const kf_found *found, const double *{driven},{ready}\n"
@@ -93,10 +96,10 @@ def _rates(parts: Parts, name: str, order: int) -> list[str]:
     )
     drivers = [
         "for (k = 0; k < KF_DRIVERS; ++k) {",
-        f"    {out}[KF_COORDINATES - KF_DRIVERS + k] = {driven}[k];",
+        f"    {out}[KF_COORDINATES - KF_DRIVERS + k] = {driven}[k]",
         "}",
     ]
-    return function(signature, [*drivers, *calls], ("given", "held"), (*_LOCALS, "int k;"))
+    return function(signature, [*drivers, *calls], (*_LOCALS, "int k;"))
 
 
 def _entries(parts: Parts, name: str) -> list[str]:
@@ -107,12 +110,12 @@ def _entries(parts: Parts, name: str) -> list[str]:
             unit = _unit(parts, number, f"block - {run.first}")
             calls += [
                 f"if (block < {run.first + len(run.members)}) {{",
-                f"    {name}{run.kind.label}(model, {unit}, {name});",
-                "    return;",
+                f"    {name}{run.kind.label}(model, {unit}, {name})",
+                "    return",
                 "}",
             ]
     signature = f"void kf_{name}(const kf_model *model, const kf_found *found, int block, double *{name})"
-    return function(signature, calls, ("model", "found", "block", name), _LOCALS if calls else ())
+    return function(signature, calls, _LOCALS if calls else ())
 
 
 def _unit(parts: Parts, number: int, k: str) -> str:
@@ -137,8 +140,14 @@ _ALONE = (((0, ""),), ((1, "v"),), ((2, "(v * v)"), (1, "a")))  # sums of deriva
 
 def readers(parts: Parts) -> list[str]:
     """Return all of them."""
-    found = [*(line for order in range(3) for line in _outputs(parts, order)), *_watches(parts), *_fixed(parts)]
-    return [*found, *(_laws(parts) if parts.plan.path_laws.units else ())]
+    watches = "inline void kf_watches(const kf_model *model, const kf_found *found, double *watches)"
+    fixed = "void kf_fixed(const kf_model *model, double *fixed)"
+    return [
+        *(line for order in range(3) for line in _outputs(parts, order)),
+        *_filled(parts, watches, [node for _, node in parts.plan.watches]),
+        *_filled(parts, fixed, list(parts.plan.fixed_nodes.values())),
+        *(_laws(parts) if parts.plan.path_laws.units else ()),
+    ]
 
 
 def _outputs(parts: Parts, order: int) -> list[str]:
@@ -154,19 +163,21 @@ def _outputs(parts: Parts, order: int) -> list[str]:
     nodes = {of: [node for node, _ in parts.outputs(of)] for of, _ in summed}
     places = [place for _, place in parts.outputs(order)]
     formulas = [k for k, place in enumerate(places) if place is None]
-    texts, lines = _expressions(parts, [nodes[of][k] for of, _ in summed for k in formulas])
+    targets = [nodes[of][k] for of, _ in summed for k in formulas]
+    lines, expressions = _formulas(parts, targets)
+    texts = dict(zip(targets, expressions, strict=True))
     is_copied = len(formulas) < len(places)
     if is_copied:
         place = f"kf_{out}_places[k]"
         lines += [
             "for (k = 0; k < KF_OUTPUTS; ++k) {",
             f"    if ({place} >= 0) {{",
-            f"        {out}[k] = {_sum((f'{_LISTS[of]}[{place}]', factor) for of, factor in summed)};",
+            f"        {out}[k] = {_sum((f'{_LISTS[of]}[{place}]', factor) for of, factor in summed)}",
             "    }",
             "}",
         ]
     for k in formulas:
-        lines.append(f"{out}[{k}] = {_sum((texts[nodes[of][k]], factor) for of, factor in summed)};")
+        lines.append(f"{out}[{k}] = {_sum((texts[nodes[of][k]], factor) for of, factor in summed)}")
     lists, speeds = LISTS[1 : order + 1], ("v", "a")[:order]
     given = "".join([*(f" const double *{one}," for one in lists), *(f" double {one}," for one in speeds)])
     return [
@@ -175,7 +186,6 @@ def _outputs(parts: Parts, order: int) -> list[str]:
         *function(
             f"inline void {name}(const kf_model *model, const kf_found *found,{given}\n    double *{out})",
             lines,
-            ("model", "found", *lists, *speeds),
             ("int k;",) if is_copied else (),
         ),
     ]
@@ -191,64 +201,32 @@ def _wrapped(text: str) -> str:
     return text if text.isidentifier() or text.endswith("]") else f"({text})"
 
 
-def _watches(parts: Parts) -> list[str]:
-    nodes = [node for _, node in parts.plan.watches]
-    texts, lines = _expressions(parts, nodes)
-    lines += [f"watches[{k}] = {texts[node]};" for k, node in enumerate(nodes)]
-    signature = "inline void kf_watches(const kf_model *model, const kf_found *found, double *watches)"
-    return function(signature, lines, ("model", "found", "watches"))
-
-
-def _fixed(parts: Parts) -> list[str]:
-    nodes = list(parts.plan.fixed_nodes.values())
-    texts, lines = _expressions(parts, nodes)
-    lines += [f"fixed[{k}] = {texts[node]};" for k, node in enumerate(nodes)]
-    return function("void kf_fixed(const kf_model *model, double *fixed)", lines, ("model", "fixed"))
-
-
 def _laws(parts: Parts) -> list[str]:
     """Return the functions of what steps of a path monitor of laws."""
     laws, pose = parts.plan.path_laws, "const kf_model *model, const kf_found *found"
     functions = (
-        ("positions", f"{pose}, double *positions", laws.motions[0]),
-        ("rates", f"{pose}, const double *x1, double *rates", laws.motions[1]),
-        ("accelerations", f"{pose}, const double *x1, const double *x2, double *accelerations", laws.motions[2]),
-        ("slopes", "const kf_model *model, double *slopes", laws.slopes),
-        ("steps", "const kf_model *model, const double *arguments, double *steps", laws.steps),
+        (f"positions({pose}, double *positions)", laws.motions[0]),
+        (f"rates({pose}, const double *x1, double *rates)", laws.motions[1]),
+        (f"accelerations({pose}, const double *x1, const double *x2, double *accelerations)", laws.motions[2]),
+        ("slopes(const kf_model *model, double *slopes)", laws.slopes),
+        ("steps(const kf_model *model, const double *arguments, double *steps)", laws.steps),
     )
-    lines = []
-    for name, given, nodes in functions:
-        texts, statements = _expressions(parts, nodes)
-        statements += [f"{name}[{k}] = {texts[node]};" for k, node in enumerate(nodes)]
-        arguments = [one.split("*")[1] for one in given.split(", ")]
-        lines += function(f"void kf_law_{name}({given})", statements, arguments)
-    return lines
+    return [line for head, nodes in functions for line in _filled(parts, f"void kf_law_{head}", nodes)]
 
 
-def _expressions(parts: Parts, targets: Sequence[Node]) -> tuple[dict[Node, str], list[str]]:
-    """Return each target as an expression, and the statements that come before."""
+def _filled(parts: Parts, signature: str, nodes: Sequence[Node]) -> list[str]:
+    """Return a function that writes numbers into its last argument."""
+    lines, texts = _formulas(parts, nodes)
+    return function(signature, [*lines, *filled(signature.split("*")[-1].rstrip(")"), texts)])
+
+
+def _formulas(parts: Parts, targets: Sequence[Node]) -> tuple[list[str], list[str]]:
+    """Return statements, those that read first, and after them each target as an expression."""
     writer = Writer(parts.names, [*parts.derived, *parts.stage_cache.nodes])
-    statements = [f"{line};" for line in writer.statements(targets)]
-    texts = {node: writer.expression(node) for node in targets}
-    return texts, [*_loads(parts, writer.used), *statements]
-
-
-def _loads(parts: Parts, used: Iterable[Node]) -> list[str]:
-    """Return assignments of what the statements read from the model, its pose and the lists."""
-    listed = {name: f"{_LISTS[order]}[{k}]" for order in range(3) for name, k in parts.places(order).items()}
-    listed |= {argument_symbol(k): f"arguments[{k}]" for k in range(len(parts.plan.path_laws.turns))}
-    lines = []
-    for node in used:
-        if node in parts.derived:
-            source = f"model->derived[{parts.derived[node]}]"
-        elif node in parts.stage_cache.nodes:
-            source = f"found->hold[{parts.stage_cache.place(node)}]"
-        elif is_parameter(node):
-            source = f"model->parameters[{parts.parameters[node.name]}]"
-        else:
-            source = listed[node.name]
-        lines.append(f"{parts.names.of(node)} = {source};")
-    return lines
+    statements, texts = writer.formulas(targets)
+    held = parts.stage_cache.place
+    read = loads(parts.names, writer.used, parts.readable, lambda node: f"found->hold[{held(node)}]")
+    return [*read, *statements], texts
 
 
 _BIND = "bool kf_bind(kf_model *model, const double *parameters, char *why, size_t size)"
@@ -259,18 +237,18 @@ def bind(parts: Parts) -> list[str]:
     """Return kf_bind: true if all that follows from the parameters is finite and the plan's conditions hold."""
     derived, conditions = parts.derived, parts.plan.conditions
     writer = Writer(parts.names, (), derived)
-    known = [f"{line};" for line in writer.statements([*derived, *(condition.node for condition in conditions)])]
+    known = writer.statements([*derived, *(condition.node for condition in conditions)])
     numbers = [writer.expression(condition.node) for condition in conditions]
     used = {node.name for node in writer.used if node.op == "symbol"}
     lines = [
-        *(f"model->parameters[{k}] = parameters[{k}];" for k in parts.parameters.values()),
-        *(f"{identifier(name)} = parameters[{k}];" for name, k in parts.parameters.items() if name in used),
+        *(f"model->parameters[{k}] = parameters[{k}]" for k in parts.parameters.values()),
+        *(f"{identifier(name)} = parameters[{k}]" for name, k in parts.parameters.items() if name in used),
         *known,
-        *(f"model->derived[{k}] = {writer.expression(node)};" for k, node in enumerate(derived)),
+        *filled("model->derived", map(writer.expression, derived)),
     ]
     terms = [f"fabs({number})" for number, (_, node, _) in zip(numbers, conditions, strict=True) if node not in derived]
     if derived:
-        lines += ["for (k = 0; k < KF_DERIVED; ++k) {", "    total += fabs(model->derived[k]);", "}"]
+        lines += ["for (k = 0; k < KF_DERIVED; ++k) {", "    total += fabs(model->derived[k])", "}"]
         terms.insert(0, "total")
     if terms:
         lines += _refused_unless(f"{' + '.join(terms)} < INFINITY", string(NO_NUMBER))
@@ -278,11 +256,11 @@ def bind(parts: Parts) -> list[str]:
         message = string(f"{name.replace('%', '%%')} = %.15g must be {required}")
         lines += _refused_unless(_HOLDS[required].format(number), f"{message}, {number}")
     variables = ("double total = 0.0;", "int k;") if derived else ()
-    return function(_BIND, [*lines, "return true;"], ("model", "parameters", "why", "size"), variables)
+    return function(_BIND, [*lines, "return true"], variables)
 
 
 def _refused_unless(condition: str, message: str) -> list[str]:
-    return [f"if (!({condition})) {{", f"    snprintf(why, size, {message});", "    return false;", "}"]
+    return [f"if (!({condition})) {{", f"    snprintf(why, size, {message})", "    return false", "}"]
 
 
 _DRIVE = """\
@@ -295,11 +273,11 @@ def drive(parts: Parts) -> list[str]:
     laws = parts.plan.laws
     orders = [[getattr(law, order) for law in laws] for order in ("position", "rate", "acceleration")]
     writer = Writer(Names(curves=parts.curves, functions=FUNCTIONS), ())
-    body = [f"{line};" for line in writer.statements([node for nodes in orders for node in nodes])]
+    body = writer.statements([node for nodes in orders for node in nodes])
     for name, nodes in zip(("u", "ud", "udd"), orders, strict=True):
-        body += [f"{name}[{k}] = {writer.expression(node)};" for k, node in enumerate(nodes)]
+        body += filled(name, map(writer.expression, nodes))
     places = {constant.name: f"constants[{k}]" for k, constant in enumerate(parts.plan.law_constants)}
     places |= {name: f"model->parameters[{k}]" for name, k in parts.parameters.items()}
     used = {node.name for node in writer.used if node.op == "symbol"}
-    loads = [f"{identifier(name)} = {place};" for name, place in places.items() if name in used]
-    return function(_DRIVE, [*loads, *body], ("time", "model", "constants"))
+    read = [f"{identifier(name)} = {place}" for name, place in places.items() if name in used]
+    return function(_DRIVE, [*read, *body])

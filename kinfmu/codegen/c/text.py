@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+
+from kinfmu.codegen.lists import Lists
+from kinfmu.codegen.writer import Names
+from kinfmu.plan.equations.graph import Node
 
 _WIDTH = 110
 
+Places = dict[Node | str, str]  # where functions find operations, and symbols by their names
 FUNCTIONS = {"sin": "kf_sin", "cos": "kf_cos", "sincos": "kf_sincos", "atan2": "kf_atan2"}  # of solver/c/sincos.h
 
 
@@ -52,21 +57,43 @@ def assigned(lines: Iterable[str]) -> list[str]:
     return [name for match in found if match for name in match.groups() if name]
 
 
+def model_places(lists: Lists) -> Places:
+    """Return where functions find the parameters, and what depends on them alone."""
+    places: Places = {node: f"model->derived[{k}]" for node, k in lists.derived.items()}
+    return places | {name: f"model->parameters[{k}]" for name, k in lists.parameters.items()}
+
+
+def loads(names: Names, nodes: Iterable[Node], places: Places, held: Callable[[Node], str]) -> list[str]:
+    """Return assignments of what statements read and do not compute; held: gives the places of other operations."""
+    found = [(node, places.get(node.name if node.op == "symbol" else node)) for node in nodes]
+    return [f"{names.of(node)} = {held(node) if place is None else place};" for node, place in found]
+
+
 def indented(lines: Iterable[str]) -> list[str]:
     """Return the lines indented by one step."""
     return [f"    {line}" for line in lines]
 
 
-def function(
-    signature: str, lines: Sequence[str], arguments: Iterable[str] = (), variables: Sequence[str] = ()
-) -> list[str]:
+def ended(lines: Iterable[str]) -> list[str]:
+    """Return statements with their ends; those that end in a bracket or a comment have theirs."""
+    return [line if line.endswith((";", "{", "}", ",", "*/")) else f"{line};" for line in lines]
+
+
+def function(signature: str, lines: Sequence[str], variables: Sequence[str] = ()) -> list[str]:
     """Return a function and an empty line; names that its statements assign are declared as double.
 
-    arguments: names of those that it may leave unused, marked as unused if so; variables: further declarations.
+    Arguments that it leaves unused are marked as unused. lines: statements, with or without their ends; variables:
+    further declarations.
     """
-    text = "\n".join([*variables, *lines])
-    unused = [f"(void){name};" for name in arguments if not re.search(rf"\b{name}\b", text)]
+    lines = ended(lines)
+    words = set(re.findall(r"\w+", " ".join([*variables, *lines])))
+    unused = [f"(void){name};" for name in re.findall(r"(\w+)[,)]", signature) if name not in words]
     return [signature, "{", *indented([*declared(assigned(lines)), *variables, *unused, *lines]), "}", ""]
+
+
+def filled(array: str, texts: Iterable[str]) -> list[str]:
+    """Return the assignments of expressions to the items of an array."""
+    return [f"{array}[{k}] = {text}" for k, text in enumerate(texts)]
 
 
 def repeated(count: int, lines: Sequence[str]) -> list[str]:

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from kinfmu.codegen.c.text import FUNCTIONS, function, indented
-from kinfmu.codegen.lists import LISTS, Kind, UnitRun, positions
+from kinfmu.codegen.c.text import FUNCTIONS, Places, filled, function, indented, loads
+from kinfmu.codegen.lists import LISTS, Kind, UnitRun
 from kinfmu.codegen.newton import (
     ITERATIONS,
     before_newton,
@@ -23,7 +23,8 @@ from kinfmu.codegen.newton import (
     jacobian_text,
     opposite_solution,
     outright,
-    residual_lines,
+    outright_rates,
+    right_side,
     settled,
     solution,
     square,
@@ -31,37 +32,30 @@ from kinfmu.codegen.newton import (
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.plan import Block
 from kinfmu.plan.equations.graph import Node, reachable
-from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.python.curve import CurveData
+
+_BY_ROW = "; /* {} */"  # the comment on a coordinate that a row gives outright
 
 
 class Units:
     """The writer of one kind's functions.
 
-    curves: names of the constants that hold the data of curves; parameters: places of the parameters by the names of
-    their symbols; derived: places of what depends on parameters alone.
+    curves: names of the constants that hold the data of curves; bound: where functions find parameters and what depends
+    on them alone.
     """
 
-    def __init__(
-        self,
-        kind: Kind,
-        curves: Mapping[CurveData, str],
-        parameters: Mapping[str, int],
-        derived: Mapping[Node, int],
-    ) -> None:
+    def __init__(self, kind: Kind, curves: Mapping[CurveData, str], bound: Places) -> None:
         self.kind = kind
         self.label = kind.label
-        self.names = Names(kind.coordinates, curves, FUNCTIONS)
-        for block in kind.blocks:
-            for name, motion in block.assigned:
-                self.names.assign(motion[0], name)
-        self.positions = reachable([node for group in positions(kind.blocks) for node in group])
-        self.known = {*self.positions, *derived}  # what later functions find computed
-        self.given, self.constants, own = fields(kind)
+        self.names = Names.of_blocks(kind.blocks, curves, FUNCTIONS)
+        self.positions = kind.positions
+        self.derived = [node for node in bound if isinstance(node, Node)]
+        self.known = {*self.positions, *self.derived}  # what later functions find computed
+        _, constants, own = fields(kind)
         self.own = dict(zip(kind.coordinates, own, strict=True))
-        self.parameters = parameters
-        self.derived = derived
-        self.place = places(kind)
+        self.places = bound.copy()
+        self.places |= {name: f"row->{name}" for name in constants}
+        self.places |= {name: f"{LISTS[order]}[row->{field}]" for name, (order, field) in places(kind).items()}
         self.hold: dict[str, Node] = {}  # numbers that later functions take from the position
         self.keeps_determinant = False
         self.later = self._later()
@@ -95,25 +89,15 @@ class Units:
 
     def _loads(self, writer: Writer, found: Iterable[str]) -> list[str]:
         """Return assignments of what the statements read and do not compute."""
-        known = set(found)
-        lines = []
-        for node in writer.used:
+        names = set(found)
+
+        def held(node: Node) -> str:
             name = self.names.of(node)
-            if node in self.derived:
-                lines.append(f"{name} = model->derived[{self.derived[node]}];")
-            elif node.op != "symbol":
-                self.hold.setdefault(name, node)
-                lines.append(f"{name} = <{name}>;")  # replaced when all places are known
-            elif node.name in known:
-                continue
-            elif is_parameter(node):
-                lines.append(f"{name} = model->parameters[{self.parameters[node.name]}];")
-            elif node.name in self.constants:
-                lines.append(f"{name} = row->{name};")
-            else:
-                place = self.place[node.name]
-                lines.append(f"{name} = {LISTS[place[0]]}[row->{place[1]}];")
-        return lines
+            self.hold.setdefault(name, node)
+            return f"<{name}>"  # replaced when all places are known
+
+        read = (node for node in writer.used if node.op != "symbol" or node.name not in names)
+        return loads(self.names, read, self.places, held)
 
     # The functions
 
@@ -129,7 +113,7 @@ class Units:
             self.keeps_determinant = is_small(block)
         lines = self._rates("velocity", 1) + self._rates("acceleration", 2)
         if block is not None:
-            lines += self._entries("jacobian", block.entries, None)
+            lines += self._entries("jacobian", block.entries)
             lines += self._entries("residuals", block.residuals, block.row_scales)
         return lines
 
@@ -138,47 +122,38 @@ class Units:
         block = self.kind.solved
         lines: list[str] = []
         for one in self.kind.blocks:
-            lines += self._newton(writer, one) if one.unknowns else self._given_outright(writer, one)
-        found = [name for one in self.kind.blocks for name, _ in one.assigned]
-        lines = self._loads(writer, found) + lines
-        lines += [f"x[row->{field}] = {identifier(name)};" for name, field in self.own.items()]
-        lines += [f"{self._hold(name)} = {name};" for name in self.hold]
+            lines += self._newton(writer, one) if one.unknowns else outright(writer, one, _BY_ROW)
+        lines = self._loads(writer, self.kind.assigned) + lines
+        lines += [f"x[row->{field}] = {identifier(name)}" for name, field in self.own.items()]
+        lines += [f"{self._hold(name)} = {name}" for name in self.hold]
         if block is None:
-            arguments = ["model", "row", "x", "hold"]
             signature = (
                 f"static void position{self.label}(const kf_model *model, const row{self.label} *row, double *x,"
                 " double *hold)"
             )
-            return function(signature, lines, arguments)
-        lines += [f"{self._kept} = det;"] if self.keeps_determinant else []
-        lines += ["*determinant = det;", "newton->iterations += iteration;"]
+            return function(signature, lines)
+        lines += [f"{self._kept} = det"] if self.keeps_determinant else []
+        lines += ["*determinant = det", "newton->iterations += iteration"]
         lines += [
-            "newton->largest = newton->largest > error ? newton->largest : error;",
+            "newton->largest = newton->largest > error ? newton->largest : error",
             "newton->total += error; /* a NaN stays */",
         ]
-        lines.append("return true;")
+        lines.append("return true")
         signature = (
             f"static bool position{self.label}(const kf_model *model, const row{self.label} *row, double *x,\n"
             "    double *hold, const double *z, bool held, double *determinant, kf_newton *newton)"
         )
         variables = ["int iteration;"] if is_small(block) else ["double det;", "int iteration;"]
-        return function(signature, lines, ("model", "hold"), variables)
-
-    def _given_outright(self, writer: Writer, block: Block) -> list[str]:
-        lines = []
-        for new, row in outright(writer, block):
-            lines += [f"{line};" for line in new[:-1]]
-            lines += [f"{line}; /* {row} */" for line in new[-1:]]
-        return lines
+        return function(signature, lines, variables)
 
     def _newton(self, writer: Writer, block: Block) -> list[str]:
         looped = [*(motion[0] for _, motion in block.assigned), *block.residuals, *block.entries]
-        before = [f"{line};" for line in before_newton(writer, block)]
+        before = before_newton(writer, block)
         turned = [node for node in reachable(looped) if node.op in ("sin", "cos") and node.args[0].op == "symbol"]
-        inside = [f"{line};" for line in writer.statements(turned)]
-        inside += self._given_outright(writer, block)
-        r, lines = residual_lines(writer, block, block.entries)
-        inside += [f"{line};" for line in (*lines, f"error = {square(r, block.row_scales)}")]
+        inside = writer.statements(turned)
+        inside += outright(writer, block, _BY_ROW)
+        r, lines = right_side(writer, "r", block.residuals, block.entries)
+        inside += [*lines, f"error = {square(r, block.row_scales)}"]
         jacobian = jacobian_text(writer, block)
         inside += self._determinant(jacobian, block.usual)
         starts = [f"z[row->{self.own[name]}]" for name in block.unknowns]
@@ -186,26 +161,26 @@ class Units:
         return [
             f"/* {', '.join(block.unknowns)} from {', '.join(block.row_names)} */",
             *before,
-            "last = INFINITY;",
+            "last = INFINITY",
             f"for (iteration = 0; iteration < {ITERATIONS}; ++iteration) {{",
             *indented(inside),
-            "    if (error <= newton->enough || held",
-            f"        || (16.0 * error > last && error <= {settled(block, starts)})) {{",
-            "        break;",
+            "    if (error <= newton->enough || held\n"
+            f"            || (16.0 * error > last && error <= {settled(block, starts)})) {{",
+            "        break",
             "    }",
-            "    last = error;",
+            "    last = error",
             *indented(self._correction(jacobian, r, names)),
             "}",
             f"if (iteration == {ITERATIONS}) {{",
-            "    newton->failed = error;",
-            "    return false;",
+            "    newton->failed = error",
+            "    return false",
             "}",
         ]
 
     def _determinant(self, jacobian: Sequence[Sequence[str]], usual: Sequence[float]) -> list[str]:
         m, k = len(jacobian), len(jacobian[0])
         if m == k <= 2:
-            return [f"det = {determinant(jacobian)};"]
+            return [f"det = {determinant(jacobian)}"]
         flat = ", ".join(entry for row in jacobian for entry in row)
         part = f"kf_row_part({k}, matrix, usual)" if m == k else f"kf_column_part({m}, {k}, matrix, usual)"
         call = f"kf_lu({k}, matrix, <kept>, &det)" if m == k else f"kf_qr({m}, {k}, matrix, <kept>, &det)"
@@ -214,10 +189,10 @@ class Units:
             f"    const double matrix[{m * k}] = {{{flat}}};",
             f"    static const double usual[{k}] = {{{', '.join(map(repr, usual))}}};",
             f"    if (!{call}) {{",
-            "        newton->failed = error;",
-            "        return false;",
+            "        newton->failed = error",
+            "        return false",
             "    }",
-            f"    det *= {part};",
+            f"    det *= {part}",
             "}",
         ]
 
@@ -225,16 +200,16 @@ class Units:
         """Return z -= J^-1 r."""
         m, k = len(jacobian), len(z)
         if m == k <= 2:
-            return [f"{name} -= {step};" for name, step in zip(z, solution(jacobian, r, "det"), strict=True)]
-        return self._solve(m, k, r, [f"{name} -= step[{i}];" for i, name in enumerate(z)])
+            return [f"{name} -= {step}" for name, step in zip(z, solution(jacobian, r, "det"), strict=True)]
+        return self._solve(m, k, r, [f"{name} -= step[{i}]" for i, name in enumerate(z)])
 
     def _solve(self, m: int, k: int, right: Sequence[str], then: Sequence[str]) -> list[str]:
         sizes, name = (f"{k}", "kf_lu_solve") if m == k else (f"{m}, {k}", "kf_qr_solve")
         return [
             "{",
             f"    const double right[{m}] = {{{', '.join(right)}}};",
-            f"    double step[{k}];",
-            f"    {name}({sizes}, <kept>, right, step);",
+            f"    double step[{k}]",
+            f"    {name}({sizes}, <kept>, right, step)",
             *indented(then),
             "}",
         ]
@@ -247,56 +222,50 @@ class Units:
         for block in self.kind.blocks:
             if block.unknowns:
                 lines += self._linear(writer, block, order)
-            for coordinate, motion in block.assigned:
-                lines += [f"{line};" for line in writer.statements([motion[order]])]
-                lines.append(f"{identifier(coordinate.derivative(order))} = {writer.expression(motion[order])};")
+            lines += outright_rates(writer, block, order)
             found += [coordinate.derivative(order) for coordinate in block.coordinates]
         lines = self._loads(writer, found) + lines
         out = LISTS[order]
-        lines += [f"{out}[row->{field}] = {identifier(one.derivative(order))};" for one, field in self.own.items()]
+        lines += [f"{out}[row->{field}] = {identifier(one.derivative(order))}" for one, field in self.own.items()]
         solving = " const double *given, bool held," if self.kind.solved else ""
         ready = " const double *x1," if order == 2 else ""
         signature = (
             f"static void {name}{self.label}(const kf_model *model, const row{self.label} *row, const double *x,"
             f" const double *hold,\n   {solving}{ready} double *{out})"
         )
-        arguments = ["model", "x", "hold", *(["x1"] if order == 2 else [])]
-        return function(signature, lines, arguments)
+        return function(signature, lines)
 
     def _linear(self, writer: Writer, block: Block, order: int) -> list[str]:
         """Return the linear solve of a block, or the values given in its place."""
         right = (block.velocity, block.acceleration)[order - 1]
         m, k = len(block.residuals), len(block.unknowns)
         entries = block.entries if k == 2 and is_small(block) else ()
-        before = [f"{line};" for line in writer.statements([*right, *entries])]
+        before = writer.statements([*right, *entries])
         b = [f"b{i}" for i in range(m)]
         z = [identifier(unknown.derivative(order)) for unknown in block.unknowns]
-        taken = [f"    {one} = given[row->{self.own[name]}];" for one, name in zip(z, block.unknowns, strict=True)]
-        solved = [f"{one} = {writer.expression(node)};" for one, node in zip(b, right, strict=True)]
+        taken = [f"    {one} = given[row->{self.own[name]}]" for one, name in zip(z, block.unknowns, strict=True)]
+        solved = [f"{one} = {writer.expression(node)}" for one, node in zip(b, right, strict=True)]
         if is_small(block):
             jacobian = jacobian_text(writer, block) if entries else []
-            kept, by_det = ("det = <kept>;", "/ det") if order == 1 else ("per_det = 1.0 / <kept>;", "* per_det")
+            kept, by_det = ("det = <kept>", "/ det") if order == 1 else ("per_det = 1.0 / <kept>", "* per_det")
             values = opposite_solution(jacobian, b, by_det)
-            solved += [kept, *(f"{one} = {value};" for one, value in zip(z, values, strict=True))]
+            solved += [kept, *(f"{one} = {value}" for one, value in zip(z, values, strict=True))]
         else:
             opposite = [f"-{one}" for one in b]
-            solved += self._solve(m, k, opposite, [f"{one} = step[{i}];" for i, one in enumerate(z)])
+            solved += self._solve(m, k, opposite, [f"{one} = step[{i}]" for i, one in enumerate(z)])
         return [*before, "if (held) {", *taken, "} else {", *indented(solved), "}"]
 
-    def _entries(self, name: str, nodes: Sequence[Node], scales: Sequence[float] | None) -> list[str]:
+    def _entries(self, name: str, nodes: Sequence[Node], scales: Sequence[float] = ()) -> list[str]:
         """Return a function that writes numbers of the position stage into an array."""
         writer = Writer(self.names, self.derived if scales else self.known)
-        lines = [f"{line};" for line in writer.statements(nodes)]
-        for k, node in enumerate(nodes):
-            scale = "" if scales is None else f" / {scales[k]!r}"
-            text = writer.expression(node)
-            lines.append(f"entries[{k}] = ({text}){scale};" if scale else f"entries[{k}] = {text};")
-        lines = self._loads(writer, ()) + lines
+        lines, entries = writer.formulas(nodes)
+        if scales:
+            entries = [f"({entry}) / {scale!r}" for entry, scale in zip(entries, scales, strict=True)]
         signature = (
             f"static void {name}{self.label}(const kf_model *model, const row{self.label} *row, const double *x,"
             " const double *hold,\n    double *entries)"
         )
-        return function(signature, lines, ("model", "row", "x", "hold"))
+        return function(signature, [*self._loads(writer, ()), *lines, *filled("entries", entries)])
 
 
 def fields(kind: Kind) -> tuple[list[str], list[str], list[str]]:

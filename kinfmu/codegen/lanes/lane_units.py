@@ -9,23 +9,23 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Sequence
 
-from kinfmu.codegen.c.text import assigned, declared
-from kinfmu.codegen.c.units import places, row_type
-from kinfmu.codegen.lists import LISTS, Kind, positions
+from kinfmu.codegen.c.text import Places, assigned, declared, ended, loads
+from kinfmu.codegen.c.units import fields, places, row_type
+from kinfmu.codegen.lists import LISTS, Kind
 from kinfmu.codegen.newton import (
     before_newton,
     determinant,
     jacobian_text,
     opposite_solution,
     outright,
-    residual_lines,
+    outright_rates,
+    right_side,
     solution,
     square,
 )
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.plan import Block
-from kinfmu.plan.equations.graph import FUNCTIONS, Node, reachable
-from kinfmu.plan.trace import is_parameter
+from kinfmu.plan.equations.graph import FUNCTIONS, Node
 
 VECTORS = {"sin": "kf_sin_lane", "cos": "kf_cos_lane"}
 LISTED = {"sin": "sine", "cos": "cosine"}  # lists of the predicted sines and cosines
@@ -41,18 +41,12 @@ class LaneUnit:
     turned: names of the coordinates whose sines and cosines are predicted.
     """
 
-    def __init__(
-        self, kind: Kind, parameters: dict[str, int], derived: dict[Node, int], size: float, turned: set[str]
-    ) -> None:
+    def __init__(self, kind: Kind, bound: Places, size: float, turned: set[str]) -> None:
         self.kind = kind
-        self.parameters = parameters
-        self.derived = derived
+        self.derived = [node for node in bound if isinstance(node, Node)]
         self.size = size
-        self.names = Names(kind.coordinates, functions=VECTORS)
-        for block in kind.blocks:
-            for name, motion in block.assigned:
-                self.names.assign(motion[0], name)
-        self.positions = reachable([node for group in positions(kind.blocks) for node in group])
+        self.names = Names.of_blocks(kind.blocks, functions=VECTORS)
+        self.positions = kind.positions
         self.predicted = {node for node in self.positions if is_turned(node, turned)}
         self.turning = [  # unknown angles with the nodes of sine and cosine; the formulas hold at least one of these
             (node.name, node.graph.function("sin", node), node.graph.function("cos", node))
@@ -63,6 +57,12 @@ class LaneUnit:
         self.predicted |= {node for turn in self.turning for node in turn[1:]}
         self.assigned = {motion[0]: name for block in kind.blocks for name, motion in block.assigned}
         self.where = places(kind)
+        self.places: Places = {node: f"x_{self.where[name][1]}[i]" for node, name in self.assigned.items() if node.args}
+        for node in self.predicted:
+            self.places[node] = f"{LISTED[node.op]}_{self.where[node.args[0].name][1]}[i]"
+        self.places |= bound
+        self.places |= {name: f"row->{name}" for name in fields(kind)[1]}
+        self.places |= {name: f"{LISTS[order]}_{field}[i]" for name, (order, field) in self.where.items()}
         self.hold: dict[Node | None, int] = {}  # None: the determinant of the block that is solved
 
     def cached(self, node: Node | None) -> int:
@@ -90,21 +90,24 @@ class LaneUnit:
         writer = Writer(self.names, [*self.derived, *self.predicted])
         lines: list[str] = []
         for block in self.kind.blocks:
-            if block.unknowns:
-                lines += self._closing(writer, block) if held else self._newton(writer, block)
-            lines += [f"{line};" for new, _ in outright(writer, block) for line in new]
+            if block.unknowns and held:
+                r, closing = right_side(writer, "r", block.residuals, ())
+                lines += [*closing, *self._left(r, block)]
+            elif block.unknowns:
+                lines += self._newton(writer, block)
+            lines += outright(writer, block)
         corrected = self.kind.solved.unknowns if self.kind.solved is not None and not held else ()
         turning = self.turning if corrected else []
         for unknown, sine, cosine in turning:
             field = self.where[unknown][1]
-            lines += [f"sine_{field}[i] = {self.names.of(sine)};", f"cosine_{field}[i] = {self.names.of(cosine)};"]
-        found = [*corrected, *(name for block in self.kind.blocks for name, _ in block.assigned)]
-        lines += [f"x_{self.where[name][1]}[i] = {identifier(name)};" for name in found]
+            lines += [f"sine_{field}[i] = {self.names.of(sine)}", f"cosine_{field}[i] = {self.names.of(cosine)}"]
+        found = (*corrected, *self.kind.assigned)
+        lines += [f"x_{self.where[name][1]}[i] = {identifier(name)}" for name in found]
         held_nodes = {node: k for node, k in self.hold.items() if node is not None}
-        lines += [f"{line};" for line in writer.statements(list(held_nodes))]
-        lines += [f"hold[{k}][i] = {writer.expression(node)};" for node, k in held_nodes.items()]
+        lines += writer.statements(list(held_nodes))
+        lines += [f"hold[{k}][i] = {writer.expression(node)}" for node, k in held_nodes.items()]
         used = dict.fromkeys([*(node for turn in turning for node in turn[1:]), *writer.used])
-        predicted = [f"{identifier(name)} = z_{self.where[name][1]}[i];" for name in corrected]
+        predicted = [f"{identifier(name)} = z_{self.where[name][1]}[i]" for name in corrected]
         factor = " const double factor" if corrected else ""
         return self._function(stage, factor, [*predicted, *self._loads(used, found), *lines])
 
@@ -116,39 +119,16 @@ class LaneUnit:
             for block in self.kind.blocks:
                 if block.unknowns:
                     lines += [] if held else self._linear(writer, block, order)
-                for name, nodes in block.assigned:
-                    lines += [f"{line};" for line in writer.statements([nodes[order]])]
-                    lines.append(f"{identifier(name.derivative(order))} = {writer.expression(nodes[order])};")
-        names = [
-            name for block in self.kind.blocks for name in (block.coordinates if not held else dict(block.assigned))
-        ]
+                lines += outright_rates(writer, block, order)
+        names = self.kind.assigned if held else self.kind.coordinates
         rates = [(name.derivative(order), order, self.where[name][1]) for name in names for order in (1, 2)]
-        lines += [f"{LISTS[order]}_{field}[i] = {identifier(name)};" for name, order, field in rates]
+        lines += [f"{LISTS[order]}_{field}[i] = {identifier(name)}" for name, order, field in rates]
         return self._function(stage, "", [*self._loads(writer.used, {name for name, _, _ in rates}), *lines])
 
     def _loads(self, nodes: Iterable[Node], found: Collection[str]) -> list[str]:
         """Return assignments of what the statements read and do not compute."""
-        lines = []
-        for node in nodes:
-            if node in self.derived:
-                source = f"model->derived[{self.derived[node]}]"
-            elif node in self.predicted:
-                source = f"{LISTED[node.op]}_{self.where[node.args[0].name][1]}[i]"
-            elif node.op != "symbol" and node in self.assigned:
-                source = f"x_{self.where[self.assigned[node]][1]}[i]"
-            elif node.op != "symbol":
-                source = f"hold[{self.cached(node)}][i]"
-            elif node.name in found:
-                continue
-            elif is_parameter(node):
-                source = f"model->parameters[{self.parameters[node.name]}]"
-            elif node.name in self.where:
-                order, field = self.where[node.name]
-                source = f"{LISTS[order]}_{field}[i]"
-            else:
-                source = f"row->{node.name}"
-            lines.append(f"{self.names.of(node)} = {source};")
-        return lines
+        read = (node for node in nodes if node.op != "symbol" or node.name not in found)
+        return loads(self.names, read, self.places, lambda node: f"hold[{self.cached(node)}][i]")
 
     def _function(self, stage: str, factor: str, lines: Sequence[str]) -> list[str]:
         text = "\n".join(lines)
@@ -172,43 +152,38 @@ class LaneUnit:
     def _newton(self, writer: Writer, block: Block) -> list[str]:
         """Return statements of one correction of the prediction and of the residual after it."""
         turned = [node for turn in self.turning for node in turn[1:]]
-        lines = [f"{line};" for line in before_newton(writer, block, turned)]
+        lines = before_newton(writer, block, turned)
         known = set(writer.known)
         steps = [f"d{k}" for k in range(len(block.unknowns))]
-        r, evaluated = residual_lines(writer, block, block.entries)
+        r, evaluated = right_side(writer, "r", block.residuals, block.entries)
         jacobian = jacobian_text(writer, block)
         values = [text.replace(" / det", " * per_det") for text in solution(jacobian, r, "det")]
-        lines += [f"{line};" for line in (*evaluated, f"per_det = 1.0 / ({determinant(jacobian)})")]
-        lines += [f"{one} = {text};" for one, text in zip(steps, values, strict=True)]
+        lines += [*evaluated, f"per_det = 1.0 / ({determinant(jacobian)})"]
+        lines += [f"{one} = {text}" for one, text in zip(steps, values, strict=True)]
         for name, one in zip(block.unknowns, steps, strict=True):
             scale = "" if name.is_angle else f" * {1.0 / self.size!r}"
-            lines += [f"{identifier(name)} -= {one};", f"size = fabs({one}){scale};"]
-            lines.append("lanes->moved[i] = size > lanes->moved[i] ? size : lanes->moved[i];")
+            lines += [f"{identifier(name)} -= {one}", f"size = fabs({one}){scale}"]
+            lines.append("lanes->moved[i] = size > lanes->moved[i] ? size : lanes->moved[i]")
             for unknown, sine, cosine in self.turning:
                 if unknown == name:
-                    lines.append(f"kf_rotate(-{one}, &{self.names.of(sine)}, &{self.names.of(cosine)});")
+                    lines.append(f"kf_rotate(-{one}, &{self.names.of(sine)}, &{self.names.of(cosine)})")
         writer.known = set(known)
-        r, evaluated = residual_lines(writer, block, block.entries)
+        r, evaluated = right_side(writer, "r", block.residuals, block.entries)
         jacobian = jacobian_text(writer, block)
         return [
             *lines,
-            *(f"{line};" for line in evaluated),
-            f"det = {determinant(jacobian)};",
-            f"hold[{self.cached(None)}][i] = det;",
-            "size = fabs(det * factor);",
-            "lanes->margin[i] = size < lanes->margin[i] ? size : lanes->margin[i];",
+            *evaluated,
+            f"det = {determinant(jacobian)}",
+            f"hold[{self.cached(None)}][i] = det",
+            "size = fabs(det * factor)",
+            "lanes->margin[i] = size < lanes->margin[i] ? size : lanes->margin[i]",
             *self._left(r, block),
         ]
-
-    def _closing(self, writer: Writer, block: Block) -> list[str]:
-        """Return statements of the residual of unknowns that are given."""
-        r, evaluated = residual_lines(writer, block, ())
-        return [*(f"{line};" for line in evaluated), *self._left(r, block)]
 
     def _left(self, r: Sequence[str], block: Block) -> list[str]:
         """Return statements that add the residuals of a block to those of all blocks."""
         return [
-            f"size = {square(r, block.row_scales)};",
+            f"size = {square(r, block.row_scales)}",
             "lanes->error[i] = size > lanes->error[i] || size != size ? size : lanes->error[i]; /* a NaN stays */",
         ]
 
@@ -217,15 +192,13 @@ class LaneUnit:
         right = (block.velocity, block.acceleration)[order - 1]
         many = len(block.unknowns) > 1  # the determinant of one unknown is its Jacobian
         entries = block.entries if many else ()
-        lines = [f"{line};" for line in writer.statements([*right, *entries])]
-        b = [f"b{k}" for k in range(len(right))]
-        lines += [f"{one} = {writer.expression(node)};" for one, node in zip(b, right, strict=True)]
+        b, lines = right_side(writer, "b", right, entries)
         if order == 1:
-            lines.append(f"per_det = 1.0 / hold[{self.cached(None)}][i];")
+            lines.append(f"per_det = 1.0 / hold[{self.cached(None)}][i]")
         z = [identifier(name.derivative(order)) for name in block.unknowns]
         jacobian = [[writer.expression(entry) if many else "" for entry in row] for row in block.jacobian]
         values = opposite_solution(jacobian, b, "* per_det")
-        return lines + [f"{one} = {text};" for one, text in zip(z, values, strict=True)]
+        return lines + [f"{one} = {text}" for one, text in zip(z, values, strict=True)]
 
 
 def is_turned(node: Node, angles: Collection[str]) -> bool:
@@ -237,6 +210,7 @@ def through(lines: Sequence[str]) -> list[str]:
     """Return the statements in a loop over the lanes."""
     if not lines:
         return ["    (void)i;"]
+    lines = ended(lines)
     return [
         "    KF_SIDE_BY_SIDE",
         "    for (i = 0; i < KF_LANES; ++i) {",

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from kinfmu.codegen.c.functions import block_of, index
 from kinfmu.codegen.c.stage_cache import StageCache
-from kinfmu.codegen.c.text import array, indented, repeated
+from kinfmu.codegen.c.text import Places, array, indented, loads, model_places, repeated
 from kinfmu.codegen.c.units import rows_of
 from kinfmu.codegen.lanes.lane_units import LISTED, VECTORS, LaneUnit, is_turned, through
 from kinfmu.codegen.lists import LISTS, Kind, Lists
@@ -19,7 +19,6 @@ from kinfmu.codegen.newton import is_small
 from kinfmu.codegen.writer import Names, Writer
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.equations.graph import Node, reachable
-from kinfmu.plan.trace import is_parameter
 
 _BRANCHING = ("curve", "atan2", "floor")
 
@@ -55,9 +54,9 @@ class _Lanes(Lists):
         super().__init__(plan)
         self.names = Names((name for block in plan.blocks for name in block.coordinates), functions=VECTORS)
         self.angles = self._angles()
+        self.bound = model_places(self)
         self.units = {
-            label: LaneUnit(kind, self.parameters, self.derived, plan.size, self._turned(kind))
-            for label, kind in self.kinds.items()
+            label: LaneUnit(kind, self.bound, plan.size, self._turned(kind)) for label, kind in self.kinds.items()
         }
         self.stage_cache = StageCache(self, self.units)
         readers = [self._formulas(k) for k in range(3)] + [self._watches()]  # first: they fill the stage cache
@@ -164,27 +163,21 @@ class _Lanes(Lists):
 
     def _loop(self, name: str, lines: Sequence[str], writer: Writer) -> list[str]:
         """Return a function that loops over the lanes."""
-        where = {name: f"{LISTS[k]}[{at}]" for k in range(3) for name, at in self.places(k).items()}
-        loads = []
-        for node in writer.used:
-            if node in self.derived:
-                source = f"model->derived[{self.derived[node]}]"
-            elif is_turned(node, self.angles):
-                source = f"lanes->{LISTED[node.op]}[{self.place[node.args[0].name]}][i]"
-            elif node in self.stage_cache.nodes:
-                source = f"lanes->hold[{self.stage_cache.place(node)}][i]"
-            elif is_parameter(node):
-                source = f"model->parameters[{self.parameters[node.name]}]"
-            else:
-                source = f"lanes->{where[node.name]}[i]"
-            loads.append(f"{self.names.of(node)} = {source};")
+        listed: Places = {name: f"lanes->{LISTS[k]}[{at}][i]" for k in range(3) for name, at in self.places(k).items()}
+
+        def held(node: Node) -> str:
+            if is_turned(node, self.angles):
+                return f"lanes->{LISTED[node.op]}[{self.place[node.args[0].name]}][i]"
+            return f"lanes->hold[{self.stage_cache.place(node)}][i]"
+
+        read = loads(self.names, writer.used, self.bound | listed, held)
         return [
             f"static inline void {name}(const kf_model *model, kf_lanes *lanes)",
             "{",
             "    int i;",
             "    (void)model;",
             "    (void)lanes;",
-            *through([*loads, *lines] if lines else ()),
+            *through([*read, *lines] if lines else ()),
             "}",
             "",
         ]
@@ -206,7 +199,7 @@ class _Lanes(Lists):
         """Return statements for the targets; what the units compute and what is predicted is known."""
         turned = [node for node in reachable(targets) if is_turned(node, self.angles)]
         writer = Writer(self.names, [*self.derived, *self.stage_cache.nodes, *turned])
-        return [f"{line};" for line in writer.statements(targets)], writer
+        return writer.statements(targets), writer
 
 
 def repeats(plan: SolvePlan) -> bool:

@@ -12,7 +12,7 @@ from kinfmu.codegen.newton import (
     jacobian_text,
     opposite_solution,
     outright,
-    residual_lines,
+    right_side,
     settled,
     solution,
     square,
@@ -20,14 +20,7 @@ from kinfmu.codegen.newton import (
 from kinfmu.codegen.writer import Writer, identifier
 from kinfmu.plan import Block
 
-
-def assigned_lines(writer: Writer, block: Block) -> list[str]:
-    """Return statements for the coordinates that a block gives outright, each with its row as a comment."""
-    lines = []
-    for new, row in outright(writer, block):
-        lines += new[:-1]
-        lines += [f"{line}  # {row}" for line in new[-1:]]
-    return lines
+BY_ROW = "  # {}"  # the comment on a coordinate that a row gives outright
 
 
 def newton_lines(writer: Writer, block: Block, label: str, starts: Sequence[str], held: str, number: str) -> list[str]:
@@ -38,8 +31,8 @@ def newton_lines(writer: Writer, block: Block, label: str, starts: Sequence[str]
     The code reads `enough`, the squared residual that it may end at.
     """
     before = before_newton(writer, block)
-    inside = assigned_lines(writer, block)
-    r, lines = residual_lines(writer, block, block.entries)
+    inside = outright(writer, block, BY_ROW)
+    r, lines = right_side(writer, "r", block.residuals, block.entries)
     inside += [*lines, f"error = {square(r, block.row_scales)}"]
     jacobian = jacobian_text(writer, block)
     z = [identifier(name) for name in block.unknowns]
@@ -102,6 +95,18 @@ def solution_lines(
     return [f"{tupled(z)} = {solve}(factors{label}, [{', '.join(f'-{name}' for name in b)}])"]
 
 
+def scaled_residuals(writer: Writer, block: Block) -> tuple[list[str], str]:
+    """Return the statements of a block's residuals relative to the size, and the list of them."""
+    lines, residuals = writer.formulas(block.residuals)
+    scaled = [f"({r}) / {scale!r}" for r, scale in zip(residuals, block.row_scales, strict=True)]
+    return lines, f"[{', '.join(scaled)}]"
+
+
+def extreme(name: str, terms: Sequence[str]) -> str:
+    """Return 'max(a, b)', 'a' or '0.0' for the terms of 'max' or 'min'."""
+    return f"{name}({', '.join(terms)})" if len(terms) > 1 else "".join(terms) or "0.0"
+
+
 def matrix(rows: Sequence[Sequence[str]]) -> str:
     """Return '[[a, b], [c, d]]'."""
     return "[" + ", ".join("[" + ", ".join(row) + "]" for row in rows) + "]"
@@ -114,9 +119,14 @@ def tupled(items: Iterable[str]) -> str:
 
 
 def unpacking(names: Iterable[str], source: str) -> list[str]:
-    """Return the assignment of a tuple's items to names, indented as in a function; no line for no names."""
+    """Return the assignment of a tuple's items to names; no line for no names."""
     names = list(names)
-    return [f"    {tupled(names)} = {source}"] if names else []
+    return [f"{tupled(names)} = {source}"] if names else []
+
+
+def defined(head: str, about: str, lines: Iterable[str], returned: str) -> list[str]:
+    """Return a function with its docstring, between empty lines."""
+    return ["", f"def {head}:", f'    """{about}"""', *indented(lines), f"    return {returned}", ""]
 
 
 def indented(lines: Iterable[str], spaces: int = 4) -> list[str]:

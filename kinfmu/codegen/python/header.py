@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import accumulate
 
 from kinfmu.codegen.lists import distance_rows
-from kinfmu.codegen.python.block_code import indented, tupled, unpacking
+from kinfmu.codegen.newton import ROUND_OFF
+from kinfmu.codegen.python.block_code import defined, extreme, indented, tupled, unpacking
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.plan import Block, SolvePlan
 from kinfmu.plan.equations.graph import Node
@@ -14,7 +15,43 @@ from kinfmu.plan.path_laws import argument_symbol
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.solver.python.curve import CurveData
 
+# The functions of a model, with their arguments and docstrings.
+_FUNCTIONS = {
+    "position": (
+        f"u, z, zd, zdd, s, held=0, enough={ROUND_OFF**2}",
+        "Unknowns by Newton from a prediction, block by block; or ArithmeticError(block, residual).",
+    ),
+    "velocity": ("values, ud, given=(), held=0", "Rates of the unknowns: J zd = -rate of the rows with z at rest."),
+    "acceleration": (
+        "values, ud, udd, zd, given=(), held=0",
+        "Accelerations of the unknowns: J zdd = -second rate of the rows with zdd = 0.",
+    ),
+    "tangent": ("values", "First and second derivative of the unknowns with respect to the driver."),
+    "first_motion": ("values, ud, udd", "Tangent and motion in one go, for the first reading of a pose."),
+    "outputs": ("values", "Positions of the outputs."),
+    "rates": ("values, ud, first", "Rates of the outputs."),
+    "accelerations": ("values, ud, udd, first, second", "Accelerations of the outputs."),
+    "motion": ("values, ud, udd, first, second", "Positions, rates and accelerations of the outputs in one row."),
+    "law_motion": ("values, ud, udd, first, second", "Motions that steps monitor, with rates and accelerations."),
+    "law_positions": ("values", "Positions that steps monitor."),
+    "law_steps": ("arguments", "The fewest steps of a path through each law up to its argument."),
+    "law_slopes": ("", "Bounds of the slopes of `law_steps`."),
+    "watches": ("values", "Rows set aside as redundant, relative to the size: zero as long as they hold."),
+    "jacobians": ("values", "Jacobian of each block."),
+    "residuals": ("values", "Residuals of each block, relative to the size."),
+    "differences": (
+        "there, here",
+        "Largest differences of positions, of rates and of accelerations, in radians and sizes; all finite.",
+    ),
+}
+ORDERS = {"outputs": (0,), "rates": (1,), "accelerations": (2,), "motion": (0, 1, 2)}  # of derivatives that these give
 _RAISING = {"sin", "cos", "sqrt", "floor", "curve", "/"}  # operations that have no value for some numbers
+
+
+def stage(name: str, lines: Iterable[str], returned: str) -> list[str]:
+    """Return one of the functions of a model."""
+    arguments, about = _FUNCTIONS[name]
+    return defined(f"{name}({arguments})", about, lines, returned)
 
 
 def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str] = ()) -> list[str]:
@@ -83,18 +120,9 @@ def law_steps(plan: SolvePlan, names: Names, prolog: Sequence[Node]) -> list[str
     """Return the functions of the fewest steps through laws, and of the bounds of their slopes."""
     laws = plan.path_laws
     arguments = unpacking([identifier(argument_symbol(k)) for k in range(len(laws.steps))], "arguments")
-    functions = (
-        ("law_steps(arguments)", "The fewest steps of a path through each law up to its argument.", laws.steps),
-        ("law_slopes()", "Bounds of the slopes of `law_steps`.", laws.slopes),
-    )
-    lines = []
-    for head, about, nodes in functions:
-        writer = Writer(names, (), prolog)
-        body = writer.statements(nodes)
-        returned = f"    return {tupled(writer.expression(node) for node in nodes)}"
-        lines += ["", f"def {head}:", f'    """{about}"""', *(arguments if nodes is laws.steps else ())]
-        lines += [*indented(body), returned, ""]
-    return lines
+    body, steps = Writer(names, (), prolog).formulas(laws.steps)
+    bounds, slopes = Writer(names, (), prolog).formulas(laws.slopes)
+    return stage("law_steps", [*arguments, *body], tupled(steps)) + stage("law_slopes", bounds, tupled(slopes))
 
 
 def places(solved: Sequence[Block]) -> list[tuple[int, int]]:
@@ -126,8 +154,7 @@ def drive(plan: SolvePlan, curves: Mapping[CurveData, str]) -> list[str]:
         "",
         "def drive(time, constants):",
         '    """Driver values, speeds and accelerations at a time, by the laws."""',
-        *unpacking(constants, "constants"),
-        *indented(lines),
+        *indented([*unpacking(constants, "constants"), *lines]),
         "",
     ]
 
@@ -171,8 +198,7 @@ def bound(plan: SolvePlan, names: Names, prolog: Sequence[Node], functions: Sequ
         "",
         "def bound(parameters):",
         '    """The model for these values of PARAMETERS."""',
-        *unpacking(values, "parameters"),
-        *indented(known),
+        *indented([*unpacking(values, "parameters"), *known]),
         f"    FIXED = {{{fixed}}}",
         *(f"    {line}" if line else "" for text in functions for line in text.split("\n")),
         f"    bound = {{'FIXED': FIXED, {', '.join(f'{name!r}: {name}' for name in defined)}}}",
@@ -185,11 +211,6 @@ def bound(plan: SolvePlan, names: Names, prolog: Sequence[Node], functions: Sequ
 
 
 MANY = 100  # outputs; beyond that, loops are shorter
-_HEAD = (
-    "",
-    "def differences(there, here):",
-    '    """Largest differences of positions, of rates and of accelerations, in radians and sizes; all finite."""',
-)
 
 
 def angle_places(plan: SolvePlan) -> tuple[int, ...]:
@@ -203,33 +224,22 @@ def differences(plan: SolvePlan) -> list[str]:
     angles = angle_places(plan)
     lengths = [k for k in range(n) if k not in set(angles)]
     if n > MANY:
-        return [
-            *_HEAD,
-            "    gaps = [abs(a - b) for a, b in zip(there, here)]",
-            f"    rows = [gaps[k : k + {n}] for k in range(0, {3 * n}, {n})]",
-            "    of_angles = [max([row[k] for k in ANGLES], default=0.0) for row in rows]",
-            f"    lengths = {tupled(map(str, lengths))}",
-            "    of_lengths = [max([row[k] for k in lengths], default=0.0) / SIZE for row in rows]",
-            "    return tuple(map(max, of_angles, of_lengths))",
-            "",
+        lines = [
+            "gaps = [abs(a - b) for a, b in zip(there, here)]",
+            f"rows = [gaps[k : k + {n}] for k in range(0, {3 * n}, {n})]",
+            "of_angles = [max([row[k] for k in ANGLES], default=0.0) for row in rows]",
+            f"lengths = {tupled(map(str, lengths))}",
+            "of_lengths = [max([row[k] for k in lengths], default=0.0) / SIZE for row in rows]",
         ]
+        return stage("differences", lines, "tuple(map(max, of_angles, of_lengths))")
     largest = [_largest([k + order * n for k in angles], [k + order * n for k in lengths]) for order in range(3)]
-    return [
-        *_HEAD,
-        *unpacking([f"a{k}" for k in range(3 * n)], "there"),
-        *unpacking([f"b{k}" for k in range(3 * n)], "here"),
-        f"    return {tupled(largest)}",
-        "",
-    ]
+    lines = unpacking([f"a{k}" for k in range(3 * n)], "there") + unpacking([f"b{k}" for k in range(3 * n)], "here")
+    return stage("differences", lines, tupled(largest))
 
 
 def _largest(angles: Sequence[int], lengths: Sequence[int]) -> str:
     """Return the expression of the largest difference; a length counts relative to the size."""
     terms = [f"abs(a{k} - b{k})" for k in angles]
     if lengths:
-        terms.append(f"{_max([f'abs(a{k} - b{k})' for k in lengths])} / SIZE")
-    return _max(terms)
-
-
-def _max(terms: Sequence[str]) -> str:
-    return f"max({', '.join(terms)})" if len(terms) > 1 else "".join(terms) or "0.0"
+        terms.append(f"{extreme('max', [f'abs(a{k} - b{k})' for k in lengths])} / SIZE")
+    return extreme("max", terms)

@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from kinfmu.codegen.lists import LISTS, Lists, UnitRun
-from kinfmu.codegen.newton import ROUND_OFF
-from kinfmu.codegen.python.block_code import indented, tupled
-from kinfmu.codegen.python.header import bound, curve_names, differences, drive, header, law_steps
+from kinfmu.codegen.python.block_code import defined, extreme, tupled
+from kinfmu.codegen.python.header import ORDERS, bound, curve_names, differences, drive, header, law_steps, stage
 from kinfmu.codegen.python.loops import Loops
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.plan import SolvePlan
@@ -41,14 +40,11 @@ class _Looped(Lists):
             *self._acceleration(),
             *(self._tangent() if self.has_one_driver else ()),
             *self._carried(),
-            *self._stage("outputs", "Positions of the outputs.", (0,)),
-            *self._stage("rates", "Rates of the outputs.", (1,)),
-            *self._stage("accelerations", "Accelerations of the outputs.", (2,)),
-            *self._stage("motion", "Positions, rates and accelerations of the outputs in one row.", (0, 1, 2)),
+            *(line for name, orders in ORDERS.items() for line in self._outputs(name, orders)),
             *(self._laws() if self.plan.path_laws.units else ()),
             *self._watches(),
-            *self._appended("jacobians", "Jacobian of each block.", "jacobian"),
-            *self._appended("residuals", "Residuals of each block, relative to the size.", "residual"),
+            *self._appended("jacobians"),
+            *self._appended("residuals"),
             *differences(self.plan),
         ]
         if self.plan.parameters:
@@ -80,56 +76,46 @@ class _Looped(Lists):
 
     def _values(self) -> list[str]:
         """Return the statement by which later functions read what the position stage keeps."""
-        return [f"    {tupled(['x', *(f'holds{k}' for k, _ in self.numbered())])} = values"]
+        return [f"{self._kept()} = values"]
+
+    def _kept(self) -> str:
+        return tupled(["x", *(f"holds{k}" for k, _ in self.numbered())])
 
     def _position(self) -> list[str]:
         lines = [
-            "",
-            f"def position(u, z, zd, zdd, s, held=0, enough={ROUND_OFF**2}):",
-            '    """Unknowns by Newton from a prediction, block by block; or ArithmeticError(block, residual)."""',
-            "    half = 0.5 * s",
-            "    predicted = [a + s * (b + half * c) for a, b, c in zip(z, zd, zdd)]",
-            "    x = [*predicted, *REST, *u]",
-            "    determinants, largest, iterations = [], 0.0, 0",
+            "half = 0.5 * s",
+            "predicted = [a + s * (b + half * c) for a, b, c in zip(z, zd, zdd)]",
+            "x = [*predicted, *REST, *u]",
+            "determinants, largest, iterations = [], 0.0, 0",
         ]
         for k, run in self.numbered():
             label = run.kind.label
             if run.kind.solved:
                 arguments = f"RUN_{k}, x, z, held, enough, {run.first}, determinants, largest, iterations"
-                lines.append(f"    holds{k}, largest, iterations = position{label}({arguments})")
+                lines.append(f"holds{k}, largest, iterations = position{label}({arguments})")
             else:
-                lines.append(f"    holds{k} = position{label}(RUN_{k}, x)")
+                lines.append(f"holds{k} = position{label}(RUN_{k}, x)")
         margin, moved = "1.0", "0.0"
         if self.unknowns:
             lines += [
-                "    determinants = tuple([a * b for a, b in zip(determinants, DETERMINANT_FACTORS)])",
-                f"    found = tuple(x[:{self.unknowns}])",
+                "determinants = tuple([a * b for a, b in zip(determinants, DETERMINANT_FACTORS)])",
+                f"found = tuple(x[:{self.unknowns}])",
             ]
             margin = "min(map(abs, determinants))"
             moved = "max([abs(a - b) / c for a, b, c in zip(found, predicted, UNKNOWN_SCALES)]) if iterations else 0.0"
         else:
-            lines.append("    determinants = found = ()")
-        rows, body = self._expressions([node for _, node in self.plan.watches])
-        lines += body
-        watch = (
-            f"max({', '.join(f'abs({row})' for row in rows)})"
-            if len(rows) > 1
-            else f"abs({rows[0]})"
-            if rows
-            else "0.0"
-        )
-        values = tupled(["x", *(f"holds{k}" for k, _ in self.numbered())])
-        lines.append(f"    watch = {watch}")
+            lines.append("determinants = found = ()")
+        body, rows = self._formulas([node for _, node in self.plan.watches])
+        lines += [*body, f"watch = {extreme('max', [f'abs({row})' for row in rows])}"]
         summary = f"found, determinants, {margin}, sqrt(largest), iterations, {moved}, watch"
-        return [*lines, f"    return {summary}, {values}", ""]
+        return stage("position", lines, f"{summary}, {self._kept()}")
 
-    def _expressions(self, targets: Sequence[Node]) -> tuple[list[str], list[str]]:
-        """Return expressions of the targets, and the statements before them, which read the lists."""
+    def _formulas(self, targets: Sequence[Node]) -> tuple[list[str], list[str]]:
+        """Return statements, which read the lists, and after them each target as an expression."""
         writer = Writer(self.names, self.derived)
-        body = writer.statements(targets)
-        expressions = [writer.expression(node) for node in targets]
+        body, expressions = writer.formulas(targets)
         names = [node.name for node in writer.used if node.op == "symbol" and node.name in self.moving]
-        return expressions, indented([*(f"{identifier(name)} = {self.moving[name]}" for name in names), *body])
+        return [*(f"{identifier(name)} = {self.moving[name]}" for name in names), *body], expressions
 
     def _rest(self, drivers: str) -> str:
         """Return a list of rates at rest, with those of the drivers."""
@@ -142,7 +128,7 @@ class _Looped(Lists):
         for k, run in self.numbered():
             if run.kind.solved:
                 name = ("velocity", "acceleration")[order - 1]
-                lines.append(f"    {name}{run.kind.label}(RUN_{k}, holds{k}, {lists}, {given}, {run.first})")
+                lines.append(f"{name}{run.kind.label}(RUN_{k}, holds{k}, {lists}, {given}, {run.first})")
             else:
                 lines += self._carrying(order, k, run)
         return lines
@@ -151,88 +137,45 @@ class _Looped(Lists):
         """Return the call that computes what is given outright from what is solved for."""
         lists = ", ".join(LISTS[1 : order + 1])
         name = ("rates", "accelerations")[order - 1]
-        return [f"    {name}{run.kind.label}(RUN_{k}, holds{k}, {lists})"] if run.kind.has_assigned else []
+        return [f"{name}{run.kind.label}(RUN_{k}, holds{k}, {lists})"] if run.kind.assigned else []
 
     def _velocity(self) -> list[str]:
-        return [
-            "",
-            "def velocity(values, ud, given=(), held=0):",
-            '    """Rates of the unknowns: J zd = -rate of the rows with z at rest."""',
-            *self._values(),
-            f"    x1 = {self._rest('[*ud]')}",
-            *self._solving(1, "given, held"),
-            f"    return tuple(x1[:{self.unknowns}])",
-            "",
-        ]
+        lines = [*self._values(), f"x1 = {self._rest('[*ud]')}", *self._solving(1, "given, held")]
+        return stage("velocity", lines, self._cut("x1"))
 
     def _acceleration(self) -> list[str]:
-        return [
-            "",
-            "def acceleration(values, ud, udd, zd, given=(), held=0):",
-            '    """Accelerations of the unknowns: J zdd = -second rate of the rows with zdd = 0."""',
-            *self._values(),
-            "    x1 = carried(values, ud, zd)",
-            f"    x2 = {self._rest('[*udd]')}",
-            *self._solving(2, "given, held"),
-            f"    return tuple(x2[:{self.unknowns}])",
-            "",
-        ]
+        lines = [*self._values(), "x1 = carried(values, ud, zd)", f"x2 = {self._rest('[*udd]')}"]
+        return stage("acceleration", [*lines, *self._solving(2, "given, held")], self._cut("x2"))
+
+    def _cut(self, name: str) -> str:
+        """Return the part of a list that belongs to the unknowns."""
+        return f"tuple({name}[:{self.unknowns}])"
 
     def _tangent(self) -> list[str]:
         """Return, for one driver, the derivatives with respect to it, which every pose needs, and motion with them."""
-        n = self.unknowns
+        about = "First and second derivative of all coordinates with respect to the driver."
+        lines = [*self._values(), f"x1 = {self._rest('[1.0]')}", *self._solving(1, "(), 0")]
+        lines += [f"x2 = {self._rest('[0.0]')}", *self._solving(2, "(), 0")]
+        both, read = f"{self._cut('x1')}, {self._cut('x2')}", ["x1, x2 = derivatives(values)"]
+        chained = "Rates and accelerations by the chain rule: qd = q' ud, qdd = q'' ud^2 + q' udd."
+        at_speed = "[d * speed for d in x1], [a * speed * speed + d * more for a, d in zip(x2, x1)]"
         return [
-            "",
-            "def derivatives(values):",
-            '    """First and second derivative of all coordinates with respect to the driver."""',
-            *self._values(),
-            f"    x1 = {self._rest('[1.0]')}",
-            *self._solving(1, "(), 0"),
-            f"    x2 = {self._rest('[0.0]')}",
-            *self._solving(2, "(), 0"),
-            "    return x1, x2",
-            "",
-            "",
-            "def tangent(values):",
-            '    """First and second derivative of the unknowns with respect to the driver."""',
-            "    x1, x2 = derivatives(values)",
-            f"    return tuple(x1[:{n}]), tuple(x2[:{n}])",
-            "",
-            "",
-            "def first_motion(values, ud, udd):",
-            '    """Tangent and motion in one go, for the first reading of a pose."""',
-            "    x1, x2 = derivatives(values)",
-            f"    return (tuple(x1[:{n}]), tuple(x2[:{n}])), motion_row(values[0], *at_speed(x1, x2, ud, udd))",
-            "",
-            "",
-            "def at_speed(x1, x2, ud, udd):",
-            '    """Rates and accelerations by the chain rule: qd = q\' ud, qdd = q\'\' ud^2 + q\' udd."""',
-            "    (speed,), (more,) = ud, udd",
-            "    return [d * speed for d in x1], [a * speed * speed + d * more for a, d in zip(x2, x1)]",
-            "",
+            *defined("derivatives(values)", about, lines, "x1, x2"),
+            *stage("tangent", read, both),
+            *stage("first_motion", read, f"({both}), motion_row(values[0], *at_speed(x1, x2, ud, udd))"),
+            *defined("at_speed(x1, x2, ud, udd)", chained, ["(speed,), (more,) = ud, udd"], at_speed),
         ]
 
     def _carried(self) -> list[str]:
         """Return functions of the rates and accelerations of all coordinates from those of the unknowns."""
-        first = [line for k, run in self.numbered() for line in self._carrying(1, k, run)]
-        second = [line for k, run in self.numbered() for line in self._carrying(2, k, run)]
+        first, second = ([line for k, run in self.numbered() for line in self._carrying(n, k, run)] for n in (1, 2))
+        first = [*self._values(), "x1 = [*zd, *REST, *ud]", *first]
+        second = [*self._values(), "x2 = [*zdd, *REST, *udd]", *second]
+        about = "Rates of all coordinates from those of the unknowns."
+        of_second = "Accelerations of all coordinates from their rates and the accelerations of the unknowns."
         return [
-            "",
-            "def carried(values, ud, zd):",
-            '    """Rates of all coordinates from those of the unknowns."""',
-            *self._values(),
-            "    x1 = [*zd, *REST, *ud]",
-            *first,
-            "    return x1",
-            "",
-            "",
-            "def carried_twice(values, udd, x1, zdd):",
-            '    """Accelerations of all coordinates from their rates and the accelerations of the unknowns."""',
-            *self._values(),
-            "    x2 = [*zdd, *REST, *udd]",
-            *second,
-            "    return x2",
-            "",
+            *defined("carried(values, ud, zd)", about, first, "x1"),
+            *defined("carried_twice(values, udd, x1, zdd)", of_second, second, "x2"),
         ]
 
     def _gathered(self, order: int) -> tuple[list[Node], list[int]]:
@@ -244,98 +187,60 @@ class _Looped(Lists):
             formulas += [node] if place is None else []
         return formulas, places
 
-    def _row(self, orders: Sequence[int]) -> list[str]:
-        """Return the end of a function that returns the outputs of some orders, one after another."""
-        wanted = [self._gathered(order) for order in orders]
-        expressions, lines = self._expressions([node for formulas, _ in wanted for node in formulas])
+    def _row(self, orders: Sequence[int]) -> tuple[list[str], str]:
+        """Return statements, and after them the outputs of some orders, one after another."""
+        outputs = [self._gathered(order) for order in orders]
+        lines, expressions = self._formulas([node for formulas, _ in outputs for node in formulas])
         parts = []
-        for order, (formulas, places) in zip(orders, wanted, strict=True):
+        for order, (formulas, places) in zip(orders, outputs, strict=True):
             own, expressions = expressions[: len(formulas)], expressions[len(formulas) :]
             source = f"[*{LISTS[order]}, {', '.join(own)}]" if own else LISTS[order]
             if _is_long(places):
                 parts.append(f"{_GATHERS[order]}({source})")
             else:
                 parts.append(f"({source}[{places[0]}],)" if places else "()")
-        return [*lines, f"    return {' + '.join(parts)}", ""]
+        return lines, " + ".join(parts)
 
-    def _stage(self, name: str, docstring: str, orders: Sequence[int]) -> list[str]:
+    def _outputs(self, name: str, orders: Sequence[int]) -> list[str]:
         """Return a function that returns all outputs at some orders of derivative, one after another."""
         highest = max(orders)
-        arguments = [["values"], ["values", "ud", "first"], ["values", "ud", "udd", "first", "second"]][highest]
-        lines = ["", f"def {name}({', '.join(arguments)}):", f'    """{docstring}"""', "    x = values[0]"]
-        if highest:
-            ud, udd = ("(1.0,)", "(0.0,)") if self.has_one_driver else ("ud", "udd")
-            lines.append(f"    x1 = carried(values, {ud}, first)")
-            if highest == 2:
-                lines.append(f"    x2 = carried_twice(values, {udd}, x1, second)")
-                lines += ["    x1, x2 = at_speed(x1, x2, ud, udd)"] if self.has_one_driver else []
-            elif self.has_one_driver:
-                lines.append("    x1 = [d * ud[0] for d in x1]")
+        lines = ["x = values[0]", *self._carrying_to(highest)]
+        if self.has_one_driver and highest:
+            lines.append("x1, x2 = at_speed(x1, x2, ud, udd)" if highest == 2 else "x1 = [d * ud[0] for d in x1]")
         if len(orders) == 1:
-            return lines + self._row(orders)
-        about = '"""The outputs, their rates and accelerations in one row."""'
+            body, row = self._row(orders)
+            return stage(name, [*lines, *body], row)
+        about = "The outputs, their rates and accelerations in one row."
         return [
-            *lines,
-            "    return motion_row(x, x1, x2)",
-            "",
-            "",
-            "def motion_row(x, x1, x2):",
-            f"    {about}",
-            *self._row(orders),
+            *stage(name, lines, "motion_row(x, x1, x2)"),
+            *defined("motion_row(x, x1, x2)", about, *self._row(orders)),
         ]
+
+    def _carrying_to(self, order: int) -> list[str]:
+        """Return statements of the rates (and accelerations, order 2) of all coordinates; by a driver alone."""
+        ud, udd = ("(1.0,)", "(0.0,)") if self.has_one_driver else ("ud", "udd")
+        return [f"x1 = carried(values, {ud}, first)", f"x2 = carried_twice(values, {udd}, x1, second)"][:order]
 
     def _laws(self) -> list[str]:
         """Return the functions of what steps of a path monitor of laws."""
         motions = self.plan.path_laws.motions
-        here, lines = self._expressions(motions[0])
-        moving, all_lines = self._expressions([node for nodes in motions for node in nodes])
-        rates = ("(1.0,)", "(0.0,)") if self.has_one_driver else ("ud", "udd")
+        lines, here = self._formulas(motions[0])
+        all_lines, moving = self._formulas([node for nodes in motions for node in nodes])
         return [
-            "",
-            "def law_motion(values, ud, udd, first, second):",
-            '    """Motions that steps monitor, with rates and accelerations."""',
-            "    x = values[0]",
-            f"    x1 = carried(values, {rates[0]}, first)",
-            f"    x2 = carried_twice(values, {rates[1]}, x1, second)",
-            *all_lines,
-            f"    return {tupled(moving)}",
-            "",
-            "",
-            "def law_positions(values):",
-            '    """Positions that steps monitor."""',
-            "    x = values[0]",
-            *lines,
-            f"    return {tupled(here)}",
-            "",
+            *stage("law_motion", ["x = values[0]", *self._carrying_to(2), *all_lines], tupled(moving)),
+            *stage("law_positions", ["x = values[0]", *lines], tupled(here)),
             *law_steps(self.plan, self.names, list(self.derived)),
         ]
 
     def _watches(self) -> list[str]:
-        rows, body = self._expressions([node for _, node in self.plan.watches])
-        return [
-            "",
-            "def watches(values):",
-            '    """Rows set aside as redundant, relative to the size: zero as long as they hold."""',
-            "    x = values[0]",
-            *body,
-            f"    return {tupled(rows)}",
-            "",
-        ]
+        body, rows = self._formulas([node for _, node in self.plan.watches])
+        return stage("watches", ["x = values[0]", *body], tupled(rows))
 
-    def _appended(self, name: str, docstring: str, one: str) -> list[str]:
-        calls = [
-            f"    {one}{run.kind.label}(RUN_{k}, holds{k}, found)" for k, run in self.numbered() if run.kind.solved
-        ]
-        return [
-            "",
-            f"def {name}(values):",
-            f'    """{docstring}"""',
-            *self._values(),
-            "    found = []",
-            *calls,
-            "    return found",
-            "",
-        ]
+    def _appended(self, name: str) -> list[str]:
+        """Return the function of the Jacobians or the residuals, each block after another."""
+        solved = [(k, run.kind.label) for k, run in self.numbered() if run.kind.solved]
+        calls = [f"{name.removesuffix('s')}{label}(RUN_{k}, holds{k}, found)" for k, label in solved]
+        return stage(name, [*self._values(), "found = []", *calls], "found")
 
 
 _GATHERS = ("gather_positions", "gather_rates", "gather_accelerations")

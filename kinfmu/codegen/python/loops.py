@@ -16,20 +16,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from kinfmu.codegen.lists import LISTS, Kind, positions
-from kinfmu.codegen.newton import jacobian_text
+from kinfmu.codegen.lists import LISTS, Kind
+from kinfmu.codegen.newton import jacobian_text, outright, right_side
 from kinfmu.codegen.python.block_code import (
-    assigned_lines,
+    BY_ROW,
+    defined,
     indented,
     kept_name,
     matrix,
     newton_lines,
+    scaled_residuals,
     solution_lines,
     tupled,
 )
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.plan import Block
-from kinfmu.plan.equations.graph import Node, reachable
+from kinfmu.plan.equations.graph import Node
 from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.python.curve import CurveData
 
@@ -40,11 +42,8 @@ class Loops:
     def __init__(self, kind: Kind, curves: Mapping[CurveData, str]) -> None:
         self.kind = kind
         self.label = kind.label
-        self.names = Names(kind.coordinates, curves)
-        for block in kind.blocks:
-            for name, motion in block.assigned:
-                self.names.assign(motion[0], name)
-        self.positions = reachable([node for group in positions(kind.blocks) for node in group])
+        self.names = Names.of_blocks(kind.blocks, curves)
+        self.positions = kind.positions
         own = {name: f"k{i}" for i, name in enumerate(kind.coordinates)}
         self.row = tupled(
             [*(f"g{i}" for i in range(len(kind.given))), *(f"c{i}" for i in range(kind.constants)), *own.values()]
@@ -66,7 +65,7 @@ class Loops:
         if kind.solved:
             later += self._linear("velocity", 1) + self._linear("acceleration", 2)
             later += self._matrices(kind.solved) + self._residuals(kind.solved)
-        if kind.has_assigned:
+        if kind.assigned:
             later += self._assigned("rates", 1) + self._assigned("accelerations", 2)
         parts = self._position()
         hold = tupled(self.hold)
@@ -79,14 +78,13 @@ class Loops:
         lines: list[str] = []
         for block in self.kind.blocks:
             if not block.unknowns:
-                lines += assigned_lines(writer, block)
+                lines += outright(writer, block, BY_ROW)
                 continue
             starts = [f"z[{self.own[name]}]" for name in block.unknowns]
             lines += newton_lines(writer, block, label, starts, f"({_HELD})", "number")
             lines += ["iterations += iteration", "if error > largest:", "    largest = error"]
             lines += [f"determinants.append(det{label})", "number += 1"]
-        found = [name for block in self.kind.blocks for name, _ in block.assigned]
-        lines = self._loaded(writer, found) + lines
+        lines = self._loaded(writer, self.kind.assigned) + lines
         lines += [f"{self.places[name]} = {identifier(name)}" for name in self.kind.coordinates]
         arguments, results = ["run", "x"], ["holds"]
         about = "Coordinates that are given outright."
@@ -94,17 +92,9 @@ class Loops:
             arguments += ["z", "held", "enough", "number", "determinants", "largest", "iterations"]
             results += ["largest", "iterations"]
             about = f"{len(solved.residuals)} x {len(solved.unknowns)} from rows {', '.join(solved.row_names)}."
-        return [
-            "",
-            f"def position{label}({', '.join(arguments)}):",
-            f'    """{about}"""',
-            "    holds = []",
-            f"    for {self.row} in run:",
-            *indented(lines, 8),
-            f"        holds.append({tupled(self.hold)})",
-            f"    return {', '.join(results)}",
-            "",
-        ]
+        lines.append(f"holds.append({tupled(self.hold)})")
+        loop = ["holds = []", f"for {self.row} in run:", *indented(lines)]
+        return defined(f"position{label}({', '.join(arguments)})", about, loop, ", ".join(results))
 
     def _loaded(self, writer: Writer, known: Iterable[str]) -> list[str]:
         """Return statements that read from the lists what the written ones use and do not know."""
@@ -141,9 +131,7 @@ class Loops:
     def _solution(self, writer: Writer, block: Block, order: int) -> list[str]:
         """Return the linear solve of a block, or the values given in its place."""
         right = (block.velocity, block.acceleration)[order - 1]
-        lines = writer.statements([*right, *block.entries])
-        b = [f"b{i}" for i in range(len(right))]
-        lines += [f"{one} = {writer.expression(node)}" for one, node in zip(b, right, strict=True)]
+        b, lines = right_side(writer, "b", right, block.entries)
         z = [identifier(unknown.derivative(order)) for unknown in block.unknowns]
         jacobian = jacobian_text(writer, block)
         self.hold.setdefault(kept_name(block, self.label), None)
@@ -170,7 +158,7 @@ class Loops:
         writer = Writer(self.names, self.positions)
         lines = [line for block in self.kind.blocks for line in self._assignments(writer, block, order)]
         self._import(writer)
-        found = [coordinate.derivative(order) for block in self.kind.blocks for coordinate, _ in block.assigned]
+        found = [coordinate.derivative(order) for coordinate in self.kind.assigned]
         return self._later(name, LISTS[1 : order + 1], self._loaded(writer, [*self.hold, *found]) + lines)
 
     def _matrices(self, block: Block) -> list[str]:
@@ -182,11 +170,9 @@ class Loops:
 
     def _residuals(self, block: Block) -> list[str]:
         writer = Writer(self.names, self.positions)
-        lines = writer.statements(block.residuals)
-        scaled = zip(block.residuals, block.row_scales, strict=True)
-        row = ", ".join(f"({writer.expression(r)}) / {scale!r}" for r, scale in scaled)
+        lines, row = scaled_residuals(writer, block)
         self._import(writer)
-        return self._later("residual", ["found"], [*lines, f"found.append([{row}])"])
+        return self._later("residual", ["found"], [*lines, f"found.append({row})"])
 
     def _import(self, writer: Writer) -> None:
         """Record what a later function reads from the position stage."""

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from kinfmu.codegen.python.block_code import indented, matrix, tupled, unpacking
+from kinfmu.codegen.python.block_code import defined, matrix, tupled, unpacking
 from kinfmu.codegen.python.roots import sqrt
 from kinfmu.codegen.python.solutions import solutions
 from kinfmu.codegen.writer import Names, Writer, identifier
@@ -123,7 +123,8 @@ def stage_lines(
             rows, columns = ([[writer.expression(node) for node in row] for row in part] for part in step[:2])
             lines += solve(rows, columns, [identifier(name) for name in _names(step)])
     results = [node for node in steps.results if node.constant != 0.0]
-    return lines + writer.statements(results), [writer.expression(node) for node in results]
+    last, expressions = writer.formulas(results)
+    return lines + last, expressions
 
 
 def _text(steps: Stage, given: Sequence[str], curves: Mapping[CurveData, str]) -> str:
@@ -131,16 +132,8 @@ def _text(steps: Stage, given: Sequence[str], curves: Mapping[CurveData, str]) -
         return [f"{tupled(names)} = solutions({matrix(rows)}, {matrix(columns)})"]
 
     lines, results = stage_lines(steps, given, curves, solve)
-    return "\n".join(
-        [
-            "def results(given):",
-            '    """Return the results that are not 0."""',
-            *unpacking(map(identifier, given), "given"),
-            *indented(lines),
-            f"    return {tupled(results)}",
-            "",
-        ]
-    )
+    lines = [*unpacking(map(identifier, given), "given"), *lines]
+    return "\n".join(defined("results(given)", "Return the results that are not 0.", lines, tupled(results)))
 
 
 def _roots(steps: Stage) -> list[Node]:

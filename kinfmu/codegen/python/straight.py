@@ -6,23 +6,36 @@ import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from kinfmu.codegen.lists import parametric
-from kinfmu.codegen.newton import ROUND_OFF, jacobian_text
+from kinfmu.codegen.newton import jacobian_text, outright, right_side
 from kinfmu.codegen.python.block_code import (
-    assigned_lines,
+    BY_ROW,
+    extreme,
     indented,
     kept_name,
     matrix,
     newton_lines,
+    scaled_residuals,
     solution_lines,
     tupled,
     unpacking,
 )
-from kinfmu.codegen.python.header import bound, curve_names, differences, drive, header, law_steps, places
+from kinfmu.codegen.python.header import (
+    ORDERS,
+    bound,
+    curve_names,
+    differences,
+    drive,
+    header,
+    law_steps,
+    places,
+    stage,
+)
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.plan import Block, SolvePlan
 from kinfmu.plan.equations.graph import Node, reachable, symbols
 
-_VALUES = "    <values>"  # in place of the statements that unpack `values`, which are known when all stages are written
+_VALUES = "<values>"  # in place of the statements that unpack `values`, which are known when all stages are written
+_Motions = Sequence[Sequence[Node]]  # positions, rates, accelerations
 _Right = Callable[[Block], tuple[Node, ...]]  # right side of a block's linear solve
 
 
@@ -40,12 +53,11 @@ class _Straight:
         self.curves = curve_names(plan)
         self.unknowns = plan.unknowns
         self.places = places(self.solved)
-        self.names = Names((name for block in plan.blocks for name in block.coordinates), self.curves)
+        self.names = Names.of_blocks(plan.blocks, self.curves)
         self.position_nodes: list[Node] = []
         self.formulas: dict[str, Node] = {}  # of rates and accelerations of assigned coordinates
         for block in plan.blocks:
             for name, motion in block.assigned:
-                self.names.assign(motion[0], name)
                 self.formulas |= {name.derivative(order): motion[order] for order in (1, 2)}
             self.position_nodes += [motion[0] for _, motion in block.assigned]
             self.position_nodes += [*block.residuals, *block.entries]
@@ -62,20 +74,17 @@ class _Straight:
             self._velocity(),
             self._acceleration(),
             *(self._tangent() if len(self.plan.drivers) == 1 else ()),
-            self._stage("outputs", "Positions of the outputs.", (0,)),
-            self._stage("rates", "Rates of the outputs.", (1,)),
-            self._stage("accelerations", "Accelerations of the outputs.", (2,)),
-            self._stage("motion", "Positions, rates and accelerations of the outputs in one row.", (0, 1, 2)),
-            *self._laws(),
+            *(self._stage(name, orders, self._outputs()) for name, orders in ORDERS.items()),
+            *(self._laws() if self.plan.path_laws.units else ()),
             self._watches(),
             self._jacobians(),
             self._residuals(),
         ]
         position = self._position()  # after the later stages: they determine what it returns
-        unpacked = "\n".join(unpacking(self.exports, "values")) or "    # no values are read"
+        (unpacked,) = unpacking(self.exports, "values") or ["# no values are read"]
         functions = [*drive(self.plan, self.curves), *position, *differences(self.plan)]
         for lines in later:
-            functions += [unpacked if line is _VALUES else line for line in lines]
+            functions += [line.replace(_VALUES, unpacked) for line in lines]
         if self.plan.path_laws.units:
             functions += law_steps(self.plan, self.names, self.prolog)
         if self.plan.parameters:
@@ -85,43 +94,32 @@ class _Straight:
     def _position(self) -> list[str]:
         keep = [node for node in self.exports.values() if node is not None]
         writer = Writer(self.names, self.prolog, keep)
-        lines = [
-            "",
-            f"def position(u, z, zd, zdd, s, held=0, enough={ROUND_OFF**2}):",
-            '    """Unknowns by Newton from a prediction, block by block; or ArithmeticError(block, residual)."""',
-            *unpacking(map(identifier, self.inputs[0]), "u"),
-        ]
+        lines = unpacking(map(identifier, self.inputs[0]), "u")
         if self.solved:
-            lines += ["    half = 0.5 * s"]
+            lines += ["half = 0.5 * s"]
             if len(self.solved) > 1:
-                lines += ["    largest, iterations = 0.0, 0"]
+                lines += ["largest, iterations = 0.0, 0"]
             lines += self._predicted()
         number = 0
         for block in self.plan.blocks:
             if block.unknowns:
-                lines += indented(self._solved(writer, number, block))
+                lines += self._solved(writer, number, block)
                 number += 1
             else:
-                lines += indented(assigned_lines(writer, block))
+                lines += outright(writer, block, BY_ROW)
         z = tupled(identifier(name) for name in self.unknowns)
         values = tupled(self.exports)
-        margin, determinants = "1.0", "()"
-        if self.solved:
-            lines += [
-                f"    m{k} = det{k} * {1.0 / block.determinant_scale!r}" for k, block in enumerate(self.solved, start=1)
-            ]
-            determinants = tupled(f"m{k}" for k in range(1, len(self.solved) + 1))
-            sizes = [f"abs(m{k})" for k in range(1, len(self.solved) + 1)]
-            margin = f"min({', '.join(sizes)})" if len(sizes) > 1 else sizes[0]
+        determinants = [f"m{k}" for k in range(1, len(self.solved) + 1)]
         summary = "1.0, 0.0, 0, 0.0"
         if self.solved:
+            dets = zip(determinants, self.solved, strict=True)
+            lines += [f"{m} = det{m[1:]} * {1.0 / block.determinant_scale!r}" for m, block in dets]
+            margin = extreme("min", [f"abs({m})" for m in determinants])
             error, count = ("largest", "iterations") if len(self.solved) > 1 else ("error", "iteration")
             summary = f"{margin}, sqrt({error}), {count}, {self._moved()} if {count} else 0.0"
-        rows = [node for _, node in self.plan.watches]
-        lines += indented(writer.statements(rows))
-        watched = [f"abs({writer.expression(node)})" for node in rows]
-        summary += ", " + (f"max({', '.join(watched)})" if len(watched) > 1 else "".join(watched) or "0.0")
-        return [*lines, f"    return {z}, {determinants}, {summary}, {values}", ""]
+        body, rows = writer.formulas([node for _, node in self.plan.watches])
+        summary += f", {extreme('max', [f'abs({row})' for row in rows])}"
+        return stage("position", [*lines, *body], f"{z}, {tupled(determinants)}, {summary}, {values}")
 
     def _predicted(self) -> list[str]:
         """Return statements of the predicted unknowns, by their names."""
@@ -129,7 +127,7 @@ class _Straight:
         for letter, source in (("z", "z"), ("d", "zd"), ("a", "zdd")):
             lines += unpacking([f"{letter}{k}" for k in range(len(self.unknowns))], source)
         for k, name in enumerate(self.unknowns):
-            lines.append(f"    {identifier(name)} = p{k} = z{k} + s * (d{k} + half * a{k})")
+            lines.append(f"{identifier(name)} = p{k} = z{k} + s * (d{k} + half * a{k})")
         return lines
 
     def _moved(self) -> str:
@@ -138,7 +136,7 @@ class _Straight:
         for k, name in enumerate(self.unknowns):
             move = f"abs({identifier(name)} - p{k})"
             moves.append(move if name.is_angle else f"{move} / {self.plan.size!r}")
-        return f"max({', '.join(moves)})" if len(moves) > 1 else moves[0]
+        return extreme("max", moves)
 
     def _solved(self, writer: Writer, k: int, block: Block) -> list[str]:
         """Return the statements of a block that needs Newton."""
@@ -150,27 +148,17 @@ class _Straight:
         return lines
 
     def _velocity(self) -> list[str]:
-        lines = [
-            "",
-            "def velocity(values, ud, given=(), held=0):",
-            '    """Rates of the unknowns: J zd = -rate of the rows with z at rest."""',
-        ]
-        lines += [_VALUES, *unpacking(map(identifier, self.inputs[1]), "ud")]
-        return lines + self._linear(1, lambda block: block.velocity)
+        lines, zd = self._linear(1, lambda block: block.velocity)
+        return stage("velocity", [_VALUES, *self._driven(1), *lines], zd)
 
     def _acceleration(self) -> list[str]:
-        lines = [
-            "",
-            "def acceleration(values, ud, udd, zd, given=(), held=0):",
-            '    """Accelerations of the unknowns: J zdd = -second rate of the rows with zdd = 0."""',
-        ]
-        lines += [
-            _VALUES,
-            *unpacking(map(identifier, self.inputs[1]), "ud"),
-            *unpacking(map(identifier, self.inputs[2]), "udd"),
-        ]
-        lines += unpacking([identifier(name.derivative(1)) for name in self.unknowns], "zd")
-        return lines + self._linear(2, lambda block: block.acceleration)
+        rates = unpacking([identifier(name.derivative(1)) for name in self.unknowns], "zd")
+        lines, zdd = self._linear(2, lambda block: block.acceleration)
+        return stage("acceleration", [_VALUES, *self._driven(2), *rates, *lines], zdd)
+
+    def _driven(self, order: int) -> list[str]:
+        """Return statements that name the speeds of the drivers, and their accelerations (order 2)."""
+        return [line for k in range(1, order + 1) for line in unpacking(map(identifier, self.inputs[k]), "u" + "d" * k)]
 
     def _tangent(self) -> list[list[str]]:
         """Return two functions for one driver: `tangent`, which every pose needs, and `first_motion`."""
@@ -179,41 +167,21 @@ class _Straight:
         definitions = Definitions(unit_speed.formulas)
         lines, done = [], set[str]()
         for order, right in ((1, unit_speed.velocity), (2, unit_speed.acceleration)):
-            lines += indented(self._linear_lines(writer, order, right, definitions, done))
+            lines += self._linear_lines(writer, order, right, definitions, done)
         self._import(writer)
-        first, second = (tupled(identifier(name.derivative(order)) for name in self.unknowns) for order in (1, 2))
-        about = "First and second derivative of the unknowns with respect to the driver."
-        tangent = [
-            "",
-            "def tangent(values):",
-            f'    """{about}"""',
-            _VALUES,
-            *lines,
-            f"    return {first}, {second}",
-            "",
+        both = ", ".join(tupled(identifier(name.derivative(order)) for name in self.unknowns) for order in (1, 2))
+        motion, row = self._motions((0, 1, 2), self._outputs())
+        return [
+            stage("tangent", [_VALUES, *lines], both),
+            stage("first_motion", [_VALUES, *lines, f"first, second = {both}", *motion], f"(first, second), {row}"),
         ]
-        motion = self._stage("motion", "", (0, 1, 2))
-        head, row = motion.index(_VALUES) + 1, motion[-2].removeprefix("    return ")
-        first_read = [
-            "",
-            "def first_motion(values, ud, udd):",
-            '    """Tangent and motion in one go, for the first reading of a pose."""',
-            _VALUES,
-            *lines,
-            f"    first, second = {first}, {second}",
-            *motion[head:-2],
-            f"    return (first, second), {row}",
-            "",
-        ]
-        return [tangent, first_read]
 
-    def _linear(self, order: int, right: _Right) -> list[str]:
-        """Return the linear solves of one order as a function's body."""
+    def _linear(self, order: int, right: _Right) -> tuple[list[str], str]:
+        """Return the linear solves of one order, and what they solve for."""
         writer = Writer(self.names, self.known)
         lines = self._linear_lines(writer, order, right, self.definitions, set(), held=True)
         self._import(writer)
-        result = tupled(identifier(name.derivative(order)) for name in self.unknowns)
-        return [*indented(lines), f"    return {result}", ""]
+        return lines, tupled(identifier(name.derivative(order)) for name in self.unknowns)
 
     def _linear_lines(
         self,
@@ -229,11 +197,10 @@ class _Straight:
         lines = []
         for k, block in enumerate(self.solved):
             z = [identifier(name.derivative(order)) for name in block.unknowns]
-            vector, entries = right(block), block.entries
+            vector = right(block)
             lines += definitions.lines(writer, _names(vector), done)
-            lines += writer.statements([*vector, *entries])
-            b = [f"b{i}" for i in range(len(vector))]
-            lines += [f"{name} = {writer.expression(node)}" for name, node in zip(b, vector, strict=True)]
+            b, new = right_side(writer, "b", vector, block.entries)
+            lines += new
             jacobian = jacobian_text(writer, block)
             self.exports.setdefault(kept_name(block, str(k + 1)), None)
             solution = solution_lines(str(k + 1), order, jacobian, b, z)
@@ -246,36 +213,30 @@ class _Straight:
                 lines += solution
         return lines
 
+    def _outputs(self) -> _Motions:
+        """Return positions, rates and accelerations of all outputs."""
+        return [[motion[1:][order] for motion in self.plan.outputs_motion] for order in range(3)]
+
     def _laws(self) -> list[list[str]]:
-        """Return the functions of what steps of a path monitor of laws, if there are some."""
+        """Return the functions of what steps of a path monitor of laws."""
         motions = self.plan.path_laws.motions
-        return [
-            self._stage("law_motion", "Motions that steps monitor, with rates and accelerations.", (0, 1, 2), motions),
-            self._stage("law_positions", "Positions that steps monitor.", (0,), motions),
-        ][: 2 * bool(motions[0])]
+        return [self._stage("law_motion", (0, 1, 2), motions), self._stage("law_positions", (0,), motions)]
 
-    def _stage(
-        self, name: str, docstring: str, orders: Sequence[int], motions: Sequence[Sequence[Node]] = ()
-    ) -> list[str]:
-        """Return a function that returns motions at some orders of derivative, one after another.
+    def _stage(self, name: str, orders: Sequence[int], motions: _Motions) -> list[str]:
+        """Return a function that returns motions at some orders of derivative, one after another."""
+        lines, row = self._motions(orders, motions)
+        return stage(name, [_VALUES, *lines], row)
 
-        motions: positions, rates and accelerations; default: of all outputs.
-        """
-        motions = motions or [[motion[1:][order] for motion in self.plan.outputs_motion] for order in range(3)]
+    def _motions(self, orders: Sequence[int], motions: _Motions) -> tuple[list[str], str]:
+        """Return the statements of such a function, and what it returns."""
         targets = [node for order in orders for node in motions[order]]
         highest = max(orders)
-        arguments = [["values"], ["values", "ud", "first"], ["values", "ud", "udd", "first", "second"]][highest]
-        lines = ["", f"def {name}({', '.join(arguments)}):", f'    """{docstring}"""', _VALUES]
-        for argument, names in (("ud", self.inputs[1]), ("udd", self.inputs[2])):
-            if argument in arguments:
-                lines += unpacking(map(identifier, names), argument)
-        if highest:
-            lines += self._chained(highest)
         writer = Writer(self.names, self.known)
-        body = self.definitions.lines(writer, _names(targets), set()) + writer.statements(targets)
-        returned = tupled(writer.expression(node) for node in targets)
+        body = self.definitions.lines(writer, _names(targets), set())
+        statements, row = writer.formulas(targets)
         self._import(writer)
-        return [*lines, *indented(body), f"    return {returned}", ""]
+        chained = self._chained(highest) if highest else []
+        return [*self._driven(highest), *chained, *body, *statements], tupled(row)
 
     def _chained(self, order: int) -> list[str]:
         """Return statements of the rates (and accelerations, order 2) of the unknowns from `first` (and `second`).
@@ -288,27 +249,17 @@ class _Straight:
             return lines if order == 1 else lines + unpacking(accelerations, "second")
         speed, more = identifier(self.inputs[1][0]), identifier(self.inputs[2][0])
         lines = unpacking([f"d{k}" for k in range(len(rates))], "first")
-        lines += [f"    {rate} = d{k} * {speed}" for k, rate in enumerate(rates)]
+        lines += [f"{rate} = d{k} * {speed}" for k, rate in enumerate(rates)]
         if order == 2:
             lines += unpacking([f"a{k}" for k in range(len(rates))], "second")
-            lines += [f"    {name} = a{k} * {speed} * {speed} + d{k} * {more}" for k, name in enumerate(accelerations)]
+            lines += [f"{name} = a{k} * {speed} * {speed} + d{k} * {more}" for k, name in enumerate(accelerations)]
         return lines
 
     def _watches(self) -> list[str]:
         writer = Writer(self.names, self.known)
-        targets = [node for _, node in self.plan.watches]
-        body = writer.statements(targets)
-        returned = tupled(writer.expression(node) for node in targets)
+        body, rows = writer.formulas([node for _, node in self.plan.watches])
         self._import(writer)
-        return [
-            "",
-            "def watches(values):",
-            '    """Rows set aside as redundant, relative to the size: zero as long as they hold."""',
-            _VALUES,
-            *indented(body),
-            f"    return {returned}",
-            "",
-        ]
+        return stage("watches", [_VALUES, *body], tupled(rows))
 
     def _jacobians(self) -> list[str]:
         writer = Writer(self.names, self.known)
@@ -318,15 +269,7 @@ class _Straight:
             body += writer.statements(block.entries)
             matrices.append(matrix(jacobian_text(writer, block)))
         self._import(writer)
-        return [
-            "",
-            "def jacobians(values):",
-            '    """Jacobian of each block."""',
-            _VALUES,
-            *indented(body),
-            f"    return {tupled(matrices)}",
-            "",
-        ]
+        return stage("jacobians", [_VALUES, *body], tupled(matrices))
 
     def _residuals(self) -> list[str]:
         """Return the function of the residuals, which poses are rarely asked for: they are computed once more.
@@ -337,19 +280,11 @@ class _Straight:
         writer = Writer(self.names, [*read, *self.prolog])
         rows, body = [], []
         for block in self.solved:
-            body += writer.statements(block.residuals)
-            scaled = zip(block.residuals, block.row_scales, strict=True)
-            rows.append("[" + ", ".join(f"({writer.expression(r)}) / {scale!r}" for r, scale in scaled) + "]")
+            lines, row = scaled_residuals(writer, block)
+            body += lines
+            rows.append(row)
         self._import(writer)
-        return [
-            "",
-            "def residuals(values):",
-            '    """Residuals of each block, relative to the size."""',
-            _VALUES,
-            *indented(body),
-            f"    return {tupled(rows)}",
-            "",
-        ]
+        return stage("residuals", [_VALUES, *body], tupled(rows))
 
     def _import(self, writer: Writer) -> None:
         """Record what a later stage reads from the position stage."""

@@ -18,9 +18,8 @@ from kinfmu.fmu.interface import Interface, Variable
 from kinfmu.fmu.slave.estimated_rates import Rates
 from kinfmu.fmu.slave.layout import UNKNOWN_ERROR
 from kinfmu.plan import SolvePlan
-from kinfmu.plan.efforts import units_in_si
+from kinfmu.plan.efforts import LedLaws, units_in_si
 from kinfmu.plan.forces import ForceSteps
-from kinfmu.plan.led_laws import LedLaws
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.plan.undetermined import distance_steps, meeting_messages
 from kinfmu.solver.python.torque import dormand_prince as pair
@@ -293,7 +292,7 @@ def _events(plan: SolvePlan, *, owns: bool) -> str:
         f"/* Jumps of the laws of {plan.mechanism.name}: generated from its mechanism, not to be edited. */",
         '#include "instance.h"',
         "",
-        *function(signature, [*loads, *body], ("model", "constants", "jumps", "periods")),
+        *function(signature, [*loads, *body]),
     ]
     return "\n".join(lines).rstrip("\n") + "\n"
 

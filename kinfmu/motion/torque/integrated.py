@@ -13,8 +13,7 @@ from kinfmu.errors import RequestError, listed
 from kinfmu.motion.torque.efforts import Efforts
 from kinfmu.motion.torque.radau import Radau
 from kinfmu.plan import SolvePlan
-from kinfmu.plan.efforts import inertia_steps, units_in_si
-from kinfmu.plan.led_laws import led_laws
+from kinfmu.plan.efforts import inertia_steps, led_laws, units_in_si
 from kinfmu.solver.python import Pose, Solver, Status
 from kinfmu.solver.python.pose import Vector
 from kinfmu.solver.python.torque import Course, DormandPrince, Ended, EquationOfMotion, Given, Laws, TorqueSteps
