@@ -1,4 +1,4 @@
-"""Power series of the oracle as one more arithmetic for the joints' formulas."""
+"""Power series of the oracle as one more arithmetic for the formulas of joints, drivers, loads and laws."""
 
 from __future__ import annotations
 
