@@ -33,9 +33,8 @@ from kinfmu.solver.python import Status
 from tests import oracle
 from tests.analysis.linkages import pushed_crank
 from tests.gallery_members import every_member
-from tests.mechanisms import fourbar
+from tests.mechanisms import fourbar, scaled
 from tests.oracle import Motion, Residual, largest_error, mp
-from tests.scaled import scaled
 
 SCALES = [1e-6, 1e-3, 1.0, 1e3, 1e6]
 BARS = (4.0, 1.0, 3.5, 3.0)  # ground, crank, coupler, rocker

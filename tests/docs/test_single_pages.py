@@ -24,8 +24,7 @@ from kinfmu.log import McapLog, read
 from kinfmu.mechanism import gallery
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.run.channels import absent_columns
-from tests.docs.blocks import blocks, commands
-from tests.docs.executed import executed
+from tests.docs.blocks import blocks, commands, executed
 
 DOCS = Path(__file__).parents[2] / "docs"
 PATH = DOCS / "method.md"

@@ -13,8 +13,7 @@ from kinfmu.log import write_mcap
 from tests.fuzz import cache, files, fmu, logs, mechanisms
 from tests.fuzz.guarded import ZIG, Watch
 from tests.fuzz.hostile_text import CANARY
-from tests.fuzz.parts import PARTS, run
-from tests.fuzz.summary import Summary, one_of_each
+from tests.fuzz.summary import PARTS, Summary, one_of_each, run
 
 SECONDS = 0.5  # of each part after one trial of each kind; scripts/fuzz goes on for longer
 KINDS = {  # of the programs of `fmu`, compiled under sanitizers, see test_fmu.py; `opens` has one kind

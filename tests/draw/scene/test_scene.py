@@ -20,8 +20,8 @@ from kinfmu.run import Run
 from kinfmu.run.continued import continued
 from kinfmu.run.driving import run_times
 from tests.log.runs import DEGREE
-from tests.test_parameters_by_every_way import LENGTHS, TIMES, linkage, side
-from tests.test_parameters_by_every_way import drawn as drawn_lengths
+from tests.test_every_way import LENGTHS, TIMES, linkage, side
+from tests.test_every_way import drawn as drawn_lengths
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ from kinfmu import (
 from kinfmu.mechanism.laws import LAWS, RISES, ConstantSpeed, ConstantValue, External, Law
 from kinfmu.mechanism.laws.spline import ENDS, tridiagonal
 from tests.mechanism.joints.drawn import splines
-from tests.mechanism.laws.test_closed_forms import motion
+from tests.mechanism.laws.test_contract import motion
 from tests.power_series import mp
 
 UP_AND_DOWN = (
