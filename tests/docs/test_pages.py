@@ -202,7 +202,7 @@ def test_system_in_ecos_and_libcosim_too(request: pytest.FixtureRequest, tmp_pat
 
 OWN_TESTS = {  # pages that their own test follows: what their reader edits between the commands is special
     "adding-a-joint.md": "test_adding_a_joint.py",
-    "tutorial.md": "test_tutorial.py",
+    "tutorial.md": "test_single_pages.py",
 }
 OWN_TOML = {"mechanism-files.md": "test_mechanism_files.py"} | OWN_TESTS  # their TOML is no file to type
 CHECKED_ELSEWHERE = {  # other blocks than commands, Python and what these print: page and beginning; where, or why not

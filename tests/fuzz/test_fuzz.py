@@ -16,7 +16,7 @@ from tests.fuzz.hostile_text import CANARY
 from tests.fuzz.summary import PARTS, Summary, one_of_each, run
 
 SECONDS = 0.5  # of each part after one trial of each kind; scripts/fuzz goes on for longer
-KINDS = {  # of the programs of `fmu`, compiled under sanitizers, see test_fmu.py; `opens` has one kind
+KINDS = {  # of the programs of `fmu`, compiled under sanitizers, see below; `opens` has one kind
     "mechanisms": {mechanisms.kind_of(seed).__name__.strip("_") for seed in range(1000)},
     "files": {files.kind_of(seed).__name__.strip("_") for seed in range(1000)},
     "cache": set(cache.KINDS),
