@@ -80,11 +80,11 @@ def main(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None,
     accuracy  run time against error of every engine in every setting, and through
               singular points: the tables and charts of docs/accuracy.md; takes minutes
     sample    a sample of solve, compared with the readable reference
-    sweep     a sweep by the native engine, compared with closed forms and pylinkage
+    sweep     a sweep by the native engine, compared with a closed form and pylinkage
     designs   calls and batches with other lengths, compared with closed forms and scipy
     forces    efforts and reactions of a sweep, compared with the sweep alone
     step      a step of the FMU, compared with the smallest pythonfmu FMU
-    native    a step of the native FMU in a C host, compared with closed forms
+    native    a step of the native FMU in a C host, without efforts and with them
     log       writing and reading records of a million samples, compared with mcap
     import    `import kinfmu`, compared with bare Python
     chains    chains of up to a thousand loops

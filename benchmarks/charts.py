@@ -27,9 +27,9 @@ QUANTITIES = ("q", "qd", "qdd")
 NOTES = (
     "To the left is exact, below is fast.",
     "",
-    "Points of kinfmu's generated Python and of",
-    "the readable reference: 0 to 3 corrections",
-    "of Newton; of the others: tolerances.",
+    "Points of the readable reference: 0 to 3",
+    "corrections of Newton; of the others:",
+    "tolerances.",
     "",
     "Curves from light to dark: predicted by the",
     "last pose, with its velocity, with velocity",

@@ -34,27 +34,6 @@ class EngineSetting(NamedTuple):
 
 
 USUAL = EngineSetting()
-CORRECTIONS = (0, 1, 2, 3)
-TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12, ROUND_OFF)
-CHORD = (2, 3)  # corrections; one is the same with and without
-
-
-def newton(
-    corrections: Sequence[int] = CORRECTIONS,
-    tolerances: Sequence[float] = TOLERANCES,
-    chord: Sequence[int] = CHORD,
-) -> tuple[EngineSetting, ...]:
-    """Return settings: each predictor with numbers of corrections, with tolerances, and with chord Newton."""
-    return tuple(
-        setting
-        for order in range(len(PREDICTORS))
-        for setting in (
-            *(EngineSetting(order, corrections=n) for n in corrections if order + n > 0),
-            *(EngineSetting(order, tolerance) for tolerance in tolerances),
-            *(EngineSetting(order, corrections=n, chord=True) for n in chord),
-            EngineSetting(order, chord=True),
-        )
-    )
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What a step of the native FMU costs in a C host, compared with an FMU of closed forms written by hand."""
+"""What a step of the native FMU costs in a C host, without efforts and with them."""
 
 from __future__ import annotations
 
@@ -17,42 +17,43 @@ from benchmarks.rounds import in_turn, spread, table
 from kinfmu.codegen.c import compiler
 from kinfmu.fmu import description
 from kinfmu.fmu.build import build
-from kinfmu.fmu.native.archive import OPTIMIZED
 from kinfmu.mechanism import Gravity, Mechanism, Point
 
 STEPS = 360 * 200  # in a round, of one degree each: whole turns
 ROUNDS = 40
 INSTANCES = 200
-CLOSED_FORM_OUTPUTS = tuple(range(3, 18))  # value references of closed_form.c
-_SOURCES = Path(__file__).with_name("native_host")
 _WORDS = {2: "Real", 3: "Float64"}
 
 
 def run(mechanism: Mechanism, rounds: int = ROUNDS) -> str:
-    """Return a table: processor time of a step (set 1, step, get 15) of the native FMU and of closed forms.
+    """Return a table: processor time of a step (set 1, step, get 15) of the native FMU in both versions of FMI.
 
-    In both versions of FMI, with their ratio and what it takes to instantiate the FMU; and of a step that also reads
-    the driver's effort, of the mechanism with masses, compared with the step without.
+    Compared with a step that also reads the driver's effort, of the mechanism with masses; and what it takes to
+    instantiate the FMU.
     """
-    rows, of_forces = [], []
+    rows = []
     for fmi in (2, 3):
         with tempfile.TemporaryDirectory(prefix="kinfmu_bench_", ignore_cleanup_errors=True) as folder:
-            ours, instantiate = _ours(mechanism, fmi, Path(folder, "plain"))
-            loaded, _ = _ours(with_masses(mechanism), fmi, Path(folder, "loaded"), forces=1)
-            ways = [ours, _closed_form(fmi), loaded]
-            ns = [[value / STEPS * 1e9 for value in row] for row in in_turn(ways, rounds, process_time)]
-        rows.append(_row(f"FMI {fmi}.0, instantiate {instantiate * 1e6:.0f} us", ns[0], ns[1]))
-        of_forces.append(_row(f"FMI {fmi}.0", ns[2], ns[0]))
-    head = ("native FMU step: set 1, step 1 deg, get 15", "ours", "closed form", "ratio", "quartiles")
-    head_of_forces = ("the same with masses, get also the driver's effort", "with", "without", "ratio", "quartiles")
-    return "\n".join([*table(head, rows), "", *table(head_of_forces, of_forces)])
-
-
-def _row(name: str, ns: Sequence[float], others: Sequence[float]) -> tuple[str, ...]:
-    """Return a row of the table: medians, and the ratio with its quartiles."""
-    ratio = spread([a / b for a, b in zip(ns, others, strict=True)])
-    quartiles = f"{ratio.lower:.2f} to {ratio.upper:.2f}"
-    return name, f"{spread(ns).median:.0f} ns", f"{spread(others).median:.0f} ns", f"{ratio.median:.2f}", quartiles
+            plain, instantiate = _stepping(mechanism, fmi, Path(folder, "plain"))
+            loaded, _ = _stepping(with_masses(mechanism), fmi, Path(folder, "loaded"), forces=1)
+            ns = [[value / STEPS * 1e9 for value in row] for row in in_turn([plain, loaded], rounds, process_time)]
+        ratio = spread([with_effort / without for without, with_effort in zip(*ns, strict=True)])
+        rows.append(
+            (
+                f"FMI {fmi}.0, instantiate {instantiate * 1e6:.0f} us",
+                *(f"{spread(times).median:.0f} ns" for times in ns),
+                f"{ratio.median:.2f}",
+                f"{ratio.lower:.2f} to {ratio.upper:.2f}",
+            )
+        )
+    head = (
+        "native FMU step: set 1, step 1 deg, get 15",
+        "alone",
+        "with masses, get also an effort",
+        "ratio",
+        "quartiles",
+    )
+    return "\n".join(table(head, rows))
 
 
 def with_masses(mechanism: Mechanism) -> Mechanism:
@@ -64,7 +65,7 @@ def with_masses(mechanism: Mechanism) -> Mechanism:
     return replace(mechanism, bodies=tuple(bodies), gravity=Gravity(0.0, -9.81))
 
 
-def _ours(mechanism: Mechanism, fmi: int, folder: Path, *, forces: int = 0) -> tuple[Callable[[], None], float]:
+def _stepping(mechanism: Mechanism, fmi: int, folder: Path, *, forces: int = 0) -> tuple[Callable[[], None], float]:
     """Return a round of the mechanism's FMU, and the seconds that an instance takes; forces: number of those read."""
     folder.mkdir()
     fmu = build(mechanism, folder / "ours.fmu", flavour="native", fmi=fmi, drive="inputs")
@@ -102,17 +103,9 @@ def _ours(mechanism: Mechanism, fmi: int, folder: Path, *, forces: int = 0) -> t
     return _rounds(fmi, library, instance, outputs), seconds
 
 
-def _closed_form(fmi: int) -> Callable[[], None]:
-    """Return a round of the closed forms, compiled as the FMU is."""
-    sources = {"closed_form.c": (_SOURCES / "closed_form.c").read_text("utf-8")}
-    library = compiler.load(sources, (*OPTIMIZED, f"-DFMI={fmi}"))
-    library.instantiate.restype = ctypes.c_void_p
-    return _rounds(fmi, library, ctypes.c_void_p(library.instantiate()), CLOSED_FORM_OUTPUTS)
-
-
 def _rounds(fmi: int, library: Any, instance: ctypes.c_void_p, outputs: Sequence[int]) -> Callable[[], None]:
     """Return a function that steps an FMU through a round in C, each of which continues the last one."""
-    host = compiler.load({"host.c": (_SOURCES / "host.c").read_text("utf-8")})
+    host = compiler.load({"host.c": Path(__file__).with_name("host.c").read_text("utf-8")})
     step = getattr(host, f"host_run{fmi}")
     word = _WORDS[fmi]
     functions = [library[f"fmi{fmi}{name}"] for name in (f"Set{word}", "DoStep", f"Get{word}")]

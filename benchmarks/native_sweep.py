@@ -1,4 +1,4 @@
-"""A sweep by the native engine, compared with a four-bar's closed form: by hand, by numba, and by pylinkage."""
+"""A sweep by the native engine, compared with a four-bar's closed form by hand and with pylinkage."""
 
 from __future__ import annotations
 
@@ -29,7 +29,6 @@ LENGTHS = (40.0, 20.0, 50.0, 50.0)  # ground, crank, coupler, rocker of the gall
 CLOSED = "closed form by hand, vectorized"
 WHOLE = "crank-rocker, q, qd, qdd"
 ALONE = "the same, q alone"
-LOOP = "closed form in a loop, by numba"
 PYLINKAGE = "pylinkage, by numba: points, not angles"
 
 
@@ -55,12 +54,11 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES, loops: int = 1000) -> str:
         "the same, by Model.solve": lambda: model.solve(crank_angle=u),
         "four-bar past two change points a turn": lambda: fourbar.sweep(driven, tables, reuse=fourbar_result),
     }
-    absent = ""
-    for name, way in ((LOOP, _numba_loop), (PYLINKAGE, _pylinkage)):
-        try:
-            ways[name] = way(u, columns)
-        except MissingPackageError as error:
-            absent += f"\n{error}"
+    absent = []
+    try:
+        ways[PYLINKAGE] = _pylinkage(u)
+    except MissingPackageError as error:
+        absent.append(str(error))
     times = [
         spread([value / samples * 1e9 for value in seconds])
         for seconds in in_turn(list(ways.values()), rounds, process_time)
@@ -70,10 +68,9 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES, loops: int = 1000) -> str:
     lines += table(("", "median", "min", "max", "times closed form"), rows)
     medians = dict(zip(ways, (time.median for time in times), strict=True))
     lines.append(f"q alone takes {medians[ALONE] / medians[WHOLE]:.2f} of the time of q, qd, qdd")
-    lines += [
-        f"{name}: {medians[name] / medians[WHOLE]:.1f} times that time" for name in (LOOP, PYLINKAGE) if name in medians
-    ]
-    return "\n".join([*lines, *_chain(rounds, loops)]) + absent
+    if PYLINKAGE in medians:
+        lines.append(f"{PYLINKAGE}: {medians[PYLINKAGE] / medians[WHOLE]:.1f} times that time")
+    return "\n".join([*lines, *_chain(rounds, loops), *absent])
 
 
 def _allocated(samples: int) -> list[FloatArray]:
@@ -114,7 +111,7 @@ def closed_form(u: FloatArray, columns: FloatArray) -> Callable[[], object]:
     return way
 
 
-def _pylinkage(u: FloatArray, columns: FloatArray) -> Callable[[], object]:  # noqa: ARG001  it makes arrays of its own
+def _pylinkage(u: FloatArray) -> Callable[[], object]:
     """Return a function that computes positions, velocities and accelerations of the two moving joints."""
     if find_spec("pylinkage") is None or find_spec("numba") is None:
         raise MissingPackageError("pylinkage with numba is not installed: pip install 'kinfmu[bench]'")
@@ -139,33 +136,3 @@ def _pylinkage(u: FloatArray, columns: FloatArray) -> Callable[[], object]:  # n
         return linkage.step_fast_with_kinematics(len(u))
 
     return way
-
-
-def _numba_loop(u: FloatArray, columns: FloatArray) -> Callable[[], object]:
-    if find_spec("numba") is None:
-        raise MissingPackageError("numba is not installed: pip install 'kinfmu[bench]'")
-    import numba
-
-    loop: Any = numba.njit(_loop)
-    ground, crank, coupler, rocker = LENGTHS
-    return lambda: loop(u, ground, crank, coupler, rocker, columns)
-
-
-def _loop(u: FloatArray, g: float, a: float, b: float, c: float, columns: FloatArray) -> None:
-    """Fill columns (15, n) by the closed form, sample after sample, at speed 1."""
-    for i in range(len(u)):
-        s, k = a * np.sin(u[i]), a * np.cos(u[i])
-        dx, dy = g - k, -s
-        square = dx * dx + dy * dy
-        e = 0.5 + 0.5 * (b * b - c * c) / square
-        h = np.sqrt(b * b / square - e * e)
-        qx, qy = e * dx - h * dy, e * dy + h * dx
-        rx, ry = qx - dx, qy - dy
-        det = qx * ry - qy * rx
-        w2, w3 = (s * rx - k * ry) / det, (s * qx - k * qy) / det
-        ax, ay = k + qx * w2 * w2 - rx * w3 * w3, s + qy * w2 * w2 - ry * w3 * w3
-        columns[0, i], columns[1, i], columns[2, i] = u[i], k, s
-        columns[3, i], columns[4, i] = np.arctan2(qy, qx), np.arctan2(ry, rx)
-        columns[5, i], columns[6, i], columns[7, i], columns[8, i], columns[9, i] = 1.0, -s, k, w2, w3
-        columns[10, i], columns[11, i], columns[12, i] = 0.0, -k, -s
-        columns[13, i], columns[14, i] = (ax * rx + ay * ry) / det, (ax * qx + ay * qy) / det

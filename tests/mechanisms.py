@@ -1,14 +1,19 @@
-"""Mechanisms for the tests of several packages, built in Python."""
+"""Mechanisms for the tests of several packages: built in Python, scaled, and with lengths as parameters."""
 
 from __future__ import annotations
 
 import cmath
 import math
+import re
 from dataclasses import replace
+from typing import Any
 
 from kinfmu import AngleDriver, Body, ConstantSpeed, Coordinate, Distance, Mechanism, Revolute, load
+from kinfmu.mechanism.members import NumberPath
+from kinfmu.mechanism.operations import Dimension
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text
+from kinfmu.units import Quantity
 
 
 def reference_fourbar(bar: float = 1.0, start_degrees: float = 60.0) -> Mechanism:
@@ -339,3 +344,60 @@ def wheels(rods: dict[str, tuple[int, int, float]], *, start: float = 0.5, secon
         drivers.append(AngleDriver("arm", "arm", ConstantSpeed(0.0, 1.0)))
     pivots = {f"O{k}": (2.0 * k, 0.0) for k in range(count)} | ({"S": (0.0, 3.0)} if second else {})
     return Mechanism("wheels", [Body("ground", pivots), *bodies], joints, drivers)
+
+
+# --------------------------------------------------------------------------------------------------------------- scaled
+
+
+def scaled(mechanism: Mechanism, factor: float) -> Mechanism:
+    """The same mechanism `factor` times as large, at the same times; expressions are numbers in it.
+
+    A factor that is a power of two changes no digit, any other leaves 15 decimal ones.
+    """
+    exact = math.frexp(factor)[0] == 0.5
+
+    def larger(_: NumberPath, value: Any, quantity: Quantity) -> Any:
+        power = int(Dimension.of(quantity).length)
+        if value is None or isinstance(value, bool | int | str):
+            return value
+        product = float(value) * factor**power
+        return product if exact else float(f"{product:.15g}")
+
+    members = mechanism.members.changed(larger)
+    return replace(
+        mechanism,
+        bodies=members.bodies,
+        joints=members.joints,
+        drivers=members.drivers,
+        run=members.run,
+        parameters={},
+    )
+
+
+# --------------------------------------------------------------------------------------------------------- open lengths
+
+
+_NUMBER = re.compile(r"-?\d+\.\d+(e[-+]?\d+)?")
+
+
+def with_open_lengths(mechanism: Mechanism) -> Mechanism:
+    """Return the mechanism with parameters p0, p1, ... in place of all numbers of points, lengths and radii."""
+    values: list[str] = []
+
+    def opened(found: re.Match[str]) -> str:
+        values.append(found.group())
+        return f'"p{len(values) - 1}"'
+
+    lines = []
+    for line in text(mechanism).split("\n"):
+        key, sign, rest = line.partition(" = ")
+        is_length = key in ("points", "length", "radius", "radii") and not rest.startswith("[[")  # no table of a law
+        lines.append(f"{key}{sign}{_NUMBER.sub(opened, rest)}" if is_length else line)
+    head = [f'p{k} = "{value} {mechanism.length_unit}"' for k, value in enumerate(values)]
+    if "[parameters]" in lines:
+        at = lines.index("[parameters]") + 1
+        lines[at:at] = head
+    else:
+        at = lines.index("[run]") if "[run]" in lines else lines.index("[bodies.ground]")
+        lines[at:at] = ["[parameters]", *head, ""]
+    return parse("\n".join(lines))

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import Mechanism, Run
+from kinfmu import Run
 from kinfmu.solver.python import Status
+from tests.analysis.linkages import pushed_crank
 from tests.mechanisms import fourbar, reference_fourbar
 
 LOCKED_AT_90_DEGREES = (4.0, 3.0, 2.5, 2.5)
@@ -66,9 +67,9 @@ def test_a_residual_above_the_tolerance_is_not_converged() -> None:
 
 
 def test_the_margin_falls_to_zero_where_a_row_of_a_block_vanishes() -> None:
-    run = kinfmu.solve(_driven_by_its_piston(), piston_position=3.0 - np.logspace(-1, -13, 13))
+    run = kinfmu.solve(pushed_crank(rod=2.0, offset=0.0), push_position=3.0 - np.logspace(-1, -13, 13))
     assert_numbers_where_good(run)
-    m = np.sqrt(3.0 - run["piston_position"])  # the determinant goes with the root of the way to the dead centre
+    m = np.sqrt(3.0 - run["push_position"])  # the determinant goes with the root of the way to the dead centre
     assert (np.diff(run.margin) < 0.0).all()
     assert (run.margin < 2.0 * m).all()
     assert run.status[-1] == Status.NEAR_SINGULAR
@@ -99,28 +100,6 @@ def test_a_simulation_ends_at_the_limit_with_a_sample_that_holds_no_numbers(tmp_
     assert run.good[:6].all()
     assert run.status[-1] == Status.OUTSIDE
     assert "cannot be reached: the limit is" in run.events[-1].text
-
-
-def _driven_by_its_piston() -> Mechanism:
-    tip = (math.cos(1.0), math.sin(1.0))
-    lean = -math.asin(tip[1] / 2.0)
-    x = tip[0] + 2.0 * math.cos(lean)
-    return Mechanism(
-        "engine",
-        [
-            kinfmu.Body("ground", {"O": (0, 0)}),
-            kinfmu.Body("crank", {"O": (0, 0), "P": (1, 0)}, (0, 0, 1.0)),
-            kinfmu.Body("rod", {"P": (0, 0), "S": (2, 0)}, (*tip, lean)),
-            kinfmu.Body("piston", {"S": (0, 0)}, (x, 0, 0)),
-        ],
-        [
-            kinfmu.Revolute("O", ("ground.O", "crank.O")),
-            kinfmu.Revolute("P", ("crank.P", "rod.P")),
-            kinfmu.Revolute("S", ("rod.S", "piston.S")),
-            kinfmu.Translational("slide", ("ground.O", "piston.S")),
-        ],
-        [kinfmu.SlideDriver("piston", ("ground.O", "piston.S"), law=kinfmu.ConstantSpeed(x, 1.0))],
-    )
 
 
 def _csv(path: Path) -> dict[str, np.ndarray]:

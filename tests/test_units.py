@@ -1,13 +1,18 @@
-"""Units that files may write, and units that variables declare; names of derivatives."""
+"""Units: conversion, and advice where a number is in another one."""
 
 from __future__ import annotations
 
 import copy
 import math
+from collections.abc import Callable
 from fractions import Fraction
+from typing import Any
 
 import pytest
 
+import kinfmu
+from kinfmu.errors import KinfmuError
+from kinfmu.mechanism.toml_file import parse
 from kinfmu.units import (
     METRES,
     CoordinateName,
@@ -23,6 +28,7 @@ from kinfmu.units import (
     read_inputs,
     unit_of,
 )
+from tests.mechanism.test_wrong_files import CRANK_ROCKER
 
 EXACT = {"m": "1", "mm": "0.001", "cm": "0.01", "um": "0.000001", "km": "1000", "in": "0.0254", "ft": "0.3048"}
 
@@ -159,3 +165,41 @@ def test_names_in_files_become_values() -> None:
 )
 def test_texts_that_are_no_inputs_are_recognized(texts: list[str]) -> None:
     assert read_inputs(texts) is None
+
+
+# ---------------------------------------------------------------------------------------------------------- unit advice
+
+
+MECHANISM = parse(CRANK_ROCKER.replace("crank = 1.0", "size = 1.25", 1).replace('"crank", 0', '"0.8*size", 0', 1))
+MEASURE = {"swing": {"type": "range", "of": "rocker.phi"}}
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: kinfmu.study(MECHANISM, {"size": {"from": "25 mm", "to": "35 mm"}}, measures=MEASURE),
+        lambda: kinfmu.study(MECHANISM, {"size": {"tolerance": "25 mm"}}, measures=MEASURE),
+    ],
+    ids=["range", "tolerance"],
+)
+def test_the_message_states_the_cure(call: Callable[[], Any]) -> None:
+    with pytest.raises(KinfmuError) as caught:
+        call()
+    assert "'25 mm': unit 'mm' does not belong to a pure number; size has no unit in the mechanism file" in str(
+        caught.value
+    )
+    assert str(caught.value).endswith('write there size = "1.25 m"')
+
+
+def test_a_fit_states_the_cure_too(tmp_path: Any) -> None:
+    from kinfmu.mechanism.toml_text import text
+
+    swing = '[measures.swing]\ntype = "range"\nof = "rocker.phi"\n'
+    (tmp_path / "mine.toml").write_text(f"{text(MECHANISM)}\n{swing}", encoding="utf-8")
+    (tmp_path / "fit.toml").write_text(
+        'mechanism = "mine.toml"\n[unknowns]\nsize = ["1000 mm", "1500 mm"]\n[targets.swing]\ntype = "measure"\n'
+        'of = "swing"\nvalue = 1.0\n',
+        encoding="utf-8",
+    )
+    with pytest.raises(KinfmuError, match=r'size = "1\.25 m"$'):
+        kinfmu.fit(tmp_path / "fit.toml")

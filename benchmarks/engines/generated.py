@@ -1,15 +1,15 @@
-"""The Python engine bare: generated code without step control, in every setting of Newton."""
+"""The Python engine bare: generated code without step control, with each predictor."""
 
 from __future__ import annotations
 
 from benchmarks.case import Case, Motion
-from benchmarks.engine import GAP, BenchEngine, EngineSetting, Sampler, newton
-from benchmarks.stopping import model_with
+from benchmarks.engine import GAP, BenchEngine, EngineSetting, Sampler
+from kinfmu.codegen.python import load_model
 
 
 def _sampler(case: Case, setting: EngineSetting) -> Sampler:
     """Return a sampler: `position` of the generated model from one sample to the next, and its rates."""
-    model = model_with(case.plan, setting)
+    model = load_model(case.plan)
     start = case.start
     alone = len(case.u[0]) == 1
     rest = (0.0,) * len(start.z)
@@ -51,4 +51,4 @@ def _sampler(case: Case, setting: EngineSetting) -> Sampler:
     return take
 
 
-GENERATED = BenchEngine("generated Python", _sampler, newton())
+GENERATED = BenchEngine("generated Python", _sampler, tuple(EngineSetting(order) for order in range(3)))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from benchmarks.case import Case, Motion
-from benchmarks.engine import GAP, ROUND_OFF, BenchEngine, EngineSetting, Sampler, newton
+from benchmarks.engine import GAP, ROUND_OFF, BenchEngine, EngineSetting, Sampler
 from kinfmu.arrays import FloatArray
 from kinfmu.errors import PoseError
 from kinfmu.plan.equations.reference import Solution
@@ -93,5 +93,13 @@ def _predicted(last: Solution, h: float, order: int) -> FloatArray:
 READABLE = BenchEngine(
     "readable reference",
     _sampler,
-    settings=newton(tolerances=(1e-3, 1e-9, ROUND_OFF), chord=(2,)),  # few, because this engine is the slowest
+    settings=tuple(
+        setting
+        for order in range(3)
+        for setting in (
+            *(EngineSetting(order, corrections=n) for n in range(4) if order + n > 0),
+            *(EngineSetting(order, tolerance) for tolerance in (1e-3, 1e-9, ROUND_OFF)),
+            *(EngineSetting(order, corrections=n, chord=True) for n in (2, None)),
+        )
+    ),
 )

@@ -258,7 +258,7 @@ def test_a_file_whose_bodies_or_joints_are_invalid_has_no_report(
 @pytest.mark.few(1)
 def test_a_terminal_shows_a_problem_once(old: str, new: str, fourbar_file: Callable[..., Path]) -> None:
     """Of a file that is reported in part, and of a mechanism that does not close."""
-    on_a_terminal = pytest.importorskip("tests.cli.test_colours").on_a_terminal
+    on_a_terminal = pytest.importorskip("tests.cli.test_command_line").on_a_terminal
     path = fourbar_file(old, new)
     shown = on_a_terminal(("-m", "kinfmu", "check", path.name), path.parent, {}).decode()
     *report, message = shown.splitlines()

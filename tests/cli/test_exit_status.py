@@ -1,16 +1,22 @@
-"""Exit status of every command, and its message: 1 error in the mechanism or the run, 2 wrong usage."""
+"""Exit statuses, of commands that are stopped and of those that find a full disk too."""
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
 import kinfmu
+from kinfmu import log
 from kinfmu.cli import main
 from kinfmu.mechanism import gallery
 from tests.cli.conftest import Command
+from tests.gallery_members import mostly_long
 
 FILES = {
     "broken.toml": "name = 'broken'\n[bodies.crank]\nponts = {}\n",
@@ -192,3 +198,82 @@ def test_every_command_that_can_be_at_fault_is_in_the_tables() -> None:
     refused, at_fault = ({arguments.split()[0] for arguments, _ in table} for table in (WRONG_USAGE, AT_FAULT))
     assert refused >= set(main.commands)
     assert at_fault >= set(main.commands) - {"list", "new", "schema"}
+
+
+# -------------------------------------------------------------------------------------------------------------- stopped
+
+
+def press(*_: object, **__: object) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("early", ["kinfmu.fmu.build", "kinfmu.fmu.simulate"])
+def test_simulate_that_is_stopped_before_the_first_sample_says_that_nothing_was_kept(
+    early: str, fails: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(early, press)
+    assert fails("simulate", "fourbar") == "stopped before the first sample: nothing was kept"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_simulate_that_is_stopped_while_the_recording_is_written_says_where_the_run_is(
+    fails: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("kinfmu.log.write_rrd", press)
+    message = fails("simulate", "fourbar", "--mcap", "run.mcap")
+    assert message == "stopped before the recording was written; the run is in run.mcap"
+    assert len(log.read(tmp_path / "run.mcap")) == 181
+
+
+@pytest.mark.parametrize("early", ["kinfmu.run.solve.solve", "kinfmu.log.write_table"])
+def test_solve_that_is_stopped_says_that_nothing_was_written(
+    early: str, fails: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(early, press)
+    message = fails("solve", "fourbar", "-o", "run.csv")
+    assert message == "stopped before the run was complete: nothing was written"
+    assert list(tmp_path.iterdir()) == []
+
+
+# ------------------------------------------------------------------------------------------------------------ full disk
+
+
+PROGRAM = """
+import resource, signal, sys
+from kinfmu.cli import main
+
+limit, *arguments = sys.argv[1:]
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(limit), int(limit)))
+main(arguments)
+"""
+COMMANDS = {
+    "schema": (["schema", "-o", "out.json"], "out.json"),
+    "build": (["build", "fourbar", "--flavour", "python", "-o", "out.fmu"], "out.fmu"),
+    "figure": (["check", "fourbar", "--figure", "out.svg"], "out.svg"),
+    "new": (["new", "fourbar", "out.toml"], "out.toml"),
+}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a limit on the size of files simulates a full disk")
+@pytest.mark.parametrize("name", mostly_long(COMMANDS, few=("schema", "figure", "new")))
+@pytest.mark.few(1)
+def test_a_full_disk_is_reported_in_one_line_and_leaves_no_file(name: str, tmp_path: Path) -> None:
+    arguments, out = COMMANDS[name]
+    existed = name != "new"  # new never replaces a file
+    if existed:
+        (tmp_path / out).write_text("older")
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, "400", *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+    )
+    assert done.returncode == 1
+    *_, line = done.stderr.splitlines()  # before it, matplotlib may report that its cache cannot be written
+    assert line == f"kinfmu: {out}: cannot be written (File too large)"
+    assert [path.name for path in tmp_path.iterdir()] == ([out] if existed else [])
+    if existed:
+        assert (tmp_path / out).read_text() == "older"

@@ -1,8 +1,10 @@
-"""kinfmu solve: tables of times, driver values, settings and outputs; invalid ones are reported."""
+"""`kinfmu solve` with values from the command line, and logs of `kinfmu simulate`."""
 
 from __future__ import annotations
 
 import math
+import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,6 +12,7 @@ import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu import log
 from kinfmu.log import read
 from tests.cli.conftest import Command, read_csv
 
@@ -206,3 +209,149 @@ def test_numbers_may_be_quotients(step: str, command: Command, refuses: Callable
     np.testing.assert_allclose(read_csv(tmp_path / "run.csv")["time"], np.arange(361) / 360.0, rtol=1e-15)
     for wrong in ("1/0 s", "1/x s", "/3 s", "1/2/3 s"):
         assert "is not a number" in refuses("solve", "fourbar", "-o", "run.csv", "--times", f"0:1:{wrong}")
+
+
+# ------------------------------------------------------------------------------------------------------------------ set
+
+
+LINKAGE = """
+name = "press"
+
+[parameters]
+crank = "40 mm"
+rod = "3*crank"
+turns = 2 # a second
+
+[units]
+length = "mm"
+
+[bodies.ground]
+points = { O = [0, 0] }
+[bodies.crank]
+points = { O = [0, 0], P = ["crank", 0] }
+start = { phi = 0.5 }
+[bodies.rod]
+points = { P = [0, 0], S = ["rod", 0] }
+start = { phi = -0.2 }
+[joints]
+O = { type = "revolute", between = ["ground.O", "crank.O"] }
+P = { type = "revolute", between = ["crank.P", "rod.P"] }
+guide = { type = "coordinate", of = "rod.S", axis = "y" }
+[drivers]
+crank = { type = "angle", of = "crank", law = "constant_speed", start = 0.5, speed = "2*pi*turns" }
+[points]
+slide = "rod.S"
+[run]
+stop = 0.5
+step = 0.01
+"""
+
+
+@pytest.fixture
+def press(tmp_path: Path) -> Path:
+    path = tmp_path / "press.toml"
+    path.write_text(LINKAGE, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def changed(tmp_path: Path) -> Path:
+    """The same file with the numbers that are set elsewhere."""
+    path = tmp_path / "changed.toml"
+    text = LINKAGE.replace('crank = "40 mm"', "crank = 50").replace("turns = 2 ", "turns = 3 ")
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+SET = ("--set", "crank=5cm", "--set", "turns=3")
+
+
+def test_solve_with_set_is_solve_of_a_file_with_those_numbers(command: Command, press: Path, changed: Path) -> None:
+    assert command("solve", press, *SET, "-o", "set.csv").exit_code == 0
+    assert command("solve", changed, "-o", "file.csv").exit_code == 0
+    by_set, by_file = read_csv(Path("set.csv")), read_csv(Path("file.csv"))
+    assert list(by_set) == list(by_file)
+    for name, column in by_file.items():
+        if not name.startswith("solver."):
+            np.testing.assert_allclose(by_set[name], column, rtol=0, atol=1e-12 * max(1.0, np.abs(column).max()))
+    u = 0.5 + 6.0 * np.pi * by_set["time"]
+    np.testing.assert_allclose(by_set["slide.x"], 50 * np.cos(u) + np.sqrt(150**2 - (50 * np.sin(u)) ** 2), rtol=1e-13)
+
+
+def test_driver_values_go_with_other_geometry(command: Command, press: Path) -> None:
+    assert command("solve", press, "--set", "crank=50", "--angle", "0deg:90deg:3", "-o", "run.csv").exit_code == 0
+    slide = read_csv(Path("run.csv"))["slide.x"]
+    np.testing.assert_allclose(slide, [200.0, np.sqrt(0.5) * 50 + np.sqrt(150**2 - 1250), np.sqrt(150**2 - 2500)])
+
+
+def test_simulate_with_set_steps_the_same_motion(command: Command, press: Path, changed: Path) -> None:
+    assert command("simulate", press, *SET, "--mcap", "set.mcap", "--rrd", "set.rrd").exit_code == 0
+    run, wanted = kinfmu.log.read("set.mcap"), kinfmu.solve(kinfmu.load(changed))
+    np.testing.assert_allclose(run.values, wanted.values, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(run.rates, wanted.rates, rtol=0, atol=1e-9)
+
+
+def test_an_fmu_is_built_with_the_numbers_set_and_takes_others(command: Command, press: Path, changed: Path) -> None:
+    assert command("build", press, *SET, "-o", "press.fmu").exit_code == 0
+    run = kinfmu.simulate("press.fmu")
+    np.testing.assert_allclose(run.values, kinfmu.solve(kinfmu.load(changed)).values, rtol=0, atol=1e-11)
+    back = kinfmu.simulate("press.fmu", parameters={"crank": 40.0, "turns": 2.0})
+    np.testing.assert_allclose(back.values, kinfmu.solve(kinfmu.load(press)).values, rtol=0, atol=1e-11)
+
+
+# ----------------------------------------------------------------------------------------------------- logs of simulate
+
+
+def test_channels_and_rate_choose_what_is_kept(command: Command, tmp_path: Path) -> None:
+    result = command("simulate", "fourbar", "--channels", "q, residual", "--rate", "0.1")
+    assert result.exit_code == 0
+    run = log.read(tmp_path / "logs" / "fourbar.mcap")
+    assert run.t.tolist() == [10.0 * k for k in range(19)]
+    assert [column.name for column in run.columns()] == ["time", *run.names, "solver.status", "solver.residual"]
+    assert result.stdout.startswith("19 samples: ")
+
+
+def test_a_minus_leaves_out(command: Command, tmp_path: Path) -> None:
+    assert command("simulate", "fourbar", "--stop", "2", "--channels", "-error,-residual").exit_code == 0
+    run = log.read(tmp_path / "logs" / "fourbar.mcap")
+    assert run.absent == {"solver.residual", *(f"solver.error_{order}" for order in ("q", "qd", "qdd"))}
+
+
+def test_none_leaves_no_logs(command: Command, refuses: Callable[..., str], tmp_path: Path) -> None:
+    result = command("simulate", "fourbar", "--channels", "none")
+    assert result.exit_code == 0
+    assert result.stdout.startswith("181 samples: ")
+    assert "nan" not in result.stdout
+    assert "written" not in result.stdout
+    assert not list(tmp_path.iterdir())
+    message = refuses("simulate", "fourbar", "--channels", "none", "--mcap", "run.mcap")
+    assert message == "--channels none leaves nothing to write to run.mcap"
+
+
+@pytest.mark.parametrize(
+    ("model", "name"), [("fourbar_chain:2", "fourbar_chain_2"), ("mine.toml", "mine"), ("other.fmu", "other")]
+)
+@pytest.mark.few(1)
+def test_logs_have_the_name_of_what_is_simulated(
+    model: str, name: str, command: Command, fourbar_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    fourbar_file(name="mine.toml")
+    assert command("build", "fourbar", "-o", "other.fmu").exit_code == 0
+    assert command("simulate", model, "--stop", "1").exit_code == 0
+    assert sorted(path.name for path in (tmp_path / "logs").iterdir()) == [f"{name}.mcap", f"{name}.rrd"]
+
+
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="names of files are Unicode there")
+@pytest.mark.parametrize("place", [b"caf\xe9.toml", b"M\xfcll/mine.toml"])  # Latin-1
+def test_names_of_files_need_not_be_utf8(
+    place: bytes, command: Command, fourbar_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    file = tmp_path / os.fsdecode(place)
+    file.parent.mkdir(exist_ok=True)
+    fourbar_file(name="mine.toml").replace(file)
+    logs = [file.with_suffix(suffix) for suffix in (".mcap", ".rrd")]
+    assert command("simulate", str(file), "--stop", "1", "--mcap", str(logs[0]), "--rrd", str(logs[1])).exit_code == 0
+    assert log.read(logs[0]).good.all()
+    compared = file.with_name(os.fsdecode(b"\xe9.rrd"))
+    assert command("review", str(logs[0]), str(logs[0]), "--save", str(compared)).exit_code == 0
+    assert all(b"RRF" in path.read_bytes()[-64:] for path in (logs[1], compared))

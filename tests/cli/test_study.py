@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from kinfmu.cli import main
-from tests.cli.test_colours import on_a_terminal
+from tests.cli.test_command_line import on_a_terminal
 from tests.design.study.linkage import write
 
 GRID = 'mechanism = "hoeken.toml"\nparameters.base = { from = 40, to = 300, count = 3 }\n'

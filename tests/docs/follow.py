@@ -36,7 +36,7 @@ NOT_RUN = {  # beginnings of the commands and blocks that no page runs in the te
     "scripts/bench": "measures for minutes; tests/benchmarks runs the parts",
     "kinfmu build mine.toml --fmi 3 --platforms all": "zig compiles for minutes; tests/fmu/native/test_build.py",
     "kinfmu build fourbar --platforms all": "zig compiles for minutes; tests/fmu/native/test_build.py",
-    "kinfmu simulate mine.toml --live": "opens the viewer; tests/log/viewer/test_live.py",
+    "kinfmu simulate mine.toml --live": "opens the viewer; tests/log/viewer/test_reviewing.py",
     "kinfmu review logs/fourbar.mcap --screenshot": "needs a graphics driver; tests/log/viewer/test_reviewing.py",
     "kinfmu study tolerances.toml --dask": "needs a cluster; tests/design/study/test_workers.py",
     "from OMSimulator import": "OMSimulator is not installed",

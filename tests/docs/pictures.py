@@ -19,7 +19,7 @@ from kinfmu.cli import main
 from kinfmu.draw import figure
 from kinfmu.page import page
 from tests.mechanism.loads.every_load import every_load
-from tests.page.browser import DESKTOP, PHONE
+from tests.page.engines import DESKTOP, PHONE
 
 DOCS = Path(__file__).parents[2] / "docs"
 COMMANDS = {  # of each page with files, and the pictures that they draw

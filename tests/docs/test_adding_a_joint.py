@@ -54,7 +54,7 @@ def run(project: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.long
 def test_the_contract_tests_pick_the_new_joint_up_and_pass(project: Path) -> None:
-    files = ("tests/mechanism/joints/test_contract.py", "tests/mechanism/test_members.py")
+    files = ("tests/mechanism/joints/test_contract.py", "tests/mechanism/test_mechanism.py")
     done = run(project, "-m", "pytest", *files, "-q", "-k", "opposed")
     assert done.returncode == 0, done.stdout + done.stderr
     (passed,) = re.findall(r"(\d+) passed", done.stdout)

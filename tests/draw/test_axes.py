@@ -1,26 +1,42 @@
-"""Figures and plots in Axes of matplotlib that the caller gives."""
+"""Axes, titles and fits of figures, and the figures that are committed."""
 
 from __future__ import annotations
 
+import dataclasses
 import subprocess
 import sys
+from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 import kinfmu
+from kinfmu import load
+from kinfmu.arrays import FloatArray
 from kinfmu.draw import figure, plot
 from kinfmu.draw.chart import unit_in
 from kinfmu.draw.drawing import sheet_of
+from kinfmu.draw.fitted import Curve, Fitted, figure_of
 from kinfmu.draw.instant import instant
+from kinfmu.draw.plots import _sheet
+from kinfmu.draw.sheet import INCH, Sheet, title_lines
+from kinfmu.draw.stacks import stacks_of
 from kinfmu.draw.writing import figure_style
 from kinfmu.errors import FigureError, KinfmuError, RequestError
+from kinfmu.mechanism import gallery
 from kinfmu.run import Run
 from tests.draw.picture import differences, picture
+from tests.gallery_members import every_member
 from tests.log.runs import fourbar, with_gap
+from tests.mechanism.loads.every_load import every_load
+from tests.mechanisms import fourbar as general_fourbar
 
 
 @pytest.fixture
@@ -146,3 +162,164 @@ def test_a_coordinate_that_a_joint_holds_has_the_unit_of_its_derivative(name: st
     assert unit_in(run, name) == unit
     with pytest.raises(KinfmuError, match=r"the run has no column 'piston\.beta'"):
         unit_in(run, "piston.beta")
+
+
+# ---------------------------------------------------------------------------------------------------------------- title
+
+
+pytest.importorskip("matplotlib")
+
+LONG = "Gripper with parallel jaws whose piston opens two of them through bell cranks of a kind"
+
+
+def titled(title: str) -> Run:
+    run = fourbar(np.arange(10.0))
+    return dataclasses.replace(run, info={**run.info, "title": title})
+
+
+def test_a_title_that_fits_is_one_line() -> None:
+    assert title_lines("Gripper with parallel jaws", 400.0) == ["Gripper with parallel jaws"]
+    assert title_lines("", 400.0) == []
+    assert title_lines("A", 400.0) == ["A"]
+
+
+def test_a_long_title_continues_on_a_second_line_and_ends_in_an_ellipsis() -> None:
+    assert " ".join(title_lines(LONG, 400.0)) == LONG
+    assert title_lines(LONG, 200.0) == ["Gripper with parallel jaws whose", "piston opens two of them through…"]
+    first, second = title_lines("W" * 90, 200.0)
+    assert set(first) == {"W"}
+    assert second == f"{first}…"
+
+
+@pytest.mark.parametrize(
+    "title", ["\U0001f468\ue1ff", pytest.param("a" * 10_000, marks=pytest.mark.long), "$\\frac{$ {} %s <b>&amp;"]
+)
+@pytest.mark.few(1)
+def test_any_line_of_text_is_a_title_of_every_picture(title: str, tmp_path: Path) -> None:
+    mechanism = dataclasses.replace(load("fourbar"), title=title)
+    figure(mechanism, tmp_path / "a.svg")
+    plot(titled(title), tmp_path / "b.svg")
+    for name in ("a.svg", "b.svg"):
+        ET.parse(tmp_path / name)  # noqa: S314  # written just now
+
+
+@pytest.mark.parametrize("title", ["Four-bar", LONG, "W" * 200])
+@pytest.mark.parametrize("unit", ["m", None])
+def test_the_title_of_a_figure_is_in_the_picture(title: str, unit: str | None) -> None:
+    figure = Sheet(np.array([[0.0, 0.0], [0.5, 4.0]]), 1.0, unit, title).figure
+    figure.canvas.draw()
+    texts = [*figure.axes[0].texts, figure.axes[0]._left_title]
+    boxes = [text.get_window_extent() for text in texts if text.get_text()]
+    assert len(boxes) == 1
+    assert boxes[0].x0 >= 0.0
+    assert boxes[0].x1 <= figure.bbox.x1
+    assert boxes[0].y1 <= figure.bbox.y1
+
+
+@pytest.mark.parametrize("title", ["Four-bar", LONG, "W" * 200])
+def test_the_title_of_plots_is_in_the_picture_and_above_the_names(title: str) -> None:
+    figure = _sheet([titled(title)], stacks_of(fourbar(np.arange(10.0)), ["coupler.x"]))
+    figure.canvas.draw()
+    (box,) = (text.get_window_extent() for text in figure.texts)
+    assert box.x1 <= figure.bbox.x1
+    assert box.y1 <= figure.bbox.y1
+    assert box.y0 > figure.axes[0]._left_title.get_window_extent().y1
+
+
+@pytest.mark.parametrize("stop", [1.0, 1e5, 9e5, 0.0123456])
+@pytest.mark.few(2)
+def test_the_number_of_the_last_tick_is_in_the_picture(stop: float) -> None:
+    run = fourbar(np.arange(10.0))
+    figure = _sheet(
+        [dataclasses.replace(run, t=np.linspace(0.0, stop, 10))],
+        stacks_of(run, ["coupler.x", "coupler.y"]),
+    )
+    figure.canvas.draw()
+    assert figure.axes[-1].xaxis.get_tightbbox().x1 <= figure.bbox.x1
+
+
+# --------------------------------------------------------------------------------------------------------------- fitted
+
+
+def panels(step: float) -> list[Axes]:
+    """Of a fit whose five wanted points are `step` apart [m]."""
+    wanted = np.array([0.2, 0.1]) + step * np.column_stack([np.arange(5.0), 0.1 * np.arange(5.0) ** 2])
+    found = figure_of(Fitted(kinfmu.load("fourbar"), None, [Curve("P", wanted, wanted, wanted)], []))
+    found.draw_without_rendering()
+    return list(found.axes)
+
+
+def markers(axes: Axes) -> tuple[float, float]:
+    """Size of the wanted points, and their smallest distance on the paper, both [pt]."""
+    (line,) = (line for line in axes.lines if line.get_label() == "P: wanted")
+    at = axes.transData.transform(line.get_xydata()) * INCH / axes.figure.dpi
+    return line.get_markersize(), min(float(np.hypot(*(b - a))) for a, b in pairwise(at))
+
+
+def test_points_close_together_are_separate_and_enlarged() -> None:
+    drawing, enlarged = panels(0.05)
+    size, apart = markers(drawing)
+    assert size < 6.0
+    assert size < apart
+    size, apart = markers(enlarged)
+    assert size == 6.0
+    assert apart > 30.0
+    (x0, y0), (x1, y1) = enlarged.transData.transform([[0.0, 0.0], [0.01, 0.01]])
+    assert x1 - x0 == pytest.approx(y1 - y0)
+    assert enlarged.get_title(loc="left") == "P, enlarged"
+    assert (enlarged.get_xlabel(), enlarged.get_ylabel()) == ("x [m]", "y [m]")
+    assert np.ptp(enlarged.get_xlim()) == pytest.approx(1.24 * 0.2)
+
+
+def test_points_far_apart_need_no_panel() -> None:
+    (drawing,) = panels(0.3)
+    assert markers(drawing)[0] == 6.0
+
+
+@pytest.mark.parametrize("name", ["crank_rocker", "jansen_leg", "slider_crank", "watt_six_bar", "double_crank"])
+@pytest.mark.few(1)
+def test_the_name_of_the_driver_keeps_off_a_curve_through_its_usual_place(name: str) -> None:
+    mech = kinfmu.load(name)
+
+    def drawn(curve: FloatArray) -> tuple[Axes, Bbox]:
+        made = figure_of(Fitted(mech, 1.0, [Curve("path", curve[:2], curve[:2], curve)], []))
+        FigureCanvasAgg(made).draw()
+        (text,) = (text for text in made.axes[0].texts if text.get_text().startswith(f"{mech.drivers[0].name} = "))
+        return made.axes[0], text.get_window_extent()
+
+    far = np.array([[0.0, 0.0], [0.0, 1e-3]])
+    axes, box = drawn(far)
+    x, y = (box.x0 + box.x1) / 2.0, (box.y0 + box.y1) / 2.0
+    across = np.linspace([x - 40.0, y - 9.0], [x + 40.0, y + 9.0], 200)
+    curve = axes.transData.inverted().transform(across)
+    axes, box = drawn(curve)
+    on_paper = axes.transData.transform(curve)
+    assert not ((box.min + 1.0 < on_paper) & (on_paper < box.max - 1.0)).all(axis=1).any()
+
+
+# ------------------------------------------------------------------------------------------------------------ committed
+
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+@every_member
+def test_the_figure_in_the_gallery_is_current(name: str, gallery_figure: Callable[[str], Path]) -> None:
+    there, now = picture(gallery.folder() / name / "figure.svg"), picture(gallery_figure(name))
+    assert not differences(there, now), "scripts/pictures draws it anew"
+
+
+def test_the_figure_of_every_load_in_the_docs_is_current(tmp_path: Path) -> None:
+    figure(every_load(), tmp_path / "now.svg")
+    there, now = picture(DOCS / "loads.svg"), picture(tmp_path / "now.svg")
+    assert not differences(there, now), "scripts/pictures draws it anew"
+
+
+def test_pictures_of_two_mechanisms_differ_in_shapes_and_texts(tmp_path: Path) -> None:
+    figure(general_fourbar(4.0, 1.0, 3.5, 3.0), tmp_path / "one.svg")
+    figure(general_fourbar(4.0, 1.0, 3.5, 3.2), tmp_path / "other.svg")
+    one, other = picture(tmp_path / "one.svg"), picture(tmp_path / "other.svg")
+    assert {line.partition(" ")[0].strip(":") for line in differences(one, other)} >= {"shape", "text"}
+    assert {"crank", "coupler", "rocker"} <= {text.look.split("'")[1] for text in one.texts}
+    assert any(np.ptp(shape.points, axis=0).max() > 100.0 for shape in one.shapes)
+    assert not differences(one, one)

@@ -23,7 +23,7 @@ from kinfmu.mechanism import toml_file
 from tests.fmu.host import DISCARD, OK, Host, answer
 from tests.gallery_members import mostly_long
 from tests.run.test_forces import MEETING, MET, loaded, met
-from tests.run.test_redundant_reactions import LOCOMOTIVE, coupled
+from tests.run.test_reactions import LOCOMOTIVE, coupled
 
 FLAVOURS = [("python", 2), ("native", 2), ("native", 3)]
 of_each_flavour = pytest.mark.parametrize(("flavour", "fmi"), FLAVOURS)

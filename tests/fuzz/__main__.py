@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from tests.fuzz.parts import PARTS, run
+from tests.fuzz.summary import PARTS, run
 
 
 def main() -> int:

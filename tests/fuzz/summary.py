@@ -1,13 +1,14 @@
-"""What a part of the hostile suite tried and found."""
+"""What a part of the hostile suite tried and found, and the parts: each a module with `run(seed, seconds)`."""
 
 from __future__ import annotations
 
+import importlib
 import itertools
 import time
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 SEEDS_OF_ALL_KINDS = 100  # among so many seeds in a row, every kind of trial is found
 
@@ -67,3 +68,15 @@ def one_of_each(first: int, kind: Callable[[int], Hashable]) -> tuple[int, ...]:
     for seed in range(first, first + SEEDS_OF_ALL_KINDS):
         found.setdefault(kind(seed), seed)
     return tuple(found.values())
+
+
+# ---------------------------------------------------------------------------------------------------------------- parts
+
+
+PARTS = ("mechanisms", "files", "fmu", "cache", "logs", "opens")
+
+
+def run(part: str, seed: int, seconds: float) -> Summary:
+    """Run one part: trials from `seed` on for about `seconds`, at least one."""
+    module = importlib.import_module(f"tests.fuzz.{part}")
+    return cast(Summary, module.run(seed, seconds))

@@ -1,4 +1,4 @@
-"""Wrong mechanism files through the command line: one line that names the place, exit status 1 or 2, no traceback."""
+"""Files with wrong words, names and values: refused with file, place and what would be right."""
 
 from __future__ import annotations
 
@@ -6,12 +6,19 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Literal
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from kinfmu.cli import main
+from kinfmu.errors import OTHER_WORDS, MechanismError, suggestion
 from kinfmu.mechanism import gallery
+from kinfmu.mechanism.toml_file import parse
+from kinfmu.run.solve import solve
+from tests.analysis.test_design_notes import FOURBAR
+from tests.fuzz.mechanisms import SAMPLES, written
 from tests.gallery_members import mostly_long
 
 ROOT = Path(__file__).parents[2]
@@ -235,3 +242,98 @@ def test_insufficient_memory_is_reported(monkeypatch: pytest.MonkeyPatch) -> Non
     result = CliRunner().invoke(main, ["check", "fourbar"])
     assert result.exit_code == 1
     assert result.stderr == "kinfmu: not enough memory for a mechanism of this size\n"
+
+
+# ---------------------------------------------------------------------------------------------------------- other words
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "meant"),
+    [
+        ('O = { type = "revolute"', 'O = { type = "pin"', "revolute"),
+        ('O = { type = "revolute"', 'O = { type = "hinge"', "revolute"),
+        ('O = { type = "revolute"', 'O = { type = "prismatic"', "translational"),
+        ('O = { type = "revolute"', 'O = { type = "slider"', "translational"),
+        ('"78 deg"', '"78 degrees"', "deg"),
+        ("x = 20,", 'x = "20 inches",', "in"),
+        ('length = "mm"', 'length = "inches"', "in"),
+    ],
+)
+def test_a_word_of_another_program_suggests_the_word_of_kinfmu(old: str, new: str, meant: str) -> None:
+    with pytest.raises(MechanismError, match=rf"; did you mean '{meant}'\?"):
+        parse(FOURBAR.replace(old, new), "fourbar.toml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "same"),
+    [
+        ('"78 deg"', '"78°"', '"78 deg"'),
+        ('"78 deg"', '"78 °"', '"78 deg"'),
+        ('"78 deg"', '"30° + 48°"', '"30 deg + 48 deg"'),
+        ("x = 20,", 'x = "20 inch",', 'x = "20 in",'),
+        ("x = 20,", 'x = "2*(4 inch + 0.5inch)",', 'x = "2*(4 in + 0.5in)",'),
+        ('length = "mm"', 'length = "inch"', 'length = "in"'),
+    ],
+)
+def test_degree_sign_and_inch_are_units(old: str, new: str, same: str) -> None:
+    assert old in FOURBAR
+    found, wanted = (parse(FOURBAR.replace(old, text), "fourbar.toml") for text in (new, same))
+    assert (found.bodies, found.length_unit) == (wanted.bodies, wanted.length_unit)
+
+
+def test_another_word_is_suggested_only_where_its_meaning_is_known() -> None:
+    assert suggestion("pin", ["crank", "coupler"]) == ""
+    assert {suggestion(word, [meant]) for word, meant in OTHER_WORDS.items()} == {
+        f"; did you mean '{meant}'?" for meant in OTHER_WORDS.values()
+    }
+
+
+@pytest.mark.parametrize("word", ["ram.X", "RAM.X", "Ram.x"])
+def test_another_case_is_the_nearest_spelling(word: str) -> None:
+    for known in (["ram.x", "ram.y", "ram.vx"], ["ram.y", "ram.z", "ram.x"]):
+        assert suggestion(word, known) == "; did you mean 'ram.x'?"
+
+
+@pytest.mark.parametrize(
+    ("word", "known", "meant"),
+    [
+        ("tol", ("from", "to", "tolerance", "nominal"), "tolerance"),
+        ("Tol", ("from", "to", "tolerance", "nominal"), "tolerance"),
+        ("tol", ("crank.start", "solver.tolerance"), "solver.tolerance"),
+        ("amp", ("amplitude", "frequency"), "amplitude"),
+        ("Couplr.X", ("coupler.x", "coupler.y"), "coupler.x"),
+    ],
+)
+def test_the_beginning_of_a_word_is_taken_for_the_word(word: str, known: tuple[str, ...], meant: str) -> None:
+    assert suggestion(word, known) == f"; did you mean '{meant}'?"
+
+
+def test_the_beginning_of_several_words_is_taken_for_none() -> None:
+    assert suggestion("tol", ["tolerance", "tolerable"]) == ""
+
+
+# -------------------------------------------------------------------------------------------------------- hostile names
+
+
+NAMES = {
+    "name": '"main"',
+    "crank": "for",  # parameters
+    "rod": "coupler_phi",
+    "arm": "int",  # a body
+    "tip": "x",  # a point
+    "joint": "errno",
+    "driver": "lambda",
+    "point": "t1",
+}
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_names_of_languages_and_of_generated_code_change_no_number(
+    engine: Literal["python", "native"], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
+    plain = solve(parse(written({})), SAMPLES, engine="python")
+    other = solve(parse(written(NAMES)), SAMPLES, engine=engine)
+    assert other.status.tolist() == plain.status.tolist()
+    np.testing.assert_allclose(other.values, plain.values, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(other.accelerations, plain.accelerations, rtol=0.0, atol=1e-12)

@@ -1,14 +1,18 @@
-"""`measure`: what it accepts and refuses, samples without numbers, several designs, ends of a motion."""
+"""Measures of runs, of their jerk and of their forces."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import replace
+from pathlib import Path
 
+import mpmath
 import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu.draw import svaj
 from kinfmu.errors import MechanismError, RequestError
 from kinfmu.mechanism.measures import (
     READINGS,
@@ -16,6 +20,7 @@ from kinfmu.mechanism.measures import (
     LowestMargin,
     Maximum,
     Minimum,
+    Peak,
     PeakAcceleration,
     PeakSpeed,
     Range,
@@ -25,7 +30,15 @@ from kinfmu.mechanism.measures import (
     VelocityRatio,
 )
 from kinfmu.mechanism.quantities import AngleBetween, DistanceBetween
+from kinfmu.mechanism.toml_file import parse
 from kinfmu.motion import History, Motion
+from kinfmu.motion.jerk import motion_of
+from kinfmu.motion.samples import sampled_history
+from kinfmu.run.channels import select
+from tests.analysis.test_lift_off import sliding
+from tests.analysis.test_loading import ARM
+from tests.mechanisms import slider_crank
+from tests.run.test_forces import loaded
 
 TURN = np.linspace(0.0, 2.0 * math.pi, 361)
 
@@ -163,3 +176,196 @@ def test_a_motion_of_several_drivers_is_measured_over_time() -> None:
 
 def test_every_type_of_measure_has_a_name_of_its_own() -> None:
     assert len({reading.type for reading in READINGS}) == len(READINGS)
+
+
+# ----------------------------------------------------------------------------------------------------------------- jerk
+
+
+CAM = """
+name = "cam"
+bodies.ground.points = { O = [0, 0], G = [0, 0] }
+bodies.cam.points = { O = [0, 0] }
+bodies.follower = { points = { G = [0, 0] }, start = { y = 2 } }
+joints.O = { type = "revolute", between = ["ground.O", "cam.O"] }
+joints.guide = { type = "translational", between = ["ground.G", "follower.G"], axis = "90 deg" }
+drivers.cam = { type = "angle", of = "cam", law = "constant_speed", speed = 2.0 }
+[joints.lift]
+type = "cam_translating"
+between = ["ground.G", "follower.G"]
+axis = "90 deg"
+cam = "cam"
+offset = 2
+law = "sequence"
+repeat = true
+segments = [
+    { law = "cycloidal", duration = "120 deg", rise = 0.5 },
+    { law = "dwell", duration = "60 deg" },
+    { law = "3-4-5", duration = "180 deg", rise = -0.5 },
+]
+"""
+
+
+def test_jerk_of_a_slider_under_a_law_of_time() -> None:
+    """x = r cos phi + sqrt(l^2 - r^2 sin^2 phi), phi = 0.3 + t + 0.7 t^2 - 0.2 t^3, differentiated by mpmath."""
+    mechanism = slider_crank(1.0, 3.0)
+    (driver,) = mechanism.drivers
+    law = kinfmu.Polynomial((0.3, 1.0, 0.7, -0.2))
+    mechanism = dataclasses.replace(mechanism, drivers=(dataclasses.replace(driver, law=law),))
+    t = np.linspace(0.0, 1.5, 7)
+    run = kinfmu.solve(mechanism, t)
+    table, kind = motion_of(run, "slider.x")
+
+    def x(time: mpmath.mpf) -> mpmath.mpf:
+        phi = mpmath.mpf("0.3") + time + mpmath.mpf("0.7") * time**2 - mpmath.mpf("0.2") * time**3
+        return mpmath.cos(phi) + mpmath.sqrt(9 - mpmath.sin(phi) ** 2)
+
+    with mpmath.workdps(30):
+        exact = [[float(mpmath.diff(x, mpmath.mpf(float(one)), k)) for k in range(4)] for one in t]
+    assert kind == "length"
+    np.testing.assert_allclose(table, exact, atol=1e-12, rtol=0.0)
+
+
+def test_jerk_of_a_cam_follower_is_that_of_its_law(tmp_path: Path) -> None:
+    path = tmp_path / "cam.toml"
+    path.write_text(CAM, encoding="utf-8")
+    angle = np.radians(np.arange(0.5, 360.0, 1.0))
+    run = kinfmu.solve(kinfmu.load(path), cam_angle=angle)
+    table, _ = motion_of(run, "lift")
+    rise, beta = angle < math.radians(120.0), math.radians(120.0)
+    phase = 2.0 * math.pi * angle / beta
+    np.testing.assert_allclose(table[rise, 0], 0.5 * (phase - np.sin(phase))[rise] / (2.0 * math.pi), atol=1e-14)
+    cycloid = 0.5 * (2.0 * math.pi) ** 2 / beta**3 * np.cos(phase)
+    np.testing.assert_allclose(table[rise, 3], cycloid[rise], atol=1e-12)
+    s = (angle - math.pi) / math.pi
+    fall = angle > math.pi
+    np.testing.assert_allclose(table[fall, 3], (-0.5 / math.pi**3 * (60 - 360 * s + 360 * s**2))[fall], atol=1e-12)
+    np.testing.assert_array_equal(motion_of(run, "follower.y")[0][:, 1:], table[:, 1:])
+    by_time = motion_of(kinfmu.solve(kinfmu.load(path), angle / 2.0), "lift")[0]
+    np.testing.assert_allclose(by_time, table * 2.0 ** np.arange(4.0), atol=1e-11)
+    svaj(run, tmp_path / "svaj.svg", "lift", degrees=True)
+    text = (tmp_path / "svaj.svg").read_text(encoding="utf-8")
+    assert all(f">{label}<" in text for label in ("s [m]", "v [m/rad]", "a [m/rad²]", "j [m/rad³]", "cam [deg]"))
+
+
+def test_jerk_has_a_gap_at_a_bridge_and_is_refused_if_it_is_not_known() -> None:
+    mechanism = kinfmu.load("fourbar")
+    degrees = np.arange(0.0, 361.0, 30.0)
+    run = kinfmu.solve(mechanism, crank_angle=np.radians(degrees))
+    jerk = motion_of(run, "coupler.x")[0][:, 3]
+    known = degrees % 180.0 != 0.0
+    np.testing.assert_array_equal(np.isfinite(jerk), known)
+    np.testing.assert_allclose(jerk[known], np.sin(np.radians(degrees))[known], atol=1e-12)
+    other = kinfmu.solve(mechanism, crank_angle=np.radians(degrees), crank_acceleration=1.0)
+    with pytest.raises(
+        RequestError, match=r"^the jerk is not known: driver 'crank' has accelerations that are not those"
+    ):
+        motion_of(other, "coupler.x")
+    with pytest.raises(
+        RequestError, match=r"^'cupler\.x' is neither a coordinate nor a cam; did you mean 'coupler\.x'"
+    ):
+        motion_of(run, "cupler.x")
+    part = kinfmu.solve(mechanism, crank_angle=np.radians(degrees), outputs=["crank.phi"])
+    with pytest.raises(RequestError, match=r"^the jerk needs all coordinates, and the run does not hold coupler\.x"):
+        motion_of(part, "crank.phi")
+    with pytest.raises(kinfmu.KinfmuError, match=r"^the run does not hold 'crank\.omega'"):
+        motion_of(select(run, ["q"]), "crank.phi")
+
+
+@pytest.mark.parametrize("joint", ["roller", "flat"])
+def test_jerk_of_followers_on_given_cams(joint: str) -> None:
+    """The law's value is the height 0.05 + 0.004 cos theta of the follower."""
+    theta = np.linspace(0.1, 6.0, 9)
+    table, kind = motion_of(kinfmu.solve(sliding(joint), cam_angle=theta, cam_speed=1.0), "lift")
+    exact = [np.cos(theta), -np.sin(theta), -np.cos(theta), np.sin(theta)]
+    np.testing.assert_allclose(table, 0.004 * np.array(exact).T + [0.05, 0.0, 0.0, 0.0], atol=1e-14)
+    assert kind == "length"
+
+
+# --------------------------------------------------------------------------------------------------------------- forces
+
+
+def test_extremes_of_a_torque_lie_between_the_samples() -> None:
+    """Torque 6 cos(phi) N m, with samples on both sides of its extremes; reaction 29.6 N at the lowest point."""
+    arm = parse(ARM, "arm.toml")
+    run = kinfmu.solve(arm, arm_angle=0.003 + np.linspace(0.0, math.tau, 361), arm_speed=4.0)
+    asked = [Maximum("high", "arm.torque"), Minimum("low", "arm.torque"), Range("span", "arm.torque"),
+             Peak("peak", "arm.torque"), Maximum("pin", "O.force"), Peak("inertia", "arm.reduced_inertia"),
+             Maximum("stored", "potential_energy")]  # fmt: skip
+    found = kinfmu.measure(run, asked)
+    values = [found[name].value for name in ("high", "low", "span", "peak", "pin", "inertia", "stored")]
+    assert values == pytest.approx([6.0, -6.0, 12.0, 6.0, 29.6, 0.68, 6.0], rel=1e-11)
+    assert [one.unit for one in found.values()] == ["N m", "N m", "N m", "N m", "N", "kg m2", "J"]
+    assert found["low"].at == pytest.approx((math.pi,), abs=1e-6)
+    assert found["pin"].at == pytest.approx((1.5 * math.pi,), abs=1e-6)
+    assert (found["pin"].driver, found["pin"].at_unit) == ("arm", "rad")
+
+
+def test_361_samples_give_peaks_of_a_slider_crank_to_1e_10() -> None:
+    mechanism = replace(
+        loaded("slider_crank"), measures=(Peak("torque", "crank.torque"), Maximum("pin", "P.force", begin=3.0, end=7.0))
+    )
+    coarse, fine = (
+        kinfmu.measure(kinfmu.solve(mechanism, crank_angle=np.linspace(0.0, math.tau, n), crank_speed=20.0 * math.pi))
+        for n in (361, 20001)
+    )
+    for name in ("torque", "pin"):
+        assert coarse[name].value == pytest.approx(fine[name].value, rel=1e-10)
+
+
+def test_kinks_jumps_and_few_samples_give_extremes_of_the_samples() -> None:
+    x = np.linspace(0.0, 1.0, 101)
+    kink = np.where(x < 0.503, x, 0.503 - 0.2 * (x - 0.503))
+    jump = np.where(x < 0.503, x**2, x - 1.0)
+    for value in (kink, jump, np.sin(200.0 * x)):
+        history = sampled_history(x, value, is_closed=False)
+        assert history.maximum().value <= value.max() + 1e-9
+        assert history.minimum().value >= value.min() - 1e-9
+    few = sampled_history(x[:4], np.array([0.0, 2.0, 1.0, 0.0]), is_closed=False)
+    assert few.maximum().value == 2.0
+
+
+def test_designs_are_measured_one_by_one() -> None:
+    text = ARM.replace('"2 kg"', '"m"').replace("[bodies]", '[parameters]\nm = "2 kg"\n\n[bodies]')
+    model = kinfmu.compile(parse(text, "arm.toml"))
+    asked = [Peak("torque", "arm.torque"), Range("swing", "arm.phi")]
+    angles = np.linspace(0.0, math.tau, 361)
+    table = kinfmu.measure_designs(model, {"m": np.array([1.0, 2.0, 3.0])}, asked, arm_angle=angles, arm_speed=4.0)
+    np.testing.assert_allclose(table["torque"], [3.0, 6.0, 9.0], rtol=1e-11)
+    assert table.units["torque"] == "N m"
+    assert table["swing"] == pytest.approx(math.tau)
+
+
+def test_undetermined_reactions_have_no_value_but_a_reason() -> None:
+    run = kinfmu.solve(loaded("fourbar"), np.arange(10.0, 60.0))
+    found = kinfmu.measure(run, [Maximum("pin", "O.force"), Peak("torque", "crank.torque")])
+    assert math.isnan(found["pin"].value)
+    assert found["pin"].reason.startswith("'O.force' is not determined: redundant rows share the load")
+    assert math.isfinite(found["torque"].value)
+
+
+def test_check_reports_measures_of_forces() -> None:
+    text = ARM + '[measures.motor]\ntype = "peak"\nof = "arm.torque"\n'
+    assert "motor = 6 N m (arm at 0 deg)" in str(kinfmu.check(parse(text, "arm.toml")))
+
+
+def test_wrong_names_and_rates_of_forces_get_one_line() -> None:
+    arm = parse(ARM, "arm.toml")
+    with pytest.raises(MechanismError, match=r"'arm.torque' is a force, which has no rates; types for forces: minimum"):
+        replace(arm, measures=(PeakSpeed("a", "arm.torque"),))
+    with pytest.raises(MechanismError, match=r"'arm.torqe' is not a coordinate .*; did you mean 'arm.torque'\?"):
+        replace(arm, measures=(Peak("a", "arm.torqe"),))
+    with pytest.raises(MechanismError, match=r"'crank.torque' is not there: without masses and loads"):
+        replace(kinfmu.load("slider_crank"), measures=(Peak("a", "crank.torque"),))
+
+
+def test_loads_over_time_are_measured_over_one_turn_by_check() -> None:
+    """Torque 6 cos(4 t) - 2 sin(4 t) N m."""
+    load = '[loads.brake]\ntype = "torque"\non = "arm"\nlaw = "harmonic"\namplitude = 2\nfrequency = 4\n'
+    report = kinfmu.check(parse(ARM + load + '[measures.motor]\ntype = "peak"\nof = "arm.torque"\n', "arm.toml"))
+    assert report.measured is not None
+    (motor,) = report.measured.values
+    assert motor.value == pytest.approx(math.sqrt(40.0), rel=1e-11)
+    assert motor.driver == "arm"
+    assert report.loading is not None
+    assert abs(report.loading.efforts[0].value) == pytest.approx(math.sqrt(40.0), rel=1e-4)  # of the samples
+    assert report.loading.efforts[0].rms == pytest.approx(math.sqrt(20.0), rel=1e-12)

@@ -24,7 +24,7 @@ from kinfmu.mechanism.measures import Maximum, Range
 from kinfmu.run.verdict import sentence
 from tests.log.runs import fourbar, with_gap
 from tests.mechanisms import fourbar as fourbar_of
-from tests.page.browser import browser, needs_browser
+from tests.page.engines import browser, needs_browser
 
 IMAGE = "data:image/svg+xml;base64,"
 TURN = np.linspace(0.0, 2.0 * np.pi, 61)

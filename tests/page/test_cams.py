@@ -15,8 +15,8 @@ import kinfmu
 from kinfmu.errors import KinfmuError
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.page import page as page_of
-from tests.page.browser import PHONE, Browser, Opened, browser, needs_browser, text_of
-from tests.run.test_cam_reactions import HEAD, JOINTS, SLIDING
+from tests.page.engines import PHONE, Browser, Opened, browser, needs_browser, text_of
+from tests.run.test_reactions import HEAD, JOINTS, SLIDING
 
 pytestmark = needs_browser
 

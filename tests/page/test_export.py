@@ -18,7 +18,7 @@ import kinfmu
 from kinfmu.errors import CompilerError
 from kinfmu.log import write_mcap
 from tests.cli.conftest import Command, command, fails, program_called, refuses
-from tests.page.browser import CHROMIUM, browser
+from tests.page.engines import CHROMIUM, browser
 
 pytest.importorskip("ziglang", reason="pages are compiled by zig")
 DATA = re.compile(r'id="data">([^<]*)<')

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import kinfmu.page
-from tests.page.browser import PHONE, Browser, Opened, browser, needs_browser, text_of
+from tests.page.engines import PHONE, Browser, Opened, browser, needs_browser, text_of
 
 pytestmark = needs_browser
 WATCH_TEXTS = """(() => {

@@ -13,8 +13,7 @@ from typing import Any
 
 import pytest
 
-from tests.page.browser import text_of
-from tests.page.engines import NODE, needs_node
+from tests.page.engines import NODE, needs_node, text_of
 
 SCRIPT = Path(__file__).with_name("break_lengths.mjs")
 DATA = re.compile(r'id="data">([^<]*)<')

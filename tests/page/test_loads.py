@@ -15,7 +15,7 @@ import pytest
 from kinfmu.arrays import FloatArray
 from kinfmu.page import page as page_of
 from tests.mechanism.loads.every_load import every_load, fourbar
-from tests.page.browser import Browser, Opened, browser, needs_browser, text_of
+from tests.page.engines import Browser, Opened, browser, needs_browser, text_of
 
 pytestmark = needs_browser
 pytest.importorskip("ziglang", reason="pages are compiled by zig")

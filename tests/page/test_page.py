@@ -16,7 +16,7 @@ from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text as toml_text
 from kinfmu.run.axis import shown_range
 from tests.gallery_members import every_member
-from tests.page.browser import DESKTOP, PHONE, Browser, browser, needs_browser, text_of
+from tests.page.engines import DESKTOP, PHONE, Browser, browser, needs_browser, text_of
 
 pytestmark = needs_browser
 LARGEST = 300_000  # [bytes] of a page

@@ -13,8 +13,7 @@ import kinfmu
 from kinfmu import Mechanism
 from kinfmu.errors import InconsistentError
 from kinfmu.plan import SolvePlan, compile_plan
-from tests.mechanisms import reference_fourbar, wheels
-from tests.open_lengths import with_open_lengths
+from tests.mechanisms import reference_fourbar, wheels, with_open_lengths
 from tests.stress.trial import trial
 
 QUARTER = math.pi / 2

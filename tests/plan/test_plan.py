@@ -144,24 +144,8 @@ def test_a_start_that_closes_at_a_single_pose_or_misses_it_is_refused_with_the_r
     coupler: float, message: str
 ) -> None:
     """Three bars stretched over the fourth: that they do not determine the motion would not be the reason."""
-    mechanism = Mechanism(
-        "stretched",
-        [
-            Body("ground", {"O": (0, 0), "C": (4, 0)}),
-            Body("crank", {"O": (0, 0), "P": (1, 0)}, (0, 0, 0)),
-            Body("coupler", {"P": (0, 0), "Q": (coupler, 0)}, (1, 0, 0)),
-            Body("rocker", {"C": (0, 0), "Q": (2, 0)}, (4, 0, math.pi)),
-        ],
-        [
-            Revolute("O", ("ground.O", "crank.O")),
-            Revolute("P", ("crank.P", "coupler.P")),
-            Revolute("Q", ("coupler.Q", "rocker.Q")),
-            Revolute("C", ("ground.C", "rocker.C")),
-        ],
-        [AngleDriver("crank", "crank", ConstantSpeed(0.0, 1.0))],
-    )
     with pytest.raises(AssemblyError, match=message):
-        compile_plan(mechanism)
+        compile_plan(fourbar(4, 1, coupler, 2, start=0.0))
 
 
 def test_a_rough_start_pose_is_assembled() -> None:
@@ -184,20 +168,9 @@ def test_a_rough_start_pose_is_assembled() -> None:
 
 def test_the_loop_that_does_not_close_is_named_with_the_distance_that_its_links_lack() -> None:
     """The links reach 2 + 3 from the crank's end P = (cos 1, sin 1) toward C = (9, 0)."""
-    mechanism = Mechanism(
-        "apart",
-        [
-            Body("ground", {"O": (0, 0), "C": (9, 0)}),
-            Body("crank", {"O": (0, 0), "P": (1, 0)}, (0, 0, 1.0)),
-            Body("coupler", {"P": (0, 0), "Q": (2, 0)}, (0.5, 0.8, 0.4)),
-            Body("rocker", {"C": (0, 0), "Q": (3, 0)}, (9, 0, 1.9)),
-        ],
-        fourbar(4, 1, 3.5, 3).joints,
-        [AngleDriver("crank", "crank", ConstantSpeed(1.0, 1.0))],
-    )
     loop = r"the loop of bodies coupler, rocker with joints P, Q, C does not close: gap 3\.501 m at '[PQC]'"
     with pytest.raises(AssemblyError, match=rf"\(crank = 1 rad .*\): {loop} with the others closed") as caught:
-        compile_plan(mechanism)
+        compile_plan(fourbar(9, 1, 2, 3))
     assert caught.value.gap == pytest.approx(math.dist((math.cos(1.0), math.sin(1.0)), (9.0, 0.0)) - 5.0, rel=1e-4)
 
 

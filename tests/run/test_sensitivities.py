@@ -26,8 +26,7 @@ from kinfmu.run.sensitivities import Sensitivities
 from tests import oracle
 from tests.fmu.test_parameters import LENGTHS, linkage
 from tests.gallery_members import mostly_long
-from tests.mechanisms import wheels
-from tests.open_lengths import with_open_lengths
+from tests.mechanisms import wheels, with_open_lengths
 from tests.oracle import Motion, mp
 from tests.stress.sensitivities import NAMES, compared_in_gallery
 

@@ -32,7 +32,7 @@ from kinfmu.run import model
 from kinfmu.run.continued import continued
 from kinfmu.solver.python.status import Status
 from kinfmu.units import CoordinateName
-from tests.open_lengths import with_open_lengths
+from tests.mechanisms import with_open_lengths
 
 SAMPLES = 24  # of a design, over the run of the file
 SPREADS = (0.02, 0.2)  # of the logarithm of a length

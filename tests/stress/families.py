@@ -24,10 +24,9 @@ from kinfmu import (
 )
 from kinfmu.mechanism.drivers import Driver
 from kinfmu.mechanism.joints import Joint
-from tests.stress.drawn import TURN, Frame, Pose, Sketch, framed, standing, world
+from tests.stress.drawn import TURN, DrawnLaw, Frame, Pose, Sketch, framed, standing, world
 from tests.stress.inverse import driven_at
 from tests.stress.jets import LONG, Array, Exact, Jet, Numbers, Value, Vector, turned
-from tests.stress.laws import DrawnLaw
 from tests.stress.loops import Closing, between, in_slot, on_arm, on_level, on_slide
 
 ENDS = (0.0, math.pi)  # of an arm: stretched toward its pivot and away from it

@@ -25,7 +25,7 @@ import kinfmu
 from kinfmu.errors import AmbiguousStartError, InconsistentError, MobilityError
 from kinfmu.mechanism.gallery import names
 from kinfmu.mechanism.toml_text import text
-from tests.open_lengths import with_open_lengths
+from tests.mechanisms import with_open_lengths
 from tests.power_series import Series, mp, sin_cos
 from tests.stress.comparisons import all_compared, command_line
 from tests.stress.families import Draw

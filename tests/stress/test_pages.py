@@ -12,7 +12,7 @@ import kinfmu
 from kinfmu import Mechanism
 from kinfmu.mechanism.gallery.chains import fourbar_chain
 from kinfmu.page import page
-from tests.page.browser import PHONE, Browser, browser, needs_browser
+from tests.page.engines import PHONE, Browser, browser, needs_browser
 
 pytestmark = needs_browser
 LARGEST = 300_000  # [bytes] of a page of the gallery

@@ -20,8 +20,7 @@ from tests.stress.branch import INSIDE, OUTSIDE, TURN, BranchPath, Expected, Flo
 from tests.stress.drawn import Drawn, Frame
 from tests.stress.families import FAMILIES, STARTS_ANYWHERE, Draw, RedrawError
 from tests.stress.jets import DIGITS, SCREENING, Numbers
-from tests.stress.patterns import drawn_steps
-from tests.stress.starts import Started, started
+from tests.stress.patterns import Started, drawn_steps, started
 
 WRONG = 1e-9  # of the column's largest magnitude
 ROUNDINGS = 64.0  # of the driver values: what they change in the exact motion, an `ok` sample may be off by, too

@@ -10,38 +10,41 @@ from kinfmu.mechanism import Mechanism, toml_file
 
 LENGTHS = {"ground": 4.0, "crank": 1.0, "coupler": 3.5, "rocker": 3.0, "px": 1.7, "py": 1.2}
 TEXT = """
-name = "four_bar"
-[parameters]
-{parameters}
+name = "NAME"
 [bodies.ground]
-points = {{ O = [0, 0], C = ["ground", 0] }}
+points = { PIVOTS }
 [bodies.crank]
-points = {{ O = [0, 0], P = ["crank", 0] }}
-start = {{ phi = "60 deg" }}
+points = { O = [0, 0], P = ["crank", 0] }
+start = { phi = "60 deg" }
 [bodies.coupler]
-points = {{ P = [0, 0], Q = ["coupler", 0], X = ["px", "py"] }}
-start = {{ phi = "40 deg" }}
+points = { P = [0, 0], Q = ["coupler", 0], X = ["px", "py"] }
+start = { phi = "40 deg" }
 [bodies.rocker]
-points = {{ C = [0, 0], Q = ["rocker", 0] }}
-start = {{ phi = "100 deg" }}
+points = { C = [0, 0], Q = ["rocker", 0] }
+start = { phi = "100 deg" }
 [joints]
-O = {{ type = "revolute", between = ["ground.O", "crank.O"] }}
-P = {{ type = "revolute", between = ["crank.P", "coupler.P"] }}
-Q = {{ type = "revolute", between = ["coupler.Q", "rocker.Q"] }}
-C = {{ type = "revolute", between = ["ground.C", "rocker.C"] }}
+O = { type = "revolute", between = ["ground.O", "crank.O"] }
+P = { type = "revolute", between = ["crank.P", "coupler.P"] }
+Q = { type = "revolute", between = ["coupler.Q", "rocker.Q"] }
+C = { type = "revolute", between = ["ground.C", "rocker.C"] }
 [drivers.crank]
 type = "angle"
 of = "crank"
 law = "constant_speed"
 start = "60 deg"
+[parameters]
 """
 
 
 def four_bar(more: str = "", **lengths: float) -> Mechanism:
     """Return a four-bar with these lengths; more: tables to add."""
-    values = LENGTHS | lengths
-    parameters = "\n".join(f'{name} = "{value!r} m"' for name, value in values.items())
-    return toml_file.parse(TEXT.format(parameters=parameters) + more)
+    return with_parameters("four_bar", 'O = [0, 0], C = ["ground", 0]', LENGTHS | lengths, more)
+
+
+def with_parameters(name: str, pivots: str, values: dict[str, float], more: str = "") -> Mechanism:
+    """Return the four-bar whose pivots on the ground are points of these values."""
+    parameters = "\n".join(f'{key} = "{value!r} m"' for key, value in values.items())
+    return toml_file.parse(TEXT.replace("NAME", name).replace("PIVOTS", pivots) + f"{parameters}\n{more}")
 
 
 def closed_form(theta: Any, lengths: dict[str, float]) -> tuple[Any, Any, Any, Any]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import kinfmu
 from kinfmu.design.fit import PathTarget
-from kinfmu.mechanism import Mechanism, toml_file
+from kinfmu.mechanism import Mechanism
+from tests.design.fit.fourbars import with_parameters
 
 BEST = 0.009028884630975  # sum of squares of the best optimum found; the best published one is 0.0091150
 X = (0.5, 0.4, 0.3, 0.2, 0.1, 0.05, 0.02, 0.0, 0.0, 0.03, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.6)
@@ -35,29 +36,4 @@ def mkh1(within: float | None = None) -> kinfmu.FitProblem:
 
 
 def _mechanism(lengths: dict[str, float]) -> Mechanism:
-    text = """
-name = "mkh1"
-[bodies.ground]
-points = { O = ["x", "y"], C = ["x + gx", "y + gy"] }
-[bodies.crank]
-points = { O = [0, 0], P = ["crank", 0] }
-start = { phi = "60 deg" }
-[bodies.coupler]
-points = { P = [0, 0], Q = ["coupler", 0], X = ["px", "py"] }
-start = { phi = "40 deg" }
-[bodies.rocker]
-points = { C = [0, 0], Q = ["rocker", 0] }
-start = { phi = "100 deg" }
-[joints]
-O = { type = "revolute", between = ["ground.O", "crank.O"] }
-P = { type = "revolute", between = ["crank.P", "coupler.P"] }
-Q = { type = "revolute", between = ["coupler.Q", "rocker.Q"] }
-C = { type = "revolute", between = ["ground.C", "rocker.C"] }
-[drivers.crank]
-type = "angle"
-of = "crank"
-law = "constant_speed"
-start = "60 deg"
-[parameters]
-"""
-    return toml_file.parse(text + "\n".join(f'{name} = "{value} m"' for name, value in lengths.items()))
+    return with_parameters("mkh1", 'O = ["x", "y"], C = ["x + gx", "y + gy"]', lengths)

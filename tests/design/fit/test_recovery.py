@@ -1,4 +1,4 @@
-"""Known mechanisms are found again from exact points of their closed form, which is not kinfmu's."""
+"""Fits that find known mechanisms again."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import pytest
 import kinfmu
 from kinfmu.design.fit import FunctionTarget, PathTarget, PoseTarget
 from tests.design.fit.fourbars import LENGTHS, closed_form, four_bar
+from tests.design.fit.mkh1 import BEST, mkh1
 
 KNOWN = {"ground": 4.1, "crank": 1.1, "coupler": 3.3, "rocker": 3.2, "px": 1.5, "py": 1.35}
 BOUNDS = {name: (0.6 * value, 1.5 * value) for name, value in LENGTHS.items()}
@@ -97,3 +98,13 @@ def test_a_mechanism_from_the_values_of_measures() -> None:
     result = kinfmu.fit(kinfmu.FitProblem(four_bar(), {"crank": (0.8, 1.4)}, [target]), starts=1, engine="python")
 
     assert result.parameters["crank"] == pytest.approx(1.2, abs=1e-8)
+
+
+# ----------------------------------------------------------------------------------------------------------------- mkh1
+
+
+def test_the_best_optimum_is_found_from_near_it() -> None:
+    result = kinfmu.fit(mkh1(within=0.2), starts=1, engine="python")
+
+    assert result.squares == pytest.approx(BEST, abs=1e-11)
+    assert result.squares < 0.0091150  # the best published one

@@ -1,18 +1,27 @@
-"""The scene of a run, compared with the closed form of the four-bar."""
+"""What is drawn of a mechanism: bodies, outlines, details and colours."""
 
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu.draw.scene.placing import world
+from kinfmu.draw.overlay import MOST_CURVES, curve_colour
+from kinfmu.draw.scene import details, palette
+from kinfmu.draw.scene.placing import recomputed, world
 from kinfmu.draw.scene.scene import Scene, drawable
+from kinfmu.draw.scene.shape import Shape, ribs, rim
+from kinfmu.errors import KinfmuError
 from kinfmu.run import Run
+from kinfmu.run.continued import continued
 from kinfmu.run.driving import run_times
 from tests.log.runs import DEGREE
+from tests.test_every_way import LENGTHS, TIMES, linkage, side
+from tests.test_every_way import drawn as drawn_lengths
 
 
 @pytest.fixture
@@ -198,3 +207,163 @@ def test_the_block_of_a_pin_on_a_line_of_the_ground_moves_with_the_pin_and_does_
     np.testing.assert_allclose(pose[:, :2], found.paths["slider"], atol=1e-9)
     assert not pose[:, 2].any()
     assert len(pose) == len(run)
+
+
+# -------------------------------------------------------------------------------------------------------------- details
+
+
+DOWN = np.array([0.0, -1.0])
+
+
+def shape(kind: str, *points: tuple[float, float], direction: np.ndarray = DOWN) -> Shape:
+    return Shape(kind, "name", "ground", np.array(points), direction=direction)
+
+
+@pytest.mark.parametrize("size", [0.01, 0.5])
+def test_hatching_is_below_the_whole_line(size: float) -> None:
+    line = details.rail(shape("rail", (4.0, 1.0), (-2.0, 1.0)), size)  # drawn to the right or to the left
+    strokes = details.hatching(line, DOWN, size)
+    tops, ends = strokes[:, 0], strokes[:, 1]
+    np.testing.assert_allclose(tops[:, 1], line[0, 1])
+    assert (ends[:, 1] < tops[:, 1]).all()
+    gaps = np.diff(np.sort([*line[:, 0], *tops[:, 0]]))
+    assert gaps.max() < 2.0 * np.median(gaps)
+
+
+def test_a_rail_is_as_far_from_its_line_as_its_block_is_wide() -> None:
+    line = details.rail(shape("rail", (0.0, 1.0), (5.0, 1.0)), 0.1)
+    np.testing.assert_allclose(line[:, 1], 1.0 - 0.1 * details.BLOCK_WIDTH)
+    assert np.ptp(line[:, 0]) > 5.0 + 2.0 * 0.1 * details.BLOCK
+    assert details.rail(shape("bed", (0.0, 1.0), (5.0, 1.0)), 0.1)[0, 1] < line[0, 1]
+
+
+@pytest.mark.parametrize("towards", [(0.0, -1.0), (1.0, 0.0), (-0.6, 0.8)])
+def test_a_support_ends_at_its_line_with_the_pin_at_its_tip(towards: tuple[float, float]) -> None:
+    direction = np.array(towards)
+    triangle, line = details.support(shape("support", (2.0, 3.0), direction=direction), 0.1)
+    np.testing.assert_array_equal(triangle[0], [2.0, 3.0])
+    for point in (*triangle[1:], *line):
+        assert (point - triangle[0]) @ direction == pytest.approx(0.1 * details.SUPPORT)
+    np.testing.assert_allclose(line.mean(axis=0), triangle[1:].mean(axis=0))
+
+
+def test_teeth_are_on_both_sides_of_the_pitch_line_and_smaller_than_their_pinion() -> None:
+    rack, radius = shape("rack", (0.0, 0.0), (10.0, 0.0)), 2.0
+    corners = details.teeth(rack, details.teeth_size(radius))
+    assert 0.0 < corners[:, 1].max() < 0.5 * radius
+    assert corners[:, 1].min() < -corners[:, 1].max()  # the back is on the side of the direction
+    assert (corners[0, 0], corners[-2, 0]) == (0.0, 10.0)
+
+
+def test_a_shape_without_direction_is_reported() -> None:
+    with pytest.raises(TypeError, match="a shape of kind 'link' has no direction"):
+        details.support(Shape("link", "crank", "crank", np.zeros((2, 2))), 1.0)
+
+
+def test_a_placed_shape_turns_with_its_frame() -> None:
+    placed = shape("block", (1.0, 0.0), direction=np.array([1.0, 0.0])).placed(
+        {"ground": np.array([2.0, 3.0, np.pi / 2])}
+    )
+    np.testing.assert_allclose(placed.points, [[2.0, 4.0]], atol=1e-15)
+    np.testing.assert_allclose(placed.towards, [0.0, 1.0], atol=1e-15)
+
+
+# ----------------------------------------------------------------------------------------------------------- completing
+
+
+def test_a_run_with_parameters_set_is_completed_on_its_own_branch(tmp_path: Path) -> None:
+    start = {"coupler": (0.5, 0.8, 2.0), "rocker": (4, 0, -0.4)}
+    bodies = tuple(replace(body, start=start.get(body.name, body.start)) for body in linkage().bodies)
+    mechanism = replace(linkage(), bodies=bodies, coordinates=("rocker.phi",))
+    whole = replace(mechanism, coordinates="all")
+    lengths = next(values for values in drawn_lengths(8, seed=22) if _differs(whole, values))
+    set_ = {name: lengths[name] for name in LENGTHS}
+    fmu = kinfmu.build(mechanism, tmp_path / "short.fmu", flavour="python")
+    run = kinfmu.simulate(fmu, parameters=set_)
+    columns = recomputed(run, mechanism)
+    assert columns is not None
+    followed = kinfmu.solve(continued(whole, set_).mechanism, run.t)
+    for name in ("coupler.x", "coupler.phi", "rocker.phi"):
+        assert columns[name] == pytest.approx(followed[name], abs=1e-11)
+
+
+def _differs(mechanism: kinfmu.Mechanism, values: dict[str, float]) -> bool:
+    """Whether the lengths assemble on another branch than the one that is followed to them."""
+    lengths = {name: values[name] for name in LENGTHS}
+    try:
+        by_file = kinfmu.solve(mechanism.with_parameters(lengths), TIMES[:1])
+        followed = continued(mechanism, lengths)
+        run = kinfmu.solve(followed.mechanism, TIMES[:1])
+    except KinfmuError:
+        return False
+    return not followed.message and bool(np.all(run.good)) and side(run) != side(by_file)
+
+
+# -------------------------------------------------------------------------------------------------------------- outline
+
+
+@pytest.mark.parametrize(
+    ("points", "expected"),
+    [
+        ([(0, 0)], [(0, 0)]),
+        ([(1, 0), (0, 0)], [(0, 0), (1, 0)]),
+        ([(0, 0), (2, 2), (1, 1)], [(0, 0), (1, 1), (2, 2)]),
+        ([(0, 0), (4, 0), (0, 4)], [(0, 0), (4, 0), (0, 4)]),
+    ],
+    ids=["point", "bar", "three-in-a-line", "triangle"],
+)
+def test_a_link_is_drawn_through_all_its_points(points: list[tuple[int, int]], expected: list[tuple[int, int]]) -> None:
+    drawn, is_closed = rim(np.array(points, dtype=float))
+    if not is_closed:  # a line has two directions
+        drawn = drawn[np.lexsort(drawn.T)]
+    np.testing.assert_array_equal(drawn, expected)
+    assert not len(ribs(np.array(points, dtype=float)))
+
+
+def test_a_point_inside_a_plate_is_joined_to_the_nearest_corner() -> None:
+    points = np.array([(0.0, 0.0), (4.0, 0.0), (0.0, 4.0), (1.0, 1.0), (2.5, 1.0)])
+    np.testing.assert_array_equal(ribs(points), [[(0, 0), (1, 1)], [(4, 0), (2.5, 1)]])
+
+
+def test_the_rim_of_a_link_is_around_its_points_or_along_them() -> None:
+    corners, is_closed = rim(np.array([(0.0, 4.0), (1.0, 1.0), (4.0, 0.0), (0.0, 0.0)]))
+    assert is_closed
+    np.testing.assert_array_equal(corners, [(0, 0), (4, 0), (0, 4)])
+    corners, is_closed = rim(np.array([(2.0, 0.0), (1.0, 0.0), (1.0, 0.0)]))
+    assert not is_closed
+    np.testing.assert_array_equal(corners, [(1, 0), (2, 0)])
+
+
+# -------------------------------------------------------------------------------------------------------------- palette
+
+
+def test_the_first_bodies_have_the_plain_colours() -> None:
+    assert tuple(map(palette.body, range(7))) == palette.BODIES
+
+
+def test_twenty_one_bodies_have_different_colours_in_x_and_y() -> None:
+    plain = [palette.body(index) for index in range(21)]
+    found = [*plain, *map(palette.lighter, plain)]
+    apart = [max(abs(a - b) for a, b in zip(one, other, strict=True)) for one in found for other in found]
+    assert sorted(apart)[len(found)] > 8  # the smallest are of each with itself
+
+
+def test_colours_are_repeated_without_end() -> None:
+    assert palette.body(1021) == palette.body(1000)
+
+
+def test_lines_on_white_paper_have_the_contrast_of_wcag() -> None:
+    white = (255, 255, 255)
+    assert palette.contrast((0, 0, 0), white) == 21.0
+    assert palette.contrast((119, 119, 119), white) == pytest.approx(4.48, abs=0.005)  # the usual example of a grey
+    for index in range(21):
+        colour = palette.body(index)
+        found = palette.on_white(colour)
+        assert palette.contrast(found, white) >= 3.0
+        assert (found == colour) == (palette.contrast(colour, white) >= 3.0)
+
+
+def test_curves_of_a_panel_are_all_visible_and_all_different() -> None:
+    colours = [curve_colour(index) for index in range(MOST_CURVES)]
+    assert min(palette.contrast(colour, (255, 255, 255)) for colour in colours) >= 3.0
+    assert len(set(colours)) == MOST_CURVES

@@ -1,6 +1,6 @@
 """A C host under the sanitizers: no access out of bounds, no undefined behaviour, no uninitialized memory, no leaks.
 
-Every mechanism with both versions of FMI: tests/stress/test_sanitizers.py.
+Every mechanism with both versions of FMI: tests/stress/test_short_forms.py.
 """
 
 from __future__ import annotations

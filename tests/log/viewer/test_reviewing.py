@@ -1,8 +1,10 @@
-"""Reviewing a run: recordings are made, pictures taken, and missing things reported."""
+"""Reviewing a run: recordings, the live view, and an installation without the viewer."""
 
 from __future__ import annotations
 
+import json
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -15,11 +17,12 @@ import kinfmu
 from kinfmu.cli import main
 from kinfmu.draw.scene import palette
 from kinfmu.errors import LogError, RequestError
-from kinfmu.log import review, write_mcap, write_rrd
-from kinfmu.log.viewer import headless, reviewing
+from kinfmu.log import LiveView, read, review, write_mcap, write_rrd
+from kinfmu.log.viewer import headless, live, reviewing
 from kinfmu.log.viewer.timeline import timeline_named, timeline_of
 from kinfmu.run import Run
 from tests.log.runs import fourbar
+from tests.log.viewer.test_rerun_file import documents, rows
 
 
 @pytest.fixture
@@ -176,3 +179,144 @@ def test_at_of_a_recording_over_a_driver_is_the_drivers_value(tmp_path: Path) ->
     with pytest.raises(RequestError, match=r"at = 100 is outside the recording, crank \[deg\] = 0 to 90$"):
         review(recording, screenshot=tmp_path / "none.png", at=np.radians(100.0))
     assert not (tmp_path / "none.png").exists()
+
+
+# ----------------------------------------------------------------------------------------------------------------- live
+
+
+rr = pytest.importorskip("rerun")
+
+
+def test_pieces_of_a_run_are_in_the_stream_once_with_layout_and_card(tmp_path: Path) -> None:
+    path = tmp_path / "live.rrd"
+    stream = rr.RecordingStream("kinfmu_test", recording_id="live")
+    stream.save(path)
+    run = kinfmu.solve(kinfmu.load("crank_rocker"), np.linspace(0.0, 2.0, 41))
+    view, sent = LiveView(stream), []
+    view.begin(run.part(slice(0, 0)))
+    for start in (0, 10, 25):
+        view.add(run.part(slice(start, {0: 10, 10: 25, 25: 41}[start])))
+        sent.append(path.stat().st_size)
+    assert 0 < sent[0] < sent[1] < sent[2]  # a viewer has it before the run ends
+    view.end(run, "")
+    stream.disconnect()
+    assert path.stat().st_size > sent[2]
+    times = list(np.rint(run.t * 1e9))
+    assert [t for t, _ in rows(path, "/position/angle", "Scalars:scalars")] == times
+    assert [t for t, _ in rows(path, "/linkage/bodies/crank", "Transform3D:translation")] == times
+    assert documents(path, "/card")[0].startswith("#")
+
+
+def test_a_viewer_that_is_closed_does_not_end_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(live, "ANSWER_TIME", 0.2)
+    stream = rr.RecordingStream("kinfmu_test", recording_id="closed")
+    flushed: list[float] = []
+
+    def lost(*, timeout_sec: float) -> None:
+        flushed.append(timeout_sec)
+        raise RuntimeError("no viewer")
+
+    monkeypatch.setattr(stream, "flush", lost)
+    run = kinfmu.solve(kinfmu.load("crank_rocker"), np.linspace(0.0, 1.0, 5))
+    view = LiveView(stream)
+    view.begin(run.part(slice(0, 0)))
+    view.add(run)
+    view.add(run)
+    view.end(run, "")
+    assert flushed == [0.2]  # nothing is sent after that
+
+
+def test_without_display_and_viewer_the_message_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(live, "PORT", 1)  # nothing listens there
+    monkeypatch.setattr(live.sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(LogError, match=r"^there is no display to open the viewer on; .*--screenshot F\.png$"):
+        LiveView()
+
+
+# ------------------------------------------------------------------------------------------------------- without viewer
+
+
+BASE = (  # a process in which the packages of the extras cannot be imported
+    "import sys; sys.modules.update(dict.fromkeys(('rerun', 'rerun_bindings', 'rerun_cli', 'PIL', 'matplotlib')))\n"
+)
+INSTALL = "needs the Rerun viewer: pip install 'kinfmu[viewer]'"
+
+
+def outcomes(folder: Path, *commands: str) -> list[tuple[int, str, str]]:
+    """Return exit status, output and errors of commands, which run one after another in one process."""
+    code = f"""{BASE}
+import json
+from click.testing import CliRunner
+from kinfmu.cli import main
+results = [CliRunner().invoke(main, command.split(), prog_name="kinfmu") for command in sys.argv[1:]]
+print(json.dumps([(one.exit_code, one.stdout, one.stderr) for one in results]))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code, *commands], cwd=folder, capture_output=True, text=True, check=True
+    )
+    return [tuple(outcome) for outcome in json.loads(done.stdout)]
+
+
+def test_simulate_writes_the_record_alone_and_reports_it(tmp_path: Path) -> None:
+    ((status, out, err),) = outcomes(tmp_path, "simulate fourbar --stop 3")
+    assert (status, err) == (0, "")
+    first, second = out.splitlines()
+    assert first.endswith("; written to logs/fourbar.mcap")
+    assert second == f"no recording, which {INSTALL}"
+    assert [path.name for path in (tmp_path / "logs").iterdir()] == ["fourbar.mcap"]
+    assert len(read(tmp_path / "logs" / "fourbar.mcap")) == 4
+    (tmp_path / "logs" / "fourbar.rrd").write_bytes(b"older")
+    tables = ("run.csv", "run.parquet")
+    again, without, *exports = outcomes(
+        tmp_path,
+        "simulate fourbar --stop 2",
+        "simulate fourbar --stop 2 --channels none",
+        *(f"export logs/fourbar.mcap -o {name}" for name in tables),
+    )
+    assert (again[0], again[2]) == (0, "")
+    assert again[1].splitlines()[1] == f"no recording, which {INSTALL}; logs/fourbar.rrd is of an older run"
+    assert (without[0], without[2], len(without[1].splitlines())) == (0, "", 1)
+    assert exports == [(0, f"written: {name}\n", "") for name in tables]
+
+
+def test_what_needs_the_viewer_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    refused = {
+        "simulate fourbar --rrd a.rrd": "a.rrd: a recording",
+        "simulate fourbar --live": "--live",
+        "review run.mcap": "run.mcap: a review",
+        "review run.mcap --screenshot a.png": "run.mcap: a review",
+    }
+    (tmp_path / "run.mcap").touch()
+    assert outcomes(tmp_path, *refused) == [(1, "", f"kinfmu: {what} {INSTALL}\n") for what in refused.values()]
+    assert [path.name for path in tmp_path.iterdir()] == ["run.mcap"]
+
+
+def test_so_are_the_functions_of_the_log(tmp_path: Path) -> None:
+    code = f"""{BASE}
+import kinfmu
+from kinfmu.errors import MissingPackageError
+from kinfmu.log.viewer.comparison import write_comparison
+run = kinfmu.solve(kinfmu.load("fourbar"), [0.0, 1.0])
+for call in (
+    lambda: kinfmu.log.write_rrd(run, "a.rrd"), lambda: write_comparison(run, run, "a.rrd"), kinfmu.log.LiveView
+):
+    try:
+        call()
+    except MissingPackageError as error:
+        print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+    recording = f"a.rrd: a recording {INSTALL}"
+    assert done.stdout.splitlines() == [recording, recording, f"the live view {INSTALL}"]
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.long
+def test_so_is_the_recording_of_the_demo(tmp_path: Path) -> None:
+    code = f"{BASE}from kinfmu.cli import demo; sys.exit(demo.main())"
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"wrote logs/fourbar.mcap; no recording: logs/fourbar.rrd: a recording {INSTALL}" in done.stdout
+    assert "no picture: logs/fourbar.gif: " in done.stdout

@@ -1,19 +1,32 @@
-"""Curves grouped by unit, and axes that do not mislead."""
+"""Curves of recordings: grouped by unit, of forces, and the parameters in which runs differ."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import kinfmu
+from kinfmu.cli import main
 from kinfmu.draw.scene import palette
-from kinfmu.log.viewer.blueprint import plot
-from kinfmu.log.viewer.series import SMALLEST, accuracy, efforts, error_estimates, groups, margin
+from kinfmu.draw.scene.scene import drawable
+from kinfmu.log import read, write_rrd
+from kinfmu.log.viewer.blueprint import Drawn, plot, single
+from kinfmu.log.viewer.card import parameters_apart
+from kinfmu.log.viewer.comparison import write_comparison
+from kinfmu.log.viewer.linkage import view_box
+from kinfmu.log.viewer.series import SMALLEST, accuracy, efforts, error_estimates, groups, margin, reactions
 from kinfmu.log.viewer.timeline import timeline_of
 from kinfmu.run import Run
+from kinfmu.run.components import mechanism_info
 from tests.log.runs import fourbar, with_gap
+from tests.log.viewer.test_rerun_file import SCALARS, documents, rows, statics
 from tests.run.test_forces import loaded
 
 
@@ -128,3 +141,162 @@ def test_efforts_and_energies_have_a_plot_for_each_unit() -> None:
 
 def test_a_run_without_masses_has_no_plot_of_forces(run: Run) -> None:
     assert efforts(run) == []
+
+
+# --------------------------------------------------------------------------------------------------------- force curves
+
+
+def test_a_recording_has_curves_of_reactions_with_names_and_arrows_with_a_scale(tmp_path: Path) -> None:
+    run = kinfmu.solve(loaded("slider_crank"), np.linspace(0.0, 1.0, 41))
+    force, moment = reactions(run)
+    joints = list(dict.fromkeys(name.owner for name in run.reaction_names if name.owner))
+    assert (force.title, moment.title) == ("joint force [N]", "joint moment [N m]")
+    assert list(force.names) == [*joints, "shaking"]
+    path = tmp_path / "run.rrd"
+    write_rrd(run, path)
+    assert statics(path, "/reactions/force", "SeriesLines:names") == list(force.names)
+    recorded = np.array([values for _, values in rows(path, "/reactions/force", SCALARS)])
+    first = np.hypot(run[f"{joints[0]}.force_x"], run[f"{joints[0]}.force_y"])
+    np.testing.assert_allclose(recorded[:, 0], first, rtol=1e-12)
+    shaking = np.hypot(run["shaking_force_x"], run["shaking_force_y"])
+    np.testing.assert_allclose(recorded[:, -1], shaking, rtol=1e-12)
+    assert list(moment.names)[-1] == "shaking"
+    (label,) = statics(path, "/linkage/forces/legend", "Arrows2D:labels")
+    (along,) = statics(path, "/linkage/forces/legend", "Arrows2D:vectors")
+    newton, unit = str(label).split()
+    assert unit == "N"
+    per_newton = np.hypot(*np.array(along, float)) / float(newton)  # the scale of all arrows
+    pin = f"/linkage/forces/joints/{joints[0]}"
+    assert statics(path, pin, "Arrows2D:labels") == [joints[0]]
+    arrows = np.array([vectors[0] for _, vectors in rows(path, pin, "Arrows2D:vectors")], float)  # type: ignore[index]
+    np.testing.assert_allclose(np.hypot(*arrows.T), first * per_newton, rtol=1e-5)
+
+
+def test_undetermined_and_missing_reactions_have_no_curves(run: Run) -> None:
+    assert reactions(run) == []  # without masses
+    four = kinfmu.solve(loaded("fourbar"), np.linspace(0.0, 1.0, 11))
+    named = {name for group in reactions(four) for name in group.names}
+    assert named == {"shaking"}  # the redundant bar shares all loads
+    crank = kinfmu.solve(loaded("slider_crank"), np.linspace(0.0, 1.0, 11))
+    left_out = [name for name in crank.reaction_names if name.owner == crank.reaction_names[0].owner]
+    kept = {name for group in reactions(crank.without(left_out)) for name in group.names}
+    assert crank.reaction_names[0].owner not in kept
+
+
+def views(part: Any) -> Iterator[Any]:
+    """The views in a container of a layout."""
+    for inner in getattr(part, "contents", ()) if hasattr(part, "grid_columns") else ():
+        yield from views(inner)
+    if not hasattr(part, "grid_columns"):
+        yield part
+
+
+def test_the_view_shows_all_arrows() -> None:
+    run = kinfmu.solve(kinfmu.load("excavator_loaded"))
+    shown, _ = drawable(run)
+    assert shown is not None
+    drawn = Drawn("linkage", "/linkage", run, shown)
+    found = drawn.arrows
+    assert found is not None
+    layout = single(timeline_of([run]), run, [drawn], {}, [], [])
+    (view,) = (view for view in views(layout.root_container) if view.name == "linkage")
+    (bounds,) = view.properties["VisualBounds2D"].range.as_arrow_array().to_pylist()
+    (x0, x1), (y0, y1) = bounds["x_range"], bounds["y_range"]
+    assert x0 < view_box(shown)[0][0]  # of the linkage alone
+    for name, along in found.along.items():
+        x, y = (found.at[name] + along).T
+        assert x0 < np.nanmin(x) <= np.nanmax(x) < x1, name
+        assert y0 < np.nanmin(-y) <= np.nanmax(-y) < y1, name
+
+
+# ----------------------------------------------------------------------------------------------------------- parameters
+
+
+WHEEL = """
+name = "wheel"
+units.length = "mm"
+parameters = { r = "30 mm", half = "r/2", tilt = "30 deg", push = "2 kN", copies = 3 }
+bodies.ground.points = { O = [0, 0] }
+bodies.crank = { points = { O = [0, 0], P = ["r", "half"] }, start = { phi = "60 deg" } }
+joints.O = { type = "revolute", between = ["ground.O", "crank.O"] }
+drivers.m = { type = "angle", of = "crank", law = "constant_speed", start = "tilt", speed = "60 rpm" }
+loads.weight = { type = "force", at = "crank.P", x = 0, y = "-push*copies" }
+run = { stop = 0.5, step = 0.1 }
+"""
+SPEED = ("m.speed", "6.28319 rad/s (60 rpm)", "7.33038 rad/s (70 rpm)")
+
+
+@pytest.fixture
+def wheel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The working folder, with wheel.toml in it."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "wheel.toml").write_text(WHEEL, encoding="utf-8")
+    return tmp_path
+
+
+def recorded(*arguments: str) -> Run:
+    """The run that a command writes."""
+    result = CliRunner().invoke(main, [*arguments, "-o" if arguments[0] == "solve" else "--mcap", "run.mcap"])
+    assert result.exit_code == 0, result.stderr
+    return read("run.mcap")
+
+
+@pytest.mark.parametrize("command", ["simulate", "solve"])
+@pytest.mark.few(1)
+def test_parameters_and_law_constants_are_compared_with_units(command: str, wheel: Path) -> None:
+    assert wheel.is_dir()
+    a = recorded("simulate", "wheel.toml")
+    settings = ("r=35mm", "m.speed=70rpm", "tilt=20deg", "push=2500N", "copies=4")
+    b = recorded(command, "wheel.toml", *(word for setting in settings for word in ("--set", setting)))
+    assert parameters_apart(a, b) == [  # not half, which follows from r
+        ("r", "30 mm", "35 mm"),
+        ("tilt", "0.523599 rad (30 deg)", "0.349066 rad (20 deg)"),
+        ("push", "2000 N", "2500 N"),
+        ("copies", "3", "4"),
+        SPEED,
+    ]
+    assert parameters_apart(a, a) == []
+
+
+def test_an_fmu_with_a_setting_is_compared_with_its_file(wheel: Path) -> None:
+    kinfmu.build(kinfmu.load("wheel.toml"), wheel / "wheel.fmu", flavour="python")
+    a = recorded("simulate", "wheel.toml")
+    b = recorded("simulate", "wheel.fmu", "--set", "m.speed=70rpm", "--set", "solver.tolerance=1e-8")
+    assert parameters_apart(a, b) == [SPEED, ("solver.tolerance", "-", "1e-08")]
+
+
+def test_units_are_those_of_the_file_while_a_run_has_them() -> None:
+    mechanism = kinfmu.mechanism.toml_file.parse(WHEEL)
+    a, b = (kinfmu.solve(mechanism, parameters=values) for values in ({}, {"push": 3e3, "tilt": "40 deg"}))
+    assert parameters_apart(a, b) == [
+        ("tilt", "30 deg", "40 deg"),
+        ("push", "2 kN", "3 kN"),
+    ]
+
+
+def test_numbers_are_never_shown_with_the_same_digits() -> None:
+    mechanism = kinfmu.mechanism.toml_file.parse(WHEEL)
+    a, b = (kinfmu.solve(mechanism, parameters={"r": r}) for r in (30.0, 30.0 + 1e-7))
+    assert parameters_apart(a, b) == [("r", "30 mm", "30.0000001 mm")]
+
+
+def test_the_mechanisms_of_a_system_are_compared_under_the_names_of_their_columns() -> None:
+    a = kinfmu.solve(kinfmu.mechanism.toml_file.parse(WHEEL))
+    of_a, of_b = (mechanism_info("wheel", [("slide", WHEEL.replace("30 mm", length))]) for length in ("30 mm", "40 mm"))
+    a, b = (replace(a, info={"parameters": given, **info}) for given, info in (("", of_a), ("slide.r = 40", of_b)))
+    assert parameters_apart(a, b) == [("slide.r", "30 mm", "40 mm")]
+
+
+def test_what_a_damaged_record_holds_of_its_mechanism_is_not_compared() -> None:
+    run = replace(kinfmu.solve(kinfmu.mechanism.toml_file.parse(WHEEL)), info={"g": "1"}, mechanism_source="name = ")
+    assert parameters_apart(run, replace(run, info={"g": "2", "note": "x"})) == [("g", "1", "2"), ("note", "-", "x")]
+
+
+def test_the_table_follows_the_names_of_the_runs(wheel: Path) -> None:
+    a = recorded("simulate", "wheel.toml")
+    b = recorded("simulate", "wheel.toml", "--set", "r=35mm")
+    write_comparison(a, b, wheel / "both.rrd")
+    (text,) = documents(wheel / "both.rrd", "/card")
+    table = "| parameter | A | B |\n|---|---:|---:|\n| r | 30 mm | 35 mm |"
+    title, of_a, of_b, third, *_ = text.split("\n\n")
+    assert (title, of_a[:5], of_b[:5], third) == ("### B - A", "**A**", "**B**", table)

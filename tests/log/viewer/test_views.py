@@ -1,24 +1,37 @@
-"""Views of recordings in a viewer without a window: none reports an error."""
+"""Views of recordings: which there are, their axes, timelines and names, and the samples that long runs leave out."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu import Mechanism
+from kinfmu.draw.scene.forces import arrows
+from kinfmu.draw.scene.scene import Scene, drawable, scene
+from kinfmu.errors import LogError
 from kinfmu.log import write_mcap, write_rrd
-from kinfmu.log.viewer import headless
+from kinfmu.log.viewer import headless, timeline
+from kinfmu.log.viewer.blueprint import ABREAST, EDGE, NUMBERS, WIDTH, Plot, _abreast, plot, with_two_labels
+from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.comparison import write_comparison
+from kinfmu.log.viewer.ground import dots, places_below, shown_names
+from kinfmu.log.viewer.marks import legend_start
+from kinfmu.log.viewer.series import efforts, groups, margin
+from kinfmu.log.viewer.timeline import decimated, timeline_of
 from kinfmu.mechanism import gallery
+from kinfmu.mechanism.toml_file import parse
+from kinfmu.run import Run
 from kinfmu.run.channels import select
 from kinfmu.run.driving import run_times
-from tests.gallery_members import mostly_long
+from tests.gallery_members import every_member, mostly_long
 from tests.log.runs import KINDS, fourbar, with_gap
-from tests.log.viewer.test_rerun_file import verified
+from tests.log.viewer.test_rerun_file import SCALARS, documents, rows, statics, verified
 from tests.run.test_forces import loaded
 
 MOST_SAMPLES = 60  # of a mechanism of the gallery
@@ -132,3 +145,204 @@ def test_recordings_of_two_mechanisms_do_not_share_a_layout(tmp_path: Path, view
     assert "velocity [m/s]" in viewer.glance().views
     viewer.show(tmp_path / "second.rrd")
     assert "velocity [m/s]" not in viewer.glance().views
+
+
+# ------------------------------------------------------------------------------------------------------------ blueprint
+
+
+pytest.importorskip("rerun")
+WIDEST_LABEL = 50.0  # [points], such as +100 ms
+
+
+@pytest.mark.parametrize("width", [WIDTH / 2, WIDTH / ABREAST])
+def test_the_label_at_the_end_of_the_run_is_not_cut_off(width: float) -> None:
+    run = fourbar(np.arange(181.0))
+    group = margin(run)
+    assert group is not None
+    view = plot(group.title, [("", group)], timeline_of([run]), [run], width)
+    (shown,) = view.properties["TimeAxis"].view_range.as_arrow_array().to_pylist()
+    start, end = (shown[key] / 1e9 for key in ("start", "end"))
+    assert start == pytest.approx(-EDGE * 180.0)
+    assert (end - 180.0) / (end - start) * (width - NUMBERS) > 0.5 * WIDEST_LABEL
+
+
+@pytest.mark.parametrize("height", [45.0, 82.0, 110.0, 300.0])
+def test_an_axis_has_two_labels_at_powers_of_ten(height: float) -> None:
+    """Rerun labels the multiples of the least power of ten that are 20 points apart or more."""
+    drawn = np.random.default_rng(4)
+    for _ in range(500):
+        low, high = np.sort(drawn.choice([0.0, 1.0], 2) * drawn.normal(size=2) * 10.0 ** drawn.uniform(-9, 9, 2))
+        if not high > low:
+            continue
+        bottom, top = with_two_labels(low, high, height)
+        assert bottom <= low
+        assert high <= top
+        assert top - bottom < 25.0 * (high - low)
+        steps = [step for k in range(-20, 20) if (step := 10.0**k) / (top - bottom) * height >= 20.0]
+        labels = np.arange(np.ceil(bottom / steps[0]), np.floor(top / steps[0]) + 0.5)
+        assert len(labels) >= 2, (low, high, bottom, top)
+
+
+def test_a_legend_hides_no_curve() -> None:
+    run = kinfmu.solve(loaded("slider_crank"), np.linspace(0.0, 0.1, 21))
+    plots = [Plot(group.title, [("", group)]) for group in groups(run).values()]
+    rows = [*([one, one] for one in plots), *_abreast([Plot(group.title, [("", group)]) for group in efforts(run)])]
+    for row in rows:
+        for one in row:
+            names = one.groups[0][1].names
+            view = plot(*one, timeline_of([run]), [run], WIDTH / len(row))
+            (shown,) = view.properties["TimeAxis"].view_range.as_arrow_array().to_pylist()
+            start, end = (shown[key] / 1e9 for key in ("start", "end"))
+            free = (end - 0.1) / (end - start) * (WIDTH / len(row) - NUMBERS)
+            if len(names) > 1:
+                assert free > 7.0 * max(map(len, names)) + 30.0, names  # letters, and the mark with its margins
+
+
+# ------------------------------------------------------------------------------------------------------------- timeline
+
+
+def test_runs_over_different_axes_have_no_timeline_in_common() -> None:
+    mechanism = kinfmu.load("fourbar")
+    runs = [kinfmu.solve(mechanism, [0.0, 1.0]), kinfmu.solve(mechanism, crank_angle=[0.0, 1.0])]
+    message = r"the runs are over t \[s\] and crank \[deg\]; runs over the same axis can be compared"
+    with pytest.raises(LogError, match=f"^{message}$"):
+        timeline_of(runs)
+
+
+def test_values_that_a_recording_cannot_hold_are_refused() -> None:
+    run = kinfmu.solve(kinfmu.load("fourbar"), crank_angle=np.array([0.0, 3e9]))
+    with pytest.raises(LogError, match=r"^crank \[rad\]: a recording holds values of at most 2147483648$"):
+        timeline_of([run])
+
+
+# ------------------------------------------------------------------------------------------------------------ decimated
+
+
+@pytest.fixture
+def long_run() -> Run:
+    """2001 samples with a gap of three and one sample that stands out."""
+    run = fourbar(np.linspace(0.0, 180.0, 2001))
+    peaked = np.where(np.arange(2001) == 777, 5.0, run.residual)
+    return with_gap(dataclasses.replace(run, residual=peaked), 1234, 1236)
+
+
+def test_a_short_run_is_left_as_it_is(run: Run) -> None:
+    assert decimated(run, 181) is run
+    assert decimated(run) is run
+
+
+def test_peaks_are_kept(long_run: Run) -> None:
+    less = decimated(long_run, 100)
+    assert 100 <= len(less) < 150
+    kept = np.searchsorted(long_run.t, less.t)
+    assert {0, 777, 1233, 1234, 1236, 1237, 2000} <= set(kept.tolist())
+    for column, whole in zip(less.columns(), long_run.columns(), strict=True):
+        np.testing.assert_array_equal(column.values, whole.values[kept])
+        assert np.nanmax(column.values) == np.nanmax(whole.values)
+        assert np.nanmin(column.values) == np.nanmin(whole.values)
+
+
+def test_a_recording_states_what_it_leaves_out_and_holds_all_events(
+    long_run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(timeline, "MOST_ROWS", 100)
+    write_rrd(long_run, tmp_path / "run.rrd")
+    angles = rows(tmp_path / "run.rrd", "/position/angle", SCALARS)
+    assert 100 <= len(angles) < 150
+    (text,) = documents(tmp_path / "run.rrd", "/card")
+    assert f"{len(angles)} of 2001 samples are drawn" in text
+    assert len(rows(tmp_path / "run.rrd", "/log", "TextLog:text")) == 5
+    write_comparison(long_run, long_run, tmp_path / "both.rrd")
+    (text,) = documents(tmp_path / "both.rrd", "/card")
+    assert "A: " in text
+    assert "B: " in text
+
+
+# --------------------------------------------------------------------------------------------------------------- labels
+
+
+SLIDER_FIRST = """
+name = "slider_first"
+[bodies.ground]
+points = { O = [0, 0], way = [0, -1] }
+[bodies.crank]
+points = { O = [0, 0], P = [1, 0] }
+[bodies.rod]
+points = { P = [0, 0], S = [3, 0] }
+start = { x = 1, phi = -0.3 }
+[bodies.slider]
+points = { S = [0, 0], tip = [1, 0] }
+start = { x = 4, y = -1 }
+[joints]
+main = { type = "revolute", between = ["ground.O", "crank.O"] }
+P = { type = "revolute", between = ["crank.P", "rod.P"] }
+S = { type = "revolute", between = ["rod.S", "slider.S"] }
+guide = { type = "translational", between = ["slider.S", "ground.way"] }
+[drivers.crank]
+type = "angle"
+of = "crank"
+law = "constant_speed"
+speed = 1
+"""
+
+
+def scene_of(mechanism: Mechanism) -> Scene:
+    run = kinfmu.solve(mechanism, np.linspace(mechanism.run.start, mechanism.run.stop, 41))
+    found, _ = drawable(run)
+    assert found
+    return found
+
+
+@every_member
+def test_names_of_supports_do_not_cover_each_other(name: str) -> None:
+    scene = scene_of(kinfmu.load(name))
+    places, names = places_below(scene) * dots(scene), list(scene.supports)
+    for k, at in enumerate(places):
+        for other, text in zip(places[:k], names, strict=False):
+            assert abs(at - other)[1] > 16.0 or abs(at - other)[0] > 3.2 * (len(text) + len(names[k]))
+
+
+def test_a_name_that_would_cover_another_is_shown_only_when_pointed_at() -> None:
+    mechanism = kinfmu.load("fourbar")
+    assert {"crank", "coupler", "rocker"} <= shown_names(scene_of(mechanism))
+    scene = scene_of(mechanism)
+    (crank,) = (shape for shape in scene.shapes if (shape.kind, shape.name) == ("link", "crank"))
+    twins = replace(scene, shapes=(*scene.shapes, replace(crank, name="other")))
+    assert "other" not in shown_names(twins)
+    assert "crank" in shown_names(twins)
+
+
+def test_supports_have_the_names_of_all_joints_at_their_place() -> None:
+    assert list(scene_of(parse(SLIDER_FIRST, "slider.toml")).supports) == ["main"]
+    assert "pin_upper, pin_lower" in scene_of(kinfmu.load("jansen_leg")).supports
+
+
+def test_the_block_of_the_ground_through_which_a_slider_moves_is_drawn(tmp_path: Path) -> None:
+    mechanism = parse(SLIDER_FIRST, "slider.toml")
+    write_rrd(kinfmu.solve(mechanism, np.linspace(0.0, 1.0, 11)), tmp_path / "run.rrd")
+    (block,) = statics(tmp_path / "run.rrd", "/linkage/ground/blocks", "LineStrips2D:strips")
+    np.testing.assert_allclose(np.mean(block, axis=0), [0.0, -1.0], atol=1e-6)
+    (radius,) = statics(tmp_path / "run.rrd", "/linkage/ground/blocks", "LineStrips2D:radii")
+    assert radius > 0.01  # as wide as a block, not a thin line
+    assert "guide" in statics(tmp_path / "run.rrd", "/linkage/ground/blocks", "LineStrips2D:labels")
+
+
+def test_the_card_states_the_tool_that_made_the_fmu_but_not_its_token() -> None:
+    run = kinfmu.solve(kinfmu.load("fourbar"), [0.0])
+    of_fmu = replace(run, info={"name": "fourbar", "generation_tool": "kinfmu 1", "token": "{12ab}", "parameters": ""})
+    assert "{12ab}" not in card(of_fmu)
+    assert "token" not in card(of_fmu)
+    assert "| FMU made by | kinfmu 1 |" in card(of_fmu)
+    assert "parameters set" not in card(of_fmu)
+
+
+def test_the_scale_of_forces_keeps_off_the_names_of_supports() -> None:
+    for name in ("fourbar_loaded", "excavator_loaded", "jansen_leg_loaded", "toggle_press"):
+        mechanism = kinfmu.load(name)
+        run = kinfmu.solve(mechanism)
+        found = scene(run, mechanism)
+        drawn = arrows(run, mechanism, found)
+        assert drawn is not None
+        middle = legend_start(found, drawn.length) + 0.5 * drawn.length
+        near = [at for at in found.supports.values() if at[1] < found.low[1] + 0.2 * found.size]
+        assert all(abs(at[0] - middle) > 0.1 * found.size for at in near), name

@@ -23,7 +23,7 @@ from kinfmu.plan.equations.system import placement
 from kinfmu.plan.trace import Tracer
 from kinfmu.units import Quantity
 from tests.mechanism.joints.drawn import angles, coordinates
-from tests.mechanism.loads.drawn import acting, are_apart, argument, in_si, mechanisms
+from tests.mechanism.loads.every_load import acting, are_apart, argument, in_si, mechanisms
 
 AT_A_POINT = (ForceAt, ForceAlong)
 every_load = pytest.mark.parametrize("cls", LOADS, ids=lambda cls: cls.type)

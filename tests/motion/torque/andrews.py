@@ -1,6 +1,6 @@
 """Solution of Andrews' squeezer at its end, published with the Test Set for IVP Solvers.
 
-It starts at rest and is driven by a constant torque; the mechanism is that of `tests.run.test_squeezer`.
+It starts at rest and is driven by a constant torque; the mechanism is that of `tests.run.test_lagrange`.
 """
 
 from __future__ import annotations

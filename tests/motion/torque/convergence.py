@@ -15,7 +15,7 @@ import kinfmu
 from kinfmu.draw.chart import dress
 from kinfmu.draw.writing import write
 from tests.motion.torque import andrews
-from tests.run.test_squeezer import TORQUE, squeezer
+from tests.run.test_lagrange import TORQUE, squeezer
 
 TOLERANCES = {"DOP853": 10.0 ** np.arange(-4.0, -13.5, -1.0), "Radau": 10.0 ** np.arange(-4.0, -10.5, -1.0)}
 COLOURS = {"DOP853": "#1d4ed8", "Radau": "#b45309"}

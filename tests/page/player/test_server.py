@@ -19,7 +19,7 @@ from kinfmu.errors import KinfmuError
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.page.player import PlayServer, PlaySource
 from kinfmu.page.player.server import LARGEST_BODY
-from tests.page.browser import browser, needs_browser
+from tests.page.engines import browser, needs_browser
 
 LENGTH = "bodies.crank.points.P.x"
 

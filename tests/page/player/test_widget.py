@@ -12,7 +12,7 @@ import pytest
 
 import kinfmu
 from kinfmu.page.player import widget
-from tests.page.browser import browser, needs_browser
+from tests.page.engines import browser, needs_browser
 
 traitlets = pytest.importorskip("traitlets", reason="anywidget is not installed")
 pytest.importorskip("anywidget", reason="anywidget is not installed")
