@@ -146,8 +146,6 @@ def archive(
         laws = f"{emit_python_forces(plan, owned.laws.steps)}\n\nCOUNTS = {owned.laws.counts!r}\n"
         contents["kinfmu/solver/laws.py"] = laws.encode()
         contents |= _modules("kinfmu.solver.python.torque", "kinfmu/solver/torque")
-    else:
-        del contents["kinfmu/solver/law_breaks.py"]
     added = (*(WITH_FORCES if stages else ()), *(WITH_EFFORTS if owned else ()))
     contents |= {f"kinfmu/fmu/{name}": files("kinfmu.fmu").joinpath(name).read_bytes() for name in added}
     metadata = documents.metadata if documents else {}

@@ -19,9 +19,9 @@ from kinfmu.fmu.force_slave import ForceSlave
 from kinfmu.fmu.layout import Numbers
 from kinfmu.fmu.slave import as_numbers
 from kinfmu.solver.python import Pose, Status
-from kinfmu.solver.python.law_breaks import LEAST_TOLERANCE, MOST_TOLERANCE
 from kinfmu.solver.python.pose import failed
 from kinfmu.solver.python.torque import Course, DormandPrince, Ended, EquationOfMotion, Given, Laws, TorqueSteps
+from kinfmu.solver.python.torque.law_breaks import LEAST_TOLERANCE, MOST_TOLERANCE
 
 _UNDETERMINED = "the reduced inertia is singular, or a number is not finite"
 

@@ -18,7 +18,7 @@ from kinfmu.mechanism.loads.following import Following
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.efforts import effort_names
 from kinfmu.plan.forces import effort_noun
-from kinfmu.solver.python.law_breaks import LEAST_TOLERANCE, MOST_TOLERANCE, STEP_TOLERANCE
+from kinfmu.solver.python.torque.law_breaks import LEAST_TOLERANCE, MOST_TOLERANCE, STEP_TOLERANCE
 from kinfmu.units import Quantity, unit_of
 
 STATES, EFFORTS, INPUTS = "states", "efforts", "inputs"  # parts

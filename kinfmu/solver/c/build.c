@@ -1,11 +1,6 @@
 /* Build: a bridge over a singular point ahead of a regular pose. See kinfmu/solver/python/build.py. */
 #include "internal.h"
 
-#define NARROWEST 1e-3 /* [rad, sizes]; nodes closer than this have lost the digits that a bridge would gain */
-#define FINE 1e-12     /* [rad, sizes]; difference of two widths below which narrower ones gain nothing */
-#define STRAIGHT 0.1   /* change of a zero located anew, as a part of the distance ahead: it is as small where there is a zero */
-#define STEADY 0.1     /* largest correction of an extrapolation over the determinant: beyond lies another branch */
-
 /* Find the driver value where a determinant vanishes on the secant through its values at a and b. */
 bool kf_secant_zero(double a, double of_a, double b, double of_b, double *zero)
 {
@@ -20,7 +15,7 @@ bool kf_secant_zero(double a, double of_a, double b, double of_b, double *zero)
  */
 static bool locate(kf_solver *solver, kf_pose *pose, int block, double *zero)
 {
-    const double least = 0.1 * NARROWEST * kf_reach[KF_ALONG(solver)];
+    const double least = 0.1 * KF_NARROWEST * kf_reach[KF_ALONG(solver)];
     double step = 0.5 * (*zero - KF_HERE(solver, pose));
     bool is_compared = false; /* the first step says nothing: the estimate may stem from the same two places */
     while (fabs(step) > least) {
@@ -43,7 +38,7 @@ static bool locate(kf_solver *solver, kf_pose *pose, int block, double *zero)
         }
         change = fabs(better - *zero);
         *zero = better;
-        if (is_compared && change <= STRAIGHT * fabs(left) && change <= 0.2 * NARROWEST * kf_reach[KF_ALONG(solver)]) {
+        if (is_compared && change <= KF_STRAIGHT * fabs(left) && change <= 0.2 * KF_NARROWEST * kf_reach[KF_ALONG(solver)]) {
             return true;
         }
         solver->scratch.located = *ahead; /* paths from here may fail */
@@ -84,7 +79,7 @@ static bool cross(kf_solver *solver, kf_span *span, kf_pose *before, double side
         kf_combined(span, side * span->half, count, order + first, (const double(*)[3])weights, solver->scratch.z);
         kf_fresh(pose, -1, -INFINITY, INFINITY);
         if (!kf_evaluated(&solver->model, KF_AT(&solver->model, &u, buffer), solver->scratch.z, NULL, &pose->found)
-            || pose->found.moved > STEADY * pose->found.margin) {
+            || pose->found.moved > KF_STEADY * pose->found.margin) {
             return false;
         }
         for (k = 0; node > 3 && k < KF_BLOCKS; ++k) {
@@ -148,7 +143,7 @@ int kf_build(kf_solver *solver, kf_pose *pose, int block, double zero)
     if (!locate(solver, pose, block, &zero)) {
         return -1;
     }
-    for (half = KF_HALF_WIDTH * reach; half >= NARROWEST * reach && apart > FINE; half *= 0.5) {
+    for (half = KF_HALF_WIDTH * reach; half >= KF_NARROWEST * reach && apart > KF_FINE; half *= 0.5) {
         const int number = kf_spare_span(solver, best);
         kf_span *const span = &KF_POOL(solver)->spans[number < 0 ? 0 : number];
         if (number >= 0 && span_over(solver, span, pose, block, zero, half) && kf_span_apart(span) < apart) {

@@ -1,12 +1,6 @@
 /* Limits: driver values where a path ends, and why. See kinfmu/solver/python/limit.py. */
 #include "internal.h"
 
-#define VANISHING 1e-6        /* [sizes] of a length that a law gives: where steps end there, it would be negative beyond */
-#define FAR_AWAY 100.0        /* [sizes]; what runs to infinity is at least as far away */
-#define AT_POLE 0.999         /* of the distance to a pole; beyond it an unknown is a thousand times as far away */
-#define STEEPEST_SLOPE (-0.8) /* of z'/z'' over the driver: -1 / (p + 1) toward a pole of order p, */
-#define LEAST_SLOPE (-0.2)    /* -2 toward a dead centre */
-
 /* Move the limit past the last pose, to where a number vanishes that is `far` at the pose before and `near` at the last. */
 static void extrapolate(const kf_pose *before, const kf_pose *pose, double near, double far, kf_limit *limit)
 {
@@ -42,7 +36,7 @@ void kf_limit_beyond(kf_solver *solver, const kf_pose *before, kf_pose *pose, co
     kf_limit_at(limit, KF_POSE_U(pose), KF_BLOCKS > 0 ? 0 : KF_NO_BLOCK);
 #if KF_LAWS
     for (k = KF_LAW_ARGUMENTS; k < KF_LAW_ARGUMENTS + KF_LAW_LENGTHS; ++k) {
-        if (lengths[k] < VANISHING * kf_size) {
+        if (lengths[k] < KF_VANISHING * kf_size) {
             extrapolate(before, pose, lengths[k], longer[k], limit);
             limit->block = KF_NEGATIVE;
             return;
@@ -109,7 +103,7 @@ bool kf_pole_before(kf_solver *solver, kf_pose *before, kf_pose *pose, const dou
             double there, here, slope, order, ahead;
             if (kf_is_outside(&solver->model, block) || kf_unknown_is_angle[k] || before->x2[k] * between == 0.0
                 || !(fabs(first) * unit > KF_STEEP * scale && second != 0.0
-                     && first * first > FAR_AWAY * scale * fabs(second))) {
+                     && first * first > KF_FAR_AWAY * scale * fabs(second))) {
                 continue;
             }
             there = before->x1[k] / before->x2[k];
@@ -117,8 +111,8 @@ bool kf_pole_before(kf_solver *solver, kf_pose *before, kf_pose *pose, const dou
             slope = (here - there) / between;
             order = 0.5 * rint(-2.0 / slope) - 1.0;
             ahead = 1.5 * (there + here) / (2.0 / (order + 1.0) - slope) - 0.5 * between;
-            if (STEEPEST_SLOPE < slope && slope < LEAST_SLOPE && 0.0 < AT_POLE * ahead / distance
-                && AT_POLE * ahead / distance <= 1.0) {
+            if (KF_STEEPEST_SLOPE < slope && slope < KF_LEAST_SLOPE && 0.0 < KF_AT_POLE * ahead / distance
+                && KF_AT_POLE * ahead / distance <= 1.0) {
                 kf_limit_at(limit, KF_POSE_U(pose), block);
                 limit->pole = k;
                 for (d = 0; d < KF_DRIVERS; ++d) {

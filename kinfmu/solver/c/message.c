@@ -4,10 +4,6 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-#define KF_LARGE 1e6                /* [rad]; decimals of larger numbers are meaningless */
-#define KF_MORE 6                   /* digits that such numbers have before the point */
-#define KF_DEGREE 57.29577951308232 /* degrees in a radian */
-
 void kf_append(char *message, const char *format, ...)
 {
     const size_t length = strlen(message);

@@ -1,9 +1,6 @@
 /* Survey: find the singular points near a pose and bridge them. See kinfmu/solver/python/survey.py. */
 #include "internal.h"
 
-#define NEXT_TO 1e-3 /* [rad, sizes] up to which the secant through two poses is too rough to find a zero by */
-#define FAR_OFF 4.0  /* times as far as zeros are bridged: one that the rough secant has beyond is not searched for */
-
 /* Return a pose at a distance from another, on the side where a block's determinant grows; NULL if there is none. */
 static kf_pose *nearby(kf_solver *solver, kf_pose *pose, int block, double distance)
 {
@@ -29,7 +26,7 @@ static bool is_far_off(const kf_solver *solver, const kf_pose *pose, const kf_po
     for (; block < KF_BLOCKS; ++block) {
         if (fabs(after[block]) < KF_REGULAR && !kf_knows(solver, trial->map, here, block)
             && !(kf_secant_zero(from, before[block], here, after[block], &zero)
-                 && fabs(zero - here) > FAR_OFF * KF_HALF_WIDTH * kf_reach[KF_ALONG(solver)])) {
+                 && fabs(zero - here) > KF_FAR_OFF * KF_HALF_WIDTH * kf_reach[KF_ALONG(solver)])) {
             return false;
         }
     }
@@ -58,7 +55,7 @@ int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial)
             return kf_with_bridge(solver, map, again);
         }
     }
-    if (fabs(here - KF_HERE(solver, pose)) <= NEXT_TO * reach) {
+    if (fabs(here - KF_HERE(solver, pose)) <= KF_NEXT_TO * reach) {
         if (is_far_off(solver, pose, trial, block)) {
             return map;
         }

@@ -13,7 +13,7 @@ VANISHING = 1e-6  # [sizes] of a length that a law gives: where steps end there,
 NO_POLE = -1  # in place of an unknown that runs to infinity
 FAR_AWAY = 100.0  # [sizes]; what runs to infinity is at least as far away
 AT_POLE = 0.999  # of the distance to a pole; beyond it an unknown is more than a thousand times as far away
-POLE_SLOPES = -0.8, -0.2  # of z'/z'' over the driver: -1 / (p + 1) toward a pole of order p, -2 toward a dead centre
+STEEPEST_SLOPE, LEAST_SLOPE = -0.8, -0.2  # of z'/z'': -1 / (p + 1) toward a pole of order p, -2 to a dead centre
 
 
 class Limit(NamedTuple):
@@ -76,7 +76,7 @@ def pole_before(model: Model, before: Pose, pose: Pose, direction: Vector, dista
             continue
         there, here = old[k] / older[k], new[k] / newer[k]
         slope = (here - there) / between
-        if not POLE_SLOPES[0] < slope < POLE_SLOPES[1]:
+        if not STEEPEST_SLOPE < slope < LEAST_SLOPE:
             continue
         order = 0.5 * round(-2.0 / slope) - 1.0
         ahead = 1.5 * (there + here) / (2.0 / (order + 1.0) - slope) - 0.5 * between

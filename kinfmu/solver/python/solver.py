@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import inf, isfinite
 from typing import Any
 
-from .advance import CLOSE, NEAR_SINGULAR, advance
+from .advance import CLOSE, NEAR, advance
 from .estimate import estimated_errors, margin_of, with_driver_errors
 from .limit import Limit, limit_message
 from .message import place
@@ -66,9 +66,7 @@ class Solver:
                     margin = near.margin
                     if margin >= REGULAR:
                         return near
-                    if margin > NEAR_SINGULAR and (
-                        margin >= CLOSE or keeps_branch(self.model, start, near, UNIT_SPEED, s)
-                    ):
+                    if margin > NEAR and (margin >= CLOSE or keeps_branch(self.model, start, near, UNIT_SPEED, s)):
                         singularities = surveyed(self.model, start, near)
                         if singularities is start.singularities:  # nothing new there
                             return near
@@ -115,7 +113,7 @@ class Solver:
             found = start if singularities is None else advance(self.model, start, start.u, singularities)
             if not isinstance(found, Limit):
                 pose = found
-            if pose is start and pose.margin < NEAR_SINGULAR:
+            if pose is start and pose.margin < NEAR:
                 pose = with_map(start, None)
                 pose.status = Status.NEAR_SINGULAR
         if pose.residual <= self.tolerance and pose.watch <= self.tolerance:

@@ -13,7 +13,7 @@ from itertools import pairwise
 from math import inf, sqrt
 from typing import Any, Protocol
 
-from .advance import NEAR_SINGULAR
+from .advance import NEAR
 from .limit import NO_BLOCK, Limit, limit_message
 from .linear import Matrix
 from .pose import Found, Model, Pose, Vector, evaluated, failed, tangent_of
@@ -255,7 +255,7 @@ class Tracks:
         if margin >= REGULAR or self.mixed is None:
             return margin >= REGULAR
         of_tracks = [abs(pose.determinants[k]) for k, by in enumerate(self.model.BLOCK_DRIVERS) if by != MIXED]
-        return margin >= NEAR_SINGULAR and min(of_tracks) >= REGULAR
+        return margin >= NEAR and min(of_tracks) >= REGULAR
 
     def dump(self, pose: Pose) -> list[Any]:
         """Return a pose that consists of tracks as plain numbers."""

@@ -11,8 +11,6 @@ import random
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -46,7 +44,6 @@ from tests.solver.change_points import fourbar as change_point_fourbar
 from tests.solver.change_points import two_loops
 from tests.stress.trial import trial
 
-HEADERS = ("internal.h", "solver.h")
 QUICK = (*STRICT, "-O0")  # to compile
 Samples = Sequence[tuple[float, ...]]
 
@@ -94,29 +91,6 @@ def assert_same(plan: SolvePlan, samples: Samples, flags: Sequence[str] = QUICK)
         good = pose
         c.commit()
     return statuses
-
-
-MODULES = (
-    "advance", "bridge", "build", "continuation", "estimate", "limit",
-    "singularity_map", "solver", "span", "trusted_step",
-)  # fmt: skip
-
-
-@pytest.mark.parametrize("module", MODULES)
-def test_constants_are_the_same_in_both(module: str) -> None:
-    in_headers = {name.removeprefix("KF_"): number for name, number in defined(HEADERS).items()}
-    c = in_headers | {"NEAR_SINGULAR": in_headers["NEAR"]} | defined((f"{module}.c",))
-    python = import_module(f"kinfmu.solver.python.{module}")
-    own = re.findall(r"^_?([A-Z_]+) = [0-9]", Path(str(python.__file__)).read_text("utf-8"), re.M)
-    assert own
-    for name in own:
-        assert c[name] == getattr(python, name, None) or c[name] == getattr(python, f"_{name}"), name
-
-
-def defined(files: Sequence[str]) -> dict[str, float]:
-    """Numbers that C files of the run time define, by name."""
-    text = "\n".join(compiler.sources([file for file in files if (compiler.RUNTIME / file).exists()]).values())
-    return {name: float(number) for name, number in re.findall(r"^#define (\w+) ([0-9][0-9.e+-]*)", text, re.M)}
 
 
 @every_member
