@@ -16,7 +16,7 @@ from kinfmu.fmu.estimated_rates import LARGEST
 from kinfmu.fmu.layout import NOT_A_NUMBER, Numbers
 from kinfmu.fmu.slave import MechanismSlave
 from kinfmu.fmu.slave_outputs import Shown
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from kinfmu.solver.python.tracks import sample_rates
 
 

@@ -17,8 +17,8 @@ from kinfmu.fmu.linear_inputs import linear_inputs
 from kinfmu.fmu.torque_variables import with_states
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import ForceSteps
+from kinfmu.solver.python.pose import Status
 from kinfmu.solver.python.solver import TOLERANCE
-from kinfmu.solver.python.status import Status
 from kinfmu.units import CoordinateName, Quantity, unit_of
 
 _INSIDE = 1e-12  # of a range: how far declared limits are from those found, which round-off may miss

@@ -22,7 +22,7 @@ from kinfmu.plan.equations.jets import Jet
 from kinfmu.plan.equations.system import placement
 from kinfmu.run import Run
 from kinfmu.run.axis import TIME
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from kinfmu.units import CoordinateName
 
 SAME = 1e-9  # of the largest value; by how much inputs may differ from the law of their driver

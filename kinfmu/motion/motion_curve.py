@@ -21,7 +21,7 @@ from kinfmu.plan.equations.system import placement
 from kinfmu.run import Column, Run
 from kinfmu.run.axis import TIME, rates_per
 from kinfmu.run.tables import in_degrees
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from kinfmu.units import Quantity, unit_of
 
 _STEPS = 12  # of Newton at most

@@ -9,7 +9,7 @@ import numpy as np
 from kinfmu.log.viewer.card import card
 from kinfmu.run import Event, Run
 from kinfmu.run.verdict import notable_events, sentence
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from tests.log.runs import fourbar, with_gap
 
 

@@ -49,12 +49,11 @@ bool kf_evaluated(const kf_model *model, const double *u, const double *z, const
 bool kf_evaluated_as_given(const kf_model *model, const double *u, const double *z, kf_found *found);
 void kf_tangent(const kf_model *model, kf_pose *pose);
 
-/* hermite.c */
+/* span.c */
 void kf_hermite_through(int count, const double *nodes, const double samples[][3], kf_hermite *polynomial);
 void kf_hermite_at(const kf_hermite *polynomial, double x, double values[3]);
 void kf_weights(int count, const double *nodes, double x, double weights[][3]);
 
-/* span.c */
 void kf_span_node(kf_span *span, int place, kf_pose *node, const kf_model *model);
 void kf_span_reverse(kf_span *span);
 void kf_span_hold(kf_span *span, const double *before, const double *after);
@@ -77,18 +76,11 @@ void kf_bridge_missed(kf_solver *solver, const kf_pose *pose, double slope, doub
 void kf_bridge_difference(kf_solver *solver, int number, double u, double *z, double *zd, double *zdd);
 int kf_moved(kf_solver *solver, int number, kf_pose *pose, double u);
 
-/* build.c */
-int kf_build(kf_solver *solver, kf_pose *pose, int block, double zero);
-bool kf_secant_zero(double a, double of_a, double b, double of_b, double *zero);
-
 /* singularity_map.c */
 void kf_around(const kf_solver *solver, int map, double u, double *low, double *high);
-bool kf_knows(const kf_solver *solver, int map, double u, int block);
-int kf_with_bridge(kf_solver *solver, int map, int bridge);
-int kf_with_interval(kf_solver *solver, int map, kf_interval interval);
 int kf_next_bridge(const kf_solver *solver, int map, double here, double target);
 int kf_spare_bridge(const kf_solver *solver);
-int kf_spare_span(const kf_solver *solver, int other);
+KF_RARE int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial);
 void kf_keep_maps(kf_solver *solver, int start, int pose, int regular);
 
 /* limit.c */
@@ -105,6 +97,13 @@ bool kf_pole_before(kf_solver *solver, kf_pose *before, kf_pose *pose, const dou
 void kf_limit_beyond(kf_solver *solver, const kf_pose *before, kf_pose *pose, const double *direction, kf_limit *limit);
 bool kf_is_beyond(const double *target, const double *limit, const double *direction, double s);
 void kf_append_limit(char *message, const kf_limit *limit, const double *target, int driver);
+void kf_append(char *message, const char *format, ...);
+void kf_append_number(char *message, const char *format, double value);
+void kf_append_place(char *message, const double *u, int digits, int driver); /* -1: all of them */
+bool kf_differs(const double *a, const double *b, int digits);
+/* Append the redundant row with the largest gap; about, format: of the gap. */
+void kf_append_watch(char *message, const kf_model *model, const kf_found *found, const char *about,
+                     const char *format);
 
 /* advance.c
  *
@@ -172,19 +171,11 @@ static inline double kf_straight_path(const double *start, const double *target,
     return length;
 }
 
-/* survey.c */
-KF_RARE int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial);
-
 /* tracks.c */
 #if KF_TRACKS
 kf_pose *kf_on_track(kf_solver *solver, const kf_pose *whole, int driver);
-kf_status kf_assembled(kf_solver *solver, kf_pose *start, const double *u, const double *target, const double *z,
-                       kf_pose *pose);
-bool kf_is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose);
 #endif
 const bool *kf_rates_in_time(const kf_model *model, kf_pose *pose, const double *ud, const double *udd);
-
-/* mixed.c */
 #if KF_MIXES
 KF_RARE kf_status kf_advance_mixed(kf_solver *solver, kf_pose *start, const double *target, kf_pose *pose);
 #endif
@@ -223,15 +214,5 @@ typedef struct {
  */
 bool kf_continued(kf_solver *solver, const double *from, const double *to, const double *u, double shortest,
                   kf_pose *pose, kf_continuation *path);
-
-/* message.c */
-void kf_append(char *message, const char *format, ...);
-void kf_append_number(char *message, const char *format, double value);
-void kf_append_place(char *message, const double *u, int digits, int driver); /* -1: all of them */
-bool kf_differs(const double *a, const double *b, int digits);
-
-/* Append the redundant row with the largest gap; about, format: of the gap. */
-void kf_append_watch(char *message, const kf_model *model, const kf_found *found, const char *about,
-                     const char *format);
 
 #endif

@@ -75,7 +75,7 @@ typedef struct {
     bool held[KF_ROOM(KF_BLOCKS)];
 } kf_span;
 
-/* A polynomial in Newton's form: see kinfmu/solver/python/hermite.py. */
+/* A polynomial in Newton's form: see kinfmu/solver/python/span.py. */
 #define KF_MOST_NODES 4
 typedef struct {
     int count; /* of the terms, three a node */

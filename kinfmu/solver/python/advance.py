@@ -6,11 +6,9 @@ from collections.abc import Callable
 
 from .bridge import Bridge
 from .limit import MOST_STEPS, NO_BLOCK, TOO_FAR, Limit, is_beyond, limit_beyond, pole_before
-from .pose import UNIT_SPEED, Model, Pose, Vector, with_map
-from .singularity_map import SingularityMap
+from .pose import UNIT_SPEED, Model, Pose, Status, Vector, with_map
+from .singularity_map import SingularityMap, surveyed
 from .span import REGULAR
-from .status import Status
-from .survey import surveyed
 from .trusted_step import LONGEST_STEP, keeps_branch, straight_path, trusted_step
 
 SHORTEST_STEP = 5e-9  # of the longest; where shorter ones are needed, a limit is near and is extrapolated

@@ -13,9 +13,8 @@ from math import hypot
 from typing import Any, NamedTuple
 
 from .linear import factor, lu_solve
-from .pose import Model, Pose, Vector, evaluated, failed, position
+from .pose import Model, Pose, Status, Vector, evaluated, failed, position
 from .solver import TOLERANCE, Solver
-from .status import Status
 from .trusted_step import FALL, MOST_OFF, TRUST
 
 _SHORTEST = 1e-7  # step in s; where steps get shorter the path ends

@@ -8,15 +8,11 @@ from typing import Any
 
 from .advance import CLOSE, NEAR, advance
 from .estimate import estimated_errors, margin_of, with_driver_errors
-from .limit import Limit, limit_message
-from .message import place
-from .mixed import advance_mixed
-from .pose import UNIT_SPEED, Model, Pose, Vector, evaluated, failed, tangent_of, with_map
-from .singularity_map import restored_map
+from .limit import Limit, limit_message, place
+from .pose import UNIT_SPEED, Model, Pose, Status, Vector, evaluated, failed, tangent_of, with_map
+from .singularity_map import restored_map, surveyed
 from .span import REGULAR
-from .status import Status
-from .survey import surveyed
-from .tracks import MIXED, TrackModel, Tracks, on_track, rates_in_time, tracks_of
+from .tracks import MIXED, TrackModel, Tracks, advance_mixed, on_track, rates_in_time, tracks_of
 from .trusted_step import LONGEST_STEP, keeps_branch, straight_path, trusted_step
 
 TOLERANCE = 1e-9  # residual relative to the size above which a sample is not ok

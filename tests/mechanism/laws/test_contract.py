@@ -20,7 +20,7 @@ from kinfmu.mechanism.laws import LAWS, RISES, Harmonic, Law, MotionSequence, Po
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text
 from kinfmu.plan.equations.graph import Graph, evaluate
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from tests.mechanism.joints.drawn import coordinates, laws, splines
 from tests.power_series import Series
 

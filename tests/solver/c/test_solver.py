@@ -23,9 +23,8 @@ from kinfmu.codegen.python import load_model, load_module
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.run.driving import run_times
 from kinfmu.solver.python import Solver, Status, with_parameters
-from kinfmu.solver.python.hermite import weights
 from kinfmu.solver.python.pose import AT_REST, UNIT_SPEED
-from kinfmu.solver.python.span import PLACES
+from kinfmu.solver.python.span import PLACES, weights
 from tests.fmu.test_parameters import geared, linkage
 from tests.gallery_members import every_member, mostly_long
 from tests.mechanisms import (
