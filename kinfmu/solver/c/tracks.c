@@ -91,7 +91,7 @@ static bool is_apart(const kf_pose *pose)
 }
 
 /* Take one trusted step of all drivers; return false if it is not trusted, or if a track is near a singular point. */
-static bool is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
+static bool is_near_by_tracks(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
 {
     double direction[KF_DRIVERS], distance;
     int k;
@@ -209,7 +209,7 @@ kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *
         *pose = *start;
         return pose->status;
     }
-    if (is_near(solver, start, u, pose)) { /* most samples */
+    if (is_near_by_tracks(solver, start, u, pose)) { /* most samples */
         return KF_OK;
     }
     if (kf_is_refused(solver, u, -1, true)) {
@@ -376,7 +376,7 @@ kf_status kf_advance_mixed(kf_solver *solver, kf_pose *start, const double *targ
         double s;
         const double *const u = kf_path_ahead(&path, &s);
         kf_pose *const trial = kf_path_spare(&path);
-        if ((!(u == target && path.pose == start) && is_near(solver, path.pose, u, trial))
+        if ((!(u == target && path.pose == start) && is_near_by_tracks(solver, path.pose, u, trial))
             || mixed_step(solver, path.pose, u, target, trial)) {
             if (!KF_GOOD(trial->status)) {
                 return kf_failed(found, trial->status);
