@@ -68,7 +68,7 @@ class Taylor:
         return Taylor([a - b for a, b in zip(self.c, other.c, strict=True)], side)
 
     def __rsub__(self, other: Any) -> Taylor:
-        return -self + other
+        return (-self).__add__(other)
 
     def __mul__(self, other: Any) -> Taylor:
         if not isinstance(other, Taylor):
