@@ -31,8 +31,8 @@ class Solver:
     def __init__(self, model: Model, tolerance: float = TOLERANCE, anchor: Pose | None = None) -> None:
         self.model = model
         self.tolerance = tolerance
-        u, z = model.ANCHOR
-        self.anchor = Pose(u, evaluated(model, u, z, held=0)) if anchor is None else anchor
+        self.anchor = _anchor_of(model) if anchor is None else anchor
+        u = model.ANCHOR[0]
         self._has_one_driver = len(u) == 1
         tracks = () if self._has_one_driver else tracks_of(model, u, self.anchor.z)
         self._tracks: Tracks | None = None
@@ -226,4 +226,15 @@ class Solver:
         pose.singularities = None if singularities is None else singularities.around(pose.u[0])
         pose.iterations, pose.status, pose.message = iterations, status, message
         pose.base = None if base is None else self.restore(base)
+        return pose
+
+
+def _anchor_of(model: Model) -> Pose:
+    """Return the anchor; if Newton does not end there, with the residual left, so that it is not converged."""
+    u, z = model.ANCHOR
+    try:
+        return Pose(u, evaluated(model, u, z, held=0))
+    except ArithmeticError as error:
+        pose = Pose(u, evaluated(model, u, z))
+        pose.residual = error.args[1] if len(error.args) == 2 else inf
         return pose

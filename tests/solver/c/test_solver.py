@@ -18,7 +18,7 @@ import pytest
 
 import kinfmu
 from kinfmu import Mechanism
-from kinfmu.codegen.c import compiler
+from kinfmu.codegen.c import compiler, emit
 from kinfmu.codegen.python import load_model, load_module
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.run.driving import run_times
@@ -272,6 +272,21 @@ def test_trials_leave_no_trace_and_a_copy_of_the_bytes_behaves_the_same(name: st
         else:
             assert [pose.status for pose in answer] == [answer[0].status] * 3
             assert one.message == other.message == again.message
+
+
+def test_an_anchor_that_does_not_close_is_not_converged(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = compile_plan(kinfmu.load("triple_rocker"))
+    model = load_model(plan)
+    beyond = 1.6  # the limit is 1.494
+    model.ANCHOR = (beyond,), model.ANCHOR[1]
+    moved = rf"kf_anchor_u[1] = {{{beyond}}}"
+    files = {name: re.sub(r"kf_anchor_u\[1\] = \{.*?\}", moved, text) for name, text in emit(plan).items()}
+    monkeypatch.setattr("tests.solver.c.native.emit", lambda _: files)
+    python, c = Solver(model), Native(plan, QUICK)
+    pose = python.solve(python.anchor, (beyond,))
+    assert c.solve((beyond,)).status == pose.status == Status.NOT_CONVERGED
+    assert c.message == pose.message == "left = 1.6 rad (91.6732 deg): the rows do not close: residual 2.3 of the size"
+    assert c.solve((1.2,)).status == python.solve(python.anchor, (1.2,)).status == Status.OUTSIDE
 
 
 def test_only_requested_tables_are_written_with_the_same_numbers() -> None:
