@@ -86,7 +86,7 @@ from kinfmu.run.model import Model as Model
 from kinfmu.run.model import compile as compile  # noqa: A004  as re.compile
 from kinfmu.run.sensitivities import Sensitivities as Sensitivities
 from kinfmu.run.solve import solve as solve
-from kinfmu.solver.python.status import Status as Status
+from kinfmu.solver.python.pose import Status as Status
 
 VERSION: str
 __version__: str

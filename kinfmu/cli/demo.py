@@ -18,7 +18,7 @@ from kinfmu.fmu import build, simulate
 from kinfmu.log import write_mcap, write_rrd
 from kinfmu.mechanism.gallery import load
 from kinfmu.run import Run
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 
 # The printed table of the report (Alzaga 1999): t [s], then phi1, x2, y2, phi2, phi3 to four digits.
 PRINTED = (

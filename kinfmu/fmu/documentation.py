@@ -13,7 +13,7 @@ from kinfmu.fmu.reference import FOLDER, ReferenceResults
 from kinfmu.fmu.slave.layout import UNKNOWN_ERROR
 from kinfmu.mechanism.drivers import Driver
 from kinfmu.plan import SolvePlan
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from kinfmu.units import Quantity, unit_of
 
 _PAGE = """<!DOCTYPE html>

@@ -24,7 +24,7 @@ from kinfmu.plan.efforts import LedLaws, effort_inputs, effort_names, inertia_st
 from kinfmu.plan.equations.graph import Node
 from kinfmu.plan.forces import ForceSteps, effort_noun
 from kinfmu.plan.mechanics import Mechanics
-from kinfmu.solver.python.law_breaks import LEAST_TOLERANCE, MOST_TOLERANCE, STEP_TOLERANCE
+from kinfmu.solver.python.solver import LEAST_TOLERANCE, MOST_TOLERANCE, STEP_TOLERANCE
 from kinfmu.units import Quantity, unit_of
 
 

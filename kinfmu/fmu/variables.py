@@ -18,8 +18,8 @@ from kinfmu.plan import SolvePlan
 from kinfmu.plan.equations.graph import Node, reachable
 from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.trace import is_parameter
+from kinfmu.solver.python.pose import Status
 from kinfmu.solver.python.solver import TOLERANCE
-from kinfmu.solver.python.status import Status
 from kinfmu.units import CoordinateName, Quantity, unit_of
 
 _INSIDE = 1e-12  # of a range: how far declared limits are from those found, which round-off may miss

@@ -15,7 +15,7 @@ from kinfmu.log.target import check_writable, replacing, target_of, write_error
 from kinfmu.log.writing import Content
 from kinfmu.run import Event, Run
 from kinfmu.run.verdict import status_events, unexplained
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 
 
 class McapLog:

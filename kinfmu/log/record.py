@@ -21,7 +21,7 @@ from kinfmu.errors import LogError, listed
 from kinfmu.mechanism.valid import is_line, quoted
 from kinfmu.run import MOST_SAMPLES, Event, Run
 from kinfmu.run.axis import SAMPLE, TIME
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from kinfmu.units import METRES, ForceName, SignalName, read_coordinate, read_force, read_inputs
 
 FORMAT = "2"  # increased when older files can no longer be read the same way

@@ -40,7 +40,7 @@ from kinfmu.run.axis import TIME, axis_for
 from kinfmu.run.designs import Batch, Driving, first_failure, parts_of, solve_alone, solve_by_library
 from kinfmu.run.driving import column_of, numbers_of, run_times
 from kinfmu.run.model import Model
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from kinfmu.units import CoordinateName, InputName, Quantity, unit_of
 
 SAMPLES_AT_ONCE = 150_000  # of designs that are solved and measured together

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -15,8 +15,8 @@ from kinfmu.mechanism.joints.joint import Joint
 from kinfmu.mechanism.laws import External, Law
 from kinfmu.mechanism.laws.law import Constant
 from kinfmu.mechanism.quantities.arithmetic import Value
-from kinfmu.plan.equations.jets import Jet
 from kinfmu.plan.equations.system import placement
+from kinfmu.plan.equations.taylor import Taylor
 from kinfmu.run import Run
 from kinfmu.run.axis import TIME
 
@@ -85,7 +85,7 @@ def bracket(place: float, side: int) -> tuple[int, int]:
 
 @dataclass(frozen=True, eq=False)
 class OneSided(Law):
-    """A law at arguments that are jets, with the limits of its derivatives at breaks.
+    """A law at arguments that are Taylor numbers, with the limits of its derivatives at breaks.
 
     law: the law; side: (n,) -1 where the limit is that from below, 1 from above.
     """
@@ -99,5 +99,5 @@ class OneSided(Law):
         return self.law.constants()
 
     def target(self, x: Value, **constants: Value) -> Value:
-        found = self.law.target(replace(x, side=self.side) if isinstance(x, Jet) else x, **constants)
-        return replace(found, side=None) if isinstance(found, Jet) else found
+        found = self.law.target(Taylor(x.c, self.side) if isinstance(x, Taylor) else x, **constants)
+        return Taylor(found.c) if isinstance(found, Taylor) else found

@@ -168,11 +168,11 @@ def _polished(shape: FittedShape, x: History, y: History, contacts: IntArray) ->
     low = x.x[np.maximum(contacts - 1, 0)]
     high = x.x[np.minimum(contacts + 1, len(x.x) - 1)]
     for _ in range(_POLISHES):
-        px, py = (Taylor(*t.at(at)) for t in (x, y))
-        e = shape.distance(px, py)
-        is_peak = e.f * e.d2 < 0.0  # elsewhere, as at an end of the path, the distance grows up to the bound
-        uphill = np.where(e.f * e.d1 < 0.0, low, high)
-        at = np.where(is_peak, np.clip(at - e.d1 / np.where(is_peak, e.d2, 1.0), low, high), uphill)
+        px, py = (Taylor.of(2, *t.at(at)) for t in (x, y))
+        value, slope, bend = map(shape.distance(px, py).derivative, range(3))
+        is_peak = value * bend < 0.0  # elsewhere, as at an end of the path, the distance grows up to the bound
+        uphill = np.where(value * slope < 0.0, low, high)
+        at = np.where(is_peak, np.clip(at - slope / np.where(is_peak, bend, 1.0), low, high), uphill)
         p_x, p_y = (t.at(at)[0] for t in (x, y))
         basis = shape.basis(p_x, p_y)
         weights = np.linalg.svd(np.swapaxes(basis, 1, 2))[2][:, -1]

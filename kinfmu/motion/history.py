@@ -74,15 +74,15 @@ class History:
     @classmethod
     def of(cls, like: History, quantity: Taylor) -> History:
         """Return a quantity computed from the histories of a motion as a history of the same motion."""
-        parts = (np.asarray(part, float) for part in (quantity.f, quantity.d1, quantity.d2))
-        shape = np.broadcast_shapes(*(np.shape(part) for part in (quantity.f, quantity.d1, quantity.d2)), like.x.shape)
+        parts = [np.asarray(quantity.derivative(order), float) for order in range(3)]
+        shape = np.broadcast_shapes(*(part.shape for part in parts), like.x.shape)
         value, rate, acceleration = (np.broadcast_to(part, shape) for part in parts)
         return cls(like.x, value, rate, acceleration, like.is_closed, like.is_seamed)
 
     @property
     def taylor(self) -> Taylor:
         """The history as a number with two derivatives, with which formulas compute."""
-        return Taylor(self.value, self.rate, self.acceleration)
+        return Taylor.of(2, *self.rows)
 
     @property
     def span(self) -> float:

@@ -17,12 +17,12 @@ from kinfmu.mechanism.joints.joint import Joint
 from kinfmu.mechanism.laws import External
 from kinfmu.mechanism.quantities.placement import Placement
 from kinfmu.motion.breaks import OneSided
-from kinfmu.motion.jet_equations import LEAST_MARGIN, JetEquations, derivative
-from kinfmu.plan.equations.jets import Jet
+from kinfmu.motion.motion_equations import LEAST_MARGIN, MotionEquations, derivative
 from kinfmu.plan.equations.system import placement
+from kinfmu.plan.equations.taylor import Taylor
 from kinfmu.run import Run
 from kinfmu.run.axis import TIME
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from kinfmu.units import CoordinateName
 
 SAME = 1e-9  # of the largest value; by how much inputs may differ from the law of their driver
@@ -58,10 +58,10 @@ def motion_of(run: Run, name: str) -> tuple[FloatArray, str]:
     if missing:
         raise RequestError(f"the jerk needs all coordinates, and the run does not hold {listed(missing)}")
     columns = [tuple(np.asarray(run[place.derivative(k)], dtype=float) for k in range(3)) for place in places]
-    along = [Jet.of(*_whole(run, one)) for one in columns]
-    jerks, margin = JetEquations(mechanism, len(run)).solved(along, targets_at(run, mechanism), 3)
+    along = [Taylor.of(3, *_whole(run, one)) for one in columns]
+    jerks, margin = MotionEquations(mechanism, len(run)).solved(along, targets_at(run, mechanism), 3)
     is_known = run.good & (run.status != Status.BRIDGED) & (margin > LEAST_MARGIN)
-    full = [Jet((*jet.c[:3], jerks[:, k] / 6.0)) for k, jet in enumerate(along)]
+    full = [Taylor((*number.c[:3], jerks[:, k] / 6.0)) for k, number in enumerate(along)]
     table, kind = quantity_table(mechanism, mechanism.joints, name, full, len(run))
     table[~run.good] = np.nan
     table[~is_known, 3] = np.nan
@@ -69,7 +69,7 @@ def motion_of(run: Run, name: str) -> tuple[FloatArray, str]:
 
 
 def quantity_table(
-    mechanism: Mechanism, joints: Sequence[Joint], name: str, q: Sequence[Jet], count: int
+    mechanism: Mechanism, joints: Sequence[Joint], name: str, q: Sequence[Taylor], count: int
 ) -> tuple[FloatArray, str]:
     """Return a coordinate or the lift of a cam, from the coordinates q at n poses, as `motion_of` does."""
     value, kind = _quantity(mechanism, joints, name, placement(mechanism, q))
@@ -77,7 +77,7 @@ def quantity_table(
 
 
 def _quantity(mechanism: Mechanism, joints: Sequence[Joint], name: str, at: Placement) -> tuple[Any, str]:
-    """Return a coordinate or the lift of a cam as a jet, and its kind."""
+    """Return a coordinate or the lift of a cam as a Taylor number, and its kind."""
     cams = {joint.name: joint for joint in joints if isinstance(joint, Cam | CamRoller | CamFlatFace)}
     cam = cams.get(name)
     if isinstance(cam, Cam):
@@ -108,7 +108,7 @@ def _whole(run: Run, columns: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
 
 def targets_at(
     run: Run, mechanism: Mechanism, place: FloatArray | None = None, side: FloatArray | None = None
-) -> list[Jet]:
+) -> list[Taylor]:
     """Return the values of all drivers with three derivatives.
 
     Args:
@@ -127,12 +127,12 @@ def targets_at(
         given = [np.asarray(run[name], dtype=float) for name in driver.inputs()]
         given = [np.where(np.isfinite(column), column, 0.0) for column in given]
         if run.axis == TIME and not isinstance(driver.law, External):
-            of_law = _lifted(driver.law.at(Jet.of(run.t, 1.0)))
+            of_law = _lifted(driver.law.at(Taylor.of(3, run.t, 1.0)))
             if all(map(_agrees, given, map(of_law.derivative, range(3)))):
                 if place is not None:
                     t = np.interp(place, samples, run.t)
                     of_law = _lifted(
-                        (OneSided(driver.law, side) if side is not None else driver.law).at(Jet.of(t, 1.0))
+                        (OneSided(driver.law, side) if side is not None else driver.law).at(Taylor.of(3, t, 1.0))
                     )
                 found.append(of_law)
                 continue
@@ -141,12 +141,12 @@ def targets_at(
                 f"the jerk is not known: driver '{driver.name}' has accelerations that are not those of the law in the "
                 "mechanism file, so their rate of change is unknown; run it by its law, or at constant speed"
             )
-        found.append(Jet.of(*(one if place is None else np.interp(place, samples, one) for one in given)))
+        found.append(Taylor.of(3, *(one if place is None else np.interp(place, samples, one) for one in given)))
     return found
 
 
-def _lifted(value: Any) -> Jet:
-    return value if isinstance(value, Jet) else Jet.of(value)
+def _lifted(value: Any) -> Taylor:
+    return value if isinstance(value, Taylor) else Taylor.of(3, value)
 
 
 def _agrees(given: FloatArray, of_law: Any) -> bool:

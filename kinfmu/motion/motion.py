@@ -332,7 +332,7 @@ class Motion:
     def direction(self, angle: float) -> Vector:
         """Return the unit vector at an angle [rad]."""
         x, y = unit_vector(float(angle))
-        return Taylor(x), Taylor(y)
+        return Taylor.of(2, x), Taylor.of(2, y)
 
     def velocity_against(self, point: str, body: str) -> Vector:
         """Return the velocity of a point relative to the point of a body at the same place."""
@@ -446,7 +446,7 @@ class Motion:
     def _as_history(self, value: Value) -> History:
         """Return a computed quantity as a history of this motion."""
         like = History(self.x, self.x, self.x, self.x, self.is_closed, self.is_seamed)
-        return History.of(like, value if isinstance(value, Taylor) else Taylor(float(value)))
+        return History.of(like, value if isinstance(value, Taylor) else Taylor.of(2, float(value)))
 
 
 def break_places(run: Run) -> list[float]:

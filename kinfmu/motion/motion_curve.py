@@ -15,13 +15,13 @@ from kinfmu.mechanism.joints import CamRoller
 from kinfmu.mechanism.laws.law import TURN
 from kinfmu.motion.breaks import AT_SAMPLE, FollowedLaw, OneSided, bracket, breaks_of, followed_laws
 from kinfmu.motion.jerk import motion_of, quantity_table, targets_at
-from kinfmu.motion.jet_equations import LEAST_MARGIN, JetEquations, derivative, with_derivative
-from kinfmu.plan.equations.jets import Jet
+from kinfmu.motion.motion_equations import LEAST_MARGIN, MotionEquations, derivative, with_derivative
 from kinfmu.plan.equations.system import placement
+from kinfmu.plan.equations.taylor import Taylor
 from kinfmu.run import Column, Run
 from kinfmu.run.axis import TIME, rates_per
 from kinfmu.run.tables import in_degrees
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from kinfmu.units import Quantity, unit_of
 
 _STEPS = 12  # of Newton at most
@@ -81,7 +81,7 @@ def motion_curve(run: Run, name: str) -> MotionCurve:
 
 
 class _Limits:
-    """The sides of breaks within a run: place (m,), side (m,), and the coordinates there as jets."""
+    """The sides of breaks within a run: place (m,), side (m,), and the coordinates there as Taylor numbers."""
 
     def __init__(
         self, run: Run, mechanism: Mechanism, laws: list[FollowedLaw], sides: list[tuple[float, int, int, float]]
@@ -97,7 +97,7 @@ class _Limits:
             if law.joint is not None
         }
         self._joints = [sided.get(joint.name, joint) for joint in mechanism.joints]
-        self._equations = JetEquations(mechanism, len(place), self._joints)
+        self._equations = MotionEquations(mechanism, len(place), self._joints)
         self._crossings = [
             (law.joint, np.flatnonzero(number == k), level)
             for k, law in enumerate(laws)
@@ -118,7 +118,7 @@ class _Limits:
                     sides.append((one.place, side, one.number, one.level))
         return cls(run, mechanism, laws, sides) if sides else None
 
-    def _pose(self) -> tuple[list[Jet], NDArray[np.bool_]]:
+    def _pose(self) -> tuple[list[Taylor], NDArray[np.bool_]]:
         """Move the places to the breaks; return the coordinates there, and which are found."""
         run, size = self._run, self._equations.system.column_scales
         step = self._argument_steps()
@@ -126,9 +126,9 @@ class _Limits:
         first = q.copy()
         for _ in range(_STEPS):
             targets = targets_at(run, self._mechanism, self.place, self.side)
-            missing, margin = self._equations.solved(_jets(q), targets, 0)
+            missing, margin = self._equations.solved(_numbers(q), targets, 0)
             q = q + missing
-            rates = self._equations.slopes(_jets(q), targets)
+            rates = self._equations.slopes(_numbers(q), targets)
             moved = self._to_break(q, rates, step)
             q = q + rates * (moved * step)[:, None]
             self.place = self.place + moved
@@ -137,11 +137,11 @@ class _Limits:
                 break
         width = np.abs(self._columns(0)[self._high] - self._columns(0)[self._low]) / size
         strayed = np.abs((q - first) / size).max(axis=1) > width.max(axis=1) + _CLOSE
-        return _jets(q), (gap <= _CLOSE) & (margin > LEAST_MARGIN) & ~strayed
+        return _numbers(q), (gap <= _CLOSE) & (margin > LEAST_MARGIN) & ~strayed
 
     def _to_break(self, q: FloatArray, rates: FloatArray, step: FloatArray) -> FloatArray:
         """Return by how many samples each place misses its break."""
-        at = placement(self._mechanism, [Jet.of(*pair) for pair in zip(q.T, rates.T, strict=True)])
+        at = placement(self._mechanism, [Taylor.of(1, *pair) for pair in zip(q.T, rates.T, strict=True)])
         moved = np.zeros(len(q))
         for joint, rows, level in self._crossings:
             led: Any = joint.led_by(at)
@@ -197,8 +197,8 @@ class _Limits:
         return place[kept], self.side[kept].astype(np.int64), drive[kept], table[kept]
 
 
-def _jets(q: FloatArray) -> list[Jet]:
-    return [Jet.of(column) for column in q.T]
+def _numbers(q: FloatArray) -> list[Taylor]:
+    return [Taylor.of(3, column) for column in q.T]
 
 
 NAMES = ("position", "velocity", "acceleration", "jerk")

@@ -14,8 +14,7 @@ from kinfmu.mechanism.members import COORDINATES
 from kinfmu.mechanism.number import in_unit_of
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.solver.python import Solver, UnsolvableModel, with_parameters
-from kinfmu.solver.python.pose import Pose, failed
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Pose, Status, failed
 from kinfmu.units import Quantity
 
 Settings = Mapping[str, float | str]

@@ -22,7 +22,7 @@ from kinfmu.run import Run
 from kinfmu.run.arguments import Arguments, Settings
 from kinfmu.run.driving import driven_by_inputs, numbers_of
 from kinfmu.run.engine import Driven
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from kinfmu.units import CoordinateName
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from kinfmu.run.arguments import Setting
 from kinfmu.run.designs import Solvable
 from kinfmu.run.engine import Driven
 from kinfmu.run.stages import native_results, native_stage, stage_results
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 
 LEAST_SPEED = 1e-100  # [rad/s, ...] of a driver; products with smaller ones lose digits
 _STAGES = 6  # forces by each kind of coefficients, reactions, those on the ground alone, distances of ends

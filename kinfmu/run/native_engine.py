@@ -20,8 +20,8 @@ from kinfmu.codegen.lanes.stage import address_of as _start
 from kinfmu.errors import KinfmuError
 from kinfmu.plan import SolvePlan
 from kinfmu.run.engine import Driven, SweepResult, Tables, UnreachedError
+from kinfmu.solver.python.pose import Status
 from kinfmu.solver.python.solver import TOLERANCE
-from kinfmu.solver.python.status import Status
 
 
 class NativeEngine:
@@ -95,10 +95,9 @@ def _is_plain(table: FloatArray) -> bool:
 
 FLAGS = compiler.VECTORIZED
 RARE = {  # what runs at few samples, joined
-    "singular_points.c": ("bridge.c", "build.c", "hermite.c", "mixed.c", "singularity_map.c", "span.c", "survey.c",
-                          "tracks.c"),
-    "diagnosis.c": ("designs.c", "estimate.c", "limit.c", "linear.c", "message.c", "worst_case_step.c"),
-}  # fmt: skip
+    "singular_points.c": ("bridge.c", "singularity_map.c", "span.c", "tracks.c"),
+    "diagnosis.c": ("designs.c", "estimate.c", "limit.c", "linear.c", "worst_case_step.c"),
+}
 MESSAGE = 480  # characters, as KF_MESSAGE
 MOST_FAILURES = 1000  # intervals without numbers whose reasons are kept
 

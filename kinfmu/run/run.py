@@ -17,7 +17,7 @@ from kinfmu.display import Displayed
 from kinfmu.errors import KinfmuError, listed, suggestion
 from kinfmu.run.axis import TIME, axis_of, rates_per
 from kinfmu.run.tables import NAMES, Column, Place, Tabular, index_of, sizes_of, tables_of
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from kinfmu.units import CoordinateName, ForceName, InputName, SignalName, read_coordinate, read_inputs, unit_of
 
 if TYPE_CHECKING:

@@ -33,7 +33,7 @@ from kinfmu.run import Run
 from kinfmu.run.arguments import Settings
 from kinfmu.run.designs import Solvable
 from kinfmu.run.stages import Native, native_stage, set_zeros, stage_results
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 
 OPEN = 1e-7  # derivative of a row relative to the size, for a change by the size or by 1, above which it would open
 _STAGES_KEPT = 16

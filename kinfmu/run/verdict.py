@@ -12,7 +12,7 @@ import numpy as np
 from kinfmu.arrays import FloatArray
 from kinfmu.run import Event, Run
 from kinfmu.run.axis import axis_of
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from kinfmu.units import InputName
 
 _WHEN = re.compile(r"^at t = \S+ s: ")

@@ -19,7 +19,7 @@ from kinfmu.log.record import ESTIMATES
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.plan import compile_plan
 from kinfmu.run import Run
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from tests.fmu.conftest import GALLERY
 
 ALL = ["all"]  # margins and errors are read from the FMU if the channels name them

@@ -14,7 +14,7 @@ from kinfmu.fmu import simulate
 from kinfmu.fmu.host.samples import PIECE
 from kinfmu.fmu.host.slaves import Slave2
 from kinfmu.run import Run
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 
 
 @pytest.fixture

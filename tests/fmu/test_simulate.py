@@ -16,7 +16,7 @@ from kinfmu.errors import FmuError, RequestError
 from kinfmu.fmu import simulate
 from kinfmu.fmu.host.samples import Samples
 from kinfmu.run import Run
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 
 
 def test_fourbar_equals_its_closed_form_at_every_sample(fourbar: Path) -> None:

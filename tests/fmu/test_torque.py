@@ -23,7 +23,7 @@ from kinfmu.mechanism.drivers import AngleDriver
 from kinfmu.mechanism.laws import ConstantValue, External, MotionSequence
 from kinfmu.mechanism.laws.sequence import Segment
 from kinfmu.mechanism.loads import Damper, ForceAlong, TorqueOn
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from tests.fmu.host import DISCARD, LAST_SUCCESSFUL_TIME, OK, Host
 from tests.mechanisms import fourbar
 from tests.motion.torque.test_torque_driven import G, five_bar, heavy, pendulum

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from kinfmu.run import Event, Run
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 
 FOURBAR = Path(__file__).parents[2] / "fmus" / "fourbar" / "mechanism.toml"
 DEGREE = np.pi / 180.0

@@ -20,7 +20,7 @@ from kinfmu.run import Event, Run
 from kinfmu.run.channels import select
 from kinfmu.run.tables import ROWS
 from kinfmu.run.verdict import notable_events, sentence
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from tests.gallery_members import every_member
 from tests.log.runs import fourbar, with_gap, without_samples
 from tests.log.test_mcap import assert_same

@@ -272,9 +272,10 @@ def test_roundness_of_a_bent_oval_is_half_its_width_although_its_ring_is_not_uni
 ) -> None:
     """An oval along an arc: its nearest and farthest point have one normal, on which the centre may be anywhere."""
     t = np.linspace(0.0, math.tau, count + 1) + 0.0123
-    along = Taylor(t, np.ones_like(t), np.zeros_like(t))
+    along = Taylor.of(2, t, np.ones_like(t), np.zeros_like(t))
     angle, radius = cos(along) * half + turned, sin(along) * width + 1.0
     x, y = (
-        History(t, one.f, one.d1, one.d2, is_closed=True) for one in (radius * cos(angle) + 3.0, radius * sin(angle))
+        History(t, *map(one.derivative, range(3)), is_closed=True)
+        for one in (radius * cos(angle) + 3.0, radius * sin(angle))
     )
     assert float(deviation(x, y, Circle)) == pytest.approx(width, abs=1e-9 if count == 90 else 1e-13)

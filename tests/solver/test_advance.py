@@ -17,7 +17,7 @@ from kinfmu import AngleDriver, Body, ConstantSpeed, Distance, Mechanism, PointO
 from kinfmu.codegen.python import load_model
 from kinfmu.mechanism.joints import Joint
 from kinfmu.plan import compile_plan
-from kinfmu.solver.python import Pose, Solver, Status, survey
+from kinfmu.solver.python import Pose, Solver, Status, singularity_map
 from kinfmu.solver.python.trusted_step import trusted_step
 from tests import oracle
 from tests.mechanisms import slider_crank, tight_jaw, with_arm
@@ -347,8 +347,8 @@ def test_a_determinant_that_stays_low_is_not_searched_again_in_every_short_step(
         searched.append(pose.u[0])
         return nearby(model, pose, block, distance)
 
-    nearby = survey._nearby
-    monkeypatch.setattr(survey, "_nearby", counted)
+    nearby = singularity_map._nearby
+    monkeypatch.setattr(singularity_map, "_nearby", counted)
     flat = Mechanism(
         "flat",
         [

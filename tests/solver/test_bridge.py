@@ -13,8 +13,7 @@ from kinfmu import Point
 from kinfmu.codegen.python import load_model
 from kinfmu.mechanism.gallery.chains import fourbar_chain
 from kinfmu.plan import compile_plan
-from kinfmu.solver.python import Pose, Solver, Status
-from kinfmu.solver.python import build as building
+from kinfmu.solver.python import Pose, Solver, Status, singularity_map
 from kinfmu.solver.python.bridge import TURN, turned, whole_turns
 
 Errors = Callable[[Solver, Pose], list[float]]
@@ -37,13 +36,13 @@ def test_bridge_is_built_once_and_moved_on_later_turns(
     fourbar: Solver, errors: Errors, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     built = []
-    build = building.build
+    build = singularity_map.build
 
     def counted(*args: object) -> object:
         built.append(args)
         return build(*args)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("kinfmu.solver.python.survey.build", counted)
+    monkeypatch.setattr("kinfmu.solver.python.singularity_map.build", counted)
     pose = fourbar.anchor
     for k in range(40):
         pose = fourbar.solve(pose, (1.0 + 0.5 * math.pi * k,))
@@ -85,7 +84,7 @@ def test_dumped_pose_is_restored_to_the_bit_in_and_out_of_windows(fourbar: Solve
 def test_many_loops_that_all_but_cross_at_once_are_each_searched_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """More of them than a singularity map has places: each search must be remembered until all are done."""
     searched: list[int] = []
-    monkeypatch.setattr("kinfmu.solver.python.survey.build", lambda *args: searched.append(args[2]))
+    monkeypatch.setattr("kinfmu.solver.python.singularity_map.build", lambda *args: searched.append(args[2]))
     written = fourbar_chain(40)
     longer = [
         replace(body, points={**body.points, "Q": Point(1.0 + 1e-6, 0.0)}) if body.name[:7] == "coupler" else body

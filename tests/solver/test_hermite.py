@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinfmu.solver.python.hermite import Hermite, weights
+from kinfmu.solver.python.span import Hermite, weights
 
 NODES = (-2.0, -1.0, 1.0, 2.0)
 

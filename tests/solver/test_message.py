@@ -12,8 +12,7 @@ import pytest
 import kinfmu
 from kinfmu.codegen.python import load_model
 from kinfmu.plan import compile_plan
-from kinfmu.solver.python.limit import NO_POLE, Limit, limit_message
-from kinfmu.solver.python.message import LOCATED, place
+from kinfmu.solver.python.limit import LOCATED, NO_POLE, Limit, limit_message, place
 from tests.solver.c.native import Native
 
 DEAD_CENTRE = math.acos(1.0 / 13.0)  # 65^2 + 100^2 - 2 65 100 cos u = (50 + 65)^2

@@ -17,7 +17,7 @@ from fmpy import read_model_description
 import kinfmu
 from kinfmu import Body, ConstantSpeed, DistanceDriver, Mechanism, Revolute
 from kinfmu.errors import AssemblyError, RequestError
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from tests import oracle
 from tests.fmu.host import DISCARD, OK, Host
 from tests.mechanisms import fourbar

@@ -30,7 +30,7 @@ from kinfmu.plan import SolvePlan
 from kinfmu.processes import cores, processes, without_main
 from kinfmu.run import model
 from kinfmu.run.continued import continued
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from kinfmu.units import CoordinateName
 from tests.mechanisms import with_open_lengths
 

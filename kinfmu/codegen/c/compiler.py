@@ -27,9 +27,9 @@ from kinfmu.files import temporary_folder
 
 RUNTIME = Path(__file__).parents[2] / "solver" / "c"
 MODEL = ("kinfmu.h", "curve.h", "sincos.h", "position.c", "linear.c", "curve.c")  # what a model needs of the run time
-SOLVER = (*MODEL, "solver.h", "internal.h", "pose.c", "hermite.c", "span.c", "trusted_step.c", "bridge.c", "build.c",
-          "singularity_map.c", "survey.c", "tracks.c", "mixed.c", "limit.c", "advance.c", "message.c", "solver.c",
-          "continuation.c", "worst_case_step.c", "estimate.c")  # fmt: skip
+SOLVER = (*MODEL, "solver.h", "internal.h", "pose.c", "span.c", "trusted_step.c", "bridge.c",
+          "singularity_map.c", "tracks.c", "limit.c", "advance.c", "solver.c", "continuation.c", "worst_case_step.c",
+          "estimate.c")  # fmt: skip
 _LEVEL = "-O2"
 FLAGS = ("-std=c99", _LEVEL, "-ffp-contract=off", "-fPIC", "-shared")  # no fused multiply-add: Python has none
 VECTORIZED = (  # for loops over samples; results are equal

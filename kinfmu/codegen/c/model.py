@@ -1,4 +1,4 @@
-"""SolvePlan -> C: model.c, the formulas of a mechanism, and sizes.h, the sizes of its arrays.
+"""SolvePlan -> C: model.c, the formulas of a mechanism; sizes.h, the sizes of its arrays; the constants of the solver.
 
 The same plan gives the same bytes. The functions are described in solver/c/kinfmu.h.
 """
@@ -6,21 +6,25 @@ The same plan gives the same bytes. The functions are described in solver/c/kinf
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib import import_module
 from itertools import accumulate
+from pkgutil import iter_modules
 
 from kinfmu.codegen.c.functions import Parts, bind, drive, readers, stages
 from kinfmu.codegen.c.text import array, booleans, string
 from kinfmu.codegen.c.units import rows_of
 from kinfmu.codegen.lists import distance_rows
 from kinfmu.plan import Block, SolvePlan
+from kinfmu.solver import python
 from kinfmu.solver.python.curve import CurveData
 
 
 def emit(plan: SolvePlan, labels: Mapping[str, str] | None = None) -> dict[str, str]:
-    """Return the texts of sizes.h and model.c, by file name; labels: of parameters that messages name otherwise."""
+    """Return model.c, sizes.h and constants.h, by file name; labels: of parameters that messages name otherwise."""
     parts = Parts(plan)
     model = _model(parts, labels or {})
-    return {"sizes.h": _sizes(parts), "model.c": model}
+    return {"constants.h": _constants(), "sizes.h": _sizes(parts), "model.c": model}
 
 
 def _model(parts: Parts, labels: Mapping[str, str]) -> str:
@@ -77,6 +81,25 @@ def _sizes(parts: Parts) -> str:
         "#define KF_SIZES_H",
         "",
         *(f"#define KF_{name} {count}" for name, count in counts.items()),
+        "",
+        "#endif",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+@cache
+def _constants() -> str:
+    """Return constants.h: statuses and numbers of the solver in Python. A name with two values does not compile."""
+    modules = [import_module(f"{python.__name__}.{one.name}") for one in iter_modules(python.__path__) if not one.ispkg]
+    numbers = {(k.strip("_"), x) for each in modules for k, x in vars(each).items() if type(x) in (int, float)}
+    lines = [
+        "/* Statuses and constants of the solver: generated from kinfmu/solver/python, not to be edited. */",
+        "#ifndef KF_CONSTANTS_H",
+        "#define KF_CONSTANTS_H",
+        "",
+        f"typedef enum {{ {', '.join(f'KF_{status.name}' for status in python.Status)} }} kf_status;",
+        "",
+        *(f"#define KF_{name} ({number!r})" for name, number in sorted(numbers) if name.isupper()),
         "",
         "#endif",
     ]

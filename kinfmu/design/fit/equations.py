@@ -19,7 +19,7 @@ from kinfmu.design.fit.sampled import Sampled
 from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.plan import compile_plan
 from kinfmu.run.model import Model
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from kinfmu.units import unit_of
 
 VANISHED = 1e-8  # violation, as a part of the limit's size, that counts as none

@@ -12,8 +12,8 @@ from kinfmu.errors import KinfmuError
 from kinfmu.mechanism import toml_file
 from kinfmu.run import Run
 from kinfmu.run.components import MAIN, other_mechanisms
+from kinfmu.solver.python.pose import Status
 from kinfmu.solver.python.solver import TOLERANCE
-from kinfmu.solver.python.status import Status
 
 COST = 4  # of a sample with its estimates, in samples without
 SAME_POSE = 1e-6  # [rad, sizes]; a pose that differs by more has another margin

@@ -187,11 +187,11 @@ def _force_of_load(run: Run, mechanism: Mechanism, scene: Scene, load: Load, row
         pose = scene.frames[body][row].tolist()
         rates = [float(run[f"{body}.{rate}"][row]) for rate in ("vx", "vy", "omega")]
         still[body] = BodyFrame.of(*pose)
-        moving[body] = BodyFrame.of(*(Taylor(one, rate) for one, rate in zip(pose, rates, strict=True)))
+        moving[body] = BodyFrame.of(*(Taylor.of(1, one, rate) for one, rate in zip(pose, rates, strict=True)))
     place, metre = Placement(still, mechanism.body_points), METRES[mechanism.length_unit]
     quantities = load.measured(Placement(moving, mechanism.body_points))
-    s = [metre * one.f if isinstance(one, Taylor) else metre * one for one in quantities]
-    sd = [metre * one.d1 if isinstance(one, Taylor) else 0.0 for one in quantities]
+    s = [metre * one.derivative(0) if isinstance(one, Taylor) else metre * one for one in quantities]
+    sd = [metre * one.derivative(1) if isinstance(one, Taylor) else 0.0 for one in quantities]
     over = load.argument(place)
     efforts = load.efforts(place, s, sd, float(run.t[row]) if over is None else over)
     if len(efforts) > 1:

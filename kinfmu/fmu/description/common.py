@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element, SubElement
 from kinfmu.fmu.interface import RATES_TYPE, STATUS_TYPE, Interface, Variable
 from kinfmu.fmu.slave.estimated_rates import Rates
 from kinfmu.mechanism import RunSettings
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from kinfmu.units import KINDS, METRES
 
 TOOL = "kinfmu"  # name of the annotation that identifies FMUs of kinfmu

@@ -20,7 +20,7 @@ from kinfmu.run import Event, Run
 from kinfmu.run.channels import absent_columns, is_all_but
 from kinfmu.run.run import Sink
 from kinfmu.run.verdict import coarse_samples
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from kinfmu.units import ForceName, read_inputs
 
 PIECE = 1024 * 1024  # [bytes] of a run passed to a sink at once, or fewer after PERIOD

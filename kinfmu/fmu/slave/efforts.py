@@ -13,8 +13,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from ...solver.python import Pose, Status
-from ...solver.python.law_breaks import LEAST_TOLERANCE, MOST_TOLERANCE
 from ...solver.python.pose import failed
+from ...solver.python.solver import LEAST_TOLERANCE, MOST_TOLERANCE
 from ...solver.python.torque import Course, DormandPrince, Ended, EquationOfMotion, Given, Laws, TorqueSteps
 from .base import Fmi2Status
 from .layout import Numbers

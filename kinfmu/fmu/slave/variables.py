@@ -10,7 +10,7 @@ from itertools import chain
 from typing import Any, ClassVar
 
 from ...solver.python import Pose, Status, UnsolvableModel, with_parameters
-from ...solver.python.law_breaks import LEAST_TOLERANCE, MOST_TOLERANCE
+from ...solver.python.solver import LEAST_TOLERANCE, MOST_TOLERANCE
 from ...solver.python.tracks import sample_rates
 from .base import Fmi2Slave, Fmi2Status
 from .estimated_rates import LARGEST, Rates, Sample

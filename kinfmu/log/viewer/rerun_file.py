@@ -59,7 +59,7 @@ from kinfmu.log.viewer.timeline import Timeline, decimated, send, timeline_of
 from kinfmu.run import Run
 from kinfmu.run.components import is_of_mechanisms
 from kinfmu.run.verdict import changes, label, notable_events, sentence
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -12,7 +12,7 @@ from kinfmu.errors import MechanismError
 from kinfmu.mechanism.joints import CamFlatFace, CamRoller
 from kinfmu.mechanism.laws import Law
 from kinfmu.motion.cams.placed import PlacedCam
-from kinfmu.plan.equations.jets import Jet
+from kinfmu.plan.equations.taylor import Taylor
 
 ComplexArray = NDArray[np.complex128]
 _LEAST = 1e-12  # of the size; a follower whose face turns with the cam at this rate has no profile
@@ -49,9 +49,9 @@ class Traced:
 
 def law_values(law: Law, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return f, f' and f'' at arguments (n,)."""
-    value = law.at(Jet.of(x, np.ones(len(x))))
-    jet = value if isinstance(value, Jet) else Jet.of(value)  # a constant
-    f, f1, f2 = (np.broadcast_to(jet.derivative(order), x.shape) for order in range(3))
+    value = law.at(Taylor.of(2, x, np.ones(len(x))))
+    number = value if isinstance(value, Taylor) else Taylor.of(2, value)  # a constant
+    f, f1, f2 = (np.broadcast_to(number.derivative(order), x.shape) for order in range(3))
     return f, f1, f2
 
 

@@ -24,9 +24,8 @@ from kinfmu.run.driving import applied_efforts
 from kinfmu.run.forces import ForceModel, LoadedRun, force_plan
 from kinfmu.run.model import Model
 from kinfmu.run.verdict import coarse_samples
-from kinfmu.solver.python.law_breaks import LEAST_TOLERANCE, MOST_TOLERANCE, STEP_TOLERANCE
-from kinfmu.solver.python.pose import Vector
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status, Vector
+from kinfmu.solver.python.solver import LEAST_TOLERANCE, MOST_TOLERANCE, STEP_TOLERANCE
 from kinfmu.units import InputName
 
 

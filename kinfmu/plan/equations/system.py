@@ -17,7 +17,6 @@ from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.drivers import Driver
 from kinfmu.mechanism.joints import Joint
 from kinfmu.mechanism.quantities.placement import GROUND, BodyFrame, Placement, body_of
-from kinfmu.plan.equations.dual import Dual
 from kinfmu.plan.equations.row_code import RowCode, row_code
 from kinfmu.plan.equations.taylor import Taylor
 from kinfmu.units import METRES
@@ -135,10 +134,10 @@ class System:
         if code is not None:
             with suppress(ZeroDivisionError):
                 return np.array(code.gradients(coordinates, 0.0)).reshape(shape)
-        along = list(map(Dual, coordinates, np.eye(len(coordinates))))
+        along = [Taylor(pair) for pair in zip(coordinates, np.eye(len(coordinates)), strict=True)]
         gradients = np.zeros(shape)
         for row, phi in enumerate(self._alone(member, along, 0.0)):
-            gradients[row] = phi.g if isinstance(phi, Dual) else 0.0
+            gradients[row] = phi.c[1] if isinstance(phi, Taylor) else 0.0
         return gradients
 
     def _code(self, member: Member) -> RowCode | None:
@@ -168,13 +167,13 @@ class System:
 
     def nu(self, q: ArrayLike, u: ArrayLike, ud: ArrayLike) -> FloatArray:
         """Return the right side of the velocity equation, -Phi_t = -Phi_u ud, (m,)."""
-        moving = [Taylor(value, rate) for value, rate in zip(_floats(u), _floats(ud), strict=True)]
+        moving = [Taylor((value, rate)) for value, rate in zip(_floats(u), _floats(ud), strict=True)]
         return np.array([-_derivative(phi, 1) for phi in self.evaluate(_floats(q), moving)])
 
     def gamma(self, q: ArrayLike, qd: ArrayLike, u: ArrayLike, ud: ArrayLike, udd: ArrayLike) -> FloatArray:
         """Return the right side of the acceleration equation, (m,): -Phi'' along q + qd t, u(t)."""
-        along = [Taylor(value, rate) for value, rate in zip(_floats(q), _floats(qd), strict=True)]
-        moving = [Taylor(*target) for target in zip(_floats(u), _floats(ud), _floats(udd), strict=True)]
+        along = [Taylor.of(2, value, rate) for value, rate in zip(_floats(q), _floats(qd), strict=True)]
+        moving = [Taylor.of(2, *target) for target in zip(_floats(u), _floats(ud), _floats(udd), strict=True)]
         return np.array([-_derivative(phi, 2) for phi in self.evaluate(along, moving)])
 
     def scaled_jacobian(self, q: ArrayLike) -> FloatArray:
@@ -232,6 +231,4 @@ def _floats(values: ArrayLike) -> list[float]:
 
 def _derivative(phi: Any, order: int) -> Any:
     """Return a derivative of a residual; 0 if it is a plain number."""
-    if not isinstance(phi, Taylor):
-        return 0.0
-    return phi.d1 if order == 1 else phi.d2
+    return phi.derivative(order) if isinstance(phi, Taylor) else 0.0

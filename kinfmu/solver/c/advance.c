@@ -1,8 +1,6 @@
 /* Advance: from a good pose to other driver values, along one continuous branch. See kinfmu/solver/python/advance.py. */
 #include "internal.h"
 
-#define STRIDE 0.02 /* of the longest step; where steps become as short, an unknown may run to infinity */
-
 inline void kf_path_init(kf_path *path, kf_pose *start, const double *target, int driver, kf_pose *places)
 {
     path->places = places;
@@ -175,7 +173,7 @@ static void step(kf_solver *solver, const kf_pose *start, kf_path *path)
                 }
             }
             kf_path_accept(path, trial, s, trial->found.margin);
-            if (!path->is_ended && path->length < STRIDE * path->longest) {
+            if (!path->is_ended && path->length < KF_STRIDE * path->longest) {
                 path->is_ended = kf_pole_before(solver, pose, trial, path->direction, path->distance, &path->limit);
             }
             return;

@@ -3,23 +3,16 @@
  */
 #include "internal.h"
 
-#define CLOSED 1e-12   /* residual relative to the size up to which an interpolated pose counts as closed */
-#define DAMPING 1e-3   /* of J dz = -r at a change point: its singular value is 0, the others are far above */
-#define NOISE 8.0      /* roundings of the residual at the centre; a smaller residual is no miss */
-#define TURN 6.283185307179586       /* [rad]; for counting */
-#define HIGH 6.2831853069365025      /* [rad]; 2 pi to 32 bits: its multiples by up to 2^21 turns are exact */
-#define LOW 2.430840202602477e-10    /* [rad]; the rest */
-
 /* Return angle + turns * 2 pi [rad], rounded about once. */
 double kf_turned(double angle, double turns)
 {
-    return angle + turns * HIGH + turns * LOW;
+    return angle + turns * KF_HIGH + turns * KF_LOW;
 }
 
 /* Return the whole number of turns nearest to an angle [rad]. */
 double kf_whole_turns(double angle)
 {
-    return nearbyint(angle / TURN);
+    return nearbyint(angle / KF_TURN);
 }
 
 /* Return whether u is inside the window, where the bridge is used. */
@@ -146,7 +139,7 @@ static bool keeps_distances(const kf_solver *solver, const kf_bridge *bridge, co
             double squared;
             kf_residuals(&solver->model, found, kf_distance_blocks[k], residuals);
             squared = residuals[kf_distance_rows[k]] * kf_distance_scales[k] + u * u;
-            if (fabs(sqrt(fmax(squared, 0.0)) - fabs(u)) > CLOSED * kf_size) {
+            if (fabs(sqrt(fmax(squared, 0.0)) - fabs(u)) > KF_CLOSED * kf_size) {
                 return false;
             }
         }
@@ -158,7 +151,7 @@ static bool keeps_distances(const kf_solver *solver, const kf_bridge *bridge, co
 bool kf_bridge_closes(kf_solver *solver, const kf_bridge *bridge, kf_found *found)
 {
     double largest;
-    return find_middle(solver, bridge, found, &largest) && found->residual <= CLOSED + 4.0 * KF_EPS * largest
+    return find_middle(solver, bridge, found, &largest) && found->residual <= KF_CLOSED + 4.0 * KF_EPS * largest
            && keeps_distances(solver, bridge, found);
 }
 
@@ -187,11 +180,11 @@ static double miss(kf_solver *solver, const kf_bridge *bridge)
                     jacobian[i * columns + k] *= kf_unknown_scales[first + k] / rows[i];
                 }
             }
-            left = fmax(left, kf_unclosed(m, columns, jacobian, right, DAMPING));
+            left = fmax(left, kf_unclosed(m, columns, jacobian, right, KF_DAMPING));
         }
         rows += m;
     }
-    return fmax(0.0, left - NOISE * KF_EPS * (1.0 + largest));
+    return fmax(0.0, left - KF_NOISE * KF_EPS * (1.0 + largest));
 }
 
 /* Return what the miss may do to unknowns and their derivatives over the driver, in radians and sizes.

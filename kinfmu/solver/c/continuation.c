@@ -7,9 +7,6 @@
  */
 #include "internal.h"
 
-#define SHORTEST 1e-7 /* step in s; where steps get shorter the path ends */
-#define MOST_STEPS 10000
-#define ITERATIONS 60
 #define WHY 200 /* characters */
 
 /* Return whether corrections are small compared with the determinants and no determinant falls steeply. */
@@ -114,7 +111,7 @@ double kf_gap(kf_solver *solver, const kf_model *model, int block, const double 
     double *const trial = solver->scratch.zd;
     const int first = kf_first_of(block), k = kf_block_ends[block] - first;
     int turn, i;
-    for (turn = 0; turn < ITERATIONS; ++turn) {
+    for (turn = 0; turn < KF_MOST_ITERATIONS; ++turn) {
         if (left < 0.0) {
             if (!kf_evaluated_as_given(model, u, z, found)) {
                 return 0.0;
@@ -200,7 +197,7 @@ bool kf_continued(kf_solver *solver, const double *from, const double *to, const
         is_there = is_there && to[k] == from[k];
     }
     memset(slope, 0, KF_UNKNOWNS * sizeof(double));
-    for (path->steps = 0; path->steps < MOST_STEPS && !is_there; ++path->steps) {
+    for (path->steps = 0; path->steps < KF_MOST_CONTINUED && !is_there; ++path->steps) {
         const double there = fmin(s + step, 1.0);
         char why[WHY];
         for (k = 0; k < KF_PARAMETERS; ++k) {
@@ -238,7 +235,7 @@ bool kf_solver_bind(kf_solver *solver, const double *parameters)
     bool is_there;
     kf_solver_start(solver);
     solver->tolerance = tolerance;
-    is_there = kf_continued(solver, kf_parameters_written, parameters, kf_anchor_u, SHORTEST, &solver->anchor, &path);
+    is_there = kf_continued(solver, kf_parameters_written, parameters, kf_anchor_u, KF_SHORTEST, &solver->anchor, &path);
     solver->unsolvable = !is_there || !(solver->anchor.found.watch <= solver->tolerance);
     if (!solver->unsolvable) {
         solver->message[0] = '\0';
@@ -247,7 +244,7 @@ bool kf_solver_bind(kf_solver *solver, const double *parameters)
     append_parameters(solver->message, parameters);
     if (is_there) {
         kf_append_watch(solver->message, &solver->model, &solver->anchor.found, "gap about ", "%.4g");
-    } else if (path.steps < MOST_STEPS) {
+    } else if (path.steps < KF_MOST_CONTINUED) {
         append_failure(solver, parameters, path.block);
     } else {
         kf_append(solver->message, "too far from the parameters as written");

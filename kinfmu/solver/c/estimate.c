@@ -10,9 +10,6 @@
  */
 #include "internal.h"
 
-#define UNBOUNDED 0.5 /* relative change of a determinant within a pose's error from which rates are unknown */
-#define STEEP_LAW 40.0 /* steps through a law per radian or size of its argument, from which the argument's rounding counts */
-
 /* Speeds and accelerations of the drivers (with one driver: 1 and 0), and the blocks held; the largest derivatives, in
  * radians and sizes.
  */
@@ -78,7 +75,7 @@ static double rounding_of_laws(const kf_solver *solver, const kf_pose *pose)
     kf_law_slopes(&solver->model, slopes);
     kf_law_positions(&solver->model, &pose->found, here);
     for (k = 0; k < KF_LAW_ARGUMENTS; ++k) {
-        if (slopes[k] * kf_law_units[k] > STEEP_LAW) {
+        if (slopes[k] * kf_law_units[k] > KF_STEEP_LAW) {
             largest = fmax(largest, fabs(here[k]) / kf_law_units[k]);
         }
     }
@@ -305,7 +302,7 @@ static bool is_singular_between(const kf_pose *pose, const kf_pose *there, const
     int k;
     for (k = 0; k < KF_BLOCKS; ++k) {
         const double a = pose->found.determinants[k], b = there->found.determinants[k];
-        if (!(held != NULL && held[k]) && fabs(b - a) > UNBOUNDED * fabs(a)) {
+        if (!(held != NULL && held[k]) && fabs(b - a) > KF_UNBOUNDED * fabs(a)) {
             return true;
         }
     }

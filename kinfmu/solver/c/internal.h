@@ -8,22 +8,6 @@
 #include <math.h>
 #include <string.h>
 
-#define KF_EPS DBL_EPSILON
-#define KF_REGULAR 0.19      /* determinant from which a block is regular: see span.py */
-#define KF_HALF_WIDTH 0.05   /* [rad, sizes] of a bridge: see build.py */
-#define KF_LONGEST_STEP 0.2  /* [rad, sizes]: see trusted_step.py, advance.py and limit.py, as all that follows */
-#define KF_TRUST 10.0
-#define KF_FALL 0.3
-#define KF_NEAR 0.0125       /* determinant below which a pose is near-singular */
-#define KF_CLOSE 0.1
-#define KF_MOST_STEPS 1000000
-#define KF_SHORTEST_STEP 5e-9 /* of the longest; where steps get shorter, a limit is near: its place is extrapolated */
-#define KF_GIVE_UP 5e-15      /* of the longest; nothing lies between such steps */
-#define KF_BENT 1.0           /* [rad, sizes]; a prediction whose quadratic term is larger may land whole turns away */
-#define KF_MOST_OFF 0.5       /* [rad, sizes] of what a law gives outright from its prediction; farther off lie whole turns */
-#define KF_UNDECIDED 1e-6    /* determinant below which a path ends: lengths within 1e-12 of a change point give such a determinant */
-#define KF_STEEP 100.0       /* slope of an unknown; right before a dead centre it is more: see pose.py */
-
 /* Blocks of models with several drivers that depend on one driver alone are followed along it: a track.
  * KF_ALONG: the number of the driver; KF_SPEEDS: those of the drivers then; KF_AT: values of all drivers of which one is
  * given.
@@ -65,12 +49,11 @@ bool kf_evaluated(const kf_model *model, const double *u, const double *z, const
 bool kf_evaluated_as_given(const kf_model *model, const double *u, const double *z, kf_found *found);
 void kf_tangent(const kf_model *model, kf_pose *pose);
 
-/* hermite.c */
+/* span.c */
 void kf_hermite_through(int count, const double *nodes, const double samples[][3], kf_hermite *polynomial);
 void kf_hermite_at(const kf_hermite *polynomial, double x, double values[3]);
 void kf_weights(int count, const double *nodes, double x, double weights[][3]);
 
-/* span.c */
 void kf_span_node(kf_span *span, int place, kf_pose *node, const kf_model *model);
 void kf_span_reverse(kf_span *span);
 void kf_span_hold(kf_span *span, const double *before, const double *after);
@@ -82,7 +65,6 @@ void kf_span_read(const kf_span *span, kf_inner *inner, double x, double *z, dou
 void kf_span_difference(const kf_span *span, kf_inner *inner, double x, double *z, double *zd, double *zdd);
 
 /* bridge.c */
-#define KF_AGREED 1e-9 /* [rad, sizes]; largest difference of two widths, and of a pose and a node whole turns away */
 double kf_turned(double angle, double turns);
 double kf_whole_turns(double angle);
 void kf_make_bridge(kf_bridge *bridge, const kf_solver *solver, int span, double turns);
@@ -94,18 +76,11 @@ void kf_bridge_missed(kf_solver *solver, const kf_pose *pose, double slope, doub
 void kf_bridge_difference(kf_solver *solver, int number, double u, double *z, double *zd, double *zdd);
 int kf_moved(kf_solver *solver, int number, kf_pose *pose, double u);
 
-/* build.c */
-int kf_build(kf_solver *solver, kf_pose *pose, int block, double zero);
-bool kf_secant_zero(double a, double of_a, double b, double of_b, double *zero);
-
 /* singularity_map.c */
 void kf_around(const kf_solver *solver, int map, double u, double *low, double *high);
-bool kf_knows(const kf_solver *solver, int map, double u, int block);
-int kf_with_bridge(kf_solver *solver, int map, int bridge);
-int kf_with_interval(kf_solver *solver, int map, kf_interval interval);
 int kf_next_bridge(const kf_solver *solver, int map, double here, double target);
 int kf_spare_bridge(const kf_solver *solver);
-int kf_spare_span(const kf_solver *solver, int other);
+KF_RARE int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial);
 void kf_keep_maps(kf_solver *solver, int start, int pose, int regular);
 
 /* limit.c */
@@ -115,7 +90,6 @@ typedef struct {
     bool crosses; /* another branch crosses there and no bridge holds: the motion does not turn back */
     int pole;     /* the unknown that runs to infinity there, or KF_NO_POLE */
 } kf_limit;
-enum { KF_NO_BLOCK = -1, KF_TOO_FAR = -2, KF_NEGATIVE = -3, KF_NO_POLE = -1 };
 /* Make a limit at driver values. */
 void kf_limit_at(kf_limit *limit, const double *u, int block);
 bool kf_pole_before(kf_solver *solver, kf_pose *before, kf_pose *pose, const double *direction, double distance,
@@ -123,6 +97,13 @@ bool kf_pole_before(kf_solver *solver, kf_pose *before, kf_pose *pose, const dou
 void kf_limit_beyond(kf_solver *solver, const kf_pose *before, kf_pose *pose, const double *direction, kf_limit *limit);
 bool kf_is_beyond(const double *target, const double *limit, const double *direction, double s);
 void kf_append_limit(char *message, const kf_limit *limit, const double *target, int driver);
+void kf_append(char *message, const char *format, ...);
+void kf_append_number(char *message, const char *format, double value);
+void kf_append_place(char *message, const double *u, int digits, int driver); /* -1: all of them */
+bool kf_differs(const double *a, const double *b, int digits);
+/* Append the redundant row with the largest gap; about, format: of the gap. */
+void kf_append_watch(char *message, const kf_model *model, const kf_found *found, const char *about,
+                     const char *format);
 
 /* advance.c
  *
@@ -190,26 +171,16 @@ static inline double kf_straight_path(const double *start, const double *target,
     return length;
 }
 
-/* survey.c */
-KF_RARE int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial);
-
 /* tracks.c */
 #if KF_TRACKS
 kf_pose *kf_on_track(kf_solver *solver, const kf_pose *whole, int driver);
-kf_status kf_assembled(kf_solver *solver, kf_pose *start, const double *u, const double *target, const double *z,
-                       kf_pose *pose);
-bool kf_is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose);
 #endif
 const bool *kf_rates_in_time(const kf_model *model, kf_pose *pose, const double *ud, const double *udd);
-
-/* mixed.c */
 #if KF_MIXES
 KF_RARE kf_status kf_advance_mixed(kf_solver *solver, kf_pose *start, const double *target, kf_pose *pose);
 #endif
 
 /* worst_case_step.c */
-#define KF_ROUNDINGS 2.0  /* of a row's terms, and of what is formed of them */
-#define KF_MOST_SOURCES 3 /* with more blocks, those that move farthest represent all */
 bool kf_worst_case_step(const kf_model *model, const kf_found *found, int block, const double *rows, double *step);
 double kf_known_to(const kf_found *found, int block);
 int kf_worst_blocks(const kf_model *model, const kf_found *found, const bool *held, int *worst, double *weight);
@@ -243,16 +214,5 @@ typedef struct {
  */
 bool kf_continued(kf_solver *solver, const double *from, const double *to, const double *u, double shortest,
                   kf_pose *pose, kf_continuation *path);
-
-/* message.c */
-enum { KF_ROUGHLY = 6, KF_LOCATED = 10 }; /* digits; limits are located to 1e-10 rad */
-void kf_append(char *message, const char *format, ...);
-void kf_append_number(char *message, const char *format, double value);
-void kf_append_place(char *message, const double *u, int digits, int driver); /* -1: all of them */
-bool kf_differs(const double *a, const double *b, int digits);
-
-/* Append the redundant row with the largest gap; about, format: of the gap. */
-void kf_append_watch(char *message, const kf_model *model, const kf_found *found, const char *about,
-                     const char *format);
 
 #endif

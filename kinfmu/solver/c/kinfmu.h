@@ -1,7 +1,8 @@
 /* The model and the solver of a mechanism in C99: libm only, no allocation, no global state.
  *
  * model.c is generated from the plan of a mechanism, sizes.h with it; all other files are the same for every
- * mechanism. Names and methods are those of the Python run time (kinfmu/solver/python), file by file.
+ * mechanism. Names and methods are those of the Python run time (kinfmu/solver/python), file by file; its constants and
+ * statuses are generated into constants.h: each is described where Python defines it.
  */
 #ifndef KINFMU_H
 #define KINFMU_H
@@ -9,10 +10,10 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "constants.h"
 #include "curve.h"
 #include "sizes.h"
 
-#define KF_MIXED (-1)
 #define KF_ROOM(n) ((n) > 0 ? (n) : 1) /* arrays without elements are no C */
 
 /* Compiler hints: functions that are rarely called, and the function most samples go through, to be inlined as a whole. */

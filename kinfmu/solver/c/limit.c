@@ -1,11 +1,11 @@
-/* Limits: driver values where a path ends, and why. See kinfmu/solver/python/limit.py. */
+/* Limits: driver values where a path ends, and the messages that state where and why. See kinfmu/solver/python/limit.py.
+ *
+ * Messages are appended piece by piece and cut at the end of the buffer; numbers as %g of the C locale writes them.
+ */
 #include "internal.h"
 
-#define VANISHING 1e-6        /* [sizes] of a length that a law gives: where steps end there, it would be negative beyond */
-#define FAR_AWAY 100.0        /* [sizes]; what runs to infinity is at least as far away */
-#define AT_POLE 0.999         /* of the distance to a pole; beyond it an unknown is a thousand times as far away */
-#define STEEPEST_SLOPE (-0.8) /* of z'/z'' over the driver: -1 / (p + 1) toward a pole of order p, */
-#define LEAST_SLOPE (-0.2)    /* -2 toward a dead centre */
+#include <stdarg.h>
+#include <stdio.h>
 
 /* Move the limit past the last pose, to where a number vanishes that is `far` at the pose before and `near` at the last. */
 static void extrapolate(const kf_pose *before, const kf_pose *pose, double near, double far, kf_limit *limit)
@@ -42,7 +42,7 @@ void kf_limit_beyond(kf_solver *solver, const kf_pose *before, kf_pose *pose, co
     kf_limit_at(limit, KF_POSE_U(pose), KF_BLOCKS > 0 ? 0 : KF_NO_BLOCK);
 #if KF_LAWS
     for (k = KF_LAW_ARGUMENTS; k < KF_LAW_ARGUMENTS + KF_LAW_LENGTHS; ++k) {
-        if (lengths[k] < VANISHING * kf_size) {
+        if (lengths[k] < KF_VANISHING * kf_size) {
             extrapolate(before, pose, lengths[k], longer[k], limit);
             limit->block = KF_NEGATIVE;
             return;
@@ -109,7 +109,7 @@ bool kf_pole_before(kf_solver *solver, kf_pose *before, kf_pose *pose, const dou
             double there, here, slope, order, ahead;
             if (kf_is_outside(&solver->model, block) || kf_unknown_is_angle[k] || before->x2[k] * between == 0.0
                 || !(fabs(first) * unit > KF_STEEP * scale && second != 0.0
-                     && first * first > FAR_AWAY * scale * fabs(second))) {
+                     && first * first > KF_FAR_AWAY * scale * fabs(second))) {
                 continue;
             }
             there = before->x1[k] / before->x2[k];
@@ -117,8 +117,8 @@ bool kf_pole_before(kf_solver *solver, kf_pose *before, kf_pose *pose, const dou
             slope = (here - there) / between;
             order = 0.5 * rint(-2.0 / slope) - 1.0;
             ahead = 1.5 * (there + here) / (2.0 / (order + 1.0) - slope) - 0.5 * between;
-            if (STEEPEST_SLOPE < slope && slope < LEAST_SLOPE && 0.0 < AT_POLE * ahead / distance
-                && AT_POLE * ahead / distance <= 1.0) {
+            if (KF_STEEPEST_SLOPE < slope && slope < KF_LEAST_SLOPE && 0.0 < KF_AT_POLE * ahead / distance
+                && KF_AT_POLE * ahead / distance <= 1.0) {
                 kf_limit_at(limit, KF_POSE_U(pose), block);
                 limit->pole = k;
                 for (d = 0; d < KF_DRIVERS; ++d) {
@@ -178,4 +178,107 @@ void kf_append_limit(char *message, const kf_limit *limit, const double *target,
     if (limit->crosses && KF_DRIVERS > 1 && driver < 0) {
         kf_append(message, "; the crossing depends on several drivers, so no bridge is built");
     }
+}
+
+void kf_append(char *message, const char *format, ...)
+{
+    const size_t length = strlen(message);
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(message + length, KF_MESSAGE - length, format, arguments);
+    va_end(arguments);
+}
+
+/* Append a number with a decimal point in every locale. */
+void kf_append_number(char *message, const char *format, double value)
+{
+    char *text = message + strlen(message);
+    kf_append(message, format, value == value ? value : fabs(value)); /* a NaN is printed without its sign */
+    for (; *text != '\0'; ++text) {
+        if (*text == ',') {
+            *text = '.';
+        }
+    }
+}
+
+/* Append a number with at most `count` decimals, without zeros at its end. */
+static void append_decimals(char *message, int count, double value)
+{
+    char *const text = message + strlen(message);
+    char format[16];
+    const bool is_large = !(value > -KF_LARGE && value < KF_LARGE);
+    snprintf(format, sizeof format, is_large ? "%%.%dg" : "%%.%df",
+             is_large && count > KF_ROUGHLY ? count + KF_MORE : count);
+    kf_append_number(message, format, value);
+    if (!is_large && strchr(text, '.') != NULL) {
+        char *end = text + strlen(text);
+        while (end[-1] == '0') {
+            --end;
+        }
+        end -= end[-1] == '.';
+        *end = '\0';
+    }
+    if (strcmp(text, "-0") == 0) {
+        strcpy(text, "0");
+    }
+}
+
+/* Append "crank = 1.047198 rad (60 deg)": driver values, of one driver or of all;
+ * digits: decimals of angles, digits of lengths.
+ */
+void kf_append_place(char *message, const double *u, int digits, int driver)
+{
+    char format[16];
+    int k;
+    snprintf(format, sizeof format, "%%.%dg", digits);
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        if (driver >= 0 && k != driver) {
+            continue;
+        }
+        kf_append(message, "%s%s = ", k > 0 && driver < 0 ? ", " : "", kf_driver_names[k]);
+        if (kf_driver_is_angle[k]) {
+            append_decimals(message, digits, u[k]);
+            kf_append(message, " rad (");
+            append_decimals(message, digits - 2, u[k] * KF_DEGREE);
+            kf_append(message, " deg)");
+        } else {
+            kf_append_number(message, format, u[k]);
+            kf_append(message, " %s", kf_length_unit);
+        }
+    }
+}
+
+/* Return whether kf_append_place shows a driver of two places with different digits: of an angle, in rad and in degrees. */
+bool kf_differs(const double *a, const double *b, int digits)
+{
+    char format[16];
+    int k;
+    snprintf(format, sizeof format, "%%.%dg", digits);
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        char first[KF_MESSAGE] = "", second[KF_MESSAGE] = "";
+        if (kf_driver_is_angle[k]) { /* in degrees there are fewer digits */
+            append_decimals(first, digits - 2, a[k] * KF_DEGREE);
+            append_decimals(second, digits - 2, b[k] * KF_DEGREE);
+        } else {
+            kf_append_number(first, format, a[k]);
+            kf_append_number(second, format, b[k]);
+        }
+        if (strcmp(first, second) != 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+void kf_append_watch(char *message, const kf_model *model, const kf_found *found, const char *about, const char *format)
+{
+    double watches[KF_ROOM(KF_WATCHES)];
+    int k, most = 0;
+    kf_watches(model, found, watches);
+    for (k = 1; k < KF_WATCHES; ++k) {
+        most = fabs(watches[k]) > fabs(watches[most]) ? k : most;
+    }
+    kf_append(message, "redundant row %s does not close: %s", kf_watch_names[most], about);
+    kf_append_number(message, format, fabs(watches[most]) * kf_size);
+    kf_append(message, " %s", kf_length_unit);
 }

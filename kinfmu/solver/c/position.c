@@ -4,7 +4,6 @@
 #include "kinfmu.h"
 
 #define KF_ROUND_OFF 4e-16 /* residual relative to the size that Newton may end at: see kinfmu/codegen/newton.py */
-#define KF_POLISHED 0.1    /* determinant below which it goes on: see kinfmu/solver/python/pose.py */
 
 /* Return the largest residual of the watches. */
 static inline double watched(const kf_model *model, const kf_found *found)

@@ -1,13 +1,11 @@
 /* Solver: poses, rates and accelerations of the model. See kinfmu/solver/python/solver.py. */
 #include "internal.h"
 
-#define TOLERANCE 1e-9 /* residual relative to the size above which a sample is not ok */
-
 void kf_solver_start(kf_solver *solver)
 {
     int k;
     kf_bind(&solver->model, kf_parameters_written, solver->message, sizeof solver->message);
-    solver->tolerance = TOLERANCE;
+    solver->tolerance = KF_TOLERANCE;
 #if KF_TRACKS
     solver->model.track = solver->scratch.ahead.track = 0;
 #endif

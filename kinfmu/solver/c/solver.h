@@ -26,16 +26,6 @@
 
 #define KF_MESSAGE 480 /* characters, with the 0 at the end */
 
-/* How far the numbers of a pose can be trusted: see kinfmu/solver/python/status.py. */
-typedef enum {
-    KF_OK,
-    KF_NEAR_SINGULAR, /* right, but with fewer digits: see kf_errors */
-    KF_BRIDGED,       /* interpolated across a singular point; the interpolated pose closes */
-    KF_OUTSIDE,       /* the drivers cannot take the mechanism there */
-    KF_INCONSISTENT,  /* a watch (a redundant row that is monitored) does not close there */
-    KF_NOT_CONVERGED
-} kf_status;
-
 #define KF_GOOD(status) ((status) <= KF_BRIDGED) /* the pose holds numbers */
 
 /* The part of a pose of the whole mechanism that belongs to one driver's track: base, singularity map and bridge. */
@@ -85,7 +75,7 @@ typedef struct {
     bool held[KF_ROOM(KF_BLOCKS)];
 } kf_span;
 
-/* A polynomial in Newton's form: see kinfmu/solver/python/hermite.py. */
+/* A polynomial in Newton's form: see kinfmu/solver/python/span.py. */
 #define KF_MOST_NODES 4
 typedef struct {
     int count; /* of the terms, three a node */
@@ -117,7 +107,6 @@ typedef struct {
 } kf_interval;
 
 /* The singular points known so far along one driver: see kinfmu/solver/python/singularity_map.py. */
-#define KF_KEPT 32 /* of each kind, the latest */
 #define KF_IS_FOLLOWED (KF_DRIVERS == 1 || KF_TRACKS) /* along one driver: there are bridges */
 #define KF_INTERVALS (KF_IS_FOLLOWED ? KF_KEPT + KF_BLOCKS : 1) /* at one place there may be one for each block */
 typedef struct {

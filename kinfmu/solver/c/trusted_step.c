@@ -1,12 +1,6 @@
 /* Trusted steps: predict, correct, and accept only what stays on the branch. See kinfmu/solver/python/trusted_step.py. */
 #include "internal.h"
 
-#define UNDOUBTED 1e-5      /* [rad, sizes]; a prediction that was corrected by less did not land by accident */
-#define SMOOTH 0.5          /* largest jump of the tangent in a step, as a part of it: a larger one is another branch */
-#define APART 1e-3          /* least distance of a crossing branch over the determinant, in radians and sizes */
-#define MOST_FOLLOWED 10000 /* steps between a pose and a node; a few, as a rule */
-#define ROUGHEST 5e-4       /* of the longest step; a path that needs shorter ones is not followed */
-
 /* Return whether the columns of a block's J change their orientation from a pose to another, det(J^T J') <= 0.
  *
  * The determinant of a block of more rows than unknowns has no sign by which a crossing in between could be seen.
@@ -132,7 +126,7 @@ inline bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *dire
     if (KF_TALL && turns_over(model, pose, trial)) {
         return false;
     }
-    for (k = 0; trial->found.moved > UNDOUBTED && k < KF_UNKNOWNS; ++k) {
+    for (k = 0; trial->found.moved > KF_UNDOUBTED && k < KF_UNKNOWNS; ++k) {
         if (fabs(x2[k]) * s * s > 2.0 * KF_BENT * kf_unknown_scales[k]) {
             return false;
         }
@@ -144,7 +138,7 @@ inline bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *dire
 /* Return false if the tangent of a path jumps in a step along it, as it does from one branch to a crossing one.
  *
  * Near a crossing the branches lie as close as corrections are small, and one of them keeps the determinant's sign;
- * their tangents stay apart. Towards a dead centre the tangent grows, but in a step by at most SMOOTH of itself. Where
+ * their tangents stay apart. Towards a dead centre the tangent grows, but in a step by at most KF_SMOOTH of itself. Where
  * the unknowns rest the tangent is rounding noise: at a distance x from a crossing both branches have a determinant
  * |D| ~ x and lie |D| apart, so in a step s across it their tangents differ by (|D| + |D'|) / s. Where a pose is so
  * close to either that doubles cannot tell the branches apart, no step is accepted.
@@ -174,7 +168,7 @@ bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const dou
             }
         }
     }
-    return jump <= SMOOTH * fmax(largest, APART * (pose->found.margin + trial->found.margin) / fabs(s));
+    return jump <= KF_SMOOTH * fmax(largest, KF_APART * (pose->found.margin + trial->found.margin) / fabs(s));
 }
 
 /* Return the pose at a value of the only driver, followed by trusted steps without bridges, or NULL. It lasts until the
@@ -189,7 +183,7 @@ kf_pose *kf_follow_path(kf_solver *solver, kf_pose *start, double u)
     double buffer[KF_DRIVERS];
 #endif
     int k;
-    for (k = 0; k < MOST_FOLLOWED; ++k) {
+    for (k = 0; k < KF_MOST_FOLLOWED; ++k) {
         const double here = KF_HERE(solver, pose), distance = u - here;
         const bool whole = -step <= distance && distance <= step;
         const double s = whole ? distance : distance > 0.0 ? step : -step, there = whole ? u : here + s;
@@ -202,7 +196,7 @@ kf_pose *kf_follow_path(kf_solver *solver, kf_pose *start, double u)
             continue;
         }
         step = 0.5 * fabs(s);
-        if (step < ROUGHEST * longest) {
+        if (step < KF_ROUGHEST * longest) {
             return NULL;
         }
     }

@@ -6,8 +6,7 @@ The Python FMU carries a copy of this package, in which the generated model is o
 from __future__ import annotations
 
 from .continuation import UnsolvableModel, with_parameters
-from .pose import Pose
+from .pose import Pose, Status
 from .solver import Solver
-from .status import Status
 
 __all__ = ["Pose", "Solver", "Status", "UnsolvableModel", "with_parameters"]

@@ -6,15 +6,13 @@ from collections.abc import Callable
 
 from .bridge import Bridge
 from .limit import MOST_STEPS, NO_BLOCK, TOO_FAR, Limit, is_beyond, limit_beyond, pole_before
-from .pose import UNIT_SPEED, Model, Pose, Vector, with_map
-from .singularity_map import SingularityMap
+from .pose import UNIT_SPEED, Model, Pose, Status, Vector, with_map
+from .singularity_map import SingularityMap, surveyed
 from .span import REGULAR
-from .status import Status
-from .survey import surveyed
 from .trusted_step import LONGEST_STEP, keeps_branch, straight_path, trusted_step
 
 SHORTEST_STEP = 5e-9  # of the longest; where shorter ones are needed, a limit is near and is extrapolated
-NEAR_SINGULAR = 0.0125  # determinant below which qdd keeps less than nine digits
+NEAR = 0.0125  # determinant below which qdd keeps less than nine digits
 CLOSE = 0.1  # determinant below which another branch may be as near as a correction is long
 STRIDE = 0.02  # of the longest; where steps become as short, an unknown may run to infinity
 GIVE_UP = 5e-15  # of the longest; shorter steps are lost in rounding
@@ -78,7 +76,7 @@ class Path:
             self.end = trial
             return
         self.before, self.pose = self.pose, trial
-        if margin >= NEAR_SINGULAR:
+        if margin >= NEAR:
             self.regular = trial
         self.distance -= s
         self.length = min(2.0 * self.length, self.longest)
@@ -99,7 +97,7 @@ class Path:
         end = Limit(self.pose.u, TOO_FAR) if self.end is None else self.end
         if isinstance(end, Pose) and end.bridge is None:
             end.iterations = self.iterations
-            if self.margin < NEAR_SINGULAR:
+            if self.margin < NEAR:
                 end.status = Status.NEAR_SINGULAR
                 end.base = self.regular
         return end

@@ -13,9 +13,8 @@ from math import sqrt
 from typing import Any
 
 from .linear import unclosed
-from .pose import AT_REST, EPS, UNIT_SPEED, Found, Model, Pose, Vector, evaluated
+from .pose import AT_REST, EPS, UNIT_SPEED, Found, Model, Pose, Status, Vector, evaluated
 from .span import Span, restored_span
-from .status import Status
 from .trusted_step import follow_path, passes_unseen
 
 CLOSED = 1e-12  # residual relative to the size up to which an interpolated pose counts as closed

@@ -13,14 +13,13 @@ from math import hypot
 from typing import Any, NamedTuple
 
 from .linear import factor, lu_solve
-from .pose import Model, Pose, Vector, evaluated, failed, position
+from .pose import Model, Pose, Status, Vector, evaluated, failed, position
 from .solver import TOLERANCE, Solver
-from .status import Status
 from .trusted_step import FALL, MOST_OFF, TRUST
 
 _SHORTEST = 1e-7  # step in s; where steps get shorter the path ends
-_MOST_STEPS = 10_000
-_ITERATIONS = 60
+_MOST_CONTINUED = 10_000
+_MOST_ITERATIONS = 60
 NO_NUMBER = "they lead to numbers that are not finite"
 
 
@@ -72,7 +71,7 @@ def reach(module: Any, values: Vector, tolerance: float = TOLERANCE) -> Reached:
     u = pose.u
     slope = at_rest = (0.0,) * len(pose.z)
     s, step, block = 0.0, 1.0, -1
-    for _ in range(_MOST_STEPS):
+    for _ in range(_MOST_CONTINUED):
         if values == written:
             break
         there = min(s + step, 1.0)
@@ -159,7 +158,7 @@ def _gap(model: Model, u: Vector, z: Vector, block: int) -> float:
     """Return the smallest length of a block's residuals near z, relative to the size (Levenberg-Marquardt)."""
     first, last = model.BLOCKS[block]
     damping, best, left = 1e-3, list(z), None
-    for _ in range(_ITERATIONS):
+    for _ in range(_MOST_ITERATIONS):
         if left is None:
             values = evaluated(model, u, tuple(best))[-1]
             left = model.residuals(values)[block]

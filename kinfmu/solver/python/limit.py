@@ -1,10 +1,9 @@
-"""Limits: driver values where a path ends, and why."""
+"""Limits: driver values where a path ends, and the messages that state where and why."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from .message import LOCATED, ROUGHLY, differs, place
 from .pose import STEEP, Model, Pose, Vector, directed
 
 MOST_STEPS = 1_000_000  # of a path: seconds, and more than any intended motion
@@ -13,7 +12,11 @@ VANISHING = 1e-6  # [sizes] of a length that a law gives: where steps end there,
 NO_POLE = -1  # in place of an unknown that runs to infinity
 FAR_AWAY = 100.0  # [sizes]; what runs to infinity is at least as far away
 AT_POLE = 0.999  # of the distance to a pole; beyond it an unknown is more than a thousand times as far away
-POLE_SLOPES = -0.8, -0.2  # of z'/z'' over the driver: -1 / (p + 1) toward a pole of order p, -2 toward a dead centre
+STEEPEST_SLOPE, LEAST_SLOPE = -0.8, -0.2  # of z'/z'': -1 / (p + 1) toward a pole of order p, -2 to a dead centre
+ROUGHLY, LOCATED = 6, 10  # digits; limits are located to 1e-10 rad
+_DEGREE = 57.29577951308232  # degrees in a radian
+_LARGE = 1e6  # [rad]; decimals of larger numbers are meaningless
+_MORE = 6  # digits that such numbers have before the point
 
 
 class Limit(NamedTuple):
@@ -76,7 +79,7 @@ def pole_before(model: Model, before: Pose, pose: Pose, direction: Vector, dista
             continue
         there, here = old[k] / older[k], new[k] / newer[k]
         slope = (here - there) / between
-        if not POLE_SLOPES[0] < slope < POLE_SLOPES[1]:
+        if not STEEPEST_SLOPE < slope < LEAST_SLOPE:
             continue
         order = 0.5 * round(-2.0 / slope) - 1.0
         ahead = 1.5 * (there + here) / (2.0 / (order + 1.0) - slope) - 0.5 * between
@@ -111,3 +114,34 @@ def limit_message(model: Model, limit: Limit, target: Vector) -> str:
         return f"{place(model, target, LOCATED)} cannot be reached: to these digits it is the limit{why}"
     asked = place(model, target, ROUGHLY if differs(model, target, limit.u, ROUGHLY) else LOCATED)
     return f"{asked} cannot be reached: the limit is {place(model, limit.u, LOCATED)}{why}"
+
+
+def place(model: Model, u: Vector, digits: int = ROUGHLY) -> str:
+    """Return driver values as 'crank = 1.047198 rad (60 deg)'; digits: decimals of angles, digits of lengths."""
+    parts = []
+    for name, kind, value in zip(model.DRIVERS, model.DRIVER_KINDS, u, strict=True):
+        if kind == "angle":
+            parts.append(f"{name} = {_decimals(value, digits)} rad ({_decimals(value * _DEGREE, digits - 2)} deg)")
+        else:
+            parts.append(f"{name} = {value:.{digits}g} {model.LENGTH_UNIT}")
+    return ", ".join(parts)
+
+
+def differs(model: Model, a: Vector, b: Vector, digits: int) -> bool:
+    """Return whether `place` shows a driver of two places with different digits: of an angle, in rad and in degrees."""
+    for kind, first, second in zip(model.DRIVER_KINDS, a, b, strict=True):
+        if kind != "angle":
+            is_same = f"{first:.{digits}g}" == f"{second:.{digits}g}"
+        else:  # in degrees there are fewer digits
+            is_same = _decimals(first * _DEGREE, digits - 2) == _decimals(second * _DEGREE, digits - 2)
+        if not is_same:
+            return True
+    return False
+
+
+def _decimals(value: float, count: int) -> str:
+    """Return a number with at most `count` decimals, without zeros at its end."""
+    if not -_LARGE < value < _LARGE:
+        return f"{value:.{count + _MORE if count > ROUGHLY else count}g}"
+    text = f"{value:.{count}f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text

@@ -1,10 +1,9 @@
-"""Pose: an assembled pose of a mechanism at given driver values, and how it is found by Newton."""
+"""Pose: an assembled pose of a mechanism at given driver values, its status, and how it is found by Newton."""
 
 from __future__ import annotations
 
+from enum import IntEnum
 from typing import Any
-
-from .status import Status
 
 Vector = tuple[float, ...]
 Model = Any  # a generated module: see kinfmu.codegen.python.emit
@@ -16,6 +15,17 @@ UNDECIDED = 1e-6  # determinant below which a path ends: lengths within 1e-12 of
 STEEP = 100.0  # slope of an unknown over the driver, both in radians or sizes; right before a dead centre it is more
 UNIT_SPEED: Vector = (1.0,)  # of a single driver: derivatives are then with respect to its value
 AT_REST: Vector = (0.0,)
+
+
+class Status(IntEnum):
+    """Status of a sample: 0 to 2 hold numbers, 3 to 5 do not."""
+
+    OK = 0
+    NEAR_SINGULAR = 1  # right, but with fewer digits: see the error estimate
+    BRIDGED = 2  # interpolated across a singular point; the interpolated pose closes
+    OUTSIDE = 3  # the drivers cannot take the mechanism there
+    INCONSISTENT = 4  # a watch (a redundant row that is monitored) does not close there
+    NOT_CONVERGED = 5
 
 
 class Pose:

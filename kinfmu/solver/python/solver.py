@@ -6,20 +6,19 @@ from collections.abc import Sequence
 from math import inf, isfinite
 from typing import Any
 
-from .advance import CLOSE, NEAR_SINGULAR, advance
+from .advance import CLOSE, NEAR, advance
 from .estimate import estimated_errors, margin_of, with_driver_errors
-from .limit import Limit, limit_message
-from .message import place
-from .mixed import advance_mixed
-from .pose import UNIT_SPEED, Model, Pose, Vector, evaluated, failed, tangent_of, with_map
-from .singularity_map import restored_map
+from .limit import Limit, limit_message, place
+from .pose import UNIT_SPEED, Model, Pose, Status, Vector, evaluated, failed, tangent_of, with_map
+from .singularity_map import restored_map, surveyed
 from .span import REGULAR
-from .status import Status
-from .survey import surveyed
-from .tracks import MIXED, TrackModel, Tracks, on_track, rates_in_time, tracks_of
+from .tracks import MIXED, TrackModel, Tracks, advance_mixed, on_track, rates_in_time, tracks_of
 from .trusted_step import LONGEST_STEP, keeps_branch, straight_path, trusted_step
 
 TOLERANCE = 1e-9  # residual relative to the size above which a sample is not ok
+STEP_TOLERANCE = 1e-9  # error of a step of the integrators in rad, sizes, for fast speeds relative, if none is given
+LEAST_TOLERANCE = 1e-13  # smaller ones are rounding
+MOST_TOLERANCE = 1e-4  # larger ones do not tell a limit from a turn before it
 
 
 class Solver:
@@ -35,8 +34,8 @@ class Solver:
     def __init__(self, model: Model, tolerance: float = TOLERANCE, anchor: Pose | None = None) -> None:
         self.model = model
         self.tolerance = tolerance
-        u, z = model.ANCHOR
-        self.anchor = Pose(u, evaluated(model, u, z, held=0)) if anchor is None else anchor
+        self.anchor = _anchor_of(model) if anchor is None else anchor
+        u = model.ANCHOR[0]
         self._has_one_driver = len(u) == 1
         tracks = () if self._has_one_driver else tracks_of(model, u, self.anchor.z)
         self._tracks: Tracks | None = None
@@ -66,9 +65,7 @@ class Solver:
                     margin = near.margin
                     if margin >= REGULAR:
                         return near
-                    if margin > NEAR_SINGULAR and (
-                        margin >= CLOSE or keeps_branch(self.model, start, near, UNIT_SPEED, s)
-                    ):
+                    if margin > NEAR and (margin >= CLOSE or keeps_branch(self.model, start, near, UNIT_SPEED, s)):
                         singularities = surveyed(self.model, start, near)
                         if singularities is start.singularities:  # nothing new there
                             return near
@@ -115,7 +112,7 @@ class Solver:
             found = start if singularities is None else advance(self.model, start, start.u, singularities)
             if not isinstance(found, Limit):
                 pose = found
-            if pose is start and pose.margin < NEAR_SINGULAR:
+            if pose is start and pose.margin < NEAR:
                 pose = with_map(start, None)
                 pose.status = Status.NEAR_SINGULAR
         if pose.residual <= self.tolerance and pose.watch <= self.tolerance:
@@ -232,4 +229,15 @@ class Solver:
         pose.singularities = None if singularities is None else singularities.around(pose.u[0])
         pose.iterations, pose.status, pose.message = iterations, status, message
         pose.base = None if base is None else self.restore(base)
+        return pose
+
+
+def _anchor_of(model: Model) -> Pose:
+    """Return the anchor; if Newton does not end there, with the residual left, so that it is not converged."""
+    u, z = model.ANCHOR
+    try:
+        return Pose(u, evaluated(model, u, z, held=0))
+    except ArithmeticError as error:
+        pose = Pose(u, evaluated(model, u, z))
+        pose.residual = error.args[1] if len(error.args) == 2 else inf
         return pose

@@ -10,7 +10,7 @@ import pytest
 from kinfmu import MotionSequence, Spline
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.laws import Cycloidal, Harmonic, Law, SimpleHarmonic
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from tests.fmu.conftest import Start
 from tests.fmu.host import OK, Host, answer
 from tests.fmu.test_laws import arms

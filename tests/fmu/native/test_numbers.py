@@ -12,7 +12,7 @@ import pytest
 import kinfmu
 from kinfmu.errors import FmuError
 from kinfmu.mechanism import gallery
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from tests.fmu.conftest import Build
 from tests.fmu.test_parameters import OTHERS, linkage
 from tests.gallery_members import mostly_long

@@ -15,7 +15,7 @@ import pytest
 import kinfmu
 from kinfmu.fmu.native.sources import HEADERS, headers
 from kinfmu.fmu.slave.layout import UNKNOWN_ERROR
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from tests import oracle
 from tests.fmu.conftest import Build, Start
 from tests.fmu.host import DISCARD, ERROR, LAST_SUCCESSFUL_TIME, OK, TERMINATED, WARNING, Host, answer

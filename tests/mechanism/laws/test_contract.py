@@ -36,7 +36,7 @@ from kinfmu.mechanism.toml_text import text
 from kinfmu.plan.equations.graph import Graph, evaluate
 from kinfmu.plan.equations.taylor import Taylor
 from kinfmu.solver.python.curve import curve
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from tests.mechanism.joints.drawn import coordinates, laws, splines
 from tests.power_series import Real, Series, cos, mp, sin
 
@@ -259,8 +259,8 @@ def exact(law: Formula, x: float) -> list[Real]:
 
 def motion(law: Law, x: float) -> list[float]:
     """Value, first and second derivative of a law."""
-    u = law.at(Taylor(x, 1.0))
-    return [u.f, u.d1, u.d2] if isinstance(u, Taylor) else [u, 0.0, 0.0]
+    u = law.at(Taylor.of(2, x, 1.0))
+    return [u.derivative(k) for k in range(3)] if isinstance(u, Taylor) else [u, 0.0, 0.0]
 
 
 def close(values: list[float], truth: list[Real], size: float = 1.0) -> Any:

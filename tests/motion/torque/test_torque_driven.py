@@ -30,7 +30,7 @@ from kinfmu import (
 from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.mechanism.laws import External, Harmonic, MotionSequence, Segment
 from kinfmu.mechanism.measures import Maximum, PeakSpeed
-from kinfmu.solver.python.status import Status
+from kinfmu.solver.python.pose import Status
 from tests.mechanisms import five_bar, fourbar
 from tests.motion.test_breaks import tappet
 from tests.motion.torque import andrews

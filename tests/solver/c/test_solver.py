@@ -11,8 +11,6 @@ import random
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,14 +18,13 @@ import pytest
 
 import kinfmu
 from kinfmu import Mechanism
-from kinfmu.codegen.c import compiler
+from kinfmu.codegen.c import compiler, emit
 from kinfmu.codegen.python import load_model, load_module
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.run.driving import run_times
 from kinfmu.solver.python import Solver, Status, with_parameters
-from kinfmu.solver.python.hermite import weights
 from kinfmu.solver.python.pose import AT_REST, UNIT_SPEED
-from kinfmu.solver.python.span import PLACES
+from kinfmu.solver.python.span import PLACES, weights
 from tests.fmu.test_parameters import geared, linkage
 from tests.gallery_members import every_member, mostly_long
 from tests.mechanisms import (
@@ -46,7 +43,6 @@ from tests.solver.change_points import fourbar as change_point_fourbar
 from tests.solver.change_points import two_loops
 from tests.stress.trial import trial
 
-HEADERS = ("internal.h", "solver.h")
 QUICK = (*STRICT, "-O0")  # to compile
 Samples = Sequence[tuple[float, ...]]
 
@@ -94,29 +90,6 @@ def assert_same(plan: SolvePlan, samples: Samples, flags: Sequence[str] = QUICK)
         good = pose
         c.commit()
     return statuses
-
-
-MODULES = (
-    "advance", "bridge", "build", "continuation", "estimate", "limit",
-    "singularity_map", "solver", "span", "trusted_step",
-)  # fmt: skip
-
-
-@pytest.mark.parametrize("module", MODULES)
-def test_constants_are_the_same_in_both(module: str) -> None:
-    in_headers = {name.removeprefix("KF_"): number for name, number in defined(HEADERS).items()}
-    c = in_headers | {"NEAR_SINGULAR": in_headers["NEAR"]} | defined((f"{module}.c",))
-    python = import_module(f"kinfmu.solver.python.{module}")
-    own = re.findall(r"^_?([A-Z_]+) = [0-9]", Path(str(python.__file__)).read_text("utf-8"), re.M)
-    assert own
-    for name in own:
-        assert c[name] == getattr(python, name, None) or c[name] == getattr(python, f"_{name}"), name
-
-
-def defined(files: Sequence[str]) -> dict[str, float]:
-    """Numbers that C files of the run time define, by name."""
-    text = "\n".join(compiler.sources([file for file in files if (compiler.RUNTIME / file).exists()]).values())
-    return {name: float(number) for name, number in re.findall(r"^#define (\w+) ([0-9][0-9.e+-]*)", text, re.M)}
 
 
 @every_member
@@ -299,6 +272,21 @@ def test_trials_leave_no_trace_and_a_copy_of_the_bytes_behaves_the_same(name: st
         else:
             assert [pose.status for pose in answer] == [answer[0].status] * 3
             assert one.message == other.message == again.message
+
+
+def test_an_anchor_that_does_not_close_is_not_converged(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = compile_plan(kinfmu.load("triple_rocker"))
+    model = load_model(plan)
+    beyond = 1.6  # the limit is 1.494
+    model.ANCHOR = (beyond,), model.ANCHOR[1]
+    moved = rf"kf_anchor_u[1] = {{{beyond}}}"
+    files = {name: re.sub(r"kf_anchor_u\[1\] = \{.*?\}", moved, text) for name, text in emit(plan).items()}
+    monkeypatch.setattr("tests.solver.c.native.emit", lambda _: files)
+    python, c = Solver(model), Native(plan, QUICK)
+    pose = python.solve(python.anchor, (beyond,))
+    assert c.solve((beyond,)).status == pose.status == Status.NOT_CONVERGED
+    assert c.message == pose.message == "left = 1.6 rad (91.6732 deg): the rows do not close: residual 2.3 of the size"
+    assert c.solve((1.2,)).status == python.solve(python.anchor, (1.2,)).status == Status.OUTSIDE
 
 
 def test_only_requested_tables_are_written_with_the_same_numbers() -> None:

@@ -1,4 +1,5 @@
-/* Breaks of laws over a quantity of the pose, such as a cam's dwell, within a step. See kinfmu/solver/python/law_breaks.py.
+/* Breaks of laws over a quantity of the pose, such as a cam's dwell, within a step.
+ * See kinfmu/solver/python/torque/law_breaks.py.
  *
  * A step across a break of the law, which moves by g(q), has the order of neither side. So it ends shortly before the break,
  * and a short Taylor step leads just past it:

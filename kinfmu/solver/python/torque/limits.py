@@ -11,9 +11,9 @@ from collections.abc import Callable
 from math import inf, sqrt
 from typing import NamedTuple
 
-from ..hermite import Hermite
 from ..pose import Pose, Vector
 from ..solver import Solver
+from ..span import Hermite
 from .equation_of_motion import StepEnd
 
 NEAR = 0.5  # determinant below which steps of several drivers are searched

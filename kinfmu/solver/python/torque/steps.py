@@ -9,11 +9,10 @@ from collections.abc import Callable, Sequence
 from math import floor, inf
 from typing import NamedTuple, Protocol
 
-from ..hermite import Hermite
-from ..law_breaks import CUTS, first_crossing, hop, landing, moved_by
-from ..pose import Pose, Vector
-from ..status import Status
+from ..pose import Pose, Status, Vector
+from ..span import Hermite
 from .equation_of_motion import Course, StepEnd
+from .law_breaks import CUTS, first_crossing, hop, landing, moved_by
 from .limits import Ended, is_arrived, limit_past, suspicion, time_to_rest
 
 DETERMINED = 1e-12  # of a span between jumps: laws are read on that side of a jump

@@ -12,9 +12,6 @@ from collections.abc import Callable, Sequence
 from math import ceil, floor, inf
 from typing import NamedTuple
 
-STEP_TOLERANCE = 1e-9  # error of a step of the integrators in rad, sizes, for fast speeds relative, if none is given
-LEAST_TOLERANCE = 1e-13  # smaller ones are rounding
-MOST_TOLERANCE = 1e-4  # larger ones do not tell a limit from a turn before it
 WINDOW = 1e-6  # [rad, sizes] before a break, from which the short step starts
 PAST = 1e-12  # [rad, sizes] beyond it, where that step ends
 ROUNDED = 1e-15  # of g: it is known so well

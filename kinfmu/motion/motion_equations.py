@@ -1,9 +1,8 @@
-"""JetEquations: the constraint equations along motions, solved for one derivative of the coordinates at a time."""
+"""MotionEquations: the constraint equations along motions, solved for one derivative of the coordinates at a time."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,14 +10,14 @@ import numpy as np
 from kinfmu.arrays import FloatArray
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.joints.joint import Joint
-from kinfmu.plan.equations.jets import Jet
 from kinfmu.plan.equations.system import System, placement
+from kinfmu.plan.equations.taylor import Taylor
 
 LEAST_MARGIN = 1e-6  # 1 / condition of the scaled Jacobian; below it a third derivative has no digits
 
 
-class JetEquations:
-    """The constraint equations of a mechanism at n poses, in jets.
+class MotionEquations:
+    """The constraint equations of a mechanism at n poses, in Taylor numbers.
 
         Phi_q q^(k) = -Phi^(k) along q + qd t + ... without q^(k), u(t)
 
@@ -35,7 +34,7 @@ class JetEquations:
         self.count = count
         self.system = System(mechanism)
 
-    def solved(self, q: Sequence[Jet], targets: Sequence[Jet], order: int) -> tuple[FloatArray, FloatArray]:
+    def solved(self, q: Sequence[Taylor], targets: Sequence[Taylor], order: int) -> tuple[FloatArray, FloatArray]:
         """Return what a derivative of the coordinates lacks to satisfy the equations.
 
         Args:
@@ -55,20 +54,20 @@ class JetEquations:
             margin = sizes[:, -1] / sizes[:, 0]
         return missing, margin
 
-    def slopes(self, q: Sequence[Jet], targets: Sequence[Jet]) -> FloatArray:
+    def slopes(self, q: Sequence[Taylor], targets: Sequence[Taylor]) -> FloatArray:
         """Return the rates of the coordinates (n, coordinates) that follow from those of the drivers."""
-        return self.solved([Jet.of(one.c[0]) for one in q], targets, 1)[0]
+        return self.solved([Taylor.of(3, one.c[0]) for one in q], targets, 1)[0]
 
-    def _decomposed(self, q: Sequence[Jet], targets: Sequence[Jet]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _decomposed(self, q: Sequence[Taylor], targets: Sequence[Taylor]) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the singular values and vectors of the scaled Jacobian."""
-        at_rest = [Jet.of(target.c[0]) for target in targets]
-        units = ([Jet.of(one.c[0], 1.0 if j == k else 0.0) for j, one in enumerate(q)] for k in range(len(q)))
+        at_rest = [Taylor((target.c[0], 0.0)) for target in targets]
+        units = ([Taylor((one.c[0], float(j == k))) for j, one in enumerate(q)] for k in range(len(q)))
         jacobian = np.stack([self._columns(self._evaluate(unit, at_rest), 1) for unit in units], -1)
         scaled = jacobian / self.system.scales[:, None] * self.system.column_scales / self.system.size
         u, sizes, v = np.linalg.svd(np.nan_to_num(scaled), full_matrices=False)
         return u, sizes, v
 
-    def _evaluate(self, q: Sequence[Jet], targets: Sequence[Jet]) -> list[Any]:
+    def _evaluate(self, q: Sequence[Taylor], targets: Sequence[Taylor]) -> list[Any]:
         at = placement(self.mechanism, q)
         phi = [value for joint in self.joints for value in joint.residual(at)]
         return phi + [one.residual(at, u) for one, u in zip(self.mechanism.drivers, targets, strict=True)]
@@ -78,12 +77,12 @@ class JetEquations:
 
 
 def derivative(value: Any, order: int, count: int) -> FloatArray:
-    """Return a derivative of a jet or a number at all of `count` poses."""
-    found = value.derivative(order) if isinstance(value, Jet) else (0.0 if order else value)
+    """Return a derivative of a Taylor number or a float at all of `count` poses."""
+    found = value.derivative(order) if isinstance(value, Taylor) else (0.0 if order else value)
     return np.broadcast_to(np.asarray(found, dtype=float), (count,)).copy()
 
 
-def with_derivative(jet: Jet, order: int, value: FloatArray) -> Jet:
-    """Return a jet with a number added to a derivative."""
-    added = Jet.of(*(value if k == order else 0.0 for k in range(order + 1)))
-    return replace(jet, c=(jet + added).c)
+def with_derivative(number: Taylor, order: int, value: FloatArray) -> Taylor:
+    """Return a number with a value added to a derivative."""
+    added = Taylor.of(3, *(value if k == order else 0.0 for k in range(order + 1)))
+    return Taylor((number + added).c, number.side)
