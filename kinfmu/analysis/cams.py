@@ -41,6 +41,7 @@ from kinfmu.run.driving import numbers_of
 SLIDING_LIMIT, SWINGING_LIMIT = math.radians(30.0), math.radians(45.0)  # [rad], usual for pressure angles
 _ANGLES = 361  # of a table by default, one a degree
 _ROUNDING = 1e-9  # of a lift; lifts to both sides that differ less are equal
+_WIDE = 1e6  # of the distance from the axle; a larger radius of curvature is that of a straight line
 
 
 @dataclass(frozen=True)
@@ -322,9 +323,6 @@ def _poses(plan: SolvePlan) -> dict[str, tuple[float, float, float]]:
     rows = in_world(plan.origin, plan.anchor.q).reshape(-1, 3).tolist()
     bodies = [body.name for body in plan.mechanism.moving_bodies]
     return {GROUND_NAME: (0.0, 0.0, 0.0), **{body: (x, y, phi) for body, (x, y, phi) in zip(bodies, rows, strict=True)}}
-
-
-_WIDE = 1e6  # of the distance from the axle; a larger radius of curvature is that of a straight line
 
 
 def cam_lines(cam: CamFindings) -> list[str]:

@@ -24,70 +24,6 @@ from kinfmu.solver.python.advance import advance
 from kinfmu.solver.python.bridge import Bridge
 from kinfmu.solver.python.limit import NO_BLOCK, Limit
 
-
-@dataclass(frozen=True)
-class HeldDriver(Held):
-    """The quantity of a driver, held at a value.
-
-        Phi = quantity - value, or the row that the quantity defines in its place        (1 row)
-
-    Only `check` uses it: the range of one driver is found with the others at their start values.
-    """
-
-    type: ClassVar[str] = "held_driver"
-    labels: ClassVar[tuple[str, ...]] = ("value",)
-
-    name: str
-    driver: Driver = field(metadata={"internal": True})
-    value: float = field(metadata={"internal": True})
-
-    def moved(self, dx: float, dy: float) -> HeldDriver:
-        quantity = self.driver.measured()
-        if not isinstance(quantity, CoordinateOf):
-            return self
-        return replace(self, value=decimal_sum(self.value, dx if quantity.axis == "x" else dy))
-
-    def measured(self) -> tuple[PoseQuantity, float]:
-        return self.driver.measured(), self.value
-
-
-def alone(plan: SolvePlan, number: int) -> SolvePlan:
-    """Return the plan of one driver alone, by its number, with all coordinates as outputs.
-
-    The other drivers keep their values in the plan's anchor, and it starts from the anchor's pose. Returns the plan
-    itself if there is nothing to hold.
-    """
-    mechanism = plan.mechanism
-    if len(mechanism.drivers) == 1 and isinstance(mechanism.coordinates, str):
-        return plan
-    taken = {joint.name for joint in mechanism.joints}
-    held = []
-    for k, driver in enumerate(mechanism.drivers):
-        if k != number:
-            name = driver.name
-            while name in taken:
-                name += "_held"
-            taken.add(name)
-            held.append(HeldDriver(name, driver, float(plan.anchor.u[k])))
-    return compile_plan(
-        replace(
-            started(mechanism, in_world(plan.origin, plan.anchor.q)),
-            joints=(*mechanism.joints, *held),
-            drivers=(mechanism.drivers[number],),
-            coordinates="all",
-            points={},
-            measures=(),  # they may read forces of the other drivers
-        )
-    )
-
-
-def started(mechanism: Mechanism, pose: FloatArray) -> Mechanism:
-    """Return the mechanism with this pose of all coordinates, in the world, as its start."""
-    poses = iter(pose.reshape(-1, 3).tolist())
-    bodies = [body if body.is_ground else replace(body, start=Start(*next(poses))) for body in mechanism.bodies]
-    return replace(mechanism, bodies=tuple(bodies))
-
-
 STEP = 0.1  # [rad, sizes] between evaluations of the determinants
 MOST_TURNS = 12  # most turns after which a mechanism may repeat: gears with odd ratios
 SIZES = 3.0  # reach of a driver of a length, in both directions
@@ -326,3 +262,66 @@ def _leg(solver: Solver, start: Pose, distance: float, unit: float) -> _Leg:
             if bridge.centre not in known
         ]
     return _Leg(poses, bridges)
+
+
+def alone(plan: SolvePlan, number: int) -> SolvePlan:
+    """Return the plan of one driver alone, by its number, with all coordinates as outputs.
+
+    The other drivers keep their values in the plan's anchor, and it starts from the anchor's pose. Returns the plan
+    itself if there is nothing to hold.
+    """
+    mechanism = plan.mechanism
+    if len(mechanism.drivers) == 1 and isinstance(mechanism.coordinates, str):
+        return plan
+    taken = {joint.name for joint in mechanism.joints}
+    held = []
+    for k, driver in enumerate(mechanism.drivers):
+        if k != number:
+            name = driver.name
+            while name in taken:
+                name += "_held"
+            taken.add(name)
+            held.append(HeldDriver(name, driver, float(plan.anchor.u[k])))
+    return compile_plan(
+        replace(
+            started(mechanism, in_world(plan.origin, plan.anchor.q)),
+            joints=(*mechanism.joints, *held),
+            drivers=(mechanism.drivers[number],),
+            coordinates="all",
+            points={},
+            measures=(),  # they may read forces of the other drivers
+        )
+    )
+
+
+def started(mechanism: Mechanism, pose: FloatArray) -> Mechanism:
+    """Return the mechanism with this pose of all coordinates, in the world, as its start."""
+    poses = iter(pose.reshape(-1, 3).tolist())
+    bodies = [body if body.is_ground else replace(body, start=Start(*next(poses))) for body in mechanism.bodies]
+    return replace(mechanism, bodies=tuple(bodies))
+
+
+@dataclass(frozen=True)
+class HeldDriver(Held):
+    """The quantity of a driver, held at a value.
+
+        Phi = quantity - value, or the row that the quantity defines in its place        (1 row)
+
+    Only `check` uses it: the range of one driver is found with the others at their start values.
+    """
+
+    type: ClassVar[str] = "held_driver"
+    labels: ClassVar[tuple[str, ...]] = ("value",)
+
+    name: str
+    driver: Driver = field(metadata={"internal": True})
+    value: float = field(metadata={"internal": True})
+
+    def moved(self, dx: float, dy: float) -> HeldDriver:
+        quantity = self.driver.measured()
+        if not isinstance(quantity, CoordinateOf):
+            return self
+        return replace(self, value=decimal_sum(self.value, dx if quantity.axis == "x" else dy))
+
+    def measured(self) -> tuple[PoseQuantity, float]:
+        return self.driver.measured(), self.value

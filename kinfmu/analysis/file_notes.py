@@ -29,6 +29,20 @@ from kinfmu.run.solve import solve
 from kinfmu.units import METRES, PLAUSIBLE_TURN, Quantity, looks_like_degrees, unit_of
 
 _TABLES = (Spline, MotionSequence)  # laws that keep their last value beyond their end
+_FAR = 0.5  # [rad]; start angles read off a sketch are nearer to those of a cam
+_LARGE = 600  # coordinates; a larger mechanism is not evaluated for a note on its run
+_USUAL = {  # a bare number is in N/m or N s/m
+    ("stiffness", "mm"): "N/mm",
+    ("stiffness", "cm"): "N/cm",
+    ("stiffness", "in"): "lbf/in",
+    ("damping", "mm"): "N s/mm",
+}
+_EARTH = (9.7, 10.1)  # [m/s2]; what is written for the gravity of the earth
+_SLIP = 1000.0  # between m and mm
+_APART = 100.0  # a length that is farther from all others is probably one in another unit
+_FREE_APART = 20.0  # the same for free lengths, which are like the distances that springs span
+_NEAR = 2.0  # of the others' range, in which the length is then
+_FEWEST = 3  # other lengths that tell
 
 
 def file_notes(mechanism: Mechanism, written: Mechanism | None = None) -> Iterator[str]:
@@ -152,10 +166,6 @@ def _loads(mechanism: Mechanism) -> Iterator[str]:
             )
 
 
-_FAR = 0.5  # [rad]; start angles read off a sketch are nearer to those of a cam
-_LARGE = 600  # coordinates; a larger mechanism is not evaluated for a note on its run
-
-
 def run_notes(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Iterator[str]:
     """Yield a line if the run exceeds the range of its driver, or if several drivers leave the reachable poses."""
     mechanism = plan.mechanism
@@ -225,20 +235,6 @@ def _turned_followers(system: System) -> Iterator[str]:
                     f"[joints.{joint.name}] turns {joint.between[1]} by {degrees(-off)} from its start pose: check "
                     f"offset = {degrees(joint.offset)} and the law"
                 )
-
-
-_USUAL = {  # a bare number is in N/m or N s/m
-    ("stiffness", "mm"): "N/mm",
-    ("stiffness", "cm"): "N/cm",
-    ("stiffness", "in"): "lbf/in",
-    ("damping", "mm"): "N s/mm",
-}
-_EARTH = (9.7, 10.1)  # [m/s2]; what is written for the gravity of the earth
-_SLIP = 1000.0  # between m and mm
-_APART = 100.0  # a length that is farther from all others is probably one in another unit
-_FREE_APART = 20.0  # the same for free lengths, which are like the distances that springs span
-_NEAR = 2.0  # of the others' range, in which the length is then
-_FEWEST = 3  # other lengths that tell
 
 
 def unit_notes(mechanism: Mechanism) -> Iterator[str]:

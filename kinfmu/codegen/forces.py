@@ -27,6 +27,11 @@ from kinfmu.solver.python.curve import CurveData
 
 STAGES = ("forces", "reactions", "shaking")  # each is a part of the FMU's variables and a function of its own
 ARGUMENTS = ("time", "u", "ud", "udd", "z", "zd", "zdd", "slopes", "efforts", "parameters")
+SIGNATURE = (
+    "void kf_{stage}(double time, const double *u, const double *ud, const double *udd, const double *z,\n"
+    "         const double *zd, const double *zdd, const double *slopes, const double *efforts,\n"
+    "         const double *parameters, double *forces)"
+)
 
 
 def load_inputs(plan: SolvePlan) -> tuple[str, ...]:
@@ -139,13 +144,6 @@ def emit_jumps(plan: SolvePlan) -> str:
             "",
         ]
     )
-
-
-SIGNATURE = (
-    "void kf_{stage}(double time, const double *u, const double *ud, const double *udd, const double *z,\n"
-    "         const double *zd, const double *zdd, const double *slopes, const double *efforts,\n"
-    "         const double *parameters, double *forces)"
-)
 
 
 def emit_c_forces(plan: SolvePlan, steps: ForceSteps, stage: str = "forces", *, are_loads_open: bool = True) -> str:

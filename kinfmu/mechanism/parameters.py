@@ -24,6 +24,7 @@ from kinfmu.units import KINDS, METRES, Quantity, every_unit, length_power
 
 NUMBER = Quantity("number")
 _MOST_LISTED = 8  # names of a circle in a message
+MOST_PARAMETERS = 10_000
 
 
 @dataclass(frozen=True)
@@ -260,9 +261,6 @@ def _has_a_unit(expression: Expression, dimensions: Mapping[str, Dimension]) -> 
     known = [step.dimension for step in expression.steps if step.operation == "number"]
     known += [dimensions[name] for name in expression.names]
     return any(one.is_known and not one.is_open for one in known)
-
-
-MOST_PARAMETERS = 10_000
 
 
 class Resolved(NamedTuple):

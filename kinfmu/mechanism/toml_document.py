@@ -31,6 +31,23 @@ _TOKEN = re.compile(
     r"""|[^\w"'#-]++""",
     re.DOTALL,
 )
+_OWN_KEYS = {  # keys by which files that name a mechanism differ
+    "fit": {"over", "unknowns", "targets", "constraints"},
+    "study": {"sampling", "designs", "seed", "report", "parameters", "measures", "run"},
+}
+_PLACE = re.compile(r"^(?P<what>.*?) ?\(at line (?P<line>\d+), column (?P<column>\d+)\)$", re.DOTALL)
+_KEY = r"""(?P<key>[A-Za-z0-9_."'-]+) *="""
+_TEXT = r"""(?P<value>(?:[+-]?[\d.]+ *(?:[*/+-] *)?)?[^\W\d][^,}\]#"'=]*)"""
+_HINTS = (  # what is found in the wrong line, and what to say; the first that is found counts
+    (rf"{_KEY} *(?P<value>[+-]?[0-9]+,[0-9]+)(?![\w.]|,\d)", "a decimal has a point, not a comma", "{key} = {point}"),
+    (rf"{_KEY} *\((?P<value>[^()]*)\)", "a list has brackets, not parentheses", "{key} = [{value}]"),
+    (rf"{_KEY} *(?P<value>True|TRUE|False|FALSE)\b", "written in small letters", "{key} = {small}"),
+    (rf"{_KEY} *{_TEXT}", "text, also a number with a unit, needs quotes", '{key} = "{value}"'),
+)
+_TWICE = re.compile(r"^Cannot (?:overwrite a value|declare .* twice|mutate immutable namespace)")
+_HEADER = re.compile(r"^ *\[+ *(?P<name>[^\[\]#]+?) *\]")
+_LONGEST = 80  # characters of a line in a message
+_DECIMAL = re.compile(r"\s*+[+-]?+(?:(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?+[0-9]++)?+|nan|inf)\s*+")
 
 
 def text_in(path: Path, what: str, where: str = "") -> str:
@@ -77,12 +94,6 @@ def _deep_key(text: str) -> int | None:
     if not _MANY_DOTS.search(text):
         return None
     return next((token.start() for token in _TOKEN.finditer(text) if token.lastgroup), None)
-
-
-_OWN_KEYS = {  # keys by which files that name a mechanism differ
-    "fit": {"over", "unknowns", "targets", "constraints"},
-    "study": {"sampling", "designs", "seed", "report", "parameters", "measures", "run"},
-}
 
 
 def table_keys(cls: type) -> list[str]:
@@ -164,20 +175,6 @@ def text_of(where: str, value: object, valid: str = "text") -> str:
     if not isinstance(value, str):
         raise MechanismError(f"{where} = {quoted(value)} must be {valid}")
     return value
-
-
-_PLACE = re.compile(r"^(?P<what>.*?) ?\(at line (?P<line>\d+), column (?P<column>\d+)\)$", re.DOTALL)
-_KEY = r"""(?P<key>[A-Za-z0-9_."'-]+) *="""
-_TEXT = r"""(?P<value>(?:[+-]?[\d.]+ *(?:[*/+-] *)?)?[^\W\d][^,}\]#"'=]*)"""
-_HINTS = (  # what is found in the wrong line, and what to say; the first that is found counts
-    (rf"{_KEY} *(?P<value>[+-]?[0-9]+,[0-9]+)(?![\w.]|,\d)", "a decimal has a point, not a comma", "{key} = {point}"),
-    (rf"{_KEY} *\((?P<value>[^()]*)\)", "a list has brackets, not parentheses", "{key} = [{value}]"),
-    (rf"{_KEY} *(?P<value>True|TRUE|False|FALSE)\b", "written in small letters", "{key} = {small}"),
-    (rf"{_KEY} *{_TEXT}", "text, also a number with a unit, needs quotes", '{key} = "{value}"'),
-)
-_TWICE = re.compile(r"^Cannot (?:overwrite a value|declare .* twice|mutate immutable namespace)")
-_HEADER = re.compile(r"^ *\[+ *(?P<name>[^\[\]#]+?) *\]")
-_LONGEST = 80  # characters of a line in a message
 
 
 def explained(text: str, error: ValueError) -> str:
@@ -316,9 +313,6 @@ def _number(where: str, line: int, cell: str, unit: str) -> float | str:
     if not math.isfinite(number):
         raise MechanismError(f"{where}, line {line}: {cell} must be a finite number")
     return f"{number!r} {unit}" if unit else number
-
-
-_DECIMAL = re.compile(r"\s*+[+-]?+(?:(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?+[0-9]++)?+|nan|inf)\s*+")
 
 
 def read_decimal(text: str) -> float:

@@ -24,6 +24,8 @@ from kinfmu.run.model import Model
 from kinfmu.units import CoordinateName, ForceName
 
 QuantityRead = CoordinateName | PoseQuantity  # a column of a run, or made of the coordinates of bodies
+_MOST_KEPT = 8  # of each model
+_kept: WeakKeyDictionary[Model, dict[tuple[QuantityRead, ...], Model]] = WeakKeyDictionary()
 
 
 class QuantityNames:
@@ -70,10 +72,6 @@ def coordinates_behind(quantities: Iterable[QuantityRead]) -> tuple[CoordinateNa
         moving = [body for body in one.bodies() if body != GROUND_NAME]
         found |= dict.fromkeys(CoordinateName(body, axis) for body in moving for axis in COORDINATES)
     return tuple(found)
-
-
-_MOST_KEPT = 8  # of each model
-_kept: WeakKeyDictionary[Model, dict[tuple[QuantityRead, ...], Model]] = WeakKeyDictionary()
 
 
 def quantity_model(model: Model, quantities: Sequence[QuantityRead]) -> Model:

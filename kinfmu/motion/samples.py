@@ -17,6 +17,18 @@ from kinfmu.motion.history import History
 from kinfmu.motion.quintic import ranges
 from kinfmu.run.axis import TIME, HasAxis, axis_of, rates_per
 
+_SAME = 1e-9  # of the travel of the driver; values closer than this are equal
+_CLOSE = 0.1  # of the mean distance of samples
+_EQUAL = 0.03  # of the largest acceleration; samples that differ by more follow a steep change and are all kept
+_ROUNDING = 1e-9  # of the largest rate over the mean distance; the same for accelerations that are 0 but for rounding
+_SAME_POSE = 1e-9  # [rad, sizes]; a motion whose first and last pose differ by less goes round
+_SAME_RATE = 1e-6  # of the largest; the same for rates and accelerations
+_FEW = 5  # samples that show the least range of all
+_WIDE, _NARROW = 7, 5  # samples of a polynomial: of degree 6, and of degree 4 to judge it
+_ROUGH = 1e-3  # of the range of 7 samples; where the rates of both polynomials differ by more in a step, it has a kink
+_PERIODIC = 1e-6  # of the range; a quantity whose first and last sample differ by less goes round
+Ranges = Callable[[FloatArray], tuple[FloatArray, FloatArray]]  # smallest and largest number of each row (..., n)
+
 
 class DrivenSamples(NamedTuple):
     """The samples of a motion in order.
@@ -76,9 +88,6 @@ def _argument_of(run: HasAxis) -> tuple[FloatArray, str]:
     return (run.inputs[:, column], per) if per != "time" else (run.inputs[:, column] / speed[0], per)
 
 
-_SAME = 1e-9  # of the travel of the driver; values closer than this are equal
-
-
 def driven_at(drive: History, x: FloatArray) -> FloatArray:
     """Return values of the driver at arguments (...), which may be in the period before or after the motion."""
     if drive.is_linear:
@@ -133,11 +142,6 @@ def _argument_at(drive: History, value: float) -> float:
     return float(drive.crossings(np.asarray(value))[1][0])
 
 
-_CLOSE = 0.1  # of the mean distance of samples
-_EQUAL = 0.03  # of the largest acceleration; samples that differ by more follow a steep change and are all kept
-_ROUNDING = 1e-9  # of the largest rate over the mean distance; the same for accelerations that are 0 but for rounding
-
-
 def is_crowded(x: FloatArray) -> bool:
     """Return whether some of the ascending arguments (n,) are much closer than the others; equal ones are breaks."""
     steps = np.diff(x)
@@ -178,14 +182,6 @@ def spread(x: FloatArray, rates: FloatArray, accelerations: FloatArray) -> IntAr
 
 def _mean(x: FloatArray) -> float:
     return float(x[-1] - x[0]) / (len(x) - 1)
-
-
-_SAME_POSE = 1e-9  # [rad, sizes]; a motion whose first and last pose differ by less goes round
-_SAME_RATE = 1e-6  # of the largest; the same for rates and accelerations
-_FEW = 5  # samples
-
-
-Ranges = Callable[[FloatArray], tuple[FloatArray, FloatArray]]  # smallest and largest number of each row (..., n)
 
 
 def goes_round(
@@ -238,11 +234,6 @@ def _ranges_of_few(table: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return smallest and largest numbers of a few samples: the range of all is at least as large."""
     some = np.moveaxis(table, -1, 0)[:: -(-table.shape[-1] // _FEW)].copy()
     return some.min(axis=0), some.max(axis=0)
-
-
-_WIDE, _NARROW = 7, 5  # samples of a polynomial: of degree 6, and of degree 4 to judge it
-_ROUGH = 1e-3  # of the range of 7 samples; where the rates of both polynomials differ by more in a step, it has a kink
-_PERIODIC = 1e-6  # of the range; a quantity whose first and last sample differ by less goes round
 
 
 def sampled_history(x: FloatArray, value: FloatArray, *, is_closed: bool, is_seamed: bool = False) -> History:

@@ -20,6 +20,9 @@ from kinfmu.mechanism.measures import counted_from
 from kinfmu.mechanism.number import DisplayUnit, display_unit, written_unit
 from kinfmu.units import Quantity, quantity_in, unit_of
 
+_LENGTH, _ANGLE = Quantity("length"), Quantity("angle")
+HOLDS = 1e-6  # violation relative to the limit, or to 1, up to which a constraint holds
+
 
 @dataclass(frozen=True)
 class Optimum:
@@ -136,9 +139,6 @@ class FitOutcome:
         return all(one.holds for one in self.constraints)
 
 
-_LENGTH, _ANGLE = Quantity("length"), Quantity("angle")
-
-
 def unit_of_unknown(problem: FitProblem, name: str) -> DisplayUnit:
     """Return the unit of an unknown: of its bounds, else of the mechanism file."""
     if name in problem.unknowns:
@@ -177,9 +177,6 @@ def unit_of_measure(problem: FitProblem, name: str, unit: str) -> DisplayUnit:
 def argument_unit(problem: FitProblem) -> str:
     """Return the unit of the argument of the motion."""
     return unit_of(problem.argument.quantity, problem.mechanism.length_unit)
-
-
-HOLDS = 1e-6  # violation relative to the limit, or to 1, up to which a constraint holds
 
 
 def constraint_results(problem: FitProblem, found: Evaluation) -> list[ConstraintResult]:

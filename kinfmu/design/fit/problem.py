@@ -49,6 +49,8 @@ from kinfmu.mechanism.valid import check_name, quoted
 from kinfmu.units import CoordinateName, Quantity
 
 ANGLE = Quantity("angle")
+KEYS = ("mechanism", "over", "unknowns", "targets", "constraints")
+_WITH_FILE = (PathTarget, FunctionTarget)  # their points can be in a CSV file
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,10 +239,6 @@ def _from_text(text: str, *rest: Any) -> FitProblem:
     from kinfmu.mechanism import toml_file
 
     return FitProblem(toml_file.parse(text, "the mechanism of the fit"), *rest)
-
-
-KEYS = ("mechanism", "over", "unknowns", "targets", "constraints")
-_WITH_FILE = (PathTarget, FunctionTarget)  # their points can be in a CSV file
 
 
 def read_problem(path: str | Path) -> FitProblem:
