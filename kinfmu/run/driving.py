@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -56,6 +56,17 @@ def run_times(run: RunSettings) -> FloatArray:
         )
     count = int((run.stop - run.start) / run.step + 1e-6)
     return run.start + run.step * np.arange(count + 1, dtype=np.float64)
+
+
+def times_of(run: RunSettings, t: ArrayLike | None) -> FloatArray:
+    """Return the times (n,) [s] of a call: those of the file's run if `t` is None."""
+    return column_of("t", run_times(run) if t is None else t)
+
+
+def refuse_both(t: ArrayLike | None, inputs: Collection[str]) -> None:
+    """Raise a RequestError if times and inputs are given."""
+    if inputs and t is not None:
+        raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
 
 
 def driven_by_inputs(
