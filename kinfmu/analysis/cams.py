@@ -1,4 +1,4 @@
-"""Cams of a mechanism: their profiles, and what a check says about them, with the driver's angle."""
+"""Cams of a mechanism: their profiles, the findings of a check at values of the driver, and the lines of its report."""
 
 from __future__ import annotations
 
@@ -190,7 +190,7 @@ class CamFindings:
         """Return the findings as plain data."""
         found = self.critical
 
-        def one(extreme: CamExtreme | None) -> dict[str, float] | None:
+        def entry(extreme: CamExtreme | None) -> dict[str, float] | None:
             return None if extreme is None else {"value": extreme.value, "at": self.at(extreme.at)}
 
         values: dict[str, Any] = {"reason": self.reason or None}
@@ -202,14 +202,14 @@ class CamFindings:
                 "follower": self.cam.follower,
                 "swings": self.cam.pivot is not None,
                 "roller_radius": self.cam.radius,
-                "smallest_pressure_angle": one(found.pressure[0]),
-                "largest_pressure_angle": one(found.pressure[1]),
-                "smallest_convex_radius": one(found.convex) if self.cam.is_known else None,
-                "smallest_concave_radius": one(found.concave) if self.cam.is_known else None,
-                "smallest_pitch_radius": one(found.pitch),
+                "smallest_pressure_angle": entry(found.pressure[0]),
+                "largest_pressure_angle": entry(found.pressure[1]),
+                "smallest_convex_radius": entry(found.convex) if self.cam.is_known else None,
+                "smallest_concave_radius": entry(found.concave) if self.cam.is_known else None,
+                "smallest_pitch_radius": entry(found.pitch),
                 "undercut": [{"begin": begin, "end": end} for begin, end in self.undercut],
-                "gouge": one(found.gouge),
-                "face": None if found.width is None else {"low": one(found.width[0]), "high": one(found.width[1])},
+                "gouge": entry(found.gouge),
+                "face": None if found.width is None else {"low": entry(found.width[0]), "high": entry(found.width[1])},
             }
         return {"joint": self.joint, "element": self.element, "driver": self.driver, **values}
 
@@ -269,9 +269,9 @@ def cam_profile(
 
     """
     require_mechanism(mechanism, "cam_profile")
-    found = _named(mechanism, joint)
+    cam = _named(mechanism, joint)
     plan = compile_plan(mechanism)
-    placed = placed_cam(mechanism, found, _poses(plan))
+    placed = placed_cam(mechanism, cam, _poses(plan))
     unit = mechanism.length_unit
     turned_by = cam_driver(plan, placed, None)
     profile_at(placed, np.zeros(1), unit)  # an unknown roller is reported before its consequences
@@ -292,7 +292,7 @@ def cam_profile(
 def cam_findings(plan: SolvePlan, paths: Sequence[DriverPath]) -> tuple[CamFindings, ...]:
     """Return what is found of each cam of a mechanism; paths: of its drivers."""
     mechanism, poses = plan.mechanism, None
-    found = []
+    findings = []
     for joint in mechanism.joints:
         if not isinstance(joint, CAM_JOINTS):
             continue
@@ -300,11 +300,11 @@ def cam_findings(plan: SolvePlan, paths: Sequence[DriverPath]) -> tuple[CamFindi
         try:
             placed = placed_cam(mechanism, joint, poses)
             turned_by = cam_driver(plan, placed, paths)
-            found.append(CamFindings(joint.name, placed, critical_values(placed), turned_by, mechanism.length_unit))
+            findings.append(CamFindings(joint.name, placed, critical_values(placed), turned_by, mechanism.length_unit))
         except KinfmuError as reason:
             text = str(reason).removeprefix(f"cam '{joint.name}': ").removeprefix(f"{NO_PROFILE}: ")
-            found.append(CamFindings(joint.name, None, None, None, mechanism.length_unit, text))
-    return tuple(found)
+            findings.append(CamFindings(joint.name, None, None, None, mechanism.length_unit, text))
+    return tuple(findings)
 
 
 def _named(mechanism: Mechanism, name: str) -> CamJoint:
@@ -356,9 +356,9 @@ def _element(cam: CamFindings, placed: PlacedCam) -> str:
 
 def _pressure(cam: CamFindings, found: Critical) -> str:
     low, high = found.pressure
-    if max(abs(low.value), abs(high.value)) < 1e-12:
-        return "pressure angle 0 everywhere"
     worst = max(abs(low.value), abs(high.value))
+    if worst < 1e-12:
+        return "pressure angle 0 everywhere"
     verdict = "within" if worst <= cam.limit + 1e-9 else "above"
     return f"pressure angle {_angle(cam, low)} to {_angle(cam, high)}: {verdict} {degrees(cam.limit)}"
 

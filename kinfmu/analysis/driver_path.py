@@ -86,13 +86,13 @@ class DriverPath:
     def fine_poses(self) -> tuple[Pose, ...]:
         """Poses close enough to find the extremes of a quantity between them, up to the limits, in the same order."""
         parts = math.ceil(_MANY / len(self.poses))
-        found = [self.poses[0]]
+        fine = [self.poses[0]]
         for before, after in pairwise(self.poses):
             a, b = before.u[0], after.u[0]
             between = (self.solver.solve(before, (a + (b - a) * k / parts,)) for k in range(1, parts))
-            found += [*(pose for pose in between if pose.good), after]
+            fine += [*(pose for pose in between if pose.good), after]
         low, high = (() if limit is None else self._before(limit) for limit in (self.low, self.high))
-        return (*low[::-1], *found, *high)
+        return (*low[::-1], *fine, *high)
 
     def _before(self, limit: Limit) -> tuple[Pose, ...]:
         """Return poses between the last one of the path and a limit, toward the limit."""
@@ -107,21 +107,21 @@ class DriverPath:
         """Return the pose between two where a value changes its sign; one where the path ends before it."""
         from scipy.optimize import brentq
 
-        found, ends = low, {low.u[0]: low, high.u[0]: high}
+        last, ends = low, {low.u[0]: low, high.u[0]: high}
 
         def at(u: float) -> float:
-            nonlocal found
+            nonlocal last
             pose = ends.get(u) or self.solver.solve(low, (u,))
             if not pose.good:
                 raise _PathEndsError
-            found = pose
+            last = pose
             return value(pose)
 
         with suppress(_PathEndsError):
             u = brentq(at, low.u[0], high.u[0], xtol=_SAME, rtol=_SAME)
-            if u != found.u[0]:
+            if u != last.u[0]:
                 at(u)
-        return found
+        return last
 
     def at_limit(self, limit: Limit) -> dict[str, float]:
         """Return all coordinates by name at one of the limits.
@@ -255,11 +255,11 @@ def _leg(solver: Solver, start: Pose, distance: float, unit: float) -> _Leg:
             return _Leg(poses, bridges, stopped=arrived.message)
         pose = arrived
         poses.append(pose)
-        known = {bridge.centre for bridge in bridges}
+        crossed = {bridge.centre for bridge in bridges}
         bridges += [
             bridge
             for bridge in (pose.singularities.bridges if pose.singularities else ())
-            if bridge.centre not in known
+            if bridge.centre not in crossed
         ]
     return _Leg(poses, bridges)
 

@@ -54,8 +54,8 @@ def file_notes(mechanism: Mechanism, written: Mechanism | None = None) -> Iterat
     """
     unused = mechanism.unused_parameters
     if unused:
-        one = "changes" if len(unused) == 1 else "change"
-        yield f"[parameters] {listed(unused)} {one} nothing: no number of the mechanism refers to it"
+        verb = "changes" if len(unused) == 1 else "change"
+        yield f"[parameters] {listed(unused)} {verb} nothing: no number of the mechanism refers to it"
     for driver in mechanism.drivers:
         first = float(driver.law.at(mechanism.run.start))
         if isinstance(driver, DistanceDriver) and first < 0.0:
@@ -208,10 +208,10 @@ def start_notes(system: System, values: StartValues) -> Iterator[str]:
     yield from _turned_followers(system)
     if not values.is_moved:
         return
-    given, unit = start_from_poses(system).u, system.mechanism.length_unit
+    starts, unit = start_from_poses(system).u, system.mechanism.length_unit
     changed = [
         (driver.name, value_text(there, unit, driver.quantity.kind), value_text(start, unit, driver.quantity.kind))
-        for driver, there, start in zip(system.mechanism.drivers, given.tolist(), values.u.tolist(), strict=True)
+        for driver, there, start in zip(system.mechanism.drivers, starts.tolist(), values.u.tolist(), strict=True)
         if there != start
     ]
     yield (
@@ -224,11 +224,11 @@ def start_notes(system: System, values: StartValues) -> Iterator[str]:
 def _turned_followers(system: System) -> Iterator[str]:
     """Yield a line for each oscillating follower that its cam holds far from its start angle."""
     bodies = system.mechanism.moving_bodies
-    given = {body.name for body in bodies if body.start.phi is not None}
+    with_angle = {body.name for body in bodies if body.start.phi is not None}
     residual = system.residual(start_from_poses(system).q, np.zeros(len(system.mechanism.drivers)))
     for member in system.members[: len(system.mechanism.joints)]:
         joint = member.owner
-        if isinstance(joint, CamOscillating) and given.issuperset(member.bodies):
+        if isinstance(joint, CamOscillating) and with_angle.issuperset(member.bodies):
             off = math.remainder(float(residual[member.rows[0]]), math.tau)
             if abs(off) > _FAR:
                 yield (

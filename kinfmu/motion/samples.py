@@ -1,4 +1,4 @@
-"""The samples of a motion: their order, those too close together, the driver's values, and what samples alone tell."""
+"""The samples of a motion: their order, the driver's values at them, crowded ones, closed motions, and derivatives."""
 
 from __future__ import annotations
 
@@ -94,8 +94,8 @@ def driven_at(drive: History, x: FloatArray) -> FloatArray:
         return np.asarray(drive.rate[0] * x + (drive.value[0] - drive.rate[0] * drive.x[0]))
     span, travel = drive.span, drive.value[-1] - drive.value[0]
     turns = np.floor((x - drive.x[0]) / span) if drive.is_closed else np.zeros_like(x)
-    found = drive.at((x - turns * span).reshape(-1))[0].reshape(np.shape(x))
-    return np.asarray(np.where(np.isnan(x), np.nan, found + turns * travel))
+    values = drive.at((x - turns * span).reshape(-1))[0].reshape(np.shape(x))
+    return np.asarray(np.where(np.isnan(x), np.nan, values + turns * travel))
 
 
 def within_period(drive: History, values: FloatArray) -> FloatArray:
@@ -115,22 +115,22 @@ def window(drive: History, begin: float | None, end: float | None) -> tuple[floa
     ends = sorted((float(drive.value[0]), float(drive.value[-1])))
     if not (np.all(drive.rate > 0.0) or np.all(drive.rate < 0.0)):
         raise RequestError("'begin' and 'end' need a driver that moves in one direction")
-    wanted = [ends[0] if begin is None else begin, ends[1] if end is None else end]
+    limits = [ends[0] if begin is None else begin, ends[1] if end is None else end]
     if drive.is_closed:
-        wanted[0] = ends[0] + (wanted[0] - ends[0]) % (ends[1] - ends[0])
-        wanted[1] = ends[1] - (ends[1] - wanted[1]) % (ends[1] - ends[0])
-    for value in wanted:
+        limits[0] = ends[0] + (limits[0] - ends[0]) % (ends[1] - ends[0])
+        limits[1] = ends[1] - (ends[1] - limits[1]) % (ends[1] - ends[0])
+    for value in limits:
         if not ends[0] <= value <= ends[1]:
             raise RequestError(
                 f"the driver does not reach {value:.9g}; the motion goes from {ends[0]:.9g} to {ends[1]:.9g}"
             )
-    start, stop = (_argument_at(drive, value) for value in wanted)
+    start, stop = (_argument_at(drive, value) for value in limits)
     if drive.rate[0] < 0.0:
         start, stop = stop, start
     if drive.is_closed and stop <= start:
         stop += drive.span
     if stop <= start:
-        raise RequestError(f"'begin' {wanted[0]:.9g} must be before 'end' {wanted[1]:.9g}")
+        raise RequestError(f"'begin' {limits[0]:.9g} must be before 'end' {limits[1]:.9g}")
     return start, stop
 
 
@@ -201,9 +201,9 @@ def goes_round(
 
     """
     if is_known is not None:
-        found = is_known & _ends_agree(histories, _ranges_of_few)
-        if (found == is_known).all():
-            return np.asarray(found)
+        is_closed = is_known & _ends_agree(histories, _ranges_of_few)
+        if (is_closed == is_known).all():
+            return np.asarray(is_closed)
     return _ends_agree(histories, ranges)
 
 
@@ -297,12 +297,12 @@ def _rates(x: FloatArray, value: FloatArray, count: int, *, wraps: bool) -> tupl
     distance = x[samples] + turn - x[:, None]
     scale = np.abs(distance).max(axis=1, keepdims=True)
     powers = (distance / scale)[:, None, :] ** np.arange(count)[None, :, None]
-    wanted = np.zeros((count, 2))
-    wanted[1, 0], wanted[2, 1] = 1.0, 2.0
-    weights = np.linalg.solve(powers, np.broadcast_to(wanted, (n, count, 2)))
+    orders = np.zeros((count, 2))
+    orders[1, 0], orders[2, 1] = 1.0, 2.0
+    weights = np.linalg.solve(powers, np.broadcast_to(orders, (n, count, 2)))
     near = value[samples]
-    found = np.einsum("nk,nkd->nd", near - value[:, None], weights)
-    return found[:, 0] / scale[:, 0], found[:, 1] / scale[:, 0] ** 2, np.ptp(near, axis=1)
+    derivatives = np.einsum("nk,nkd->nd", near - value[:, None], weights)
+    return derivatives[:, 0] / scale[:, 0], derivatives[:, 1] / scale[:, 0] ** 2, np.ptp(near, axis=1)
 
 
 def lowest(

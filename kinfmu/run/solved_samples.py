@@ -1,4 +1,4 @@
-"""SolvedSamples: what a run is made of when its samples are solved; the rest is computed when it is read."""
+"""SolvedSamples: a run of samples that are solved; forces, events and the like are computed when they are read."""
 
 from __future__ import annotations
 
