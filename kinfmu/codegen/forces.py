@@ -20,6 +20,7 @@ from kinfmu.codegen.python.block_code import indented, matrix, tupled
 from kinfmu.codegen.python.stage import OF_NUMBERS, given_symbols, has_roots, stage_curves, stage_lines
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.efforts import load_inputs
 from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.steps import LinearSolve, derivative_name, law_symbol
 from kinfmu.plan.trace import parameter_symbol
@@ -32,11 +33,6 @@ SIGNATURE = (
     "         const double *zd, const double *zdd, const double *slopes, const double *efforts,\n"
     "         const double *parameters, double *forces)"
 )
-
-
-def load_inputs(plan: SolvePlan) -> tuple[str, ...]:
-    """Return the names of the inputs that give efforts of external loads."""
-    return tuple(name for load in plan.mechanism.loads for name in load.inputs())
 
 
 def places_of_symbols(plan: SolvePlan, *, are_loads_open: bool = True) -> dict[str, str]:
@@ -58,11 +54,11 @@ def places_of_symbols(plan: SolvePlan, *, are_loads_open: bool = True) -> dict[s
             places[derivative_name(name, k)] = f"slopes[{k * count + place}]"
     for k, driver in enumerate(plan.drivers):
         places |= {name: f"{u}[{k}]" for name, u in zip(driver.inputs, ("u", "ud", "udd"), strict=True)}
-    places |= {name: f"efforts[{k}]" for k, name in enumerate(load_inputs(plan))}
-    first = len(load_inputs(plan))
+    external = load_inputs(plan)
+    places |= {name: f"efforts[{k}]" for k, name in enumerate(external)}
     places |= {
-        law_symbol(constant.name): f"efforts[{first + k}]" if are_loads_open else repr(constant.value)
-        for k, constant in enumerate(plan.load_constants)
+        law_symbol(constant.name): f"efforts[{k}]" if are_loads_open else repr(constant.value)
+        for k, constant in enumerate(plan.load_constants, start=len(external))
     }
     return places | {
         parameter_symbol(parameter.name): f"parameters[{k}]" for k, parameter in enumerate(plan.parameters)

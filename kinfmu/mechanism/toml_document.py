@@ -1,4 +1,4 @@
-"""Documents: TOML and tables of two columns as text, their keys and values.
+"""Reading of TOML documents and of CSV tables of two columns.
 
 Messages about invalid text, and unknown, missing or wrong values, state the place and what is valid.
 """
@@ -103,13 +103,13 @@ def table_keys(cls: type) -> list[str]:
 
 def class_of_type(where: str, table: Mapping[str, Any], key: str, classes: Iterable[Any]) -> Any:
     """Return the class whose `type` is the value of `key`."""
-    known = {cls.type: cls for cls in classes}
+    by_type = {cls.type: cls for cls in classes}
     if key not in table:
-        raise MechanismError(f"{where} needs the key '{key}', one of {listed(known)}")
-    word = text_of(f"{where} {key}", table[key], f"one of {listed(known)}")
-    if word not in known:
-        raise MechanismError(f"{where} {key} = {quoted(word)} is not known{valid_names(word, known)}")
-    return known[word]
+        raise MechanismError(f"{where} needs the key '{key}', one of {listed(by_type)}")
+    word = text_of(f"{where} {key}", table[key], f"one of {listed(by_type)}")
+    if word not in by_type:
+        raise MechanismError(f"{where} {key} = {quoted(word)} is not known{valid_names(word, by_type)}")
+    return by_type[word]
 
 
 def check_keys(where: str, table: Mapping[str, Any], known: Iterable[str]) -> None:
@@ -188,15 +188,15 @@ def explained(text: str, error: ValueError) -> str:
         One line, to follow 'not valid TOML: '.
 
     """
-    found = _PLACE.match(str(error))
+    place = _PLACE.match(str(error))
     lines = text.replace("\t", " ").split("\n")
-    if found is None or not 0 < int(found["line"]) <= len(lines):
+    if place is None or not 0 < int(place["line"]) <= len(lines):
         return str(error)
-    number = int(found["line"])
+    number = int(place["line"])
     line = lines[number - 1].strip()
     if not "".join(lines[:number]).isprintable():  # a control character, whose code tomllib states
         return str(error)
-    if _TWICE.match(found["what"]):
+    if _TWICE.match(place["what"]):
         return f"line {number}: {_twice(lines, number)}"
     for pattern, rule, cure in _HINTS:
         wrong = re.search(pattern, line)
@@ -212,10 +212,10 @@ def _twice(lines: list[str], number: int) -> str:
     table, name = _written(lines, number)
     if not name:
         return f"{table} is written twice"
-    full = ".".join(filter(None, (table, name)))
-    first = next((k for k in range(1, number) if ".".join(filter(None, _written(lines, k))) == full), None)
-    if first is None and (found := _given_above(lines, number, full)):
-        parent, line = found
+    full = _full_name(lines, number)
+    first = next((k for k in range(1, number) if _full_name(lines, k) == full), None)
+    if first is None and (above := _parent_above(lines, number, full)):
+        parent, line = above
         if re.match(rf" *{_KEY} *\{{", lines[line - 1]):
             key = full.removeprefix(f"{parent}.")
             return f"'{parent}' is a table in braces in line {line}: write {key} = ... inside the braces"
@@ -223,14 +223,19 @@ def _twice(lines: list[str], number: int) -> str:
     return f"'{full}' is written twice" + (f", first in line {first}" if first else "") + "; keep one"
 
 
-def _given_above(lines: list[str], number: int, full: str) -> tuple[str, int] | None:
+def _parent_above(lines: list[str], number: int, full: str) -> tuple[str, int] | None:
     """Return the key above the line `number` that a name extends, such as 'a' of 'a.b', and its line; None: no such."""
     parents = {full[:k] for k, sign in enumerate(full) if sign == "."}
     for k in range(1, number):
-        name = ".".join(filter(None, _written(lines, k)))
+        name = _full_name(lines, k)
         if name in parents and not _HEADER.match(lines[k - 1]):
             return name, k
     return None
+
+
+def _full_name(lines: list[str], number: int) -> str:
+    """Return 'table.key' of a line, or the one of both that it has."""
+    return ".".join(filter(None, _written(lines, number)))
 
 
 def _written(lines: list[str], number: int) -> tuple[str, str]:

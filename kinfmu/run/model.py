@@ -16,6 +16,7 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.mechanism.settings import read_tolerance
 from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.plan.efforts import load_inputs
 from kinfmu.plan.forces import force_names
 from kinfmu.plan.reactions import reaction_names_of
 from kinfmu.processes import require_workers
@@ -93,7 +94,7 @@ class Model:
         self.input_names = tuple(name for driver in plan.drivers for name in driver.inputs)
         self.watch_names = plan.watch_names
         self.force_names, self.reaction_names = force_names(plan.mechanism), reaction_names_of(plan.mechanism)
-        self._load_inputs = tuple(name for load in plan.mechanism.loads for name in load.inputs())
+        self._load_inputs = load_inputs(plan)
         self.arguments = Arguments(plan)
         self._solver = lru_cache(maxsize=_SOLVERS_KEPT)(self._new_solver)
 
