@@ -11,7 +11,7 @@ derivatives in time; slopes are dz/du for one driver after another.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from kinfmu.codegen.c.model import curve_tables
@@ -97,17 +97,21 @@ def load_forces(plan: SolvePlan, steps: ForceSteps) -> Callable[..., tuple[float
 
 
 def _python_function(plan: SolvePlan, steps: ForceSteps, curves: Mapping[CurveData, str]) -> list[str]:
-    places, given = places_of_symbols(plan), given_symbols(steps)
-    lines, expressions = stage_lines(steps, given, curves, _solve)
-    values = iter(expressions)
-    results = ["0.0" if node.constant == 0.0 else next(values) for node in steps.results]
+    places, symbols = places_of_symbols(plan), given_symbols(steps)
+    lines, expressions = stage_lines(steps, symbols, curves, _solve)
     return [
         f"def forces({', '.join(ARGUMENTS)}):",
         '    """FORCES of one sample, in SI units."""',
-        *(f"    {identifier(name)} = {places[name]}" for name in given if identifier(name) != places[name]),
+        *(f"    {identifier(name)} = {places[name]}" for name in symbols if identifier(name) != places[name]),
         *indented(lines),
-        f"    return {tupled(results)}",
+        f"    return {tupled(_results(steps, expressions))}",
     ]
+
+
+def _results(steps: ForceSteps, expressions: Iterable[str]) -> list[str]:
+    """Return all results of a stage as text; those that are always 0 have no expression."""
+    values = iter(expressions)
+    return ["0.0" if node.constant == 0.0 else next(values) for node in steps.results]
 
 
 def solves(steps: ForceSteps) -> bool:
@@ -152,7 +156,7 @@ def emit_c_forces(plan: SolvePlan, steps: ForceSteps, stage: str = "forces", *, 
         are_loads_open: Constants of the laws of loads can be set: they follow the efforts of external loads.
 
     """
-    places, given = places_of_symbols(plan, are_loads_open=are_loads_open), given_symbols(steps)
+    places, symbols = places_of_symbols(plan, are_loads_open=are_loads_open), given_symbols(steps)
     curves = {data: f"&{name.lower()}" for data, name in stage_curves(steps).items()}
     buffers: list[str] = []
 
@@ -165,10 +169,9 @@ def emit_c_forces(plan: SolvePlan, steps: ForceSteps, stage: str = "forces", *, 
         call = f"kf_solutions({m}, {k}, {count}, a{at}, b{at}, factors{at}, x{at})"
         return [*filled, call, *(f"{name} = x{at}[{n}]" for n, name in enumerate(names))]
 
-    lines, found = stage_lines(steps, given, curves, solve, FUNCTIONS)
-    values = iter(found)
-    results = ["0.0" if node.constant == 0.0 else next(values) for node in steps.results]
-    body = [f"{identifier(name)} = {places[name]};" for name in given if identifier(name) != places[name]]
+    lines, expressions = stage_lines(steps, symbols, curves, solve, FUNCTIONS)
+    results = _results(steps, expressions)
+    body = [f"{identifier(name)} = {places[name]};" for name in symbols if identifier(name) != places[name]]
     body += [line if line.endswith(";") else f"{line};" for line in lines]
     body += [
         f"forces[{k}] = {result}; /* {name} */"

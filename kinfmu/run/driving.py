@@ -1,4 +1,4 @@
-"""What moves a sweep: times for the laws, or driver values given as inputs, as arrays of numbers."""
+"""What moves a sweep: times for the laws, or driver values as inputs, read as arrays of numbers."""
 
 from __future__ import annotations
 
@@ -92,11 +92,11 @@ def driven_by_inputs(
         column = column_of(name, inputs[name])
         table = column.reshape(-1, 1).copy()
         return table, _filled(table.shape, _DEFAULTS[1]), _filled(table.shape, _DEFAULTS[2])
-    known = [name for driver in drivers for name in driver.inputs]
+    names = [name for driver in drivers for name in driver.inputs]
     for name in inputs:
-        if name not in known:
+        if name not in names:
             raise RequestError(
-                f"input '{name}' is not known{suggestion(name, known)}; inputs: {listed(known)}; times go by t"
+                f"input '{name}' is not known{suggestion(name, names)}; inputs: {listed(names)}; times go by t"
             )
     for driver in drivers:
         if driver.inputs[0] not in inputs:
@@ -105,7 +105,7 @@ def driven_by_inputs(
     if wrap:
         angles = [driver.inputs[0] for driver in drivers if driver.quantity.kind == "angle"]
         if not angles:
-            raise RequestError(f"wrap unwraps angles, and no input is one; inputs: {listed(known)}")
+            raise RequestError(f"wrap unwraps angles, and no input is one; inputs: {listed(names)}")
         columns |= {name: np.apply_along_axis(unwrap, -1, columns[name]) for name in angles}
     lengths = {array.shape[-1] for array in columns.values()}
     if len(lengths - {1}) > 1:
