@@ -1,4 +1,4 @@
-"""The poses through which one driver moves the mechanism, while the others hold their start values."""
+"""DriverPath: the poses through which one driver moves the mechanism, while the others hold their start values."""
 
 from __future__ import annotations
 

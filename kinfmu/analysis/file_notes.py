@@ -137,13 +137,8 @@ def _cams(mechanism: Mechanism) -> Iterator[str]:
     for joint in mechanism.joints:
         if not isinstance(joint, Cam) or joint.cam not in drivers:
             continue
-        why = joint.law.why_not_periodic()
-        angles = law_values(drivers[joint.cam], mechanism.run) if why else []
-        if why and max(angles) - min(angles) > PLAUSIBLE_TURN:
-            yield (
-                f"[joints.{joint.name}] law: {why}; "
-                f"[run] turns {joint.cam} by {math.degrees(max(angles) - min(angles)):.6g} deg"
-            )
+        if why := joint.law.why_not_periodic():
+            yield from _turned_beyond(f"[joints.{joint.name}] law: {why}", mechanism, drivers[joint.cam])
 
 
 def _loads(mechanism: Mechanism) -> Iterator[str]:
@@ -158,12 +153,16 @@ def _loads(mechanism: Mechanism) -> Iterator[str]:
         law = getattr(load, "law", None)
         if not isinstance(law, _TABLES) or law.repeats:
             continue
-        angles = law_values(drivers[over.of], mechanism.run)
-        if max(angles) - min(angles) > PLAUSIBLE_TURN:
-            yield (
-                f"[loads.{load.name}] law: {law.why_not_periodic()}; "
-                f"[run] turns {over.of} by {math.degrees(max(angles) - min(angles)):.6g} deg"
-            )
+        why = law.why_not_periodic()
+        yield from _turned_beyond(f"[loads.{load.name}] law: {why}", mechanism, drivers[over.of])
+
+
+def _turned_beyond(law: str, mechanism: Mechanism, driver: AngleDriver) -> Iterator[str]:
+    """Yield a line for a law that is not periodic, if the run turns its driver by more than a turn."""
+    angles = law_values(driver, mechanism.run)
+    turn = max(angles) - min(angles)
+    if turn > PLAUSIBLE_TURN:
+        yield f"{law}; [run] turns {driver.of} by {math.degrees(turn):.6g} deg"
 
 
 def run_notes(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""Arithmetic expressions of parameters, such as "2*a + 5 mm", parsed to steps; Python never evaluates their texts.
+"""Expression: arithmetic of parameters, such as "2*a + 5 mm", parsed to steps; Python never evaluates the text.
 
     sum     = ["+" | "-"] product { ("+" | "-") product }
     product = power { ("*" | "/") power }             each factor may have a sign
@@ -176,9 +176,9 @@ class Expression:
             if step.operation == "name" and step.value not in names:
                 raise self._unknown(step, names)
 
-    def _unknown(self, step: ExpressionStep, known: Iterable[str]) -> MechanismError:
-        known = list(known)
-        what = f"no parameter '{step.value}'{suggestion(step.value, [*known, *WORDS])}; parameters: {listed(known)}"
+    def _unknown(self, step: ExpressionStep, names: Iterable[str]) -> MechanismError:
+        names = list(names)
+        what = f"no parameter '{step.value}'{suggestion(step.value, [*names, *WORDS])}; parameters: {listed(names)}"
         return error_at(self.text, step.at, what)
 
 
@@ -373,8 +373,8 @@ class _Parser:
 
     def _wrong(self, valid: str) -> MechanismError:
         token = self._token
-        found = {"end": "the end", "character": quoted(token.text)}.get(token.kind, f"'{token.text}'")
+        read = {"end": "the end", "character": quoted(token.text)}.get(token.kind, f"'{token.text}'")
         near = suggestion(token.text, self._units) if token.kind == "character" else ""  # a degree or inch sign
         if re.fullmatch(r"\d,\d", self._text[max(0, token.at - 1) : token.at + 2]):
             near = "; a decimal has a point, not a comma"
-        return error_at(self._text, token.at, f"expected {valid}, found {found}{near}")
+        return error_at(self._text, token.at, f"expected {valid}, found {read}{near}")

@@ -179,20 +179,22 @@ def argument_unit(problem: FitProblem) -> str:
     return unit_of(problem.argument.quantity, problem.mechanism.length_unit)
 
 
-def constraint_results(problem: FitProblem, found: Evaluation) -> list[ConstraintResult]:
+def constraint_results(problem: FitProblem, evaluation: Evaluation) -> list[ConstraintResult]:
     """Return how far the constraints of a problem are met by a design, Grashof's conditions first."""
     unit, constraints = problem.mechanism.length_unit, []
-    for one, met in zip(problem.lengths, found.excess, strict=True):
-        gap = float(met[: one.gaps].min()) + one.gap
-        text = f"p + q - s - l = {gap:.6g} {unit}, at least {one.gap:.6g} {unit}"
-        if one.shortest is not None:
-            others = float(met[one.gaps :].min())
-            text += f"; the other links exceed {one.links[one.shortest].text} by {others:.6g} {unit} or more"
+    for condition, met in zip(problem.lengths, evaluation.excess, strict=True):
+        gap = float(met[: condition.gaps].min()) + condition.gap
+        text = f"p + q - s - l = {gap:.6g} {unit}, at least {condition.gap:.6g} {unit}"
+        if condition.shortest is not None:
+            others = float(met[condition.gaps :].min())
+            shortest = condition.links[condition.shortest].text
+            text += f"; the other links exceed {shortest} by {others:.6g} {unit} or more"
         violation = max(0.0, -float(met.min()))
-        holds = violation <= HOLDS * max(1.0, abs(one.gap))
-        constraints.append(ConstraintResult(one.name, text, violation, holds, DisplayUnit(unit)))
+        holds = violation <= HOLDS * max(1.0, abs(condition.gap))
+        constraints.append(ConstraintResult(condition.name, text, violation, holds, DisplayUnit(unit)))
     limited: dict[str, list[tuple[Aim, float]]] = {}
-    for aim, value in zip(problem.measuring.aims if problem.measuring else (), found.measured.tolist(), strict=True):
+    aims = problem.measuring.aims if problem.measuring else ()
+    for aim, value in zip(aims, evaluation.measured.tolist(), strict=True):
         if aim.value is None:
             limited.setdefault(aim.owner, []).append((aim, value))
     for name, parts in limited.items():
@@ -202,9 +204,7 @@ def constraint_results(problem: FitProblem, found: Evaluation) -> list[Constrain
         limits += [f"at most {aim.maximum / display.factor:.6g}"] if aim.maximum is not None else []
         violation = max(0.0, aim.excess(value)[0])
         size = max(1.0, *(abs(limit) for limit in (aim.minimum, aim.maximum) if limit is not None))
-        shown = display.suffix
-        datum = counted_from(aim.reading.type)
-        number = f"{value / display.factor:.6g}{shown}{datum}"
-        text = f"{aim.reading.type} = {number}, {' and '.join(limits)}{shown}"
+        number = f"{value / display.factor:.6g}{display.suffix}{counted_from(aim.reading.type)}"
+        text = f"{aim.reading.type} = {number}, {' and '.join(limits)}{display.suffix}"
         constraints.append(ConstraintResult(name, text, violation, violation <= HOLDS * size, display))
     return constraints

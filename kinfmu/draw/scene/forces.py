@@ -131,19 +131,19 @@ def contact_force(
             return None
         frame, holder = scene.frames[cam], scene.frames[placed.holder]
         angles = np.where(run.good, frame[:, 2] - holder[:, 2], placed.turn)
-        found = traced(placed, turn_of(placed, angles))
+        curve = traced(placed, turn_of(placed, angles))
     except MechanismError:
         return None
-    out, contact = found.normal, envelope(placed, found)
+    out, contact = curve.normal, envelope(placed, curve)
     in_holder = np.exp(1j * angles)
     with np.errstate(divide="ignore", invalid="ignore"):
         if isinstance(joint, CamFlatFace):
             size = run[f"{joint.name}.force"]
         elif isinstance(joint, CamRoller):
-            radius = found.curve - placed.pole
+            radius = curve.curve - placed.pole
             size = run[f"{joint.name}.force"] / (out * (radius / np.abs(radius)).conj()).real
         elif isinstance(joint, CamOscillating) and placed.pivot is not None:
-            arm = found.curve * in_holder - placed.pivot
+            arm = curve.curve * in_holder - placed.pivot
             moment = run[f"{joint.name}.moment"] / METRES[mechanism.length_unit]
             size = moment / (arm.conj() * out * in_holder).imag
         else:

@@ -222,8 +222,8 @@ class _Curve(NamedTuple):
 
 def cam_shapes(shown: Instant) -> list[CamShape]:
     """Return all cams whose pitch curve or profile is known."""
-    found = [_shape(shown, joint) for joint in shown.joints if isinstance(joint, CAM_JOINTS)]
-    return [shape for shape in found if shape is not None]
+    shapes = (_shape(shown, joint) for joint in shown.joints if isinstance(joint, CAM_JOINTS))
+    return [shape for shape in shapes if shape is not None]
 
 
 def _shape(shown: Instant, joint: CamJoint) -> CamShape | None:
@@ -249,7 +249,6 @@ def _shape(shown: Instant, joint: CamJoint) -> CamShape | None:
         is_real = bool(bends_less.all() and np.abs(around.curve).min() > radius) and not _cuts(around, radius)
     size = float(radius or 0.0) if is_real else 0.0
     profile, contact = around.curve - size * around.normal, now.curve - size * now.normal
-
     reach = face = None
     if normal is not None:
         reach = _reach(shown, joint, touching, normal, around)
