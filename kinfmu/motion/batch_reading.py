@@ -111,9 +111,9 @@ class BatchReading:
         self._idle: list[tuple[FloatArray, NDArray[np.int32]]] = []  # memory of earlier parts
         self._names = QuantityNames(mechanism)
         self.motion, self._order = self._empty_motion()
-        alone = self._read_alone()
-        self._alone = [reading for reading in self._readings if reading.name in alone]
-        self._in_tables = [reading for reading in self._readings if reading.name not in alone]
+        by_design = self._names_by_design()
+        self._by_design = [reading for reading in self._readings if reading.name in by_design]
+        self._in_tables = [reading for reading in self._readings if reading.name not in by_design]
         self.units = self._units_of_parameters()
         self.values: dict[str, FloatArray] = {}
         self.at: dict[str, FloatArray] = {}
@@ -137,7 +137,7 @@ class BatchReading:
         self._is_native = self._model.is_native(self._count * samples)
         if self._in_tables:
             self._compute_quantities()
-        measure = self._measure if self._in_tables else self._measure_alone
+        measure = self._measure if self._in_tables else self._measure_by_design
         if self._is_native and workers > 1:
             with ThreadPoolExecutor(workers) as pool:
                 reasons_of_parts = list(pool.map(measure, parts))
@@ -174,8 +174,8 @@ class BatchReading:
             is_solved[list(left)] = False
             self.status[part] = status.max(axis=1, initial=0)
             reasons = {k: reasons[k] for k in np.flatnonzero(~is_solved).tolist() if k in reasons}
-            for k in np.flatnonzero(is_solved).tolist() if self._alone else ():
-                if reason := self._measure_design(self._alone, part.start + k):
+            for k in np.flatnonzero(is_solved).tolist() if self._by_design else ():
+                if reason := self._measure_design(self._by_design, part.start + k):
                     reasons[k] = reason
             self._read(
                 part, self._motion_of(batch, [table[:, self._order] for table in tables]), good, is_solved, reasons
@@ -242,7 +242,7 @@ class BatchReading:
                 if k not in reasons:
                     reasons[k] = reason_without_value(self._samples(part.start + k), good[k])
 
-    def _measure_alone(self, part: slice) -> dict[int, str]:
+    def _measure_by_design(self, part: slice) -> dict[int, str]:
         """Measure the designs of a part one by one; return why one has no values, by its number in the part."""
         reasons = {k: self._measure_design(self._readings, part.start + k) for k in range(part.stop - part.start)}
         return {k: reason for k, reason in reasons.items() if reason}
@@ -284,8 +284,8 @@ class BatchReading:
         """Return the motion of the designs of a part."""
         motion = self.motion
         has_pressure = any(isinstance(reading, PressureAngle) for reading in self._in_tables)
-        if self._open and (has_pressure or not self._is_native):
-            arrays = {name: batch.parameters[name] for name in self._open}
+        if self._open_parameters and (has_pressure or not self._is_native):
+            arrays = {name: batch.parameters[name] for name in self._open_parameters}
             motion = replace(motion, points=points_of_designs(self._model.mechanism, arrays))
         return replace(
             motion,
@@ -297,22 +297,22 @@ class BatchReading:
         )
 
     @cached_property
-    def _open(self) -> list[str]:
+    def _open_parameters(self) -> list[str]:
         """Names of the parameters of the geometry that are given."""
         return [name for name in self.parameters if name in self._model.parameters]
 
     def _fixed_of(self, batch: Batch) -> dict[CoordinateName, FloatArray]:
         """Return coordinates that a joint holds at a constant which differs between designs, (m, 1)."""
         names = [parameter_symbol(parameter.name) for parameter in self._model.plan.parameters]
-        rows = batch.values.tolist() if self._open_fixed else []
-        constants = [evaluate(list(self._open_fixed.values()), dict(zip(names, row, strict=True))) for row in rows]
-        table = np.array(constants, dtype=float).reshape(len(rows), len(self._open_fixed))
-        return {name: table[:, k : k + 1] for k, name in enumerate(self._open_fixed)}
+        rows = batch.values.tolist() if self._open_constants else []
+        constants = [evaluate(list(self._open_constants.values()), dict(zip(names, row, strict=True))) for row in rows]
+        table = np.array(constants, dtype=float).reshape(len(rows), len(self._open_constants))
+        return {name: table[:, k : k + 1] for k, name in enumerate(self._open_constants)}
 
     @cached_property
-    def _open_fixed(self) -> dict[CoordinateName, Node]:
+    def _open_constants(self) -> dict[CoordinateName, Node]:
         """Constant coordinates that are read and that depend on parameters which are given, as nodes."""
-        opened = {parameter_symbol(name) for name in self._open}
+        opened = {parameter_symbol(name) for name in self._open_parameters}
         return {
             name: node
             for name, node in self._model.plan.fixed_nodes.items()
@@ -354,7 +354,7 @@ class BatchReading:
             axis, inputs = axis_for(tables[0], names[::3]), np.stack(tables, axis=2)
         return SampledAxis(times, axis, names, inputs.reshape(len(times), len(names)), plan.mechanism.length_unit)
 
-    def _read_alone(self) -> set[str]:
+    def _names_by_design(self) -> set[str]:
         """Return the names of measures that are read design by design: their numbers or samples differ."""
         plan, driven = self._model.plan, self._driving.driven
         names = {reading.name for reading in self._readings}
@@ -362,7 +362,7 @@ class BatchReading:
             return names
         if driven is None:
             behind = {symbol.name for symbol in symbols([node for law in plan.laws for node in law[1:]])}
-            if behind & ({parameter_symbol(name) for name in self._open} | set(self.parameters)):
+            if behind & ({parameter_symbol(name) for name in self._open_parameters} | set(self.parameters)):
                 return names
         elif driven[0].ndim == 3:
             return names
@@ -377,7 +377,7 @@ class BatchReading:
     @cached_property
     def _dependent(self) -> set[str]:
         """Names of the measures whose own numbers depend on parameters that are given."""
-        dependent = dependent_numbers(self._measured, self._open)
+        dependent = dependent_numbers(self._measured, self._open_parameters)
         return {str(place[1]) for place in dependent if place[0] == "measures"}
 
     def _units_of_parameters(self) -> dict[str, str]:
