@@ -175,12 +175,12 @@ class Model:
             self,
             setting,
             engine,
-            None if inputs else times,
-            inputs,
-            applied_efforts(self._load_inputs, efforts, count),
-            driven,
-            result,
-            {"t": t, "parameters": parameters, "tolerance": tolerance, "wrap": wrap, **inputs},
+            times=None if inputs else times,
+            inputs=inputs,
+            efforts=applied_efforts(self._load_inputs, efforts, count),
+            driven=driven,
+            result=result,
+            arguments={"t": t, "parameters": parameters, "tolerance": tolerance, "wrap": wrap, **inputs},
             is_kept=out is None,
         ).run(tables)
 
