@@ -1,4 +1,4 @@
-"""Cams of a mechanism: their profiles, and what a check says about them, with the driver's angle."""
+"""Cams of a mechanism: their profiles, the findings of a check at values of the driver, and the lines of its report."""
 
 from __future__ import annotations
 
@@ -41,6 +41,7 @@ from kinfmu.run.driving import numbers_of
 SLIDING_LIMIT, SWINGING_LIMIT = math.radians(30.0), math.radians(45.0)  # [rad], usual for pressure angles
 _ANGLES = 361  # of a table by default, one a degree
 _ROUNDING = 1e-9  # of a lift; lifts to both sides that differ less are equal
+_WIDE = 1e6  # of the distance from the axle; a larger radius of curvature is that of a straight line
 
 
 @dataclass(frozen=True)
@@ -142,40 +143,40 @@ class CamFindings:
 
     def problem(self) -> MechanismError | None:
         """Return the reason why there is no profile that leads the follower as the law says; None if there is one."""
-        cam, found = self.cam, self.critical
-        if cam is None or found is None or not cam.is_known:
+        cam, critical = self.cam, self.critical
+        if cam is None or critical is None or not cam.is_known:
             return None
         where, radius = f"[joints.{self.joint}]", self.length(cam.radius or 0.0)
-        if found.nearest.value <= (cam.radius or 0.0):
+        if critical.nearest.value <= (cam.radius or 0.0):
             what = f"the roller of radius {radius} reaches the cam's axle: its centre is"
             if cam.normal is not None:
                 what = "the flat face reaches the cam's axle: its distance is"
             return MechanismError(
-                f"{where} {what} {self.length(found.nearest.value)} from it ({self.place(found.nearest.at)}); "
+                f"{where} {what} {self.length(critical.nearest.value)} from it ({self.place(critical.nearest.at)}); "
                 "the base circle must be larger",
                 joint=self.joint,
             )
-        if found.undercut:
+        if critical.undercut:
             parts = [f"{self.driver} at {degrees(begin)} to {degrees(end)}" for begin, end in self.undercut]
-            return MechanismError(f"{where} {self._undercut(cam, found)} from {listed(parts)}", joint=self.joint)
-        if found.gouge is not None:
-            depth = self.length(found.gouge.value)
+            return MechanismError(f"{where} {self._undercut(cam, critical)} from {listed(parts)}", joint=self.joint)
+        if critical.gouge is not None:
+            depth = self.length(critical.gouge.value)
             return MechanismError(
                 f"{where} roller_radius = {radius}: the roller cuts {depth} into another part of the profile "
-                f"({self.place(found.gouge.at)}); it must be smaller",
+                f"({self.place(critical.gouge.at)}); it must be smaller",
                 joint=self.joint,
             )
         return None
 
-    def _undercut(self, cam: PlacedCam, found: Critical) -> str:
+    def _undercut(self, cam: PlacedCam, critical: Critical) -> str:
         if cam.normal is None:
-            least = found.pitch or found.nearest
+            least = critical.pitch or critical.nearest
             return (
                 f"roller_radius = {self.length(cam.radius or 0.0)} must be smaller than the smallest radius of "
                 f"curvature of the pitch curve, {self.length(least.value)} ({self.place(least.at)}), or the base "
                 "circle larger: the profile is undercut"
             )
-        least = found.convex or found.nearest
+        least = critical.convex or critical.nearest
         remedy = "f + f'' of the law must be positive" if isinstance(cam.joint, CamFlatFace) else (
             "the base circle must be larger" if cam.pivot is not None
             else f"the base circle must be larger by more than {self.length(-least.value)}"
@@ -187,28 +188,28 @@ class CamFindings:
 
     def as_json(self) -> dict[str, Any]:
         """Return the findings as plain data."""
-        found = self.critical
+        critical = self.critical
 
-        def one(extreme: CamExtreme | None) -> dict[str, float] | None:
+        def entry(extreme: CamExtreme | None) -> dict[str, float] | None:
             return None if extreme is None else {"value": extreme.value, "at": self.at(extreme.at)}
 
         values: dict[str, Any] = {"reason": self.reason or None}
         if self.program:
             values["program"] = [{"part": part, "begin": begin, "end": end} for part, begin, end in self.program]
-        if found is not None and self.cam is not None:
+        if critical is not None and self.cam is not None:
             values |= {
                 "cam": self.cam.cam,
                 "follower": self.cam.follower,
                 "swings": self.cam.pivot is not None,
                 "roller_radius": self.cam.radius,
-                "smallest_pressure_angle": one(found.pressure[0]),
-                "largest_pressure_angle": one(found.pressure[1]),
-                "smallest_convex_radius": one(found.convex) if self.cam.is_known else None,
-                "smallest_concave_radius": one(found.concave) if self.cam.is_known else None,
-                "smallest_pitch_radius": one(found.pitch),
+                "smallest_pressure_angle": entry(critical.pressure[0]),
+                "largest_pressure_angle": entry(critical.pressure[1]),
+                "smallest_convex_radius": entry(critical.convex) if self.cam.is_known else None,
+                "smallest_concave_radius": entry(critical.concave) if self.cam.is_known else None,
+                "smallest_pitch_radius": entry(critical.pitch),
                 "undercut": [{"begin": begin, "end": end} for begin, end in self.undercut],
-                "gouge": one(found.gouge),
-                "face": None if found.width is None else {"low": one(found.width[0]), "high": one(found.width[1])},
+                "gouge": entry(critical.gouge),
+                "face": critical.width and dict(zip(("low", "high"), map(entry, critical.width), strict=True)),
             }
         return {"joint": self.joint, "element": self.element, "driver": self.driver, **values}
 
@@ -240,10 +241,10 @@ def with_opposite_lift(cam: PlacedCam) -> float | None:
     if -lifts.min() <= lifts.max() * (1.0 + _ROUNDING):
         return None
     try:
-        found = critical_values(replace(cam, joint=replace(joint, law=opposite)))
+        of_opposite = critical_values(replace(cam, joint=replace(joint, law=opposite)))
     except MechanismError:
         return None
-    return max(abs(extreme.value) for extreme in found.pressure)
+    return max(abs(extreme.value) for extreme in of_opposite.pressure)
 
 
 def cam_profile(
@@ -268,9 +269,9 @@ def cam_profile(
 
     """
     require_mechanism(mechanism, "cam_profile")
-    found = _named(mechanism, joint)
+    cam = _named(mechanism, joint)
     plan = compile_plan(mechanism)
-    placed = placed_cam(mechanism, found, _poses(plan))
+    placed = placed_cam(mechanism, cam, _poses(plan))
     unit = mechanism.length_unit
     turned_by = cam_driver(plan, placed, None)
     profile_at(placed, np.zeros(1), unit)  # an unknown roller is reported before its consequences
@@ -291,7 +292,7 @@ def cam_profile(
 def cam_findings(plan: SolvePlan, paths: Sequence[DriverPath]) -> tuple[CamFindings, ...]:
     """Return what is found of each cam of a mechanism; paths: of its drivers."""
     mechanism, poses = plan.mechanism, None
-    found = []
+    findings = []
     for joint in mechanism.joints:
         if not isinstance(joint, CAM_JOINTS):
             continue
@@ -299,11 +300,11 @@ def cam_findings(plan: SolvePlan, paths: Sequence[DriverPath]) -> tuple[CamFindi
         try:
             placed = placed_cam(mechanism, joint, poses)
             turned_by = cam_driver(plan, placed, paths)
-            found.append(CamFindings(joint.name, placed, critical_values(placed), turned_by, mechanism.length_unit))
+            findings.append(CamFindings(joint.name, placed, critical_values(placed), turned_by, mechanism.length_unit))
         except KinfmuError as reason:
             text = str(reason).removeprefix(f"cam '{joint.name}': ").removeprefix(f"{NO_PROFILE}: ")
-            found.append(CamFindings(joint.name, None, None, None, mechanism.length_unit, text))
-    return tuple(found)
+            findings.append(CamFindings(joint.name, None, None, None, mechanism.length_unit, text))
+    return tuple(findings)
 
 
 def _named(mechanism: Mechanism, name: str) -> CamJoint:
@@ -324,23 +325,20 @@ def _poses(plan: SolvePlan) -> dict[str, tuple[float, float, float]]:
     return {GROUND_NAME: (0.0, 0.0, 0.0), **{body: (x, y, phi) for body, (x, y, phi) in zip(bodies, rows, strict=True)}}
 
 
-_WIDE = 1e6  # of the distance from the axle; a larger radius of curvature is that of a straight line
-
-
 def cam_lines(cam: CamFindings) -> list[str]:
     """Return the findings of a cam: the first line has its name."""
-    placed, found = cam.cam, cam.critical
-    if placed is None or found is None:
+    placed, critical = cam.cam, cam.critical
+    if placed is None or critical is None:
         return [f"{cam.joint}: no profile, because {cam.reason}"]
     texts = [f"{cam.joint}: {placed.cam} moves {placed.follower}, {_element(cam, placed)}"]
     if cam.program:
         parts = [f"{part} {degrees(begin)} to {degrees(end)}" for part, begin, end in cam.program]
         texts.append(f"program over {cam.driver}: {', '.join(parts)}")
-    texts.append(_pressure(cam, found))
+    texts.append(_pressure(cam, critical))
     if not cam.is_cut:
-        texts.append(_curvature(cam, found))
-    if found.width is not None:
-        low, high = found.width
+        texts.append(_curvature(cam, critical))
+    if critical.width is not None:
+        low, high = critical.width
         texts.append(
             f"contact on the face from {cam.length(low.value)} ({cam.place(low.at)}) to {cam.length(high.value)} "
             f"({cam.place(high.at)}): width {cam.length(high.value - low.value)}"
@@ -356,11 +354,11 @@ def _element(cam: CamFindings, placed: PlacedCam) -> str:
     return f"roller of radius {cam.length(placed.radius)}" if placed.radius else "knife edge"
 
 
-def _pressure(cam: CamFindings, found: Critical) -> str:
-    low, high = found.pressure
-    if max(abs(low.value), abs(high.value)) < 1e-12:
-        return "pressure angle 0 everywhere"
+def _pressure(cam: CamFindings, critical: Critical) -> str:
+    low, high = critical.pressure
     worst = max(abs(low.value), abs(high.value))
+    if worst < 1e-12:
+        return "pressure angle 0 everywhere"
     verdict = "within" if worst <= cam.limit + 1e-9 else "above"
     return f"pressure angle {_angle(cam, low)} to {_angle(cam, high)}: {verdict} {degrees(cam.limit)}"
 
@@ -369,14 +367,14 @@ def _angle(cam: CamFindings, extreme: CamExtreme) -> str:
     return f"{degrees(extreme.value)} ({cam.place(extreme.at)})"
 
 
-def _curvature(cam: CamFindings, found: Critical) -> str:
+def _curvature(cam: CamFindings, critical: Critical) -> str:
     """Return the smallest radii of curvature, of the profile or, for an unknown roller, of the pitch curve."""
     is_known = cam.element != "unknown"
-    convex, concave = (found.convex, found.concave) if is_known else (found.pitch, found.concave)
+    convex, concave = (critical.convex, critical.concave) if is_known else (critical.pitch, critical.concave)
     sides = [
         f"{cam.length(extreme.value)} {side} ({cam.place(extreme.at)})"
         for side, extreme in (("convex", convex), ("concave", concave))
-        if extreme is not None and extreme.value < _WIDE * found.nearest.value
+        if extreme is not None and extreme.value < _WIDE * critical.nearest.value
     ]
     curve = "profile" if is_known else "pitch curve, larger than the roller's"
     return f"smallest radius of curvature of the {curve}: {', '.join(sides) or 'none'}"

@@ -1,4 +1,4 @@
-"""The poses through which one driver moves the mechanism, while the others hold their start values."""
+"""DriverPath: the poses through which one driver moves the mechanism, while the others hold their start values."""
 
 from __future__ import annotations
 
@@ -23,70 +23,6 @@ from kinfmu.solver.python import Pose, Solver
 from kinfmu.solver.python.advance import advance
 from kinfmu.solver.python.bridge import Bridge
 from kinfmu.solver.python.limit import NO_BLOCK, Limit
-
-
-@dataclass(frozen=True)
-class HeldDriver(Held):
-    """The quantity of a driver, held at a value.
-
-        Phi = quantity - value, or the row that the quantity defines in its place        (1 row)
-
-    Only `check` uses it: the range of one driver is found with the others at their start values.
-    """
-
-    type: ClassVar[str] = "held_driver"
-    labels: ClassVar[tuple[str, ...]] = ("value",)
-
-    name: str
-    driver: Driver = field(metadata={"internal": True})
-    value: float = field(metadata={"internal": True})
-
-    def moved(self, dx: float, dy: float) -> HeldDriver:
-        quantity = self.driver.measured()
-        if not isinstance(quantity, CoordinateOf):
-            return self
-        return replace(self, value=decimal_sum(self.value, dx if quantity.axis == "x" else dy))
-
-    def measured(self) -> tuple[PoseQuantity, float]:
-        return self.driver.measured(), self.value
-
-
-def alone(plan: SolvePlan, number: int) -> SolvePlan:
-    """Return the plan of one driver alone, by its number, with all coordinates as outputs.
-
-    The other drivers keep their values in the plan's anchor, and it starts from the anchor's pose. Returns the plan
-    itself if there is nothing to hold.
-    """
-    mechanism = plan.mechanism
-    if len(mechanism.drivers) == 1 and isinstance(mechanism.coordinates, str):
-        return plan
-    taken = {joint.name for joint in mechanism.joints}
-    held = []
-    for k, driver in enumerate(mechanism.drivers):
-        if k != number:
-            name = driver.name
-            while name in taken:
-                name += "_held"
-            taken.add(name)
-            held.append(HeldDriver(name, driver, float(plan.anchor.u[k])))
-    return compile_plan(
-        replace(
-            started(mechanism, in_world(plan.origin, plan.anchor.q)),
-            joints=(*mechanism.joints, *held),
-            drivers=(mechanism.drivers[number],),
-            coordinates="all",
-            points={},
-            measures=(),  # they may read forces of the other drivers
-        )
-    )
-
-
-def started(mechanism: Mechanism, pose: FloatArray) -> Mechanism:
-    """Return the mechanism with this pose of all coordinates, in the world, as its start."""
-    poses = iter(pose.reshape(-1, 3).tolist())
-    bodies = [body if body.is_ground else replace(body, start=Start(*next(poses))) for body in mechanism.bodies]
-    return replace(mechanism, bodies=tuple(bodies))
-
 
 STEP = 0.1  # [rad, sizes] between evaluations of the determinants
 MOST_TURNS = 12  # most turns after which a mechanism may repeat: gears with odd ratios
@@ -150,13 +86,13 @@ class DriverPath:
     def fine_poses(self) -> tuple[Pose, ...]:
         """Poses close enough to find the extremes of a quantity between them, up to the limits, in the same order."""
         parts = math.ceil(_MANY / len(self.poses))
-        found = [self.poses[0]]
+        fine = [self.poses[0]]
         for before, after in pairwise(self.poses):
             a, b = before.u[0], after.u[0]
             between = (self.solver.solve(before, (a + (b - a) * k / parts,)) for k in range(1, parts))
-            found += [*(pose for pose in between if pose.good), after]
+            fine += [*(pose for pose in between if pose.good), after]
         low, high = (() if limit is None else self._before(limit) for limit in (self.low, self.high))
-        return (*low[::-1], *found, *high)
+        return (*low[::-1], *fine, *high)
 
     def _before(self, limit: Limit) -> tuple[Pose, ...]:
         """Return poses between the last one of the path and a limit, toward the limit."""
@@ -171,21 +107,21 @@ class DriverPath:
         """Return the pose between two where a value changes its sign; one where the path ends before it."""
         from scipy.optimize import brentq
 
-        found, ends = low, {low.u[0]: low, high.u[0]: high}
+        last, ends = low, {low.u[0]: low, high.u[0]: high}
 
         def at(u: float) -> float:
-            nonlocal found
+            nonlocal last
             pose = ends.get(u) or self.solver.solve(low, (u,))
             if not pose.good:
                 raise _PathEndsError
-            found = pose
+            last = pose
             return value(pose)
 
         with suppress(_PathEndsError):
             u = brentq(at, low.u[0], high.u[0], xtol=_SAME, rtol=_SAME)
-            if u != found.u[0]:
+            if u != last.u[0]:
                 at(u)
-        return found
+        return last
 
     def at_limit(self, limit: Limit) -> dict[str, float]:
         """Return all coordinates by name at one of the limits.
@@ -319,10 +255,73 @@ def _leg(solver: Solver, start: Pose, distance: float, unit: float) -> _Leg:
             return _Leg(poses, bridges, stopped=arrived.message)
         pose = arrived
         poses.append(pose)
-        known = {bridge.centre for bridge in bridges}
+        crossed = {bridge.centre for bridge in bridges}
         bridges += [
             bridge
             for bridge in (pose.singularities.bridges if pose.singularities else ())
-            if bridge.centre not in known
+            if bridge.centre not in crossed
         ]
     return _Leg(poses, bridges)
+
+
+def alone(plan: SolvePlan, number: int) -> SolvePlan:
+    """Return the plan of one driver alone, by its number, with all coordinates as outputs.
+
+    The other drivers keep their values in the plan's anchor, and it starts from the anchor's pose. Returns the plan
+    itself if there is nothing to hold.
+    """
+    mechanism = plan.mechanism
+    if len(mechanism.drivers) == 1 and isinstance(mechanism.coordinates, str):
+        return plan
+    taken = {joint.name for joint in mechanism.joints}
+    held = []
+    for k, driver in enumerate(mechanism.drivers):
+        if k != number:
+            name = driver.name
+            while name in taken:
+                name += "_held"
+            taken.add(name)
+            held.append(HeldDriver(name, driver, float(plan.anchor.u[k])))
+    return compile_plan(
+        replace(
+            started(mechanism, in_world(plan.origin, plan.anchor.q)),
+            joints=(*mechanism.joints, *held),
+            drivers=(mechanism.drivers[number],),
+            coordinates="all",
+            points={},
+            measures=(),  # they may read forces of the other drivers
+        )
+    )
+
+
+def started(mechanism: Mechanism, pose: FloatArray) -> Mechanism:
+    """Return the mechanism with this pose of all coordinates, in the world, as its start."""
+    poses = iter(pose.reshape(-1, 3).tolist())
+    bodies = [body if body.is_ground else replace(body, start=Start(*next(poses))) for body in mechanism.bodies]
+    return replace(mechanism, bodies=tuple(bodies))
+
+
+@dataclass(frozen=True)
+class HeldDriver(Held):
+    """The quantity of a driver, held at a value.
+
+        Phi = quantity - value, or the row that the quantity defines in its place        (1 row)
+
+    Only `check` uses it: the range of one driver is found with the others at their start values.
+    """
+
+    type: ClassVar[str] = "held_driver"
+    labels: ClassVar[tuple[str, ...]] = ("value",)
+
+    name: str
+    driver: Driver = field(metadata={"internal": True})
+    value: float = field(metadata={"internal": True})
+
+    def moved(self, dx: float, dy: float) -> HeldDriver:
+        quantity = self.driver.measured()
+        if not isinstance(quantity, CoordinateOf):
+            return self
+        return replace(self, value=decimal_sum(self.value, dx if quantity.axis == "x" else dy))
+
+    def measured(self) -> tuple[PoseQuantity, float]:
+        return self.driver.measured(), self.value

@@ -29,6 +29,20 @@ from kinfmu.run.solve import solve
 from kinfmu.units import METRES, PLAUSIBLE_TURN, Quantity, looks_like_degrees, unit_of
 
 _TABLES = (Spline, MotionSequence)  # laws that keep their last value beyond their end
+_FAR = 0.5  # [rad]; start angles read off a sketch are nearer to those of a cam
+_LARGE = 600  # coordinates; a larger mechanism is not evaluated for a note on its run
+_USUAL = {  # a bare number is in N/m or N s/m
+    ("stiffness", "mm"): "N/mm",
+    ("stiffness", "cm"): "N/cm",
+    ("stiffness", "in"): "lbf/in",
+    ("damping", "mm"): "N s/mm",
+}
+_EARTH = (9.7, 10.1)  # [m/s2]; what is written for the gravity of the earth
+_SLIP = 1000.0  # between m and mm
+_APART = 100.0  # a length that is farther from all others is probably one in another unit
+_FREE_APART = 20.0  # the same for free lengths, which are like the distances that springs span
+_NEAR = 2.0  # of the others' range, in which the length is then
+_FEWEST = 3  # other lengths that tell
 
 
 def file_notes(mechanism: Mechanism, written: Mechanism | None = None) -> Iterator[str]:
@@ -40,8 +54,8 @@ def file_notes(mechanism: Mechanism, written: Mechanism | None = None) -> Iterat
     """
     unused = mechanism.unused_parameters
     if unused:
-        one = "changes" if len(unused) == 1 else "change"
-        yield f"[parameters] {listed(unused)} {one} nothing: no number of the mechanism refers to it"
+        verb = "changes" if len(unused) == 1 else "change"
+        yield f"[parameters] {listed(unused)} {verb} nothing: no number of the mechanism refers to it"
     for driver in mechanism.drivers:
         first = float(driver.law.at(mechanism.run.start))
         if isinstance(driver, DistanceDriver) and first < 0.0:
@@ -123,13 +137,8 @@ def _cams(mechanism: Mechanism) -> Iterator[str]:
     for joint in mechanism.joints:
         if not isinstance(joint, Cam) or joint.cam not in drivers:
             continue
-        why = joint.law.why_not_periodic()
-        angles = law_values(drivers[joint.cam], mechanism.run) if why else []
-        if why and max(angles) - min(angles) > PLAUSIBLE_TURN:
-            yield (
-                f"[joints.{joint.name}] law: {why}; "
-                f"[run] turns {joint.cam} by {math.degrees(max(angles) - min(angles)):.6g} deg"
-            )
+        if why := joint.law.why_not_periodic():
+            yield from _turned_beyond(f"[joints.{joint.name}] law: {why}", mechanism, drivers[joint.cam])
 
 
 def _loads(mechanism: Mechanism) -> Iterator[str]:
@@ -144,16 +153,16 @@ def _loads(mechanism: Mechanism) -> Iterator[str]:
         law = getattr(load, "law", None)
         if not isinstance(law, _TABLES) or law.repeats:
             continue
-        angles = law_values(drivers[over.of], mechanism.run)
-        if max(angles) - min(angles) > PLAUSIBLE_TURN:
-            yield (
-                f"[loads.{load.name}] law: {law.why_not_periodic()}; "
-                f"[run] turns {over.of} by {math.degrees(max(angles) - min(angles)):.6g} deg"
-            )
+        why = law.why_not_periodic()
+        yield from _turned_beyond(f"[loads.{load.name}] law: {why}", mechanism, drivers[over.of])
 
 
-_FAR = 0.5  # [rad]; start angles read off a sketch are nearer to those of a cam
-_LARGE = 600  # coordinates; a larger mechanism is not evaluated for a note on its run
+def _turned_beyond(law: str, mechanism: Mechanism, driver: AngleDriver) -> Iterator[str]:
+    """Yield a line for a law that is not periodic, if the run turns its driver by more than a turn."""
+    angles = law_values(driver, mechanism.run)
+    turn = max(angles) - min(angles)
+    if turn > PLAUSIBLE_TURN:
+        yield f"{law}; [run] turns {driver.of} by {math.degrees(turn):.6g} deg"
 
 
 def run_notes(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Iterator[str]:
@@ -198,10 +207,10 @@ def start_notes(system: System, values: StartValues) -> Iterator[str]:
     yield from _turned_followers(system)
     if not values.is_moved:
         return
-    given, unit = start_from_poses(system).u, system.mechanism.length_unit
+    starts, unit = start_from_poses(system).u, system.mechanism.length_unit
     changed = [
         (driver.name, value_text(there, unit, driver.quantity.kind), value_text(start, unit, driver.quantity.kind))
-        for driver, there, start in zip(system.mechanism.drivers, given.tolist(), values.u.tolist(), strict=True)
+        for driver, there, start in zip(system.mechanism.drivers, starts.tolist(), values.u.tolist(), strict=True)
         if there != start
     ]
     yield (
@@ -214,31 +223,17 @@ def start_notes(system: System, values: StartValues) -> Iterator[str]:
 def _turned_followers(system: System) -> Iterator[str]:
     """Yield a line for each oscillating follower that its cam holds far from its start angle."""
     bodies = system.mechanism.moving_bodies
-    given = {body.name for body in bodies if body.start.phi is not None}
+    with_angle = {body.name for body in bodies if body.start.phi is not None}
     residual = system.residual(start_from_poses(system).q, np.zeros(len(system.mechanism.drivers)))
     for member in system.members[: len(system.mechanism.joints)]:
         joint = member.owner
-        if isinstance(joint, CamOscillating) and given.issuperset(member.bodies):
+        if isinstance(joint, CamOscillating) and with_angle.issuperset(member.bodies):
             off = math.remainder(float(residual[member.rows[0]]), math.tau)
             if abs(off) > _FAR:
                 yield (
                     f"[joints.{joint.name}] turns {joint.between[1]} by {degrees(-off)} from its start pose: check "
                     f"offset = {degrees(joint.offset)} and the law"
                 )
-
-
-_USUAL = {  # a bare number is in N/m or N s/m
-    ("stiffness", "mm"): "N/mm",
-    ("stiffness", "cm"): "N/cm",
-    ("stiffness", "in"): "lbf/in",
-    ("damping", "mm"): "N s/mm",
-}
-_EARTH = (9.7, 10.1)  # [m/s2]; what is written for the gravity of the earth
-_SLIP = 1000.0  # between m and mm
-_APART = 100.0  # a length that is farther from all others is probably one in another unit
-_FREE_APART = 20.0  # the same for free lengths, which are like the distances that springs span
-_NEAR = 2.0  # of the others' range, in which the length is then
-_FEWEST = 3  # other lengths that tell
 
 
 def unit_notes(mechanism: Mechanism) -> Iterator[str]:

@@ -17,6 +17,7 @@ _SAME = 1e-12  # of the size; points of a body closer than this coincide
 _ON_LINE = 1e-9  # [rad]; a point this close to a line is on it
 
 _Point = tuple[float, float]
+SAME_LENGTH = 1e-12  # of the sum of lengths; sums that differ by less are equal, such as 0.7 + 0.1 and 0.5 + 0.3
 
 
 class Place(NamedTuple):
@@ -343,9 +344,6 @@ def _cross(a: _Point, b: _Point, c: _Point, d: _Point) -> bool:
 
 def _distance(a: Place, b: Place) -> float:
     return math.hypot(b.x - a.x, b.y - a.y)
-
-
-SAME_LENGTH = 1e-12  # of the sum of lengths; sums that differ by less are equal, such as 0.7 + 0.1 and 0.5 + 0.3
 
 
 @dataclass(frozen=True)

@@ -221,24 +221,24 @@ def _refuse_other_formats(suffix: str, options: Options) -> None:
             raise click.UsageError(f"--svaj excludes {listed(map(_label, excluded))}")
 
 
-def _write_page(given: str, output: Path, settings: tuple[tuple[str, str], ...], options: Options) -> None:
+def _write_page(shown: str, output: Path, settings: tuple[tuple[str, str], ...], options: Options) -> None:
     """Write the page of a record, from start to stop, or of a mechanism."""
-    is_record = suffix_of(given) == RECORD
+    is_record = suffix_of(shown) == RECORD
     taken = ("start", "stop") if is_record else ("settings",)
     if suffix_of(output) not in PAGES or _others_than("run", "output", *taken):
         only = f"no other options than {'--start and --stop' if is_record else '--set'}"
         raise click.UsageError(
-            f"{given}: of a mechanism only a page (.html) is written, or with --cam a cam; a page has {only}; a "
-            f"table, plot or animation needs a record (.mcap){_record_command(given)}"
+            f"{shown}: of a mechanism only a page (.html) is written, or with --cam a cam; a page has {only}; a "
+            f"table, plot or animation needs a record (.mcap){_record_command(shown)}"
         )
     if is_record:
         from kinfmu.log import read
 
-        run = samples_between(read(Path(given)), options["start"], options["stop"])
+        run = samples_between(read(Path(shown)), options["start"], options["stop"])
         write_page(mechanism_of(run), output, run)
     else:
-        mechanism = checked_settings(gallery.load(given), settings).mechanism()
-        with errors_of(given):
+        mechanism = checked_settings(gallery.load(shown), settings).mechanism()
+        with errors_of(shown):
             write_page(mechanism, output)
 
 

@@ -98,7 +98,6 @@ def samples_between(run: Run, start: str | None, stop: str | None) -> Run:
     from kinfmu.run.axis import axis_of
 
     axis = axis_of(run)
-
     first = -math.inf if start is None else _place(run, "--start", start)
     last = math.inf if stop is None else _place(run, "--stop", stop)
     edge = 0.0
@@ -114,12 +113,12 @@ def samples_between(run: Run, start: str | None, stop: str | None) -> Run:
             asked = f"up to {last:g}{unit}"
         available = axis.range() or "none"
         raise RequestError(f"--start, --stop: the run has no samples {asked}; its samples: {available}")
-    kept = run.t[rows]
-    low, high = (first, last) if axis.is_time else (np.min(kept), np.max(kept))
+    times = run.t[rows]
+    low, high = (first, last) if axis.is_time else (np.min(times), np.max(times))
     return run.part(rows, events=tuple(event for event in run.events if low <= event.t <= high))
 
 
-def write_cam(given: str, output: Path, joint: str, settings: Sequence[tuple[str, str]], options: Options) -> str:
+def write_cam(shown: str, output: Path, joint: str, settings: Sequence[tuple[str, str]], options: Options) -> str:
     """Write the profile of a cam of a mechanism, or of the mechanism of a record; return the end of the message."""
     suffix = ".csv" if output == STANDARD_OUTPUT else suffix_of(output)
     if suffix not in CAM_FORMATS:
@@ -132,17 +131,17 @@ def write_cam(given: str, output: Path, joint: str, settings: Sequence[tuple[str
         raise click.UsageError(f"--tolerance {tolerance}: only for .dxf, not {suffix}")
     from kinfmu.analysis import cam_profile
 
-    if suffix_of(given) == ".mcap":
+    if suffix_of(shown) == ".mcap":
         from kinfmu.log import read
 
-        mechanism = mechanism_of(read(Path(given)))
+        mechanism = mechanism_of(read(Path(shown)))
     else:
-        mechanism = checked_settings(gallery.load(given), settings).mechanism()
+        mechanism = checked_settings(gallery.load(shown), settings).mechanism()
     unit = mechanism.length_unit
     within = None if tolerance is None else driver_value("--tolerance", tolerance, Quantity("length"), unit)
     if within is not None and not within > 0.0:
         raise click.UsageError(f"--tolerance {tolerance}: must be a positive length, such as 0.01{unit}")
-    with errors_of(given):
+    with errors_of(shown):
         try:
             profile = cam_profile(mechanism, joint)
         except RequestError as error:

@@ -11,7 +11,7 @@ derivatives in time; slopes are dz/du for one driver after another.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from kinfmu.codegen.c.model import curve_tables
@@ -20,6 +20,7 @@ from kinfmu.codegen.python.block_code import defined, matrix, tupled
 from kinfmu.codegen.python.stage import OF_NUMBERS, given_symbols, has_roots, stage_curves, stage_lines
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.efforts import load_inputs
 from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.steps import LinearSolve, derivative_name, law_symbol
 from kinfmu.plan.trace import parameter_symbol
@@ -27,11 +28,11 @@ from kinfmu.solver.python.curve import CurveData
 
 STAGES = ("forces", "reactions", "shaking")  # each is a part of the FMU's variables and a function of its own
 ARGUMENTS = ("time", "u", "ud", "udd", "z", "zd", "zdd", "slopes", "efforts", "parameters")
-
-
-def load_inputs(plan: SolvePlan) -> tuple[str, ...]:
-    """Return the names of the inputs that give efforts of external loads."""
-    return tuple(name for load in plan.mechanism.loads for name in load.inputs())
+SIGNATURE = (
+    "void kf_{stage}(double time, const double *u, const double *ud, const double *udd, const double *z,\n"
+    "         const double *zd, const double *zdd, const double *slopes, const double *efforts,\n"
+    "         const double *parameters, double *forces)"
+)
 
 
 def places_of_symbols(plan: SolvePlan, *, are_loads_open: bool = True) -> dict[str, str]:
@@ -53,11 +54,11 @@ def places_of_symbols(plan: SolvePlan, *, are_loads_open: bool = True) -> dict[s
             places[derivative_name(name, k)] = f"slopes[{k * count + place}]"
     for k, driver in enumerate(plan.drivers):
         places |= {name: f"{u}[{k}]" for name, u in zip(driver.inputs, ("u", "ud", "udd"), strict=True)}
-    places |= {name: f"efforts[{k}]" for k, name in enumerate(load_inputs(plan))}
-    first = len(load_inputs(plan))
+    external = load_inputs(plan)
+    places |= {name: f"efforts[{k}]" for k, name in enumerate(external)}
     places |= {
-        law_symbol(constant.name): f"efforts[{first + k}]" if are_loads_open else repr(constant.value)
-        for k, constant in enumerate(plan.load_constants)
+        law_symbol(constant.name): f"efforts[{k}]" if are_loads_open else repr(constant.value)
+        for k, constant in enumerate(plan.load_constants, start=len(external))
     }
     return places | {
         parameter_symbol(parameter.name): f"parameters[{k}]" for k, parameter in enumerate(plan.parameters)
@@ -94,13 +95,17 @@ def load_forces(plan: SolvePlan, steps: ForceSteps) -> Callable[..., tuple[float
 
 
 def _python_function(plan: SolvePlan, steps: ForceSteps, curves: Mapping[CurveData, str]) -> list[str]:
-    places, given = places_of_symbols(plan), given_symbols(steps)
-    lines, expressions = stage_lines(steps, given, curves, _solve)
-    values = iter(expressions)
-    results = ["0.0" if node.constant == 0.0 else next(values) for node in steps.results]
-    read = [f"{identifier(name)} = {places[name]}" for name in given if identifier(name) != places[name]]
+    places, symbols = places_of_symbols(plan), given_symbols(steps)
+    lines, expressions = stage_lines(steps, symbols, curves, _solve)
+    read = [f"{identifier(name)} = {places[name]}" for name in symbols if identifier(name) != places[name]]
     head, about = f"forces({', '.join(ARGUMENTS)})", "FORCES of one sample, in SI units."
-    return defined(head, about, [*read, *lines], tupled(results))
+    return defined(head, about, [*read, *lines], tupled(_results(steps, expressions)))
+
+
+def _results(steps: ForceSteps, expressions: Iterable[str]) -> list[str]:
+    """Return all results of a stage as text; those that are always 0 have no expression."""
+    values = iter(expressions)
+    return ["0.0" if node.constant == 0.0 else next(values) for node in steps.results]
 
 
 def solves(steps: ForceSteps) -> bool:
@@ -131,13 +136,6 @@ def emit_jumps(plan: SolvePlan) -> str:
     )
 
 
-SIGNATURE = (
-    "void kf_{stage}(double time, const double *u, const double *ud, const double *udd, const double *z,\n"
-    "         const double *zd, const double *zdd, const double *slopes, const double *efforts,\n"
-    "         const double *parameters, double *forces)"
-)
-
-
 def emit_c_forces(plan: SolvePlan, steps: ForceSteps, stage: str = "forces", *, are_loads_open: bool = True) -> str:
     """Return the text of a stage; linear systems of three and more unknowns are left to `kf_solutions`.
 
@@ -148,7 +146,7 @@ def emit_c_forces(plan: SolvePlan, steps: ForceSteps, stage: str = "forces", *, 
         are_loads_open: Constants of the laws of loads can be set: they follow the efforts of external loads.
 
     """
-    places, given = places_of_symbols(plan, are_loads_open=are_loads_open), given_symbols(steps)
+    places, symbols = places_of_symbols(plan, are_loads_open=are_loads_open), given_symbols(steps)
     curves = {data: f"&{name.lower()}" for data, name in stage_curves(steps).items()}
     buffers: list[str] = []
 
@@ -161,10 +159,9 @@ def emit_c_forces(plan: SolvePlan, steps: ForceSteps, stage: str = "forces", *, 
         call = f"kf_solutions({m}, {k}, {count}, a{at}, b{at}, factors{at}, x{at})"
         return [*lines, call, *(f"{name} = x{at}[{n}]" for n, name in enumerate(names))]
 
-    lines, found = stage_lines(steps, given, curves, solve, FUNCTIONS)
-    values = iter(found)
-    results = ["0.0" if node.constant == 0.0 else next(values) for node in steps.results]
-    body = [f"{identifier(name)} = {places[name]}" for name in given if identifier(name) != places[name]]
+    lines, expressions = stage_lines(steps, symbols, curves, solve, FUNCTIONS)
+    results = _results(steps, expressions)
+    body = [f"{identifier(name)} = {places[name]}" for name in symbols if identifier(name) != places[name]]
     body += lines
     body += [
         f"forces[{k}] = {result}; /* {name} */"

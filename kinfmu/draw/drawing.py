@@ -93,20 +93,20 @@ def figure(
 def sheet_of(shown: Instant, ax: Axes | None = None, more: Sequence[Mark] = ()) -> Sheet:
     """Return the sheet with everything and `more` drawn on it; default: in a figure of its own; needs matplotlib."""
     mechanism = shown.mechanism
-    found = placed(shown, shapes(shown))
+    in_world = placed(shown, shapes(shown))
     arrows, places, tracks = motion(shown), pins(shown), paths(shown)
-    reach = np.vstack([extent(found), *(mark.extent() for mark in (*arrows, *places, *tracks, *more))])
+    reach = np.vstack([extent(in_world), *(mark.extent() for mark in (*arrows, *places, *tracks, *more))])
     size = float(np.ptp(reach, axis=0).max())
-    sheet = Sheet(reach, shortest(found, size), mechanism.length_unit, mechanism.title or mechanism.name, ax)
+    sheet = Sheet(reach, shortest(in_world, size), mechanism.length_unit, mechanism.title or mechanism.name, ax)
     texts = {load.name: load_text(load) for load in mechanism.loads}
-    names = draw(sheet, found, tracks, [*arrows, *places, *gaps(shown), *more], texts)
+    names = draw(sheet, in_world, tracks, [*arrows, *places, *gaps(shown), *more], texts)
     names += gravity(sheet, mechanism)
     notes = [text for text in (gap_note(shown), pose_note(shown), *_face_notes(shown)) if text]
     if len(names) <= MOST_NAMES:
         place(names, sheet)
     else:
         notes.append(f"{len(names)} names left out")
-    missing = _not_drawn(mechanism, found)
+    missing = _not_drawn(mechanism, in_world)
     if missing:
         notes.append(f"not drawn: {listed(missing)}")
     sheet.note("; ".join(notes))
@@ -115,7 +115,7 @@ def sheet_of(shown: Instant, ax: Axes | None = None, more: Sequence[Mark] = ()) 
 
 def draw(
     sheet: Sheet,
-    found: Sequence[Shape],
+    in_world: Sequence[Shape],
     tracks: Sequence[Mark],
     above: Sequence[Mark],
     loads: Mapping[str, str] | None = None,
@@ -124,7 +124,7 @@ def draw(
 
     loads: texts next to loads, by name.
     """
-    painter = Painter(sheet, found)
+    painter = Painter(sheet, in_world)
     painter.wheels()
     painter.cams()
     painter.ground()
@@ -149,27 +149,27 @@ def _face_notes(shown: Instant) -> Iterator[str]:
             yield f"{shape.joint}: contact {distance} {shown.mechanism.length_unit} from {points[shape.joint]}"
 
 
-def _not_drawn(mechanism: Mechanism, found: Sequence[Shape]) -> list[str]:
+def _not_drawn(mechanism: Mechanism, in_world: Sequence[Shape]) -> list[str]:
     """Return the names of joints that are not drawn, such as a held angle, or wheels without pins."""
-    drawn = {shape.name for shape in found if shape.kind in ("contact", "pitch")}
+    drawn = {shape.name for shape in in_world if shape.kind in ("contact", "pitch")}
     joints = [joint for joint in mechanism.joints if not isinstance(joint, _ALWAYS_DRAWN)]
     return [joint.name for joint in joints if joint.name not in drawn]
 
 
-def placed(shown: Instant, found: Sequence[Shape]) -> list[Shape]:
+def placed(shown: Instant, in_world: Sequence[Shape]) -> list[Shape]:
     """Return shapes in the world as drawn."""
     poses = {name: pose[0] for name, pose in shown.frames.items()}
-    return [shape.placed(poses) for shape in found]
+    return [shape.placed(poses) for shape in in_world]
 
 
-def extent(found: Sequence[Shape]) -> FloatArray:
+def extent(in_world: Sequence[Shape]) -> FloatArray:
     """Return world coordinates (k, 2) that must be on the sheet; a cylinder's rod may project behind its barrel."""
-    return np.vstack([shape.points[-1:] if shape.kind == "shaft" else shape.line for shape in found])
+    return np.vstack([shape.points[-1:] if shape.kind == "shaft" else shape.line for shape in in_world])
 
 
-def shortest(found: Sequence[Shape], size: float) -> float:
+def shortest(in_world: Sequence[Shape], size: float) -> float:
     """Return the length of the shortest link of a figure, `size` if there is none."""
-    steps = [np.diff(shape.points, axis=0) for shape in found if shape.kind in ("link", "bar")]
+    steps = [np.diff(shape.points, axis=0) for shape in in_world if shape.kind in ("link", "bar")]
     lengths = [length for step in steps for length in np.hypot(*step.T) if length > 1e-3 * size]
     return float(min(lengths, default=size))
 
@@ -186,15 +186,15 @@ def _anchors(load: Shape, symbol: FloatArray) -> FloatArray:
 class Painter:
     """Shapes of the world that are painted on a sheet, each kind by a method; `names` collects the names to place."""
 
-    def __init__(self, sheet: Sheet, found: Sequence[Shape]) -> None:
+    def __init__(self, sheet: Sheet, in_world: Sequence[Shape]) -> None:
         self.names: list[Name] = []
-        self._sheet, self._found = sheet, found
+        self._sheet, self._shapes = sheet, in_world
         self._width = BAR * sheet.fine  # [pt], of a link
-        self._guides = guides_of_cams(found)
+        self._guides = guides_of_cams(in_world)
         self._racks = {rack.name for rack in self._all("rack")}
 
     def _all(self, *kinds: str) -> list[Shape]:
-        return [shape for shape in self._found if shape.kind in kinds]
+        return [shape for shape in self._shapes if shape.kind in kinds]
 
     def wheels(self) -> None:
         """Paint gear pairs and belts, larger wheels first."""
@@ -345,7 +345,7 @@ class Painter:
     def loads(self, texts: Mapping[str, str]) -> None:
         """Paint the symbols of loads with their texts by name; none for a load without a text."""
         sheet = self._sheet
-        for load in self._found:
+        for load in self._shapes:
             if not load.strips:
                 continue
             places = []

@@ -179,8 +179,7 @@ class Turn(Mark):
 
     def draw(self, sheet: Sheet) -> list[Name]:
         route = self._route(sheet)
-        _arrow(sheet, route, _STROKE, _HEAD * sheet.ornament, COLOUR, 1.5)
-        return [Name(self.text, route[[len(route) // 2, -1, 0]], 4.0, COLOUR, rank=1)]
+        return _driving_arrow(sheet, route, self.text, route[[len(route) // 2, -1, 0]])
 
     def _route(self, sheet: Sheet) -> FloatArray:
         """Return the arc that covers least; the first one compared begins just ahead of the body."""
@@ -204,8 +203,7 @@ class Push(Mark):
 
     def draw(self, sheet: Sheet) -> list[Name]:
         route = self._route(sheet)
-        _arrow(sheet, route, _STROKE, _HEAD * sheet.ornament, COLOUR, 1.5)
-        return [Name(self.text, np.array([route.mean(axis=0), *route[::-1]]), 4.0, COLOUR, rank=1)]
+        return _driving_arrow(sheet, route, self.text, np.array([route.mean(axis=0), *route[::-1]]))
 
     def _route(self, sheet: Sheet) -> FloatArray:
         size = sheet.ornament
@@ -265,8 +263,8 @@ def value_text(shown: Instant, driver: Driver, value: float) -> str:
 
 def _heading(shown: Instant, body: str, centre: FloatArray) -> float:
     """Return the angle [rad] of the line from a pin to the point of the body furthest from it."""
-    found = next(one for one in shown.mechanism.bodies if one.name == body)
-    vectors = [shown.point(f"{body}.{name}") - centre for name in found.points]
+    points = next(member.points for member in shown.mechanism.bodies if member.name == body)
+    vectors = [shown.point(f"{body}.{name}") - centre for name in points]
     furthest = max(vectors, key=lambda vector: float(np.hypot(*vector)), default=np.zeros(2))
     return math.atan2(furthest[1], furthest[0]) if furthest.any() else shown.angle(body)
 
@@ -280,6 +278,12 @@ def _freest(sheet: Sheet, routes: list[FloatArray]) -> FloatArray:
         near = np.hypot(*(covered[None, :, :2] - dots[:, None, :]).transpose(2, 0, 1)) < 5.0  # [pt]
         costs.append(round(float((near * covered[:, 2]).sum()), 6) + 0.6 * k)
     return routes[int(np.argmin(costs))]
+
+
+def _driving_arrow(sheet: Sheet, route: FloatArray, text: str, anchors: FloatArray) -> list[Name]:
+    """Draw the arrow of a driver, and return its name with the places for it."""
+    _arrow(sheet, route, _STROKE, _HEAD * sheet.ornament, COLOUR, 1.5)
+    return [Name(text, anchors, 4.0, COLOUR, rank=1)]
 
 
 def _arrow(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -75,18 +76,18 @@ def sheet_of(layout: PanelGrid, title: str) -> tuple[Figure, list[list[Axes]]]:
     lines = title_lines(title, width - 2.0 * EDGE)
     top = EDGE + len(lines) * TITLE_LINE + 14.0
     height = top + layout.rows * layout.height + (layout.rows - 1) * down + layout.bottom
-    made = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
+    figure = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
     look: dict[str, Any] = {"fontsize": TITLE_FONT, "va": "top", "color": ink(INK), "parse_math": False}
-    made.text(EDGE / width, 1.0 - EDGE / height, "\n".join(lines), **look)
+    figure.text(EDGE / width, 1.0 - EDGE / height, "\n".join(lines), **look)
     panels = []
     for row in range(layout.rows):
         low = height - top - (row + 1) * layout.height - row * down
         left = [layout.left + column * (layout.width + across) for column in range(layout.columns)]
         size = (layout.width / width, layout.height / height)
-        panels.append([made.add_axes((x / width, low / height, *size)) for x in left])
-    for axes in (one for row in panels for one in row):
+        panels.append([figure.add_axes((x / width, low / height, *size)) for x in left])
+    for axes in chain(*panels):
         dress(axes, "")
-    return made, panels
+    return figure, panels
 
 
 def name_axes(axes: Axes, x: str, y: str) -> None:
@@ -130,9 +131,8 @@ def scatter_matrix(parameters: Sequence[Quantities], measures: Sequence[Quantiti
     count = len(columns)
     size = 86.0 if count > 4 else 110.0
     failed = ~np.all([np.isfinite(one.values) for one in measures], axis=0)
-    made, panels = sheet_of(PanelGrid(count, count, size, size, (10.0, 10.0), left=70.0, bottom=64.0), title)
+    figure, panels = sheet_of(PanelGrid(count, count, size, size, (10.0, 10.0), left=70.0, bottom=64.0), title)
     limits = [_limits(one.values) for one in columns]
-    step = -(-len(failed) // MOST_DOTS)
     for row, (vertical, line) in enumerate(zip(columns, panels, strict=True)):
         is_measure = row >= len(parameters)
         colour = ink(colour_of(row - len(parameters)) if is_measure else palette.on_white(palette.GROUND))
@@ -143,7 +143,7 @@ def scatter_matrix(parameters: Sequence[Quantities], measures: Sequence[Quantiti
             if row == column:
                 _histogram(axes, vertical.values, failed, colour)
             else:
-                _dots(axes, horizontal.values, vertical.values, failed, colour, step)
+                _dots(axes, horizontal.values, vertical.values, failed, colour)
             few_ticks(axes, 3, 3)
             is_last, is_first = row == count - 1, column == 0
             name_axes(axes, horizontal.label if is_last else "", vertical.label if is_first else "")
@@ -154,14 +154,14 @@ def scatter_matrix(parameters: Sequence[Quantities], measures: Sequence[Quantiti
             if is_last:
                 axes.xaxis.set_label_coords(0.5, -24.0 / size)
     if failed.any():
-        _name_failed(made, int(failed.sum()), len(failed))
-    return made
+        _name_failed(figure, int(failed.sum()), len(failed))
+    return figure
 
 
 def scatter_into(axes: Axes, parameter: Quantities, measure: Quantities) -> None:
     """Draw a measure over a parameter, a dot for each design that has a value."""
     failed = ~np.isfinite(measure.values)
-    _dots(axes, parameter.values, measure.values, failed, ink(colour_of(0)), -(-len(failed) // MOST_DOTS))
+    _dots(axes, parameter.values, measure.values, failed, ink(colour_of(0)))
     axes.set_xlim(_limits(parameter.values))
     axes.set_ylim(_limits(measure.values))
     name_axes(axes, parameter.label, measure.label)
@@ -169,43 +169,43 @@ def scatter_into(axes: Axes, parameter: Quantities, measure: Quantities) -> None
 
 def _limits(values: FloatArray) -> tuple[float, float]:
     """Return the ends of the axis of a column."""
-    known = values[np.isfinite(values)]
-    if not len(known):
+    numbers = values[np.isfinite(values)]
+    if not len(numbers):
         return 0.0, 1.0
-    low, high = float(known.min()), float(known.max())
+    low, high = float(numbers.min()), float(numbers.max())
     edge = _EDGE * (high - low) or max(_EDGE * abs(high), 1e-9)
     return low - edge, high + edge
 
 
 def _histogram(axes: Axes, values: FloatArray, failed: NDArray[np.bool_], colour: Any) -> None:
     """Draw how many designs have which value, with an axis of its own; failed ones on top."""
-    own = axes.twinx()
-    own.set_axis_off()
+    overlaid = axes.twinx()
+    overlaid.set_axis_off()
     known = np.isfinite(values)
     parts = [(values[known & ~failed], colour), (values[known & failed], ink(FAILED))]
     parts = [part for part in parts if len(part[0])]
     if parts:
         look: dict[str, Any] = {"edgecolor": "white", "linewidth": 0.3, "stacked": True, "bins": _BINS}
-        own.hist([part[0] for part in parts], color=[part[1] for part in parts], **look)
+        overlaid.hist([part[0] for part in parts], color=[part[1] for part in parts], **look)
 
 
-def _dots(axes: Axes, x: FloatArray, y: FloatArray, failed: NDArray[np.bool_], colour: Any, step: int) -> None:
+def _dots(axes: Axes, x: FloatArray, y: FloatArray, failed: NDArray[np.bool_], colour: Any) -> None:
     """Draw a dot for each design, a cross for each that failed, where both numbers are known."""
     known = np.isfinite(x) & np.isfinite(y)
-    rasterized = len(x) > _BINS**2
+    rasterized, step = len(x) > _BINS**2, -(-len(x) // MOST_DOTS)
     bad, good = known & failed, known & ~failed
     if bad.any():
         axes.scatter(x[bad][::step], y[bad][::step], color=ink(FAILED), rasterized=rasterized, **_CROSS)
     axes.scatter(x[good][::step], y[good][::step], color=colour, rasterized=rasterized, s=3.0, linewidths=0.0)
 
 
-def _name_failed(made: Figure, failed: int, count: int) -> None:
+def _name_failed(figure: Figure, failed: int, count: int) -> None:
     """Write below the panels what a cross is."""
     from matplotlib.lines import Line2D
 
     cross = Line2D([], [], color=ink(FAILED), marker="x", linestyle="none", markersize=4.0, markeredgewidth=0.8)
     text = f"a measure has no value: {failed} of {count} designs"
-    made.legend([cross], [text], loc="lower left", fontsize=SMALL, frameon=False, labelcolor=ink(GREY))
+    figure.legend([cross], [text], loc="lower left", fontsize=SMALL, frameon=False, labelcolor=ink(GREY))
 
 
 def contours(x: Quantities, y: Quantities, measures: Sequence[Quantities], title: str) -> Figure:
@@ -220,8 +220,8 @@ def contours(x: Quantities, y: Quantities, measures: Sequence[Quantities], title
     """
     columns = min(_ABREAST, len(measures))
     layout = PanelGrid(-(-len(measures) // columns), columns, WIDTH, HEIGHT, (118.0, 56.0), left=52.0, right=66.0)
-    made, panels = sheet_of(layout, title)
-    every = [axes for row in panels for axes in row]
+    figure, panels = sheet_of(layout, title)
+    every = list(chain(*panels))
     for axes in every[len(measures) :]:
         axes.remove()
     for measure, axes in zip(measures, every, strict=False):
@@ -229,8 +229,8 @@ def contours(x: Quantities, y: Quantities, measures: Sequence[Quantities], title
         filled = _fill(axes, x, y, measure)
         if filled is not None:
             place = (box.x1 + 8.0 / WIDTH * box.width, box.y0, _SCALE_WIDTH / WIDTH * box.width, box.height)
-            _scale(made, filled, cax=made.add_axes(place))
-    return made
+            _scale(figure, filled, cax=figure.add_axes(place))
+    return figure
 
 
 def contours_into(axes: Axes, x: Quantities, y: Quantities, measure: Quantities) -> None:
@@ -243,11 +243,12 @@ def contours_into(axes: Axes, x: Quantities, y: Quantities, measure: Quantities)
 def _fill(axes: Axes, x: Quantities, y: Quantities, measure: Quantities) -> Any:
     """Draw the contours of a measure and return them; None if there are none."""
     axes.grid(visible=False)
-    known, filled = np.ma.masked_invalid(measure.values.T), None
-    if known.count() and np.ptp(known.compressed()) > 1e-12 * np.abs(known.compressed()).max():
-        filled = axes.contourf(x.values, y.values, known, levels=_LEVELS, cmap="viridis")
+    table, filled = np.ma.masked_invalid(measure.values.T), None
+    numbers = table.compressed()
+    if len(numbers) and np.ptp(numbers) > 1e-12 * np.abs(numbers).max():
+        filled = axes.contourf(x.values, y.values, table, levels=_LEVELS, cmap="viridis")
     else:
-        text = f"{known.compressed()[0]:.6g} everywhere" if known.count() else "no values"
+        text = f"{numbers[0]:.6g} everywhere" if len(numbers) else "no values"
         axes.text(0.5, 0.5, text, fontsize=SMALL, ha="center", transform=axes.transAxes, color=ink(GREY))
     axes.set_xlim(*_ends(x.values))
     axes.set_ylim(*_ends(y.values))
@@ -278,7 +279,7 @@ def response(over: Quantities, measures: Sequence[Quantities], title: str) -> Fi
         title: Title of the figure.
 
     """
-    made, panels = sheet_of(PanelGrid(len(measures), 1, 360.0, 110.0, (0.0, 22.0)), title)
+    figure, panels = sheet_of(PanelGrid(len(measures), 1, 360.0, 110.0, (0.0, 22.0)), title)
     for k, (measure, (axes,)) in enumerate(zip(measures, panels, strict=True)):
         response_into(axes, over, measure, k)
         is_last = k == len(measures) - 1
@@ -286,7 +287,7 @@ def response(over: Quantities, measures: Sequence[Quantities], title: str) -> Fi
         few_ticks(axes, None, 4)
         axes.yaxis.set_label_coords(-44.0 / 360.0, 0.5)
         axes.tick_params(labelbottom=is_last)
-    return made
+    return figure
 
 
 def response_into(axes: Axes, over: Quantities, measure: Quantities, place: int = 0) -> None:
@@ -323,13 +324,13 @@ def contributions(measures: Sequence[Contributed], title: str) -> Figure:
     """
     most = max([min(len(one.parts), MOST_BARS) for one in measures] + [1])
     layout = PanelGrid(len(measures), 1, 330.0, most * _BAR + 4.0, (0.0, 40.0), left=100.0, right=48.0)
-    made, panels = sheet_of(layout, title)
+    figure, panels = sheet_of(layout, title)
     for k, (measure, (axes,)) in enumerate(zip(measures, panels, strict=True)):
         contributions_into(axes, measure, k, most)
         if k < len(measures) - 1:
             axes.tick_params(labelbottom=False)
             name_axes(axes, "", "")
-    return made
+    return figure
 
 
 def contributions_into(axes: Axes, measure: Contributed, place: int = 0, most: int = 0) -> None:

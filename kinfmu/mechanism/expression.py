@@ -1,4 +1,4 @@
-"""Arithmetic expressions of parameters, such as "2*a + 5 mm", parsed to steps; Python never evaluates their texts.
+"""Expression: arithmetic of parameters, such as "2*a + 5 mm", parsed to steps; Python never evaluates the text.
 
     sum     = ["+" | "-"] product { ("+" | "-") product }
     product = power { ("*" | "/") power }             each factor may have a sign
@@ -37,6 +37,165 @@ from kinfmu.units import every_unit, spelled
 LONGEST = 1000  # characters
 DEEPEST = 40  # parentheses within parentheses
 LARGEST_POWER = 20  # exponent; a polynomial of a higher degree loses its digits to rounding
+_TOKEN = re.compile(
+    r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
+    r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<sign>\*\*|[-+*/(),])"
+)
+_WORD = r"(?:[A-Za-z_][A-Za-z0-9_]*|\N{DEGREE SIGN})"
+_UNIT = re.compile(rf"[ \t]*({_WORD}((?: {_WORD}){{0,2}}))(/{_WORD})?")  # the longest has three words, 'N m s/rad'
+_SIGNS_IN_UNIT = re.compile(r"[ \t]*([^\W\d][^+,()-]*)")
+_PLAIN_SIGNS = str.maketrans(
+    {"^": "", "\N{SUPERSCRIPT TWO}": "2", "\N{SUPERSCRIPT THREE}": "3", "\N{MIDDLE DOT}": " ", "\N{DOT OPERATOR}": " "}
+)
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, repr=False)
+class Expression:
+    """An expression of parameters, parsed once.
+
+    Two expressions are equal if text and unit are equal.
+
+    Args:
+        text: Such as "2*a + 5 mm".
+        length_unit: Unit of length of the mechanism; lengths with other units are converted to it. Default: 'm'.
+        steps: The operations in postfix order. Default: those that the text gives.
+        is_converted: True if the steps convert between SI units and the unit of length (see `conversion`).
+
+    Raises:
+        MechanismError: The text is not an expression; the message states the position.
+
+    """
+
+    text: str
+    length_unit: str = "m"
+    steps: tuple[ExpressionStep, ...] = field(default=(), compare=False)
+    is_converted: bool = field(default=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "text", self.text.strip(" \t"))
+        if not self.steps:
+            object.__setattr__(self, "steps", steps_of(self.text, self.length_unit))
+
+    def __repr__(self) -> str:
+        return f"Expression({self.text!r})"
+
+    def __add__(self, shift: float) -> Expression:
+        """Return the expression plus a length, such as a shift of the origin."""
+        end = len(self.text)
+        steps = (*self.steps, ExpressionStep("number", end, shift), ExpressionStep("+", end))
+        return Expression(f"({self.text}) + {shift!r}", self.length_unit, steps)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The parameters in it, each once, in their order."""
+        return tuple(dict.fromkeys(step.value for step in self.steps if step.operation == "name"))
+
+    @property
+    def alone(self) -> str | None:
+        """The name of the parameter if it is the whole expression, else None."""
+        return self.steps[0].value if len(self.steps) == 1 and self.names else None
+
+    @property
+    def alone_or_negative(self) -> str | None:
+        """The name of the parameter if the expression is only it and its sign, else None."""
+        first, *signs = self.steps
+        return first.value if first.operation == "name" and all(one.operation == "sign" for one in signs) else None
+
+    @property
+    def literal(self) -> ExpressionStep | None:
+        """The number if the expression is only a number with its sign and unit, else None."""
+        number, *signs = self.steps
+        if number.operation != "number" or any(step.operation != "sign" for step in signs):
+            return None
+        return number._replace(value=-number.value if len(signs) % 2 else number.value)
+
+    def value(self, values: Mapping[str, Value]) -> Value:
+        """Return the value of the expression.
+
+        Args:
+            values: Values of the parameters by name, in any arithmetic: floats, symbols, Taylor numbers.
+
+        Raises:
+            MechanismError: A name without a value, a division by zero, a root of a negative number, or a number that
+                is too large; the message states the position.
+
+        """
+
+        def leaf(step: ExpressionStep) -> Value:
+            if step.operation == "number":
+                return step.value
+            if step.value not in values:
+                raise self._unknown(step, values)
+            return values[step.value]
+
+        def apply(step: ExpressionStep, operands: Sequence[Value]) -> Value:
+            try:
+                result = OPERATIONS[step.operation].value(*operands, *step.exponent)
+                if isinstance(result, float) and not math.isfinite(result):
+                    raise OverflowError
+            except ZeroDivisionError:
+                raise error_at(self.text, step.at, "division by zero") from None
+            except OverflowError:
+                raise error_at(self.text, step.at, "the number is too large") from None
+            except ValueError:
+                what = f"{step.operation} of {quoted(operands[-1])} is undefined"
+                raise error_at(self.text, step.at, what) from None
+            return result
+
+        return self.evaluated(leaf, apply)
+
+    def dimension(self, dimensions: Mapping[str, Dimension]) -> Dimension:
+        """Return the dimension of the expression, or raise a MechanismError where dimensions are incompatible."""
+
+        def leaf(step: ExpressionStep) -> Dimension:
+            return step.dimension if step.operation == "number" else dimensions.get(step.value, UNKNOWN)
+
+        def apply(step: ExpressionStep, operands: Sequence[Dimension]) -> Dimension:
+            try:
+                return OPERATIONS[step.operation].dimension(*operands, *step.exponent)
+            except DimensionError as error:
+                raise error_at(self.text, step.at, f"'{step.operation}': {error}") from None
+
+        return self.evaluated(leaf, apply)
+
+    def evaluated(self, leaf: Callable[[ExpressionStep], T], apply: Callable[[ExpressionStep, Sequence[T]], T]) -> T:
+        """Return the result of the steps: what `leaf` makes of numbers and names, and `apply` of operands."""
+        stack: list[T] = []
+        for step in self.steps:
+            if step.operation in ("number", "name"):
+                stack.append(leaf(step))
+            else:
+                first = len(stack) - OPERATIONS[step.operation].arity
+                stack[first:] = [apply(step, stack[first:])]
+        return stack[0]
+
+    def refuse_unknown(self, names: Collection[str]) -> None:
+        """Raise a MechanismError for the first name that is not among `names`."""
+        for step in self.steps:
+            if step.operation == "name" and step.value not in names:
+                raise self._unknown(step, names)
+
+    def _unknown(self, step: ExpressionStep, names: Iterable[str]) -> MechanismError:
+        names = list(names)
+        what = f"no parameter '{step.value}'{suggestion(step.value, [*names, *WORDS])}; parameters: {listed(names)}"
+        return error_at(self.text, step.at, what)
+
+
+class Computed(float):
+    """A float with the expression from which it was computed."""
+
+    __slots__ = ("expression",)
+
+    expression: Expression
+
+    def __new__(cls, value: float, expression: Expression) -> Computed:
+        number = super().__new__(cls, value)
+        number.expression = expression
+        return number
+
+    def __getnewargs__(self) -> tuple[float, Expression]:  # type: ignore[override]  # for copies
+        return float(self), self.expression
 
 
 def steps_of(text: str, length_unit: str) -> tuple[ExpressionStep, ...]:
@@ -61,19 +220,6 @@ class _Token(NamedTuple):
     kind: str  # "number", "name", "sign", "end"
     text: str
     at: int
-
-
-_TOKEN = re.compile(
-    r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
-    r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<sign>\*\*|[-+*/(),])"
-)
-_WORD = r"(?:[A-Za-z_][A-Za-z0-9_]*|\N{DEGREE SIGN})"
-_UNIT = re.compile(rf"[ \t]*({_WORD}((?: {_WORD}){{0,2}}))(/{_WORD})?")  # the longest has three words, 'N m s/rad'
-
-_SIGNS_IN_UNIT = re.compile(r"[ \t]*([^\W\d][^+,()-]*)")
-_PLAIN_SIGNS = str.maketrans(
-    {"^": "", "\N{SUPERSCRIPT TWO}": "2", "\N{SUPERSCRIPT THREE}": "3", "\N{MIDDLE DOT}": " ", "\N{DOT OPERATOR}": " "}
-)
 
 
 class _Parser:
@@ -227,159 +373,8 @@ class _Parser:
 
     def _wrong(self, valid: str) -> MechanismError:
         token = self._token
-        found = {"end": "the end", "character": quoted(token.text)}.get(token.kind, f"'{token.text}'")
+        read = {"end": "the end", "character": quoted(token.text)}.get(token.kind, f"'{token.text}'")
         near = suggestion(token.text, self._units) if token.kind == "character" else ""  # a degree or inch sign
         if re.fullmatch(r"\d,\d", self._text[max(0, token.at - 1) : token.at + 2]):
             near = "; a decimal has a point, not a comma"
-        return error_at(self._text, token.at, f"expected {valid}, found {found}{near}")
-
-
-T = TypeVar("T")
-
-
-@dataclass(frozen=True, repr=False)
-class Expression:
-    """An expression of parameters, parsed once.
-
-    Two expressions are equal if text and unit are equal.
-
-    Args:
-        text: Such as "2*a + 5 mm".
-        length_unit: Unit of length of the mechanism; lengths with other units are converted to it. Default: 'm'.
-        steps: The operations in postfix order. Default: those that the text gives.
-        is_converted: True if the steps convert between SI units and the unit of length (see `conversion`).
-
-    Raises:
-        MechanismError: The text is not an expression; the message states the position.
-
-    """
-
-    text: str
-    length_unit: str = "m"
-    steps: tuple[ExpressionStep, ...] = field(default=(), compare=False)
-    is_converted: bool = field(default=False, compare=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "text", self.text.strip(" \t"))
-        if not self.steps:
-            object.__setattr__(self, "steps", steps_of(self.text, self.length_unit))
-
-    def __repr__(self) -> str:
-        return f"Expression({self.text!r})"
-
-    def __add__(self, shift: float) -> Expression:
-        """Return the expression plus a length, such as a shift of the origin."""
-        end = len(self.text)
-        steps = (*self.steps, ExpressionStep("number", end, shift), ExpressionStep("+", end))
-        return Expression(f"({self.text}) + {shift!r}", self.length_unit, steps)
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """The parameters in it, each once, in their order."""
-        return tuple(dict.fromkeys(step.value for step in self.steps if step.operation == "name"))
-
-    @property
-    def alone(self) -> str | None:
-        """The name of the parameter if it is the whole expression, else None."""
-        return self.steps[0].value if len(self.steps) == 1 and self.names else None
-
-    @property
-    def alone_or_negative(self) -> str | None:
-        """The name of the parameter if the expression is only it and its sign, else None."""
-        first, *signs = self.steps
-        return first.value if first.operation == "name" and all(one.operation == "sign" for one in signs) else None
-
-    @property
-    def literal(self) -> ExpressionStep | None:
-        """The number if the expression is only a number with its sign and unit, else None."""
-        number, *signs = self.steps
-        if number.operation != "number" or any(step.operation != "sign" for step in signs):
-            return None
-        return number._replace(value=-number.value if len(signs) % 2 else number.value)
-
-    def value(self, values: Mapping[str, Value]) -> Value:
-        """Return the value of the expression.
-
-        Args:
-            values: Values of the parameters by name, in any arithmetic: floats, symbols, Taylor numbers.
-
-        Raises:
-            MechanismError: A name without a value, a division by zero, a root of a negative number, or a number that
-                is too large; the message states the position.
-
-        """
-
-        def leaf(step: ExpressionStep) -> Value:
-            if step.operation == "number":
-                return step.value
-            if step.value not in values:
-                raise self._unknown(step, values)
-            return values[step.value]
-
-        def apply(step: ExpressionStep, operands: Sequence[Value]) -> Value:
-            try:
-                result = OPERATIONS[step.operation].value(*operands, *step.exponent)
-                if isinstance(result, float) and not math.isfinite(result):
-                    raise OverflowError
-            except ZeroDivisionError:
-                raise error_at(self.text, step.at, "division by zero") from None
-            except OverflowError:
-                raise error_at(self.text, step.at, "the number is too large") from None
-            except ValueError:
-                what = f"{step.operation} of {quoted(operands[-1])} is undefined"
-                raise error_at(self.text, step.at, what) from None
-            return result
-
-        return self.evaluated(leaf, apply)
-
-    def dimension(self, dimensions: Mapping[str, Dimension]) -> Dimension:
-        """Return the dimension of the expression, or raise a MechanismError where dimensions are incompatible."""
-
-        def leaf(step: ExpressionStep) -> Dimension:
-            return step.dimension if step.operation == "number" else dimensions.get(step.value, UNKNOWN)
-
-        def apply(step: ExpressionStep, operands: Sequence[Dimension]) -> Dimension:
-            try:
-                return OPERATIONS[step.operation].dimension(*operands, *step.exponent)
-            except DimensionError as error:
-                raise error_at(self.text, step.at, f"'{step.operation}': {error}") from None
-
-        return self.evaluated(leaf, apply)
-
-    def evaluated(self, leaf: Callable[[ExpressionStep], T], apply: Callable[[ExpressionStep, Sequence[T]], T]) -> T:
-        """Return the result of the steps: what `leaf` makes of numbers and names, and `apply` of operands."""
-        stack: list[T] = []
-        for step in self.steps:
-            if step.operation in ("number", "name"):
-                stack.append(leaf(step))
-            else:
-                first = len(stack) - OPERATIONS[step.operation].arity
-                stack[first:] = [apply(step, stack[first:])]
-        return stack[0]
-
-    def refuse_unknown(self, names: Collection[str]) -> None:
-        """Raise a MechanismError for the first name that is not among `names`."""
-        for step in self.steps:
-            if step.operation == "name" and step.value not in names:
-                raise self._unknown(step, names)
-
-    def _unknown(self, step: ExpressionStep, known: Iterable[str]) -> MechanismError:
-        known = list(known)
-        what = f"no parameter '{step.value}'{suggestion(step.value, [*known, *WORDS])}; parameters: {listed(known)}"
-        return error_at(self.text, step.at, what)
-
-
-class Computed(float):
-    """A float with the expression from which it was computed."""
-
-    __slots__ = ("expression",)
-
-    expression: Expression
-
-    def __new__(cls, value: float, expression: Expression) -> Computed:
-        number = super().__new__(cls, value)
-        number.expression = expression
-        return number
-
-    def __getnewargs__(self) -> tuple[float, Expression]:  # type: ignore[override]  # for copies
-        return float(self), self.expression
+        return error_at(self._text, token.at, f"expected {valid}, found {read}{near}")

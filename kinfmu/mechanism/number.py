@@ -72,21 +72,21 @@ def read_number(where: str, value: object, quantity: Quantity | None, length_uni
         is_as_written = value.length_unit == length_unit and not value.is_converted
         return value if is_as_written else Expression(value.text, length_unit)
     if isinstance(value, str):
-        known = factors(quantity, length_unit) if quantity else every_unit(length_unit)
+        units = factors(quantity, length_unit) if quantity else every_unit(length_unit)
         try:
             expression = _expression(value, length_unit)
         except MechanismError as error:
             plain = _PLAIN.fullmatch(value)
-            if plain and quantity and known:  # a number with a wrong unit, not an expression
-                raise _wrong_unit(where, value, plain[1], known) from None
+            if plain and quantity and units:  # a number with a wrong unit, not an expression
+                raise _wrong_unit(where, value, plain[1], units) from None
             raise expression_error(where, value, quantity, length_unit, error) from None
         literal = expression.literal
         if literal is None:
             return expression
-        if quantity and known and not literal.unit:
-            raise MechanismError(f"{where} = {quoted(value)}: text needs a unit, one of {listed(known)}")
-        if literal.unit and literal.unit not in known:
-            raise _wrong_unit(where, value, literal.unit, known)
+        if quantity and units and not literal.unit:
+            raise MechanismError(f"{where} = {quoted(value)}: text needs a unit, one of {listed(units)}")
+        if literal.unit and literal.unit not in units:
+            raise _wrong_unit(where, value, literal.unit, units)
         number = float(literal.value)
         if literal.unit and quantity:
             factor, (_, usual) = factors(quantity, length_unit)[literal.unit], every_unit(length_unit)[literal.unit]

@@ -24,6 +24,7 @@ from kinfmu.units import KINDS, METRES, Quantity, every_unit, length_power
 
 NUMBER = Quantity("number")
 _MOST_LISTED = 8  # names of a circle in a message
+MOST_PARAMETERS = 10_000
 
 
 @dataclass(frozen=True)
@@ -90,13 +91,13 @@ def resolve_parameters(parameters: Mapping[str, Parameter], alone: Mapping[str, 
     expressions: dict[str, Any] = {name: p.value for name, p in parameters.items() if isinstance(p.value, Expression)}
     order = in_order(parameters, expressions)
     quantities = {name: parameter.quantity for name, parameter in parameters.items()}
-    wanted = {name: set(alone.get(name, ())) for name in parameters}
+    needed = {name: set(alone.get(name, ())) for name in parameters}
     for name in reversed(order):
-        if quantities[name] is None and name not in expressions and len(wanted[name]) == 1:
-            (quantities[name],) = wanted[name]
+        if quantities[name] is None and name not in expressions and len(needed[name]) == 1:
+            (quantities[name],) = needed[name]
         other = expressions[name].alone_or_negative if name in expressions else None
         if other is not None:
-            wanted[other] |= wanted[name]
+            needed[other] |= needed[name]
     done: dict[str, Parameter] = {}
     values: dict[str, float] = {}
     dimensions: dict[str, Dimension] = {}
@@ -105,13 +106,13 @@ def resolve_parameters(parameters: Mapping[str, Parameter], alone: Mapping[str, 
         dimensions[name] = Dimension.of(quantity) if quantity and quantity != NUMBER else UNKNOWN
         if name in expressions:
             where, expression = f"[parameters] {name}", expressions[name]
-            found = dimension_of(where, expression, dimensions, dimensions[name])
-            if found.is_known and not found.is_open:
-                dimensions[name] = found
-                same = {one for one in wanted[name] if found.mass and Dimension.of(one).powers == found.powers}
-                quantity = quantity or (same.pop() if len(same) == 1 else found.quantity)  # torque, or its stiffness
-            elif quantity is None and len(wanted[name]) == 1:
-                (quantity,) = wanted[name]
+            result = dimension_of(where, expression, dimensions, dimensions[name])
+            if result.is_known and not result.is_open:
+                dimensions[name] = result
+                same = {one for one in needed[name] if result.mass and Dimension.of(one).powers == result.powers}
+                quantity = quantity or (same.pop() if len(same) == 1 else result.quantity)  # torque, or its stiffness
+            elif quantity is None and len(needed[name]) == 1:
+                (quantity,) = needed[name]
                 dimensions[name] = Dimension.of(quantity)
             expression = converted(where, expression, quantities, dimensions, quantity)
             done[name] = Parameter(compute(where, expression, values), quantity or NUMBER, parameter.description)
@@ -147,27 +148,27 @@ def compute(where: str, expression: Expression, values: Mapping[str, float]) -> 
 
 def dimensions_of(parameters: Mapping[str, Parameter]) -> dict[str, Dimension]:
     """Return the dimensions of resolved parameters; those of pure numbers are unknown unless computed."""
-    found: dict[str, Dimension] = {}
+    dimensions: dict[str, Dimension] = {}
     expressions = {name: p.expression for name, p in parameters.items() if p.expression is not None}
     for name in in_order(parameters, expressions):
         quantity = parameters[name].quantity
         if quantity is not None and quantity != NUMBER:
-            found[name] = Dimension.of(quantity)
+            dimensions[name] = Dimension.of(quantity)
         else:
-            found[name] = expressions[name].dimension(found) if name in expressions else UNKNOWN
-    return found
+            dimensions[name] = expressions[name].dimension(dimensions) if name in expressions else UNKNOWN
+    return dimensions
 
 
 def parameter_values(parameters: Mapping[str, Parameter], values: Mapping[str, Value]) -> dict[str, Value]:
     """Return the values of all parameters, in any arithmetic: those in `values`, and those computed from them."""
     expressions = {name: p.expression for name, p in parameters.items() if p.expression and name not in values}
-    found: dict[str, Value] = {}
+    results: dict[str, Value] = {}
     for name in in_order(parameters, expressions):
         if name in values:
-            found[name] = values[name]
+            results[name] = values[name]
         else:
-            found[name] = expressions[name].value(found) if name in expressions else float(parameters[name].value)
-    return found
+            results[name] = expressions[name].value(results) if name in expressions else float(parameters[name].value)
+    return results
 
 
 def in_order(names: Iterable[str], expressions: Mapping[str, Expression]) -> list[str]:
@@ -260,9 +261,6 @@ def _has_a_unit(expression: Expression, dimensions: Mapping[str, Dimension]) -> 
     known = [step.dimension for step in expression.steps if step.operation == "number"]
     known += [dimensions[name] for name in expression.names]
     return any(one.is_known and not one.is_open for one in known)
-
-
-MOST_PARAMETERS = 10_000
 
 
 class Resolved(NamedTuple):

@@ -1,4 +1,4 @@
-"""Documents: TOML and tables of two columns as text, their keys and values.
+"""Reading of TOML documents and of CSV tables of two columns.
 
 Messages about invalid text, and unknown, missing or wrong values, state the place and what is valid.
 """
@@ -31,6 +31,23 @@ _TOKEN = re.compile(
     r"""|[^\w"'#-]++""",
     re.DOTALL,
 )
+_OWN_KEYS = {  # keys by which files that name a mechanism differ
+    "fit": {"over", "unknowns", "targets", "constraints"},
+    "study": {"sampling", "designs", "seed", "report", "parameters", "measures", "run"},
+}
+_PLACE = re.compile(r"^(?P<what>.*?) ?\(at line (?P<line>\d+), column (?P<column>\d+)\)$", re.DOTALL)
+_KEY = r"""(?P<key>[A-Za-z0-9_."'-]+) *="""
+_TEXT = r"""(?P<value>(?:[+-]?[\d.]+ *(?:[*/+-] *)?)?[^\W\d][^,}\]#"'=]*)"""
+_HINTS = (  # what is found in the wrong line, and what to say; the first that is found counts
+    (rf"{_KEY} *(?P<value>[+-]?[0-9]+,[0-9]+)(?![\w.]|,\d)", "a decimal has a point, not a comma", "{key} = {point}"),
+    (rf"{_KEY} *\((?P<value>[^()]*)\)", "a list has brackets, not parentheses", "{key} = [{value}]"),
+    (rf"{_KEY} *(?P<value>True|TRUE|False|FALSE)\b", "written in small letters", "{key} = {small}"),
+    (rf"{_KEY} *{_TEXT}", "text, also a number with a unit, needs quotes", '{key} = "{value}"'),
+)
+_TWICE = re.compile(r"^Cannot (?:overwrite a value|declare .* twice|mutate immutable namespace)")
+_HEADER = re.compile(r"^ *\[+ *(?P<name>[^\[\]#]+?) *\]")
+_LONGEST = 80  # characters of a line in a message
+_DECIMAL = re.compile(r"\s*+[+-]?+(?:(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?+[0-9]++)?+|nan|inf)\s*+")
 
 
 def text_in(path: Path, what: str, where: str = "") -> str:
@@ -79,12 +96,6 @@ def _deep_key(text: str) -> int | None:
     return next((token.start() for token in _TOKEN.finditer(text) if token.lastgroup), None)
 
 
-_OWN_KEYS = {  # keys by which files that name a mechanism differ
-    "fit": {"over", "unknowns", "targets", "constraints"},
-    "study": {"sampling", "designs", "seed", "report", "parameters", "measures", "run"},
-}
-
-
 def table_keys(cls: type) -> list[str]:
     """Return the names of the keys of a joint, driver, load, measure or law; points of a spline can be in a `file`."""
     return [key.name for key in keys_of(cls)] + (["file"] if cls is Spline else [])
@@ -92,13 +103,13 @@ def table_keys(cls: type) -> list[str]:
 
 def class_of_type(where: str, table: Mapping[str, Any], key: str, classes: Iterable[Any]) -> Any:
     """Return the class whose `type` is the value of `key`."""
-    known = {cls.type: cls for cls in classes}
+    by_type = {cls.type: cls for cls in classes}
     if key not in table:
-        raise MechanismError(f"{where} needs the key '{key}', one of {listed(known)}")
-    word = text_of(f"{where} {key}", table[key], f"one of {listed(known)}")
-    if word not in known:
-        raise MechanismError(f"{where} {key} = {quoted(word)} is not known{valid_names(word, known)}")
-    return known[word]
+        raise MechanismError(f"{where} needs the key '{key}', one of {listed(by_type)}")
+    word = text_of(f"{where} {key}", table[key], f"one of {listed(by_type)}")
+    if word not in by_type:
+        raise MechanismError(f"{where} {key} = {quoted(word)} is not known{valid_names(word, by_type)}")
+    return by_type[word]
 
 
 def check_keys(where: str, table: Mapping[str, Any], known: Iterable[str]) -> None:
@@ -166,20 +177,6 @@ def text_of(where: str, value: object, valid: str = "text") -> str:
     return value
 
 
-_PLACE = re.compile(r"^(?P<what>.*?) ?\(at line (?P<line>\d+), column (?P<column>\d+)\)$", re.DOTALL)
-_KEY = r"""(?P<key>[A-Za-z0-9_."'-]+) *="""
-_TEXT = r"""(?P<value>(?:[+-]?[\d.]+ *(?:[*/+-] *)?)?[^\W\d][^,}\]#"'=]*)"""
-_HINTS = (  # what is found in the wrong line, and what to say; the first that is found counts
-    (rf"{_KEY} *(?P<value>[+-]?[0-9]+,[0-9]+)(?![\w.]|,\d)", "a decimal has a point, not a comma", "{key} = {point}"),
-    (rf"{_KEY} *\((?P<value>[^()]*)\)", "a list has brackets, not parentheses", "{key} = [{value}]"),
-    (rf"{_KEY} *(?P<value>True|TRUE|False|FALSE)\b", "written in small letters", "{key} = {small}"),
-    (rf"{_KEY} *{_TEXT}", "text, also a number with a unit, needs quotes", '{key} = "{value}"'),
-)
-_TWICE = re.compile(r"^Cannot (?:overwrite a value|declare .* twice|mutate immutable namespace)")
-_HEADER = re.compile(r"^ *\[+ *(?P<name>[^\[\]#]+?) *\]")
-_LONGEST = 80  # characters of a line in a message
-
-
 def explained(text: str, error: ValueError) -> str:
     """Return the message of an error of tomllib with the line's content and what to write, where that is known.
 
@@ -191,15 +188,15 @@ def explained(text: str, error: ValueError) -> str:
         One line, to follow 'not valid TOML: '.
 
     """
-    found = _PLACE.match(str(error))
+    place = _PLACE.match(str(error))
     lines = text.replace("\t", " ").split("\n")
-    if found is None or not 0 < int(found["line"]) <= len(lines):
+    if place is None or not 0 < int(place["line"]) <= len(lines):
         return str(error)
-    number = int(found["line"])
+    number = int(place["line"])
     line = lines[number - 1].strip()
     if not "".join(lines[:number]).isprintable():  # a control character, whose code tomllib states
         return str(error)
-    if _TWICE.match(found["what"]):
+    if _TWICE.match(place["what"]):
         return f"line {number}: {_twice(lines, number)}"
     for pattern, rule, cure in _HINTS:
         wrong = re.search(pattern, line)
@@ -215,10 +212,10 @@ def _twice(lines: list[str], number: int) -> str:
     table, name = _written(lines, number)
     if not name:
         return f"{table} is written twice"
-    full = ".".join(filter(None, (table, name)))
-    first = next((k for k in range(1, number) if ".".join(filter(None, _written(lines, k))) == full), None)
-    if first is None and (found := _given_above(lines, number, full)):
-        parent, line = found
+    full = _full_name(lines, number)
+    first = next((k for k in range(1, number) if _full_name(lines, k) == full), None)
+    if first is None and (above := _parent_above(lines, number, full)):
+        parent, line = above
         if re.match(rf" *{_KEY} *\{{", lines[line - 1]):
             key = full.removeprefix(f"{parent}.")
             return f"'{parent}' is a table in braces in line {line}: write {key} = ... inside the braces"
@@ -226,14 +223,19 @@ def _twice(lines: list[str], number: int) -> str:
     return f"'{full}' is written twice" + (f", first in line {first}" if first else "") + "; keep one"
 
 
-def _given_above(lines: list[str], number: int, full: str) -> tuple[str, int] | None:
+def _parent_above(lines: list[str], number: int, full: str) -> tuple[str, int] | None:
     """Return the key above the line `number` that a name extends, such as 'a' of 'a.b', and its line; None: no such."""
     parents = {full[:k] for k, sign in enumerate(full) if sign == "."}
     for k in range(1, number):
-        name = ".".join(filter(None, _written(lines, k)))
+        name = _full_name(lines, k)
         if name in parents and not _HEADER.match(lines[k - 1]):
             return name, k
     return None
+
+
+def _full_name(lines: list[str], number: int) -> str:
+    """Return 'table.key' of a line, or the one of both that it has."""
+    return ".".join(filter(None, _written(lines, number)))
 
 
 def _written(lines: list[str], number: int) -> tuple[str, str]:
@@ -316,9 +318,6 @@ def _number(where: str, line: int, cell: str, unit: str) -> float | str:
     if not math.isfinite(number):
         raise MechanismError(f"{where}, line {line}: {cell} must be a finite number")
     return f"{number!r} {unit}" if unit else number
-
-
-_DECIMAL = re.compile(r"\s*+[+-]?+(?:(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?+[0-9]++)?+|nan|inf)\s*+")
 
 
 def read_decimal(text: str) -> float:

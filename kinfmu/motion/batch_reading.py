@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinfmu.arrays import FloatArray
 from kinfmu.codegen.python import load_model
-from kinfmu.errors import KinfmuError, RequestError, listed
+from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.measures import LowestMargin, PressureAngle, Reading
 from kinfmu.mechanism.parameters import in_order, parameter_values
@@ -38,7 +38,7 @@ from kinfmu.plan.plan import PlanParameter
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.run.axis import TIME, axis_for
 from kinfmu.run.designs import Batch, Driving, first_failure, parts_of, solve_alone, solve_by_library
-from kinfmu.run.driving import column_of, numbers_of, run_times
+from kinfmu.run.driving import numbers_of, refuse_both
 from kinfmu.run.model import Model
 from kinfmu.solver.python.pose import Status
 from kinfmu.units import CoordinateName, InputName, Quantity, unit_of
@@ -91,8 +91,7 @@ class BatchReading:
         anew: bool,
         inputs: Mapping[str, ArrayLike],
     ) -> None:
-        if inputs and t is not None:
-            raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
+        refuse_both(t, inputs)
         if not isinstance(model, Model):
             raise RequestError(f"measure_designs needs a model, not {type(model).__name__}; kinfmu.compile gives one")
         mechanism = model.mechanism
@@ -102,24 +101,19 @@ class BatchReading:
         if not self._readings:
             raise RequestError(f"there are no measures: {mechanism.name} declares none, or measures = []; give some")
         self._asked = dict(zip((one.name for one in self._readings), asked or mechanism.measures, strict=True))
-        given = {name: numbers_of(name, value) for name, value in inputs.items()}
-        rows = max((len(array) for array in given.values() if array.ndim == 2), default=1)
-        self._batch = batch = Batch(model, parameters, rows)
+        arrays = [numbers_of(name, value) for name, value in inputs.items()]
+        self._batch = batch = Batch(model, parameters, max((len(row) for row in arrays if row.ndim == 2), default=1))
         self.parameters, self._count = batch.parameters, batch.count
-        driven = batch.driven(inputs)
-        times = column_of("t", run_times(mechanism.run) if t is None else t)
-        if driven is not None:
-            times = np.arange(driven[0].shape[-2], dtype=float)
-        if len(times) < FEWEST:
-            raise RequestError(f"there are {len(times)} samples; measures need {FEWEST} or more")
-        self._model, self._driving = model, Driving(times, driven, given)
+        self._model, self._driving = model, batch.driving(t, inputs)
+        if (count := len(self._driving.times)) < FEWEST:
+            raise RequestError(f"there are {count} samples; measures need {FEWEST} or more")
         self._tolerance, self._anew = tolerance, anew
         self._idle: list[tuple[FloatArray, NDArray[np.int32]]] = []  # memory of earlier parts
         self._names = QuantityNames(mechanism)
         self.motion, self._order = self._empty_motion()
-        alone = self._read_alone()
-        self._alone = [reading for reading in self._readings if reading.name in alone]
-        self._in_tables = [reading for reading in self._readings if reading.name not in alone]
+        by_design = self._names_by_design()
+        self._by_design = [reading for reading in self._readings if reading.name in by_design]
+        self._in_tables = [reading for reading in self._readings if reading.name not in by_design]
         self.units = self._units_of_parameters()
         self.values: dict[str, FloatArray] = {}
         self.at: dict[str, FloatArray] = {}
@@ -143,13 +137,13 @@ class BatchReading:
         self._is_native = self._model.is_native(self._count * samples)
         if self._in_tables:
             self._compute_quantities()
-        measure = self._measure if self._in_tables else self._measure_alone
+        measure = self._measure if self._in_tables else self._measure_by_design
         if self._is_native and workers > 1:
             with ThreadPoolExecutor(workers) as pool:
-                found = list(pool.map(measure, parts))
+                reasons_of_parts = list(pool.map(measure, parts))
         else:
-            found = [measure(part) for part in parts]
-        for part, reasons in zip(parts, found, strict=True):
+            reasons_of_parts = [measure(part) for part in parts]
+        for part, reasons in zip(parts, reasons_of_parts, strict=True):
             self.reasons |= {part.start + k: reason for k, reason in reasons.items()}
 
     def _compute_quantities(self) -> None:
@@ -180,8 +174,8 @@ class BatchReading:
             is_solved[list(left)] = False
             self.status[part] = status.max(axis=1, initial=0)
             reasons = {k: reasons[k] for k in np.flatnonzero(~is_solved).tolist() if k in reasons}
-            for k in np.flatnonzero(is_solved).tolist() if self._alone else ():
-                if reason := self._measure_design(self._alone, part.start + k):
+            for k in np.flatnonzero(is_solved).tolist() if self._by_design else ():
+                if reason := self._measure_design(self._by_design, part.start + k):
                     reasons[k] = reason
             self._read(
                 part, self._motion_of(batch, [table[:, self._order] for table in tables]), good, is_solved, reasons
@@ -248,10 +242,10 @@ class BatchReading:
                 if k not in reasons:
                     reasons[k] = reason_without_value(self._samples(part.start + k), good[k])
 
-    def _measure_alone(self, part: slice) -> dict[int, str]:
+    def _measure_by_design(self, part: slice) -> dict[int, str]:
         """Measure the designs of a part one by one; return why one has no values, by its number in the part."""
-        found = {k: self._measure_design(self._readings, part.start + k) for k in range(part.stop - part.start)}
-        return {k: reason for k, reason in found.items() if reason}
+        reasons = {k: self._measure_design(self._readings, part.start + k) for k in range(part.stop - part.start)}
+        return {k: reason for k, reason in reasons.items() if reason}
 
     def _measure_design(self, readings: Sequence[Reading], design: int) -> str:
         """Read measures of one design, as `measure` does; return why one has no value."""
@@ -278,21 +272,21 @@ class BatchReading:
             try:
                 if reading.name in self._dependent:
                     (reading,) = with_measures(motion.mechanism, [self._asked[reading.name]]).measures
-                found = read_value(run, motion, reading, solved)
+                result = read_value(run, motion, reading, solved)
             except KinfmuError as error:
                 reasons.append(str(error))
                 continue
-            self.values[reading.name][design], self.at[reading.name][design] = found.value, found.at
-            reasons += [found.reason] if found.reason else []
+            self.values[reading.name][design], self.at[reading.name][design] = result.value, result.at
+            reasons += [result.reason] if result.reason else []
         return reasons[0] if reasons else ""
 
     def _motion_of(self, batch: Batch, tables: Sequence[FloatArray]) -> Motion:
         """Return the motion of the designs of a part."""
         motion = self.motion
         has_pressure = any(isinstance(reading, PressureAngle) for reading in self._in_tables)
-        if self._open and (has_pressure or not self._is_native):
-            given = {name: batch.parameters[name] for name in self._open}
-            motion = replace(motion, points=points_of_designs(self._model.mechanism, given))
+        if self._open_parameters and (has_pressure or not self._is_native):
+            arrays = {name: batch.parameters[name] for name in self._open_parameters}
+            motion = replace(motion, points=points_of_designs(self._model.mechanism, arrays))
         return replace(
             motion,
             tables=(tables[0], tables[1], tables[2]),
@@ -303,26 +297,26 @@ class BatchReading:
         )
 
     @cached_property
-    def _open(self) -> list[str]:
+    def _open_parameters(self) -> list[str]:
         """Names of the parameters of the geometry that are given."""
         return [name for name in self.parameters if name in self._model.parameters]
 
     def _fixed_of(self, batch: Batch) -> dict[CoordinateName, FloatArray]:
         """Return coordinates that a joint holds at a constant which differs between designs, (m, 1)."""
         names = [parameter_symbol(parameter.name) for parameter in self._model.plan.parameters]
-        rows = batch.values.tolist() if self._open_fixed else []
-        found = [evaluate(list(self._open_fixed.values()), dict(zip(names, row, strict=True))) for row in rows]
-        table = np.array(found, dtype=float).reshape(len(found), len(self._open_fixed))
-        return {name: table[:, k : k + 1] for k, name in enumerate(self._open_fixed)}
+        rows = batch.values.tolist() if self._open_constants else []
+        constants = [evaluate(list(self._open_constants.values()), dict(zip(names, row, strict=True))) for row in rows]
+        table = np.array(constants, dtype=float).reshape(len(rows), len(self._open_constants))
+        return {name: table[:, k : k + 1] for k, name in enumerate(self._open_constants)}
 
     @cached_property
-    def _open_fixed(self) -> dict[CoordinateName, Node]:
+    def _open_constants(self) -> dict[CoordinateName, Node]:
         """Constant coordinates that are read and that depend on parameters which are given, as nodes."""
-        given = {parameter_symbol(name) for name in self._open}
+        opened = {parameter_symbol(name) for name in self._open_parameters}
         return {
             name: node
             for name, node in self._model.plan.fixed_nodes.items()
-            if name in self._computed and given.intersection(symbol.name for symbol in symbols([node]))
+            if name in self._computed and opened.intersection(symbol.name for symbol in symbols([node]))
         }
 
     def _empty_motion(self) -> tuple[Motion, slice]:
@@ -356,11 +350,11 @@ class BatchReading:
             table = np.array([drive(time, tuple(constants.tolist())) for time in times.tolist()], dtype=float)
             inputs = table.reshape(len(times), 3, len(plan.drivers)).transpose(0, 2, 1)
         else:
-            one = [table[design] if table.ndim == 3 else table for table in driven]
-            axis, inputs = axis_for(one[0], names[::3]), np.stack(one, axis=2)
+            tables = [table[design] if table.ndim == 3 else table for table in driven]
+            axis, inputs = axis_for(tables[0], names[::3]), np.stack(tables, axis=2)
         return SampledAxis(times, axis, names, inputs.reshape(len(times), len(names)), plan.mechanism.length_unit)
 
-    def _read_alone(self) -> set[str]:
+    def _names_by_design(self) -> set[str]:
         """Return the names of measures that are read design by design: their numbers or samples differ."""
         plan, driven = self._model.plan, self._driving.driven
         names = {reading.name for reading in self._readings}
@@ -368,8 +362,7 @@ class BatchReading:
             return names
         if driven is None:
             behind = {symbol.name for symbol in symbols([node for law in plan.laws for node in law[1:]])}
-            given = {parameter_symbol(name) for name in self._open} | set(self.parameters)
-            if behind & given:
+            if behind & ({parameter_symbol(name) for name in self._open_parameters} | set(self.parameters)):
                 return names
         elif driven[0].ndim == 3:
             return names
@@ -384,14 +377,14 @@ class BatchReading:
     @cached_property
     def _dependent(self) -> set[str]:
         """Names of the measures whose own numbers depend on parameters that are given."""
-        dependent = dependent_numbers(self._measured, self._open)
+        dependent = dependent_numbers(self._measured, self._open_parameters)
         return {str(place[1]) for place in dependent if place[0] == "measures"}
 
     def _units_of_parameters(self) -> dict[str, str]:
         """Return the units of the parameters and law constants that are given."""
         plan = self._model.plan
-        known: list[PlanParameter | LawConstant] = [*plan.parameters, *plan.law_constants, *plan.load_constants]
-        quantities = {one.name: one.quantity for one in known}
+        arguments: list[PlanParameter | LawConstant] = [*plan.parameters, *plan.law_constants, *plan.load_constants]
+        quantities = {argument.name: argument.quantity for argument in arguments}
         unit = plan.mechanism.length_unit
         return {name: unit_of(quantities[name] or Quantity("number"), unit) for name in self.parameters}
 
@@ -408,13 +401,13 @@ def points_of_designs(mechanism: Mechanism, given: Mapping[str, FloatArray]) -> 
 
     """
     with np.errstate(all="ignore"):  # designs without a solution may have any numbers
-        known = parameter_values(mechanism.parameters, {name: array[:, None] for name, array in given.items()})
+        values = parameter_values(mechanism.parameters, {name: array[:, None] for name, array in given.items()})
         points: dict[str, tuple[Value, Value]] = dict(mechanism.body_points)
         for place in dependent_numbers(mechanism, given):
             if place[0] == "bodies" and place[2] == "points":
                 body, point, axis = str(place[1]), str(place[3]), place[4]
                 pair = list(points[f"{body}.{point}"])
-                pair[int(axis)] = mechanism.expressions[place].value(known)
+                pair[int(axis)] = mechanism.expressions[place].value(values)
                 points[f"{body}.{point}"] = pair[0], pair[1]
     return points
 

@@ -24,6 +24,8 @@ from kinfmu.run.model import Model
 from kinfmu.units import CoordinateName, ForceName
 
 QuantityRead = CoordinateName | PoseQuantity  # a column of a run, or made of the coordinates of bodies
+_MOST_KEPT = 8  # of each model
+_kept: WeakKeyDictionary[Model, dict[tuple[QuantityRead, ...], Model]] = WeakKeyDictionary()
 
 
 class QuantityNames:
@@ -44,15 +46,15 @@ class QuantityNames:
 
     def quantities(self, *readings: Reading) -> tuple[QuantityRead, ...]:
         """Return the quantities with rates that measures read, each once; of points both coordinates."""
-        found: list[QuantityRead] = []
+        read: list[QuantityRead] = []
         for of in (of for reading in readings for of in reading.quantities()):
             if isinstance(of, PoseQuantity):
-                found.append(of)
+                read.append(of)
             elif of in self.orders:
-                found.append(self.orders[of][0])
+                read.append(self.orders[of][0])
             elif of in self._mechanism.body_points:
-                found += path_of(of)
-        return tuple(dict.fromkeys(found))
+                read += path_of(of)
+        return tuple(dict.fromkeys(read))
 
 
 def path_of(point: str) -> tuple[CoordinateOf, CoordinateOf]:
@@ -62,18 +64,14 @@ def path_of(point: str) -> tuple[CoordinateOf, CoordinateOf]:
 
 def coordinates_behind(quantities: Iterable[QuantityRead]) -> tuple[CoordinateName, ...]:
     """Return the coordinates of bodies and points of interest of which quantities are made, each once."""
-    found: dict[CoordinateName, None] = {}
-    for one in quantities:
-        if isinstance(one, CoordinateName):
-            found[one] = None
-            continue
-        moving = [body for body in one.bodies() if body != GROUND_NAME]
-        found |= dict.fromkeys(CoordinateName(body, axis) for body in moving for axis in COORDINATES)
-    return tuple(found)
-
-
-_MOST_KEPT = 8  # of each model
-_kept: WeakKeyDictionary[Model, dict[tuple[QuantityRead, ...], Model]] = WeakKeyDictionary()
+    names: list[CoordinateName] = []
+    for quantity in quantities:
+        if isinstance(quantity, CoordinateName):
+            names.append(quantity)
+        else:
+            moving = [body for body in quantity.bodies() if body != GROUND_NAME]
+            names += [CoordinateName(body, axis) for body in moving for axis in COORDINATES]
+    return tuple(dict.fromkeys(names))
 
 
 def quantity_model(model: Model, quantities: Sequence[QuantityRead]) -> Model:
@@ -101,20 +99,20 @@ def quantity_model(model: Model, quantities: Sequence[QuantityRead]) -> Model:
 def _nodes(plan: SolvePlan, quantities: Sequence[QuantityRead]) -> list[Node]:
     """Return the quantities as nodes of the plan's graph."""
     graph = plan.laws[0].position.graph
-    known: dict[str, Node] = {name: node for name, node in plan.fixed_nodes.items()}  # noqa: C416  of other keys
-    known |= {motion.name: motion.position for motion in plan.outputs_motion}
+    nodes: dict[str, Node] = {name: node for name, node in plan.fixed_nodes.items()}  # noqa: C416  of other keys
+    nodes |= {motion.name: motion.position for motion in plan.outputs_motion}
     open_ones = {parameter.name: graph.symbol(parameter_symbol(parameter.name)) for parameter in plan.parameters}
     points: Any = plan.mechanism.at(open_ones).body_points
 
     def placement(bodies: Sequence[str]) -> Placement:
         poses = {
-            body: GROUND if body == GROUND_NAME else BodyFrame.of(*(known[f"{body}.{axis}"] for axis in COORDINATES))
+            body: GROUND if body == GROUND_NAME else BodyFrame.of(*(nodes[f"{body}.{axis}"] for axis in COORDINATES))
             for body in bodies
         }
         return Placement(poses, points)
 
     return [
-        graph.lift(known[one] if isinstance(one, CoordinateName) else one.value(placement(one.bodies())))
+        graph.lift(nodes[one] if isinstance(one, CoordinateName) else one.value(placement(one.bodies())))
         for one in quantities
     ]
 

@@ -1,4 +1,4 @@
-"""The samples of a motion: their order, those too close together, the driver's values, and what samples alone tell."""
+"""The samples of a motion: their order, the driver's values at them, crowded ones, closed motions, and derivatives."""
 
 from __future__ import annotations
 
@@ -16,6 +16,18 @@ from kinfmu.errors import RequestError
 from kinfmu.motion.history import History
 from kinfmu.motion.quintic import ranges
 from kinfmu.run.axis import TIME, HasAxis, axis_of, rates_per
+
+_SAME = 1e-9  # of the travel of the driver; values closer than this are equal
+_CLOSE = 0.1  # of the mean distance of samples
+_EQUAL = 0.03  # of the largest acceleration; samples that differ by more follow a steep change and are all kept
+_ROUNDING = 1e-9  # of the largest rate over the mean distance; the same for accelerations that are 0 but for rounding
+_SAME_POSE = 1e-9  # [rad, sizes]; a motion whose first and last pose differ by less goes round
+_SAME_RATE = 1e-6  # of the largest; the same for rates and accelerations
+_FEW = 5  # samples that show the least range of all
+_WIDE, _NARROW = 7, 5  # samples of a polynomial: of degree 6, and of degree 4 to judge it
+_ROUGH = 1e-3  # of the range of 7 samples; where the rates of both polynomials differ by more in a step, it has a kink
+_PERIODIC = 1e-6  # of the range; a quantity whose first and last sample differ by less goes round
+Ranges = Callable[[FloatArray], tuple[FloatArray, FloatArray]]  # smallest and largest number of each row (..., n)
 
 
 class DrivenSamples(NamedTuple):
@@ -76,17 +88,14 @@ def _argument_of(run: HasAxis) -> tuple[FloatArray, str]:
     return (run.inputs[:, column], per) if per != "time" else (run.inputs[:, column] / speed[0], per)
 
 
-_SAME = 1e-9  # of the travel of the driver; values closer than this are equal
-
-
 def driven_at(drive: History, x: FloatArray) -> FloatArray:
     """Return values of the driver at arguments (...), which may be in the period before or after the motion."""
     if drive.is_linear:
         return np.asarray(drive.rate[0] * x + (drive.value[0] - drive.rate[0] * drive.x[0]))
     span, travel = drive.span, drive.value[-1] - drive.value[0]
     turns = np.floor((x - drive.x[0]) / span) if drive.is_closed else np.zeros_like(x)
-    found = drive.at((x - turns * span).reshape(-1))[0].reshape(np.shape(x))
-    return np.asarray(np.where(np.isnan(x), np.nan, found + turns * travel))
+    values = drive.at((x - turns * span).reshape(-1))[0].reshape(np.shape(x))
+    return np.asarray(np.where(np.isnan(x), np.nan, values + turns * travel))
 
 
 def within_period(drive: History, values: FloatArray) -> FloatArray:
@@ -106,22 +115,22 @@ def window(drive: History, begin: float | None, end: float | None) -> tuple[floa
     ends = sorted((float(drive.value[0]), float(drive.value[-1])))
     if not (np.all(drive.rate > 0.0) or np.all(drive.rate < 0.0)):
         raise RequestError("'begin' and 'end' need a driver that moves in one direction")
-    wanted = [ends[0] if begin is None else begin, ends[1] if end is None else end]
+    limits = [ends[0] if begin is None else begin, ends[1] if end is None else end]
     if drive.is_closed:
-        wanted[0] = ends[0] + (wanted[0] - ends[0]) % (ends[1] - ends[0])
-        wanted[1] = ends[1] - (ends[1] - wanted[1]) % (ends[1] - ends[0])
-    for value in wanted:
+        limits[0] = ends[0] + (limits[0] - ends[0]) % (ends[1] - ends[0])
+        limits[1] = ends[1] - (ends[1] - limits[1]) % (ends[1] - ends[0])
+    for value in limits:
         if not ends[0] <= value <= ends[1]:
             raise RequestError(
                 f"the driver does not reach {value:.9g}; the motion goes from {ends[0]:.9g} to {ends[1]:.9g}"
             )
-    start, stop = (_argument_at(drive, value) for value in wanted)
+    start, stop = (_argument_at(drive, value) for value in limits)
     if drive.rate[0] < 0.0:
         start, stop = stop, start
     if drive.is_closed and stop <= start:
         stop += drive.span
     if stop <= start:
-        raise RequestError(f"'begin' {wanted[0]:.9g} must be before 'end' {wanted[1]:.9g}")
+        raise RequestError(f"'begin' {limits[0]:.9g} must be before 'end' {limits[1]:.9g}")
     return start, stop
 
 
@@ -131,11 +140,6 @@ def _argument_at(drive: History, value: float) -> float:
         if value == drive.value[k]:
             return float(drive.x[k])
     return float(drive.crossings(np.asarray(value))[1][0])
-
-
-_CLOSE = 0.1  # of the mean distance of samples
-_EQUAL = 0.03  # of the largest acceleration; samples that differ by more follow a steep change and are all kept
-_ROUNDING = 1e-9  # of the largest rate over the mean distance; the same for accelerations that are 0 but for rounding
 
 
 def is_crowded(x: FloatArray) -> bool:
@@ -180,14 +184,6 @@ def _mean(x: FloatArray) -> float:
     return float(x[-1] - x[0]) / (len(x) - 1)
 
 
-_SAME_POSE = 1e-9  # [rad, sizes]; a motion whose first and last pose differ by less goes round
-_SAME_RATE = 1e-6  # of the largest; the same for rates and accelerations
-_FEW = 5  # samples
-
-
-Ranges = Callable[[FloatArray], tuple[FloatArray, FloatArray]]  # smallest and largest number of each row (..., n)
-
-
 def goes_round(
     histories: Sequence[tuple[History, bool]], is_known: NDArray[np.bool_] | None = None
 ) -> NDArray[np.bool_]:
@@ -205,9 +201,9 @@ def goes_round(
 
     """
     if is_known is not None:
-        found = is_known & _ends_agree(histories, _ranges_of_few)
-        if (found == is_known).all():
-            return np.asarray(found)
+        is_closed = is_known & _ends_agree(histories, _ranges_of_few)
+        if (is_closed == is_known).all():
+            return np.asarray(is_closed)
     return _ends_agree(histories, ranges)
 
 
@@ -238,11 +234,6 @@ def _ranges_of_few(table: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return smallest and largest numbers of a few samples: the range of all is at least as large."""
     some = np.moveaxis(table, -1, 0)[:: -(-table.shape[-1] // _FEW)].copy()
     return some.min(axis=0), some.max(axis=0)
-
-
-_WIDE, _NARROW = 7, 5  # samples of a polynomial: of degree 6, and of degree 4 to judge it
-_ROUGH = 1e-3  # of the range of 7 samples; where the rates of both polynomials differ by more in a step, it has a kink
-_PERIODIC = 1e-6  # of the range; a quantity whose first and last sample differ by less goes round
 
 
 def sampled_history(x: FloatArray, value: FloatArray, *, is_closed: bool, is_seamed: bool = False) -> History:
@@ -306,12 +297,12 @@ def _rates(x: FloatArray, value: FloatArray, count: int, *, wraps: bool) -> tupl
     distance = x[samples] + turn - x[:, None]
     scale = np.abs(distance).max(axis=1, keepdims=True)
     powers = (distance / scale)[:, None, :] ** np.arange(count)[None, :, None]
-    wanted = np.zeros((count, 2))
-    wanted[1, 0], wanted[2, 1] = 1.0, 2.0
-    weights = np.linalg.solve(powers, np.broadcast_to(wanted, (n, count, 2)))
+    orders = np.zeros((count, 2))
+    orders[1, 0], orders[2, 1] = 1.0, 2.0
+    weights = np.linalg.solve(powers, np.broadcast_to(orders, (n, count, 2)))
     near = value[samples]
-    found = np.einsum("nk,nkd->nd", near - value[:, None], weights)
-    return found[:, 0] / scale[:, 0], found[:, 1] / scale[:, 0] ** 2, np.ptp(near, axis=1)
+    derivatives = np.einsum("nk,nkd->nd", near - value[:, None], weights)
+    return derivatives[:, 0] / scale[:, 0], derivatives[:, 1] / scale[:, 0] ** 2, np.ptp(near, axis=1)
 
 
 def lowest(

@@ -15,11 +15,12 @@ from typing import NamedTuple
 
 from kinfmu.codegen.c import compiler, emit
 from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
-from kinfmu.codegen.forces import SIGNATURE, emit_c_forces, load_inputs, solves
+from kinfmu.codegen.forces import SIGNATURE, emit_c_forces, solves
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import reaction_names_of, shaking_names
 from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.plan.efforts import load_inputs
 from kinfmu.plan.forces import ForceSteps, force_names, force_steps, loaded_coordinates
 from kinfmu.plan.reactions import reaction_steps, shaking_steps
 from kinfmu.plan.trace import Tracer, parameter_symbol

@@ -27,6 +27,11 @@ from kinfmu.units import METRES, ForceName, Quantity
 OF_JOINTS, OF_LOADS = 3, 2
 
 
+def load_inputs(plan: SolvePlan) -> tuple[str, ...]:
+    """Return the names of the inputs that give efforts of external loads."""
+    return tuple(name for load in plan.mechanism.loads for name in load.inputs())
+
+
 def effort_names(plan: SolvePlan) -> list[str]:
     """Return the names of the inputs for the efforts of the drivers, such as 'crank_torque'."""
     return [f"{driver.name}_{effort_noun(driver.quantity.kind)}" for driver in plan.drivers]
@@ -39,7 +44,7 @@ def effort_inputs(plan: SolvePlan) -> list[str]:
         RequestError: An effort of a driver has the name of a load's input.
 
     """
-    names = [*effort_names(plan), *(name for load in plan.mechanism.loads for name in load.inputs())]
+    names = [*effort_names(plan), *load_inputs(plan)]
     doubled = [name for name in names if names.count(name) > 1]
     if doubled:
         raise RequestError(f"'{doubled[0]}' is an input of a driver and of a load; rename one of them")
@@ -49,13 +54,13 @@ def effort_inputs(plan: SolvePlan) -> list[str]:
 def inertia_steps(plan: SolvePlan) -> ForceSteps:
     """Return the steps to the bias efforts, then to the upper triangle of the reduced inertia, row by row."""
     drivers = plan.drivers
-    wanted = [f"{driver.name}.bias_{effort_noun(driver.quantity.kind)}" for driver in drivers]
+    order = [f"{driver.name}.bias_{effort_noun(driver.quantity.kind)}" for driver in drivers]
     for k, driver in enumerate(drivers):
-        wanted.append(f"{driver.name}.reduced_inertia")
-        wanted += [f"{driver.name}.reduced_inertia.{other.name}" for other in drivers[k + 1 :]]
-    steps = force_steps(plan, wanted, coefficients="given")
+        order.append(f"{driver.name}.reduced_inertia")
+        order += [f"{driver.name}.reduced_inertia.{other.name}" for other in drivers[k + 1 :]]
+    steps = force_steps(plan, order, coefficients="given")
     results = {str(name): (name, node) for name, node in zip(steps.names, steps.results, strict=True)}
-    names, nodes = zip(*(results[name] for name in wanted), strict=True)
+    names, nodes = zip(*(results[name] for name in order), strict=True)
     return ForceSteps(steps.steps, names, list(nodes))
 
 

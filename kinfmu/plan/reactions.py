@@ -1,10 +1,13 @@
-"""Reactions of joints: the multipliers of their rows, block after block in reverse order.
+"""Reactions of joints, with the contact forces of cams, and shaking forces on the ground.
+
+Reactions are the multipliers of the joints' rows, block after block in reverse order:
 
     Phi_q^T lambda = Q - M qdd        Q: generalized forces of gravity and loads
 
 A row that gives a coordinate outright has its multiplier from the equation of that coordinate; a block has those of its
 rows from the transposed Jacobian. The effort along a row, per unit of its gap, is what the joint transmits: the force
-or moment that its first body exerts on its second. Haug (1989), Lagrange multipliers and reaction forces.
+or moment that its first body exerts on its second. Haug (1989), Lagrange multipliers and reaction forces. The bearings
+of a cam and the guide of its follower carry its contact force too, beyond what the multiplier of its lift exerts.
 """
 
 from __future__ import annotations
@@ -144,8 +147,7 @@ class _Multipliers:
 
     def _slope(self, index: int, name: str) -> Node:
         """Return the derivative of a row with respect to a coordinate, the others where they are."""
-        known = {other: node for other, node in self._mechanics.known.items() if other != name}
-        row = self._row(index, known)
+        row = self._row(index, {other: node for other, node in self._mechanics.known.items() if other != name})
         return self._graph.derivative([row], {self._graph.symbol(name): self._graph.constant(1.0)})[0]
 
 
@@ -178,9 +180,9 @@ def known_contacts(joints: Sequence[Joint]) -> Iterator[tuple[int, Supports]]:
     """Yield the numbers of the cams whose contact force follows from their lift, each with its supports."""
     for number, joint in enumerate(joints):
         if isinstance(joint, Cam) and joint.is_contact_known:
-            found = supports(joints, joint)
-            if found is not None:
-                yield number, found
+            carriers = supports(joints, joint)
+            if carriers is not None:
+                yield number, carriers
 
 
 def carried(mechanics: Mechanics, efforts: Mapping[int, Sequence[Node]]) -> dict[tuple[int, int], Node]:
@@ -268,9 +270,9 @@ class _Contact:
             self.force = (size * n[0], size * n[1])
         self.beyond, self.moment_beyond = self.force, effort * slope
         if lifted is not None:
-            own = (effort * lifted[0], effort * lifted[1])
-            self.beyond = (self.force[0] - own[0], self.force[1] - own[1])
-            self.moment_beyond = self.moment_beyond - _cross(b, own)
+            of_row = (effort * lifted[0], effort * lifted[1])
+            self.beyond = (self.force[0] - of_row[0], self.force[1] - of_row[1])
+            self.moment_beyond = self.moment_beyond - _cross(b, of_row)
 
     def on_slide(self, guide: Translational) -> Pair:
         """Return what the rest exerts on the rows of a slide: across its axis [N], and about its point [N m]."""

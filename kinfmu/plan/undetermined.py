@@ -28,8 +28,8 @@ _CARRIES = 1e-7  # weight of a row in a balance of unit size from which on it ta
 
 def undetermined_reactions(plan: SolvePlan) -> tuple[ForceName, ...]:
     """Return the reactions that have no value, in the order of `reaction_names_of`."""
-    found = {*shared_reactions(plan)}.union(*unknown_contacts(plan).values())
-    return tuple(name for name in reaction_names_of(plan.mechanism) if name in found)
+    undetermined = {*shared_reactions(plan)}.union(*unknown_contacts(plan).values())
+    return tuple(name for name in reaction_names_of(plan.mechanism) if name in undetermined)
 
 
 def shared_reactions(plan: SolvePlan) -> dict[ForceName, tuple[str, ...]]:
@@ -43,9 +43,9 @@ def shared_reactions(plan: SolvePlan) -> dict[ForceName, tuple[str, ...]]:
         cam = joints[number]
         for row in shared.get(f"{cam.name}.{cam.labels[0]}", ()):
             for carrier in carriers:
-                rows_of = [f"{joints[carrier].name}.{label}" for label in joints[carrier].labels]
-                for own in rows_of:
-                    shared[own] = tuple(dict.fromkeys((*shared.get(own, ()), row)))
+                for label in joints[carrier].labels:
+                    carried = f"{joints[carrier].name}.{label}"
+                    shared[carried] = tuple(dict.fromkeys((*shared.get(carried, ()), row)))
     return {
         name: shared[row]
         for row, name in zip(row_names(plan), reaction_names_of(plan.mechanism), strict=False)
@@ -67,24 +67,24 @@ def unknown_contacts(plan: SolvePlan) -> dict[str, tuple[ForceName, ...]]:
     """
     mechanism = plan.mechanism
     names = reaction_names_of(mechanism)
-    unknown = [one for one in mechanism.joints if isinstance(one, Cam) and why_unknown(plan, one)] if names else []
-    if not unknown:
+    cams = [joint for joint in mechanism.joints if isinstance(joint, Cam) and why_unknown(plan, joint)]
+    if not names or not cams:
         return {}
     system = System(localized(mechanism)[0])
     part = Part(system, range(system.joint_row_count))
     poses = list(motion_samples(part, plan.anchor.q, _POSES)) or [plan.anchor.q]
     rows, shared = row_names(plan), shared_reactions(plan)
-    found = {}
-    for cam in unknown:
+    loaded = {}
+    for cam in cams:
         carrying = np.zeros(len(rows), dtype=bool)
         for pose in poses:
             matrix = np.vstack([part.jacobian(pose), _pushes(system, cam, pose)])
             balances = null_space(matrix.T)  # (rows and pushes, k); also those of redundant rows alone
             carrying |= (np.abs(balances[: len(rows)]) > _CARRIES).any(axis=1)
         carrying[rows.index(f"{cam.name}.{cam.labels[0]}")] = False
-        own = zip(names, carrying.tolist(), strict=False)
-        found[cam.name] = tuple(name for name, carries in own if carries and name not in shared)
-    return {name: own for name, own in found.items() if own}
+        rows_of_cam = zip(names, carrying.tolist(), strict=False)
+        loaded[cam.name] = tuple(name for name, carries in rows_of_cam if carries and name not in shared)
+    return {cam: reactions for cam, reactions in loaded.items() if reactions}
 
 
 def why_unknown(plan: SolvePlan, cam: Cam) -> str:

@@ -20,7 +20,7 @@ from kinfmu.plan import SolvePlan
 from kinfmu.plan.plan import PlanParameter
 from kinfmu.run import Run
 from kinfmu.run.arguments import Arguments, Settings
-from kinfmu.run.driving import driven_by_inputs, numbers_of
+from kinfmu.run.driving import driven_by_inputs, numbers_of, times_of
 from kinfmu.run.engine import Driven
 from kinfmu.solver.python.pose import Status
 from kinfmu.units import CoordinateName
@@ -141,13 +141,20 @@ class Batch:
         self.constants = self._rows(self.plan.law_constants)
         self._of_loads = self._rows(self.plan.load_constants)
 
-    def driven(self, inputs: Mapping[str, ArrayLike]) -> Driven | None:
-        """Return driver values, speeds and accelerations as `Driving` has them; None without inputs.
+    def driving(self, t: ArrayLike | None, inputs: Mapping[str, ArrayLike]) -> Driving:
+        """Return what moves the designs: times, or inputs.
 
         Raises:
-            RequestError: The inputs are invalid, or constants of the drivers' laws are given, without effect then.
+            RequestError: Times or inputs are invalid, or constants of the drivers' laws are given, without effect where
+                inputs are.
 
         """
+        driven = self._driven(inputs)
+        times = times_of(self.plan.mechanism.run, t) if driven is None else np.arange(driven[0].shape[-2], dtype=float)
+        return Driving(times, driven, {name: numbers_of(name, value) for name, value in inputs.items()})
+
+    def _driven(self, inputs: Mapping[str, ArrayLike]) -> Driven | None:
+        """Return driver values, speeds and accelerations as `Driving` has them; None without inputs."""
         if not inputs:
             return None
         drivers = {driver.name for driver in self.plan.drivers}

@@ -1,10 +1,10 @@
-"""What moves a sweep: times for the laws, or driver values given as inputs, as arrays of numbers."""
+"""What moves a sweep: times for the laws, or driver values as inputs, read as arrays of numbers."""
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -27,61 +27,9 @@ _NO_NUMBERS: dict[tuple[type, ...], str] = {  # types that numpy makes floats of
     (np.timedelta64,): "durations; divide them by a unit, such as np.timedelta64(1, 's')",
     (np.void,): "records of several fields",
 }
-
-
-def numbers_of(name: str, values: ArrayLike, what: str = "numbers") -> FloatArray:
-    """Return an array of floats.
-
-    Raises:
-        RequestError: They are no real numbers, though numpy may make numbers of them, or some are masked.
-
-    """
-    if type(values) is np.ndarray and values.dtype is _DOUBLE:
-        return values
-    if type(values) is float:
-        return np.array(values)
-    items: Sequence[Any] = values if isinstance(values, list | tuple) else ()
-    types: set[type] = set(map(type, items))
-    try:
-        if any(issubclass(one, np.ma.MaskedArray) for one in types):  # numpy would drop their masks
-            values = np.ma.stack(list(map(np.ma.asanyarray, items)))
-        array = np.asanyarray(values)
-        types |= set(map(type, array.ravel().tolist())) if array.dtype == object else {array.dtype.type}
-        for kinds, what_they_are in _NO_NUMBERS.items():
-            if any(issubclass(one, kinds) for one in types):
-                raise RequestError(f"{name} must be {what}, not {what_they_are}")
-        if np.ma.is_masked(array):
-            place = np.argwhere(np.ma.getmaskarray(array))[0]
-            where = f"[{', '.join(map(str, place))}]" if array.ndim else ""
-            raise RequestError(f"{name}{where} is masked; leave it out, or fill in a number")
-        return np.asarray(array, dtype=float)
-    except (TypeError, ValueError):
-        raise RequestError(f"{name} must be {what}") from None
-
-
 _HALF = 0.5 + 1e-9  # [turns]; a step of half a turn, within rounding, is unchanged
-
-
-def unwrap(angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the angles, each moved by whole turns to within half a turn of the one before.
-
-        350, 10, 350 deg -> 350, 370, 350 deg
-
-    angles: (n,) [rad]; the first is unchanged.
-    """
-    steps = np.diff(angles) / TURN
-    back = np.sign(steps) * np.ceil(np.abs(steps) - _HALF)  # [turns]
-    turns = -np.concatenate([[0.0], np.cumsum(back)])[: len(angles)]
-    return np.array([turned(angle, n) for angle, n in zip(angles.tolist(), turns.tolist(), strict=True)])  # (n,)
-
-
-def is_long(steps: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which steps between angles [rad] are longer than half a turn, so that unwrapping changes them."""
-    return np.abs(steps) > _HALF * TURN
-
-
 LARGEST_RATE = 1e100  # of drivers; squares of much larger numbers are infinite
-_LARGEST_KEPT = 1_000_000  # numbers
+_LARGEST_KEPT = 1_000_000  # numbers of a table of equal ones that is kept
 _FEW = 50  # numbers that are checked sooner one by one
 _NUMBER = (float, int)
 _DEFAULTS = (0.0, 1.0, 0.0)  # of value (which must be given), speed and acceleration
@@ -110,6 +58,17 @@ def run_times(run: RunSettings) -> FloatArray:
     return run.start + run.step * np.arange(count + 1, dtype=np.float64)
 
 
+def times_of(run: RunSettings, t: ArrayLike | None) -> FloatArray:
+    """Return the times (n,) [s] of a call: those of the file's run if `t` is None."""
+    return column_of("t", run_times(run) if t is None else t)
+
+
+def refuse_both(t: ArrayLike | None, inputs: Collection[str]) -> None:
+    """Raise a RequestError if times and inputs are given."""
+    if inputs and t is not None:
+        raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
+
+
 def driven_by_inputs(
     drivers: Sequence[DriverInfo], inputs: Mapping[str, ArrayLike], *, wrap: bool = False, rows: int = 1
 ) -> Driven:
@@ -133,11 +92,11 @@ def driven_by_inputs(
         column = column_of(name, inputs[name])
         table = column.reshape(-1, 1).copy()
         return table, _filled(table.shape, _DEFAULTS[1]), _filled(table.shape, _DEFAULTS[2])
-    known = [name for driver in drivers for name in driver.inputs]
+    names = [name for driver in drivers for name in driver.inputs]
     for name in inputs:
-        if name not in known:
+        if name not in names:
             raise RequestError(
-                f"input '{name}' is not known{suggestion(name, known)}; inputs: {listed(known)}; times go by t"
+                f"input '{name}' is not known{suggestion(name, names)}; inputs: {listed(names)}; times go by t"
             )
     for driver in drivers:
         if driver.inputs[0] not in inputs:
@@ -146,7 +105,7 @@ def driven_by_inputs(
     if wrap:
         angles = [driver.inputs[0] for driver in drivers if driver.quantity.kind == "angle"]
         if not angles:
-            raise RequestError(f"wrap unwraps angles, and no input is one; inputs: {listed(known)}")
+            raise RequestError(f"wrap unwraps angles, and no input is one; inputs: {listed(names)}")
         columns |= {name: np.apply_along_axis(unwrap, -1, columns[name]) for name in angles}
     lengths = {array.shape[-1] for array in columns.values()}
     if len(lengths - {1}) > 1:
@@ -232,6 +191,20 @@ def without_huge_rates(driven: Driven) -> Driven:
     return np.where(has_value, u, np.nan), ud, udd
 
 
+def _refuse_huge(name: str, rates: FloatArray) -> None:
+    """Raise a RequestError for a speed or an acceleration of a driver whose square overflows."""
+    if not _is_within(rates, LARGEST_RATE):
+        *_, sample = place = tuple(np.argwhere(np.abs(rates) > LARGEST_RATE)[0])
+        raise RequestError(f"{name} = {rates[place]:.6g} at sample {sample}: the largest value is {LARGEST_RATE:g}")
+
+
+def _is_within(values: FloatArray, largest: float) -> bool:
+    """Return True if all values are numbers of at most this size; no temporary arrays are made."""
+    if values.size <= _FEW and math.hypot(*values.ravel().tolist()) <= largest:  # NaN stays
+        return True
+    return bool(values.min(initial=0.0) >= -largest and values.max(initial=0.0) <= largest)
+
+
 def column_of(name: str, values: ArrayLike, rows: int = 1) -> FloatArray:
     """Return finite numbers as an array (n,); with `rows` > 1 also (rows, n).
 
@@ -251,15 +224,49 @@ def column_of(name: str, values: ArrayLike, rows: int = 1) -> FloatArray:
     return array
 
 
-def _refuse_huge(name: str, rates: FloatArray) -> None:
-    """Raise a RequestError for a speed or an acceleration of a driver whose square overflows."""
-    if not _is_within(rates, LARGEST_RATE):
-        *_, sample = place = tuple(np.argwhere(np.abs(rates) > LARGEST_RATE)[0])
-        raise RequestError(f"{name} = {rates[place]:.6g} at sample {sample}: the largest value is {LARGEST_RATE:g}")
+def numbers_of(name: str, values: ArrayLike, what: str = "numbers") -> FloatArray:
+    """Return an array of floats.
+
+    Raises:
+        RequestError: They are no real numbers, though numpy may make numbers of them, or some are masked.
+
+    """
+    if type(values) is np.ndarray and values.dtype is _DOUBLE:
+        return values
+    if type(values) is float:
+        return np.array(values)
+    items: Sequence[Any] = values if isinstance(values, list | tuple) else ()
+    types: set[type] = set(map(type, items))
+    try:
+        if any(issubclass(one, np.ma.MaskedArray) for one in types):  # numpy would drop their masks
+            values = np.ma.stack(list(map(np.ma.asanyarray, items)))
+        array = np.asanyarray(values)
+        types |= set(map(type, array.ravel().tolist())) if array.dtype == object else {array.dtype.type}
+        for kinds, what_they_are in _NO_NUMBERS.items():
+            if any(issubclass(one, kinds) for one in types):
+                raise RequestError(f"{name} must be {what}, not {what_they_are}")
+        if np.ma.is_masked(array):
+            place = np.argwhere(np.ma.getmaskarray(array))[0]
+            where = f"[{', '.join(map(str, place))}]" if array.ndim else ""
+            raise RequestError(f"{name}{where} is masked; leave it out, or fill in a number")
+        return np.asarray(array, dtype=float)
+    except (TypeError, ValueError):
+        raise RequestError(f"{name} must be {what}") from None
 
 
-def _is_within(values: FloatArray, largest: float) -> bool:
-    """Return True if all values are numbers of at most this size; no temporary arrays are made."""
-    if values.size <= _FEW and math.hypot(*values.ravel().tolist()) <= largest:  # NaN stays
-        return True
-    return bool(values.min(initial=0.0) >= -largest and values.max(initial=0.0) <= largest)
+def unwrap(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the angles, each moved by whole turns to within half a turn of the one before.
+
+        350, 10, 350 deg -> 350, 370, 350 deg
+
+    angles: (n,) [rad]; the first is unchanged.
+    """
+    steps = np.diff(angles) / TURN
+    back = np.sign(steps) * np.ceil(np.abs(steps) - _HALF)  # [turns]
+    turns = -np.concatenate([[0.0], np.cumsum(back)])[: len(angles)]
+    return np.array([turned(angle, n) for angle, n in zip(angles.tolist(), turns.tolist(), strict=True)])  # (n,)
+
+
+def is_long(steps: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which steps between angles [rad] are longer than half a turn, so that unwrapping changes them."""
+    return np.abs(steps) > _HALF * TURN

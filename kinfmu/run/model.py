@@ -16,14 +16,15 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.mechanism.settings import read_tolerance
 from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.plan.efforts import load_inputs
 from kinfmu.plan.forces import force_names
 from kinfmu.plan.reactions import reaction_names_of
 from kinfmu.processes import require_workers
 from kinfmu.run import Event, Run
 from kinfmu.run.arguments import Arguments, Setting, Settings
 from kinfmu.run.continued import anew as anew_note
-from kinfmu.run.designs import Batch, Designs, Driving, solve_batch
-from kinfmu.run.driving import applied_efforts, column_of, driven_by_inputs, numbers_of, run_times, without_huge_rates
+from kinfmu.run.designs import Batch, Designs, solve_batch
+from kinfmu.run.driving import applied_efforts, driven_by_inputs, refuse_both, times_of, without_huge_rates
 from kinfmu.run.engine import Driven, Engine, PythonEngine, Tables, UnreachedError, require_engine, tables_for
 from kinfmu.run.forces import ForceModel, force_plan
 from kinfmu.run.sensitivities import Sensitivities, SensitivityModel, plan_of_unknowns
@@ -93,7 +94,7 @@ class Model:
         self.input_names = tuple(name for driver in plan.drivers for name in driver.inputs)
         self.watch_names = plan.watch_names
         self.force_names, self.reaction_names = force_names(plan.mechanism), reaction_names_of(plan.mechanism)
-        self._load_inputs = tuple(name for load in plan.mechanism.loads for name in load.inputs())
+        self._load_inputs = load_inputs(plan)
         self.arguments = Arguments(plan)
         self._solver = lru_cache(maxsize=_SOLVERS_KEPT)(self._new_solver)
 
@@ -174,12 +175,12 @@ class Model:
             self,
             setting,
             engine,
-            None if inputs else times,
-            inputs,
-            applied_efforts(self._load_inputs, efforts, count),
-            driven,
-            result,
-            {"t": t, "parameters": parameters, "tolerance": tolerance, "wrap": wrap, **inputs},
+            times=None if inputs else times,
+            inputs=inputs,
+            efforts=applied_efforts(self._load_inputs, efforts, count),
+            driven=driven,
+            result=result,
+            arguments={"t": t, "parameters": parameters, "tolerance": tolerance, "wrap": wrap, **inputs},
             is_kept=out is None,
         ).run(tables)
 
@@ -188,12 +189,11 @@ class Model:
     ) -> tuple[FloatArray, Driven | None]:
         """Return times for the laws, or values, speeds and accelerations of the drivers by inputs."""
         if inputs:
-            if t is not None:
-                raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
+            refuse_both(t, inputs)
             return np.empty(0), driven_by_inputs(self.plan.drivers, inputs, wrap=wrap)
         if wrap:
             raise RequestError("wrap unwraps angles given as inputs, such as crank_angle; times by a law have no jumps")
-        return column_of("t", run_times(self.mechanism.run) if t is None else t), None
+        return times_of(self.mechanism.run, t), None
 
     def solve_designs(
         self,
@@ -235,16 +235,10 @@ class Model:
         if derivatives not in (0, 1, 2):
             raise RequestError(f"derivatives = {derivatives!r} must be 0, 1 or 2")
         require_workers(workers)
-        if inputs and t is not None:
-            raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
+        refuse_both(t, inputs)
         batch = Batch(self, parameters)
-        driven = batch.driven(inputs)
-        if driven is None:
-            times = column_of("t", run_times(self.mechanism.run) if t is None else t)
-        else:
-            times = np.arange(driven[0].shape[-2], dtype=float)
-        driving = Driving(times, driven, {name: numbers_of(name, value) for name, value in inputs.items()})
-        native = workers if self.is_native(batch.count * len(times)) else 0
+        driving = batch.driving(t, inputs)
+        native = workers if self.is_native(batch.count * len(driving.times)) else 0
         return solve_batch(batch, driving, highest=derivatives, tolerance=tolerance, anew=anew, threads=native)
 
     def sensitivities(

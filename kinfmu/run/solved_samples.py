@@ -1,9 +1,10 @@
-"""SolvedSamples: what a run is made of when its samples are solved; the rest is computed when it is read."""
+"""SolvedSamples: a run of samples that are solved; forces, events and the like are computed when they are read."""
 
 from __future__ import annotations
 
 import weakref
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -32,6 +33,7 @@ class SolvedModel(Solvable, Protocol):
     def force_model(self) -> ForceModel: ...
 
 
+@dataclass(eq=False)
 class SolvedSamples:
     """The solved samples of a model.
 
@@ -49,31 +51,24 @@ class SolvedSamples:
 
     """
 
-    def __init__(
-        self,
-        model: SolvedModel,
-        setting: Setting,
-        engine: Engine,
-        times: FloatArray | None,
-        inputs: Mapping[str, Any],
-        efforts: Mapping[str, FloatArray],
-        driven: Driven,
-        result: SweepResult,
-        arguments: Mapping[str, Any],
-        *,
-        is_kept: bool,
-    ) -> None:
-        self._model, self._setting, self._engine = model, setting, engine
-        self._times, self._inputs, self._efforts, self._driven = times, inputs, efforts, driven
-        self._result, self._arguments, self._is_kept = result, arguments, is_kept
+    model: SolvedModel
+    setting: Setting
+    engine: Engine
+    times: FloatArray | None
+    inputs: Mapping[str, Any]
+    efforts: Mapping[str, FloatArray]
+    driven: Driven
+    result: SweepResult
+    arguments: Mapping[str, Any]
+    is_kept: bool
 
     def run(self, tables: Tables) -> Run:
         """Return the run; tables: values, rates and accelerations."""
-        model, result = self._model, self._result
-        plan, is_driven = model.plan, self._times is None
+        model, result = self.model, self.result
+        plan, is_driven = model.plan, self.times is None
         has_forces, may_meet = bool(model.force_names), any(load.needs_direction for load in plan.mechanism.loads)
         run = Run.of_fields(
-            t=self._numbers if is_driven else self._times,
+            t=self._numbers if is_driven else self.times,
             outputs=model.outputs,
             coordinate_count=plan.coordinate_count,
             values=tables[0],
@@ -95,7 +90,7 @@ class SolvedSamples:
             reactions=self._reactions if has_forces else None,
             shaking=self._shaking if has_forces else None,
             length_unit=plan.mechanism.length_unit,
-            mechanism_source=model.arguments.mechanism_with(self._setting),
+            mechanism_source=model.arguments.mechanism_with(self.setting),
             info=self._info,
             events=self._events if may_meet else self._failures(),
             axis=self._axis if is_driven else TIME,
@@ -104,48 +99,48 @@ class SolvedSamples:
         return run
 
     def _numbers(self) -> FloatArray:
-        return np.arange(len(self._driven[0]), dtype=float)
+        return np.arange(len(self.driven[0]), dtype=float)
 
     def _fixed(self) -> Mapping[Any, float]:
-        return dict(zip(self._model.plan.fixed_nodes, self._engine.fixed.values(), strict=True))
+        return dict(zip(self.model.plan.fixed_nodes, self.engine.fixed.values(), strict=True))
 
     def _input_columns(self) -> FloatArray:
-        shape = len(self._model.input_names), len(self._driven[0])
-        return np.stack([table.T for table in self._driven], axis=1).reshape(shape).T
+        shape = len(self.model.input_names), len(self.driven[0])
+        return np.stack([table.T for table in self.driven], axis=1).reshape(shape).T
 
     def _info(self) -> Mapping[str, str]:
-        return self._model.arguments.info(self._setting, self._engine.name)
+        return self.model.arguments.info(self.setting, self.engine.name)
 
     def _axis(self) -> str:
-        return axis_for(self._driven[0], self._model.input_names[::3])
+        return axis_for(self.driven[0], self.model.input_names[::3])
 
     def _failures(self) -> tuple[Event, ...]:
-        return self._as_events(self._result.failures, "error")
+        return self._as_events(self.result.failures, "error")
 
     def _events(self) -> tuple[Event, ...]:
         """Return failures, and warnings of loads whose ends meet."""
-        meetings = self._model.force_model.meetings(self._loaded())
+        meetings = self.model.force_model.meetings(self._loaded())
         return (*self._failures(), *self._as_events(meetings, "warning"))
 
-    def _as_events(self, found: Iterable[tuple[int, str]], level: str) -> tuple[Event, ...]:
-        times = self._times
-        return tuple(Event(float(k if times is None else times[k]), level, message) for k, message in found)
+    def _as_events(self, messages: Iterable[tuple[int, str]], level: str) -> tuple[Event, ...]:
+        times = self.times
+        return tuple(Event(float(k if times is None else times[k]), level, message) for k, message in messages)
 
     def _forces(self) -> FloatArray:
-        return self._model.force_model.forces(self._loaded())
+        return self.model.force_model.forces(self._loaded())
 
     def _reactions(self) -> FloatArray:
-        return self._model.force_model.reactions(self._loaded())
+        return self.model.force_model.reactions(self._loaded())
 
     def _shaking(self) -> FloatArray:
-        return self._model.force_model.shaking(self._loaded())
+        return self.model.force_model.shaking(self._loaded())
 
     def _loaded(self) -> LoadedRun:
         """Return what forces are computed from: the run itself, if it is kept and holds all that they need."""
-        model, poses = self._model.force_model.poses, self._itself()
-        driven = with_constants(self._model.plan.drivers, self._driven, self._inputs)
-        has_gaps = bool(self._result.failures)
-        if poses is None or model is not self._model or not self._is_kept:
-            poses = model.solve(**self._arguments)
+        model, poses = self.model.force_model.poses, self._itself()
+        driven = with_constants(self.model.plan.drivers, self.driven, self.inputs)
+        has_gaps = bool(self.result.failures)
+        if poses is None or model is not self.model or not self.is_kept:
+            poses = model.solve(**self.arguments)
             driven, has_gaps = (poses.inputs[:, ::3], poses.inputs[:, 1::3], poses.inputs[:, 2::3]), True
-        return LoadedRun(poses, driven, has_gaps, self._setting, self._efforts, self._times)
+        return LoadedRun(poses, driven, has_gaps, self.setting, self.efforts, self.times)

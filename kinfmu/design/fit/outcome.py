@@ -20,6 +20,9 @@ from kinfmu.mechanism.measures import counted_from
 from kinfmu.mechanism.number import DisplayUnit, display_unit, written_unit
 from kinfmu.units import Quantity, quantity_in, unit_of
 
+_LENGTH, _ANGLE = Quantity("length"), Quantity("angle")
+HOLDS = 1e-6  # violation relative to the limit, or to 1, up to which a constraint holds
+
 
 @dataclass(frozen=True)
 class Optimum:
@@ -136,15 +139,12 @@ class FitOutcome:
         return all(one.holds for one in self.constraints)
 
 
-_LENGTH, _ANGLE = Quantity("length"), Quantity("angle")
-
-
 def unit_of_unknown(problem: FitProblem, name: str) -> DisplayUnit:
     """Return the unit of an unknown: of its bounds, else of the mechanism file."""
     if name in problem.unknowns:
         return problem.mechanism.settable.display_unit(name, flat(problem.unknowns[name]))
-    own, _, key = name.rpartition(".")
-    target: Any = next(one for one in problem.targets if one.name == own)
+    owner, _, key = name.rpartition(".")
+    target: Any = next(target for target in problem.targets if target.name == owner)
     length = problem.mechanism.length_unit
     return display_unit(problem.quantity(name), length, written_unit(flat(getattr(target, key)), length))
 
@@ -153,24 +153,24 @@ def units_of_columns(problem: FitProblem, sampled: Sampled) -> tuple[DisplayUnit
     """Return the units of the columns of a path, function or poses: of its points, all lengths in the first one."""
     target: Any = next(one for one in problem.targets if one.name == sampled.name)
     rows = [list(row) for row in (target.poses if sampled.type == "poses" else target.points)]
-    length, found = problem.mechanism.length_unit, []
+    length, units = problem.mechanism.length_unit, []
     for is_angle in sampled.angles:
         places = [k for k, angle in enumerate(sampled.angles) if angle is is_angle]
         places = [1] if sampled.type == "function" else places
         written = written_unit([row[k] for row in rows for k in places], length)
         if not written and sampled.type == "function":
             written = written_unit(flat(target.offset), length)
-        found.append(display_unit(_ANGLE if is_angle else _LENGTH, length, written))
-    return tuple(found)
+        units.append(display_unit(_ANGLE if is_angle else _LENGTH, length, written))
+    return tuple(units)
 
 
 def unit_of_measure(problem: FitProblem, name: str, unit: str) -> DisplayUnit:
     """Return the unit of a measure: of its value or limits; `unit`: that used inside."""
     if unit == "1":
         return DisplayUnit()
-    one: Any = next(one for one in (*problem.targets, *problem.constraints) if one.name == name)
+    owner: Any = next(owner for owner in (*problem.targets, *problem.constraints) if owner.name == name)
     length = problem.mechanism.length_unit
-    written = written_unit((getattr(one, key, None) for key in ("value", "minimum", "maximum")), length)
+    written = written_unit((getattr(owner, key, None) for key in ("value", "minimum", "maximum")), length)
     return display_unit(quantity_in(unit, length), length, written)
 
 
@@ -179,23 +179,22 @@ def argument_unit(problem: FitProblem) -> str:
     return unit_of(problem.argument.quantity, problem.mechanism.length_unit)
 
 
-HOLDS = 1e-6  # violation relative to the limit, or to 1, up to which a constraint holds
-
-
-def constraint_results(problem: FitProblem, found: Evaluation) -> list[ConstraintResult]:
+def constraint_results(problem: FitProblem, evaluation: Evaluation) -> list[ConstraintResult]:
     """Return how far the constraints of a problem are met by a design, Grashof's conditions first."""
     unit, constraints = problem.mechanism.length_unit, []
-    for one, met in zip(problem.lengths, found.excess, strict=True):
-        gap = float(met[: one.gaps].min()) + one.gap
-        text = f"p + q - s - l = {gap:.6g} {unit}, at least {one.gap:.6g} {unit}"
-        if one.shortest is not None:
-            others = float(met[one.gaps :].min())
-            text += f"; the other links exceed {one.links[one.shortest].text} by {others:.6g} {unit} or more"
+    for condition, met in zip(problem.lengths, evaluation.excess, strict=True):
+        gap = float(met[: condition.gaps].min()) + condition.gap
+        text = f"p + q - s - l = {gap:.6g} {unit}, at least {condition.gap:.6g} {unit}"
+        if condition.shortest is not None:
+            others = float(met[condition.gaps :].min())
+            shortest = condition.links[condition.shortest].text
+            text += f"; the other links exceed {shortest} by {others:.6g} {unit} or more"
         violation = max(0.0, -float(met.min()))
-        holds = violation <= HOLDS * max(1.0, abs(one.gap))
-        constraints.append(ConstraintResult(one.name, text, violation, holds, DisplayUnit(unit)))
+        holds = violation <= HOLDS * max(1.0, abs(condition.gap))
+        constraints.append(ConstraintResult(condition.name, text, violation, holds, DisplayUnit(unit)))
     limited: dict[str, list[tuple[Aim, float]]] = {}
-    for aim, value in zip(problem.measuring.aims if problem.measuring else (), found.measured.tolist(), strict=True):
+    aims = problem.measuring.aims if problem.measuring else ()
+    for aim, value in zip(aims, evaluation.measured.tolist(), strict=True):
         if aim.value is None:
             limited.setdefault(aim.owner, []).append((aim, value))
     for name, parts in limited.items():
@@ -205,9 +204,7 @@ def constraint_results(problem: FitProblem, found: Evaluation) -> list[Constrain
         limits += [f"at most {aim.maximum / display.factor:.6g}"] if aim.maximum is not None else []
         violation = max(0.0, aim.excess(value)[0])
         size = max(1.0, *(abs(limit) for limit in (aim.minimum, aim.maximum) if limit is not None))
-        shown = display.suffix
-        datum = counted_from(aim.reading.type)
-        number = f"{value / display.factor:.6g}{shown}{datum}"
-        text = f"{aim.reading.type} = {number}, {' and '.join(limits)}{shown}"
+        number = f"{value / display.factor:.6g}{display.suffix}{counted_from(aim.reading.type)}"
+        text = f"{aim.reading.type} = {number}, {' and '.join(limits)}{display.suffix}"
         constraints.append(ConstraintResult(name, text, violation, violation <= HOLDS * size, display))
     return constraints

@@ -49,6 +49,8 @@ from kinfmu.mechanism.valid import check_name, quoted
 from kinfmu.units import CoordinateName, Quantity
 
 ANGLE = Quantity("angle")
+KEYS = ("mechanism", "over", "unknowns", "targets", "constraints")
+_WITH_FILE = (PathTarget, FunctionTarget)  # their points can be in a CSV file
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,31 +104,31 @@ class FitProblem:
         unit, traced = self.mechanism.length_unit, TracedPoints(self.mechanism)
         argument = argument_of(self.mechanism, self.over)
         of_points = [CoordinateName(point, axis) for point in self.mechanism.points for axis in "xy"]
-        known: dict[str, CoordinateName] = {name: name for name in (*self.mechanism.coordinate_names, *of_points)}
-        own = [
-            sampled(target, f"[targets.{target.name}]", traced, known, argument, unit)
+        outputs: dict[str, CoordinateName] = {name: name for name in (*self.mechanism.coordinate_names, *of_points)}
+        samples = [
+            sampled(target, f"[targets.{target.name}]", traced, outputs, argument, unit)
             for target in self.targets
             if not isinstance(target, MeasureTarget)
         ]
         bounds = self._parameter_bounds(argument)
-        for prepared in own:
+        for prepared in samples:
             bounds |= prepared.free
         lengths = [
             Lengths.of(constraint, f"[constraints.{constraint.name}]", self.mechanism)
             for constraint in self.constraints
             if isinstance(constraint, GrashofConstraint)
         ]
-        found = {
+        prepared_fields = {
             "argument": argument,
             "traced": replace(self.mechanism, points=traced.points),
             "bounds": bounds,
-            "sampled": tuple(own),
+            "sampled": tuple(samples),
             "measuring": measuring_of(self.mechanism, argument, self.targets, self.constraints),
             "lengths": tuple(lengths),
             "targets": tuple(self.targets),
             "constraints": tuple(self.constraints),
         }
-        for key, value in found.items():
+        for key, value in prepared_fields.items():
             object.__setattr__(self, key, value)
 
     def __reduce__(self) -> tuple[Callable[..., FitProblem], tuple[Any, ...]]:
@@ -182,8 +184,8 @@ class FitProblem:
         """
         if name in self.unknowns:
             return self.mechanism.settable[name].quantity or NUMBER
-        own, _, key = name.rpartition(".")
-        sampled = next(one for one in self.sampled if one.name == own)
+        target, _, key = name.rpartition(".")
+        sampled = next(one for one in self.sampled if one.name == target)
         return sampled.argument if key == "start" else Quantity("angle" if sampled.angles[0] else "length")
 
     def vector(self, z: FloatArray) -> dict[str, float]:
@@ -239,10 +241,6 @@ def _from_text(text: str, *rest: Any) -> FitProblem:
     return FitProblem(toml_file.parse(text, "the mechanism of the fit"), *rest)
 
 
-KEYS = ("mechanism", "over", "unknowns", "targets", "constraints")
-_WITH_FILE = (PathTarget, FunctionTarget)  # their points can be in a CSV file
-
-
 def read_problem(path: str | Path) -> FitProblem:
     """Return the problem of a fit file.
 
@@ -285,17 +283,17 @@ def _members(document: Mapping[str, Any], table: str, classes: Iterable[Any], fo
     for name, values in named_tables(document, table):
         where = f"[{table}.{name}]"
         cls = class_of_type(where, values, "type", classes)
-        own = [one for one in fields(cls) if one.name != "name"]
+        declared = [key for key in fields(cls) if key.name != "name"]
         with_file = cls in _WITH_FILE
-        check_keys(where, values, ("type", *(one.name for one in own), *(("file",) if with_file else ())))
+        check_keys(where, values, ("type", *(key.name for key in declared), *(("file",) if with_file else ())))
         keys = {key: value for key, value in values.items() if key not in ("type", "file")}
         if with_file and "file" in values:
             if "points" in values:
                 raise MechanismError(f"{where} has both 'points' and 'file'; give one of them")
             keys["points"] = read_table(f"{where} file", values["file"], folder)
-        for one in own:
-            if one.default is MISSING and one.name not in keys:
-                names = listed(key.name for key in own)
-                or_file = " or 'file'" if one.name == "points" else ""
-                raise MechanismError(f"{where} needs the key '{one.name}'{or_file}; keys: {names}")
+        for key in declared:
+            if key.default is MISSING and key.name not in keys:
+                names = listed(other.name for other in declared)
+                or_file = " or 'file'" if key.name == "points" else ""
+                raise MechanismError(f"{where} needs the key '{key.name}'{or_file}; keys: {names}")
         yield cls(name=name, **keys)

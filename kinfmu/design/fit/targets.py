@@ -23,6 +23,7 @@ from kinfmu.mechanism.measures import Reading
 Free = Numeral | Sequence[Numeral]
 Row = Sequence[Numeral] | FloatArray
 Rows = Sequence[Sequence[Numeral]] | FloatArray
+WEIGHT = 100.0  # of constraints by default
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,9 +151,6 @@ class MeasureTarget:
 
 Target = PathTarget | FunctionTarget | PoseTarget | MeasureTarget
 TARGETS = (PathTarget, FunctionTarget, PoseTarget, MeasureTarget)
-
-
-WEIGHT = 100.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -96,8 +96,8 @@ def _of(run: Run, component: str, text: str) -> Run:
     place = column("solver.status")
     status = np.zeros(len(run), np.int64)
     if place is not None:
-        known = np.isfinite(run.signals[:, place])
-        status = np.where(known, run.signals[:, place], Status.NOT_CONVERGED).astype(np.int64)
+        is_recorded = np.isfinite(run.signals[:, place])
+        status = np.where(is_recorded, run.signals[:, place], Status.NOT_CONVERGED).astype(np.int64)
     status = np.where(np.isfinite(values).all(axis=1), status, Status.NOT_CONVERGED)
     forces, reactions = (
         [name for name in names if column(name) is not None]

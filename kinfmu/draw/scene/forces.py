@@ -65,7 +65,7 @@ def arrows(run: Run, mechanism: Mechanism, scene: Scene) -> Arrows | None:
 
     The scale is that of the largest force, without outliers: forces may grow without bound at a singular point.
     """
-    known: dict[str, FloatArray] = {}
+    forces: dict[str, FloatArray] = {}
     tails: dict[str, FloatArray] = {}
     kept = {name.owner for name in run.reaction_names} - {
         name.owner for name in run.reaction_names if name in run.absent
@@ -74,7 +74,7 @@ def arrows(run: Run, mechanism: Mechanism, scene: Scene) -> Arrows | None:
         if joint.name in kept and isinstance(joint, CAM_JOINTS):
             contact = contact_force(run, mechanism, scene, joint)
             if contact is not None and np.isfinite(contact[0]).any():
-                known[f"joints.{joint.name}"], tails[f"joints.{joint.name}"] = contact
+                forces[f"joints.{joint.name}"], tails[f"joints.{joint.name}"] = contact
             continue
         points = getattr(joint, "between", ())  # or bodies, of joints that have no arrow
         if joint.name not in kept or any(point not in mechanism.body_points for point in points):
@@ -84,11 +84,11 @@ def arrows(run: Run, mechanism: Mechanism, scene: Scene) -> Arrows | None:
         ends = [world(scene.frames[body_of(point)], mechanism.body_points[point]) for point in points]
         force = _force(run, scene, joint, ends)
         if force is not None and np.isfinite(force).any():
-            known[f"joints.{joint.name}"], tails[f"joints.{joint.name}"] = force, ends[-1]
+            forces[f"joints.{joint.name}"], tails[f"joints.{joint.name}"] = force, ends[-1]
     for name, at, force in load_forces(run, mechanism, scene):
         if np.isfinite(force).any():
-            known[f"loads.{name}"], tails[f"loads.{name}"] = force, at
-    sizes = [np.hypot(*force.T) for force in known.values()]
+            forces[f"loads.{name}"], tails[f"loads.{name}"] = force, at
+    sizes = [np.hypot(*force.T) for force in forces.values()]
     largest = max((float(np.nanpercentile(size, 99.0)) for size in sizes), default=0.0)
     if not (largest > 0.0 and math.isfinite(largest)):
         return None
@@ -98,7 +98,7 @@ def arrows(run: Run, mechanism: Mechanism, scene: Scene) -> Arrows | None:
     longest = 2.0 * LONGEST * scene.size  # of outliers
     drawn = {
         name: force * np.fmin(scale, longest / np.fmax(np.hypot(*force.T), 1e-300))[:, None]
-        for name, force in known.items()
+        for name, force in forces.items()
     }
     return Arrows(tails, drawn, newton, newton * scale)
 
@@ -131,19 +131,19 @@ def contact_force(
             return None
         frame, holder = scene.frames[cam], scene.frames[placed.holder]
         angles = np.where(run.good, frame[:, 2] - holder[:, 2], placed.turn)
-        found = traced(placed, turn_of(placed, angles))
+        curve = traced(placed, turn_of(placed, angles))
     except MechanismError:
         return None
-    out, contact = found.normal, envelope(placed, found)
+    out, contact = curve.normal, envelope(placed, curve)
     in_holder = np.exp(1j * angles)
     with np.errstate(divide="ignore", invalid="ignore"):
         if isinstance(joint, CamFlatFace):
             size = run[f"{joint.name}.force"]
         elif isinstance(joint, CamRoller):
-            radius = found.curve - placed.pole
+            radius = curve.curve - placed.pole
             size = run[f"{joint.name}.force"] / (out * (radius / np.abs(radius)).conj()).real
         elif isinstance(joint, CamOscillating) and placed.pivot is not None:
-            arm = found.curve * in_holder - placed.pivot
+            arm = curve.curve * in_holder - placed.pivot
             moment = run[f"{joint.name}.moment"] / METRES[mechanism.length_unit]
             size = moment / (arm.conj() * out * in_holder).imag
         else:
@@ -165,9 +165,9 @@ def load_forces(run: Run, mechanism: Mechanism, scene: Scene) -> Iterator[tuple[
     rows = np.unique(np.linspace(0, len(run) - 1, min(len(run), MOST_SAMPLES)).round().astype(int))
     nearest = np.abs(np.searchsorted(0.5 * (rows[1:] + rows[:-1]), np.arange(len(run)))) if len(rows) else rows
     for load in mechanism.loads:
-        known = all(body in scene.frames or body == GROUND_NAME for body in load.bodies())
+        is_posed = all(body in scene.frames or body == GROUND_NAME for body in load.bodies())
         needs_time = getattr(load, "law", None) is not None and getattr(load, "over", None) is None
-        if "angle" in load.kinds() or load.inputs() or not known or (needs_time and run.axis != TIME):
+        if "angle" in load.kinds() or load.inputs() or not is_posed or (needs_time and run.axis != TIME):
             continue
         point = str(getattr(load, "at", "") or load.between[1])  # type: ignore[attr-defined]  # one or the other
         at = world(scene.frames[body_of(point)], mechanism.body_points[point])

@@ -56,36 +56,36 @@ class Slide:
 
 def slides(shown: Instant) -> list[Slide]:
     """Return all lines on which points slide; a held coordinate is a line of the ground."""
-    found = []
+    lines = []
     for joint in shown.joints:
         if isinstance(joint, Coordinate):
             across = 0 if joint.axis == "x" else 1
             track = shown.track(joint.of)
             ends = np.array([np.nanmin(track, axis=0), np.nanmax(track, axis=0)])
             ends[:, across] = joint.value
-            found.append(Slide(joint.name, GROUND_NAME, joint.of, ends, turns=True))
+            lines.append(Slide(joint.name, GROUND_NAME, joint.of, ends, turns=True))
         elif isinstance(joint, PointOnLine):
             a, b = joint.between
-            found.append(Slide(joint.name, a, b, _ends(shown, a, b, joint.axis), turns=True))
+            lines.append(Slide(joint.name, a, b, _ends(shown, a, b, joint.axis), turns=True))
         elif isinstance(joint, Translational):
             a, b, axis = *joint.between, joint.axis
             if _is_block(shown, body_of(a)) and not _is_block(shown, body_of(b)):  # the line is that of the rod
                 a, b, axis = b, a, axis - joint.angle
-            found.append(Slide(joint.name, a, b, _ends(shown, a, b, axis), turns=False))
-    return found
+            lines.append(Slide(joint.name, a, b, _ends(shown, a, b, axis), turns=False))
+    return lines
 
 
 def rods(shown: Instant, sliding: Sequence[Slide]) -> dict[str, FloatArray]:
     """Return ends (r, 2, 2) of slots and rods by moving body, in its frame; each includes the origin of its line."""
-    found: dict[str, list[FloatArray]] = {}
+    lines: dict[str, list[FloatArray]] = {}
     for slide in sliding:
         if slide.holder != GROUND_NAME:
             origin = np.array(shown.body_points[slide.origin])
             line = [origin, *slide.ends]
             along = slide.ends[1] - slide.ends[0]
             order = np.argsort([float(point @ along) for point in line])
-            found.setdefault(slide.holder, []).append(np.array([line[order[0]], line[order[-1]]]))
-    return {body: np.array(ends) for body, ends in found.items()}
+            lines.setdefault(slide.holder, []).append(np.array([line[order[0]], line[order[-1]]]))
+    return {body: np.array(ends) for body, ends in lines.items()}
 
 
 def _ends(shown: Instant, a: str, b: str, axis: float) -> FloatArray:
@@ -222,8 +222,8 @@ class _Curve(NamedTuple):
 
 def cam_shapes(shown: Instant) -> list[CamShape]:
     """Return all cams whose pitch curve or profile is known."""
-    found = [_shape(shown, joint) for joint in shown.joints if isinstance(joint, CAM_JOINTS)]
-    return [shape for shape in found if shape is not None]
+    shapes = (_shape(shown, joint) for joint in shown.joints if isinstance(joint, CAM_JOINTS))
+    return [shape for shape in shapes if shape is not None]
 
 
 def _shape(shown: Instant, joint: CamJoint) -> CamShape | None:
@@ -249,7 +249,6 @@ def _shape(shown: Instant, joint: CamJoint) -> CamShape | None:
         is_real = bool(bends_less.all() and np.abs(around.curve).min() > radius) and not _cuts(around, radius)
     size = float(radius or 0.0) if is_real else 0.0
     profile, contact = around.curve - size * around.normal, now.curve - size * now.normal
-
     reach = face = None
     if normal is not None:
         reach = _reach(shown, joint, touching, normal, around)
