@@ -99,6 +99,13 @@ def test_one_sample_gives_rest_two_give_a_slope_and_later_samples_do_not_count()
     assert estimated_rates([(0.5, (2.0,)), (1.0, (9.0,))], 1.0, (3.0,)) == ((2.0,), (0.0,))
 
 
+def test_an_acceleration_beyond_the_largest_rate_is_0_at_the_last_sample_too() -> None:
+    samples = [(k * 1e-3, (0.0 if k < 3 else 1.2e94,)) for k in range(4)]
+    (speed,), (acceleration,) = estimated_rates(samples, *samples[-1])
+    assert speed == pytest.approx(1.8e97)
+    assert acceleration == 0.0  # 1.2e100
+
+
 def _errors_and_estimates(host: Host, h: float, *, wired: tuple[str, ...] = ()) -> list[list[float]]:
     """True and estimated errors of qd and qdd at each sample of u = 1 + 0.3 sin 2 t, read before and after a step."""
     rows = []

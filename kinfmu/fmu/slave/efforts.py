@@ -82,7 +82,7 @@ class ByEfforts(ByInputs):
 
     def solve(self) -> Pose:
         committed = self.slave.committed
-        return committed if self.slave.history and self._values() == committed.u else super().solve()
+        return committed if self.slave.history and tuple(self.slave.inputs[::3]) == committed.u else super().solve()
 
     def drive(self) -> Drive:
         slave = self.slave
@@ -92,7 +92,7 @@ class ByEfforts(ByInputs):
                 slave.refuse("accelerations", f"have no value: {_UNDETERMINED}")
                 self._udd = slave.committed_inputs[2::3]
             slave.inputs[2::3] = self._udd
-        return self._values(), tuple(slave.inputs[1::3]), self._udd
+        return tuple(slave.inputs[::3]), tuple(slave.inputs[1::3]), self._udd
 
     def step(self, t: float, h: float) -> bool:
         """Integrate over a step: states and pose at both of its ends are committed."""

@@ -41,15 +41,6 @@ def estimated_rates(
 
     """
     count = len(samples)
-    # The most frequent case, kept short because it occurs in every step: one driver, and t is at the last sample.
-    if count == KEPT and samples[2][0] < t <= samples[3][0] and len(u) == 1:
-        (first, (a,)), (second, (b,)) = samples[1], samples[2]
-        step = t - second
-        slope = (u[0] - b) / step
-        bend = (slope - (b - a) / (second - first)) / (t - first)
-        speed = slope + bend * step
-        if -LARGEST <= speed <= LARGEST and -LARGEST <= bend <= LARGEST:
-            return (speed,), (bend + bend,)
     while count and samples[count - 1][0] >= t:
         count -= 1
     if not count:
@@ -60,13 +51,16 @@ def estimated_rates(
     if count == 1:
         return tuple([_usable((u[k] - u1[k]) / h2) for k in range(len(u))]), (0.0,) * len(u)
     t0, u0 = samples[count - 2]
-    speeds, accelerations = [], []
-    for a, b, c in zip(u0, u1, u, strict=True):
-        d2 = (c - b) / h2
-        bend = (d2 - (b - a) / (t1 - t0)) / (t - t0)
-        speeds.append(_usable(d2 + bend * h2))
-        accelerations.append(_usable(bend + bend))
-    return tuple(speeds), tuple(accelerations)
+    h1, span = t1 - t0, t - t0
+    speeds: tuple[float, ...] = ()
+    accelerations: tuple[float, ...] = ()
+    for k, b in enumerate(u1):
+        slope = (u[k] - b) / h2
+        bend = (slope - (b - u0[k]) / h1) / span
+        speed, acceleration = slope + bend * h2, bend + bend
+        speeds += (speed if -LARGEST <= speed <= LARGEST else 0.0,)
+        accelerations += (acceleration if -LARGEST <= acceleration <= LARGEST else 0.0,)
+    return speeds, accelerations
 
 
 def _usable(rate: float) -> float:

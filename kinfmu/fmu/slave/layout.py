@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from operator import itemgetter
 from typing import Any, NamedTuple
 
@@ -60,18 +60,21 @@ NOT_A_NUMBER = math.nan
 MOTION = "values", "rates", "accelerations"  # parts that are computed together, as the part "motion"
 
 
+Computer = Callable[[Any], Numbers]  # computes the numbers of a part at a pose
+
+
 class Fetch(NamedTuple):
     """How to read a list of Real variables: the numbers of some parts make a row, of which places are picked."""
 
-    parts: tuple[str, ...]
+    parts: tuple[tuple[str, Computer | None], ...]  # each with what computes it; None: it is read as it is set
     pick: Callable[[Numbers], Sequence[float]] | None  # None: all of them
 
 
-def plan_fetch(references: Places, vrs: Sequence[int]) -> Fetch:
+def plan_fetch(references: Places, vrs: Sequence[int], computers: Mapping[str, Computer]) -> Fetch:
     """Return how to read a list of value references; those of no Real variable are read from the part "no_number"."""
     layout = references.layout
     places = [references.real(vr) for vr in vrs]
-    parts = sorted({part for part, _ in places if part is not None})
+    parts = list(dict.fromkeys([part for part, _ in places if part is not None]))
     offsets: dict[int, int] = {}
     width = 0
     for part in parts:
@@ -79,7 +82,9 @@ def plan_fetch(references: Places, vrs: Sequence[int]) -> Fetch:
         width += len(layout.parts[part].variables)
     indices = [width if part is None else offsets[part] + place for part, place in places]
     names = _joined([layout.parts[part].name for part in parts])
-    return Fetch((*names, "no_number") if width in indices else tuple(names), _picker(indices, width))
+    if width in indices:
+        names.append("no_number")
+    return Fetch(tuple([(name, computers.get(name)) for name in names]), _picker(indices, width))
 
 
 def _joined(names: list[str]) -> list[str]:

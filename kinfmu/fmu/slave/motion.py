@@ -5,6 +5,7 @@ A motion decides which pose is requested, how fast the drivers move there, and w
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
@@ -29,11 +30,12 @@ class Moved(Protocol):
     inputs: list[float]
     input_starts: list[float]
     wired: set[int]
-    history: tuple[Sample, ...]
+    history: deque[Sample]
     committed: Pose
     committed_inputs: Numbers
     pose: Pose | None
-    shown: Any
+    shown: Pose | None
+    rows: dict[str, Numbers]
     time: float
     touched: bool
     stray_reported: bool
@@ -70,23 +72,23 @@ class ByInputs:
     def is_set(self, part: str) -> None:
         """Clear what depends on a part of the variables of which one was set."""
         if part == "loads":
-            if self.slave.shown is not None:
-                rows = self.slave.shown.rows
-                self.slave.shown.rows = {part: row for part, row in rows.items() if part not in self.slave.stages}
+            rows = self.slave.rows
+            self.slave.rows = {part: row for part, row in rows.items() if part not in self.slave.stages}
         else:
             self.slave.forget()
 
     def solve(self) -> Pose:
         """Return the requested pose, good or not, solved from the committed one."""
-        return self.slave.solver.solve(self.slave.committed, self._values())
+        slave = self.slave
+        return slave.solver.solve(slave.committed, tuple(slave.inputs[::3]))
 
     def drive(self) -> Drive:
         """Return u, ud, udd of the requested pose."""
-        return self._with_rates(self.slave.inputs, *self._moment())
+        return self._with_rates(self.slave.inputs, self._moment())
 
     def committed_drive(self) -> Drive:
         """Return u, ud, udd at the last commit."""
-        return self._with_rates(self.slave.committed_inputs, *self.slave.history[-1])
+        return self._with_rates(self.slave.committed_inputs, self.slave.history[-1])
 
     def errors(self) -> tuple[Numbers, Numbers] | None:
         """Return the errors of ud and udd, which estimates have; None: the motion has none."""
@@ -114,17 +116,15 @@ class ByInputs:
         slave.time = t + h
         return True
 
-    def _values(self) -> Numbers:
-        return tuple(self.slave.inputs[::3])
-
     def _moment(self) -> Sample:
         """Return the time and u that the inputs request; without a set since the commit these are the committed."""
         slave = self.slave
-        return (slave.time, self._values()) if slave.touched or not slave.history else slave.history[-1]
+        return (slave.time, tuple(slave.inputs[::3])) if slave.touched or not slave.history else slave.history[-1]
 
-    def _with_rates(self, inputs: Sequence[float], t: float, u: Numbers) -> Drive:
-        """Return u, ud, udd at time t, with estimates for rates that are not wired."""
+    def _with_rates(self, inputs: Sequence[float], moment: Sample) -> Drive:
+        """Return u, ud, udd at a time and u, with estimates for rates that are not wired."""
         wired = self.slave.wired
+        t, u = moment
         if len(wired) == 2 * len(u):
             return u, tuple(inputs[1::3]), tuple(inputs[2::3])
         ud, udd = estimated_rates(self.slave.history, t, u)

@@ -12,6 +12,7 @@ import ctypes
 import json
 import math
 import sys
+from collections import deque
 from collections.abc import Sequence
 from hashlib import sha256
 from typing import Any
@@ -82,10 +83,12 @@ class MechanismSlave(SlaveVariables):
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         try:
-            obstacle = self._no_step(current_time, step_size)
-            if obstacle:
-                self.log(obstacle, Fmi2Status.error)
-                return False
+            end = current_time + step_size
+            if not (self.running and step_size >= 0.0 and self.start_time <= current_time <= end <= self.stop_time):
+                obstacle = self._obstacle(current_time, step_size)
+                if obstacle:
+                    self.log(obstacle, Fmi2Status.error)
+                    return False
             if self.refused:
                 for reason in self.refused.values():
                     self.log(f"at t = {current_time:g} s: {reason}", Fmi2Status.discard)
@@ -96,10 +99,8 @@ class MechanismSlave(SlaveVariables):
             self.report_defect(error)
             return False
 
-    def _no_step(self, t: float, h: float) -> str:
-        """Return why a step is invalid, or an empty text."""
-        if self.running and h >= 0.0 and self.start_time <= t <= t + h <= self.stop_time:
-            return ""
+    def _obstacle(self, t: float, h: float) -> str:
+        """Return why a step is invalid, or an empty text: rounding may take it a little past the ends."""
         if not self.running:
             return "doStep before the end of initialization, or after terminate"
         if not (math.isfinite(t + h) and h >= 0.0):
@@ -116,8 +117,8 @@ class MechanismSlave(SlaveVariables):
         history = self.history
         repeated_from = t - SAME_TIME * h - ROUNDING * abs(t)
         while history and history[-1][0] >= repeated_from:  # the host repeats a step, or goes back
-            history = history[:-1]
-        self.history = (*history[1 - KEPT :], (t, pose.u))
+            history.pop()
+        history.append((t, pose.u))
         self.committed = pose
         self.committed_inputs = tuple(self.inputs)
         self.committed_loads = self.settings["loads"]
@@ -168,7 +169,7 @@ class MechanismSlave(SlaveVariables):
         self.committed = self.solver.restore(state["committed"])
         self.committed_inputs = as_numbers(state["committed_inputs"], self.inputs)
         self.committed_loads = as_numbers(state["committed_loads"], self.committed_loads)
-        self.history = tuple((t, tuple(u)) for t, u in state["history"])
+        self.history = deque([(t, tuple(u)) for t, u in state["history"]], KEPT)
         self.motion = self.new_motion()
         self.forget()
         self.motion.restore(state["motion"])
