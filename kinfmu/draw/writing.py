@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinfmu.errors import FigureError, MissingPackageError, listed
-from kinfmu.files import suffix_of, write_whole
+from kinfmu.files import errors_of_writing, suffix_of, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -79,10 +79,8 @@ def figure_style(subject: object) -> Iterator[None]:
 
 def write_bytes(path: Path, image: bytes) -> None:
     """Write a picture; FigureError if the file cannot be written."""
-    try:
+    with errors_of_writing(path, FigureError):
         write_whole(path, image)
-    except OSError as error:
-        raise FigureError(f"{path}: cannot be written ({error.strerror or error})") from None
 
 
 def check_suffix(path: Path) -> None:

@@ -9,17 +9,15 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from kinfmu.errors import FmuError
-from kinfmu.files import write_whole
+from kinfmu.files import errors_of_writing, write_whole
 
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date that a zip archive can hold
 
 
 def write(path: Path, data: bytes) -> None:
     """Write the whole file or none, so that a host never reads an incomplete FMU."""
-    try:
+    with errors_of_writing(path, FmuError):
         write_whole(path, data)
-    except OSError as error:
-        raise FmuError(f"{path}: cannot be written ({error.strerror})") from None
 
 
 def digest(contents: Mapping[str, bytes]) -> str:

@@ -9,7 +9,7 @@ from contextlib import nullcontext
 from importlib.util import find_spec
 from pathlib import Path
 
-from kinfmu.errors import CompilerError, FmuError, RequestError, listed, suggestion
+from kinfmu.errors import CompilerError, FmuError, RequestError, listed, valid_names
 from kinfmu.files import suffix_of, temporary_folder
 from kinfmu.fmu.archive import write
 from kinfmu.fmu.description import FmiVersion
@@ -146,17 +146,13 @@ def _written(path: Path, data: bytes, page: str, *, osp: bool) -> Path:
 def _check(flavour: str, drive: str, fmi: int, platforms: str) -> None:
     """Raise a RequestError for unknown choices and for choices that exclude each other."""
     if flavour not in FLAVOURS:
-        raise RequestError(
-            f"flavour '{flavour}' is not known{suggestion(flavour, FLAVOURS)}; flavours: {listed(FLAVOURS)}"
-        )
+        raise RequestError(f"flavour '{flavour}' is not known{valid_names(flavour, FLAVOURS, 'flavours')}")
     if drive not in DRIVES:
-        raise RequestError(f"drive = '{drive}' is not known{suggestion(drive, DRIVES)}; known: {listed(DRIVES)}")
+        raise RequestError(f"drive = '{drive}' is not known{valid_names(drive, DRIVES)}")
     if fmi not in FMI_VERSIONS:
         raise RequestError(f"fmi = {fmi!r} is not known; known: {listed(map(str, FMI_VERSIONS))}")
     if platforms not in PLATFORMS:
-        raise RequestError(
-            f"platforms = '{platforms}' is not known{suggestion(platforms, PLATFORMS)}; known: {listed(PLATFORMS)}"
-        )
+        raise RequestError(f"platforms = '{platforms}' is not known{valid_names(platforms, PLATFORMS)}")
     if flavour == "python" and (fmi != 2 or platforms != "host"):
         choice = f"fmi = {fmi}" if fmi != 2 else f"platforms = '{platforms}'"
         raise RequestError(f"{choice} needs flavour = 'native'; the python flavour is FMI 2.0 on pythonfmu's platforms")

@@ -22,7 +22,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from kinfmu.analysis.driver_path import follow
 from kinfmu.analysis.singular import DriverRange, driver_range
-from kinfmu.errors import FmuError, KinfmuError, RequestError, listed, suggestion
+from kinfmu.errors import FmuError, KinfmuError, RequestError, valid_names
 from kinfmu.fmu import reference
 from kinfmu.fmu.archive import write, zipped
 from kinfmu.fmu.description.common import document
@@ -193,9 +193,7 @@ def attributes(metadata: Mapping[str, str]) -> dict[str, str]:
     found = {}
     for name, text in metadata.items():
         if name not in METADATA:
-            raise RequestError(
-                f"metadata: '{name}' is not known{suggestion(name, METADATA)}; known: {listed(METADATA)}"
-            )
+            raise RequestError(f"metadata: '{name}' is not known{valid_names(name, METADATA)}")
         if not isinstance(text, str) or not text.strip() or not text.isprintable():
             raise RequestError(f"{name} = {quoted(text)} must be one line of text")
         found[METADATA[name]] = _utc(text) if name == "date" else text.strip()

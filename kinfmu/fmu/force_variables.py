@@ -11,13 +11,14 @@ from kinfmu.mechanism import LawConstant, Mechanism
 from kinfmu.mechanism.force_names import external_names
 from kinfmu.mechanism.joints import CamFlatFace, CamOscillating, CamRoller, CamTranslating, Joint
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.efforts import load_inputs
 from kinfmu.plan.equations.graph import Node, symbols
 from kinfmu.plan.forces import ForceSteps, force_names, force_steps
 from kinfmu.plan.reactions import reaction_names_of, reaction_steps, shaking_steps
 from kinfmu.plan.steps import Assignment, derivative_name, law_symbol
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.plan.undetermined import shared_reactions, unknown_contacts, why_unknown
-from kinfmu.units import ForceName, InputName, Quantity, unit_of
+from kinfmu.units import ForceName, Quantity, unit_of
 
 _WORDS = {
     "torque": "Torque that the drive must apply for this motion",
@@ -150,7 +151,7 @@ def force_parts(plan: SolvePlan, stages: Mapping[str, ForceSteps]) -> dict[str, 
 def force_variables(plan: SolvePlan, steps: ForceSteps) -> Iterator[Variable]:
     """Yield the outputs of a force stage."""
     behind = _behind_symbols(plan, steps)
-    order = [*(name for driver in plan.drivers for name in driver.inputs), *_load_inputs(plan.mechanism)]
+    order = [*(name for driver in plan.drivers for name in driver.inputs), *load_inputs(plan)]
     for name, node in zip(steps.names, steps.results, strict=True):
         found = _of_node(node, behind)
         own = next((driver.inputs for driver in plan.drivers if driver.name == name.owner), None)
@@ -202,10 +203,6 @@ def variable_description(plan: SolvePlan, name: ForceName) -> str:
 
 def _joint(plan: SolvePlan, name: str) -> Joint:
     return next(one for one in plan.mechanism.joints if one.name == name)
-
-
-def _load_inputs(mechanism: Mechanism) -> list[InputName]:
-    return [name for load in mechanism.loads for name in load.inputs()]
 
 
 def _behind_symbols(plan: SolvePlan, steps: ForceSteps) -> dict[str, frozenset[str]]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.errors import RequestError, listed, suggestion
+from kinfmu.errors import RequestError, listed, valid_names
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.joints.cam import Cam
 from kinfmu.mechanism.joints.cam_flat_face import CamFlatFace
@@ -90,9 +90,7 @@ def _quantity(mechanism: Mechanism, joints: Sequence[Joint], name: str, at: Plac
     coordinate = next((one for one in coordinates if one == name), None)
     if coordinate is None:
         known = [*cams, *coordinates]
-        raise RequestError(
-            f"'{name}' is neither a coordinate nor a cam{suggestion(name, known)}; known: {listed(known)}"
-        )
+        raise RequestError(f"'{name}' is neither a coordinate nor a cam{valid_names(name, known)}")
     kind = coordinate.quantity().kind
     if coordinate.is_angle:
         return at.angle(coordinate.owner), kind

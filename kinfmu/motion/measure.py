@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from kinfmu.arrays import FloatArray
 from kinfmu.display import Displayed
-from kinfmu.errors import RequestError, listed, suggestion
+from kinfmu.errors import RequestError, valid_names
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import measured_forces
 from kinfmu.mechanism.measures import Reading
@@ -113,7 +113,7 @@ def with_measures(mechanism: Mechanism, measures: Iterable[Reading | str] | Read
         elif one in own:
             chosen.append(own[one])
         else:
-            raise RequestError(f"there is no measure {quoted(one)}{suggestion(one, own)}; measures: {listed(own)}")
+            raise RequestError(f"there is no measure {quoted(one)}{valid_names(one, own, 'measures')}")
     return replace(mechanism, measures=tuple(chosen))
 
 

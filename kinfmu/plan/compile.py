@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
-from kinfmu.errors import RequestError, listed, suggestion
+from kinfmu.errors import RequestError, listed, valid_names
 from kinfmu.mechanism import Mechanism, Point
 from kinfmu.mechanism.drivers import Driver
 from kinfmu.mechanism.quantities.arithmetic import Value
@@ -183,7 +183,7 @@ def _chosen(
         if name in fixed:
             raise RequestError(f"outputs: '{name}' is not one: the joints hold it constant; outputs: {listed(known)}")
         if name not in known:
-            raise RequestError(f"outputs: '{name}' is not one{suggestion(name, known)}; outputs: {listed(known)}")
+            raise RequestError(f"outputs: '{name}' is not one{valid_names(name, known, 'outputs')}")
     chosen = [(k, motion) for k, motion in enumerate(motions) if motion.name in outputs]
     return [motion for _, motion in chosen], sum(k < coordinate_count for k, _ in chosen)
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinfmu.arrays import FloatArray
-from kinfmu.errors import KinfmuError, RequestError, listed, suggestion
+from kinfmu.errors import KinfmuError, RequestError, listed, valid_names
 from kinfmu.mechanism import RunSettings
 from kinfmu.plan import DriverInfo
 from kinfmu.run import MOST_SAMPLES
@@ -95,9 +95,7 @@ def driven_by_inputs(
     names = [name for driver in drivers for name in driver.inputs]
     for name in inputs:
         if name not in names:
-            raise RequestError(
-                f"input '{name}' is not known{suggestion(name, names)}; inputs: {listed(names)}; times go by t"
-            )
+            raise RequestError(f"input '{name}' is not known{valid_names(name, names, 'inputs')}; times go by t")
     for driver in drivers:
         if driver.inputs[0] not in inputs:
             raise RequestError(f"input '{driver.inputs[0]}' is missing; give times or every driver's value")

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple, Protocol
 import numpy as np
 
 from kinfmu.arrays import FloatArray, IntArray
-from kinfmu.errors import KinfmuError, RequestError, listed, suggestion
+from kinfmu.errors import KinfmuError, RequestError, valid_names
 from kinfmu.solver.python import Pose, Solver
 from kinfmu.solver.python.pose import Vector, evaluated
 
@@ -57,7 +57,7 @@ class Engine(Protocol):
 def require_engine(engine: str) -> None:
     """Raise a RequestError for the name of an unknown engine."""
     if engine not in ENGINES:
-        raise RequestError(f"engine '{engine}' is not known{suggestion(engine, ENGINES)}; engines: {listed(ENGINES)}")
+        raise RequestError(f"engine '{engine}' is not known{valid_names(engine, ENGINES, 'engines')}")
 
 
 def tables_for(out: Tables | None, shape: tuple[int, int], order: Literal["C", "F"]) -> Tables:

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 from kinfmu.arrays import FloatArray, IntArray
 from kinfmu.codegen.python.stage import CompiledStage, load_stage
 from kinfmu.display import Displayed
-from kinfmu.errors import RequestError, listed, suggestion
+from kinfmu.errors import RequestError, listed, suggestion, valid_names
 from kinfmu.plan import SolvePlan, compile_plan, localized
 from kinfmu.plan.sensitivity import scale_of, sensitivity_steps
 from kinfmu.plan.steps import law_symbol
@@ -285,7 +285,7 @@ def _names(what: str, wanted: Sequence[str] | None, known: Sequence[str]) -> tup
         raise RequestError(f"{what}: '{wanted}' must be a list of names, such as ['{wanted}']")
     for name in wanted:
         if name not in known:
-            raise RequestError(f"{what}: '{name}' is not known{suggestion(name, known)}; valid: {listed(known)}")
+            raise RequestError(f"{what}: '{name}' is not known{valid_names(name, known, 'valid')}")
     return tuple(dict.fromkeys(wanted))
 
 

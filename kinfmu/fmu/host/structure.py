@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from kinfmu.errors import FmuError, listed, suggestion
+from kinfmu.errors import FmuError, listed, suggestion, valid_names
 from kinfmu.fmu import description
 from kinfmu.fmu.description import Description
 from kinfmu.fmu.host.ports import Port, ports_of, read_description, unlogged
@@ -245,8 +245,7 @@ def _value(path: Path, one: Component, name: str, parameter: Any) -> float:
 def _component(path: Path, components: Mapping[str, Component], name: str) -> Component:
     if name not in components:
         raise FmuError(
-            f"{path}: a connection names component {quoted(name)}{suggestion(name, components)}; "
-            f"components: {listed(components)}"
+            f"{path}: a connection names component {quoted(name)}{valid_names(name, components, 'components')}"
         )
     return components[name]
 

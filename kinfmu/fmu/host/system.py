@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinfmu.errors import FmuError, MissingPackageError, RequestError, listed, suggestion
+from kinfmu.errors import FmuError, MissingPackageError, RequestError, valid_names
 from kinfmu.fmu.host.any_slave import AnySlave, foreign_slave
 from kinfmu.fmu.host.exchange import check_exchange, exchange_of, ordered
 from kinfmu.fmu.host.input_table import InputTable, table_of, times
@@ -109,8 +109,7 @@ def _values(
     for name, value in parameters.items():
         if name not in settable:
             raise RequestError(
-                f"{path}: '{name}' is no parameter or input{suggestion(name, settable)}; "
-                f"parameters and inputs: {listed(settable)}"
+                f"{path}: '{name}' is no parameter or input{valid_names(name, settable, 'parameters and inputs')}"
             )
         for one, port in system.inputs.get(name, (settable[name],)):
             found[one.name][port.name] = port.number(name, value)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kinfmu.errors import RequestError, listed, suggestion
+from kinfmu.errors import RequestError, valid_names
 from kinfmu.mechanism.laws import External, Law
 from kinfmu.mechanism.laws.law import Jumps
 from kinfmu.mechanism.loads import Load
@@ -53,7 +53,7 @@ def read_efforts(known: Sequence[str], given: Mapping[str, Any], span: tuple[flo
     """
     for name in given:
         if name != TIME and name not in known:
-            raise RequestError(f"input '{name}' is not known{suggestion(name, known)}; inputs: {listed(known)}")
+            raise RequestError(f"input '{name}' is not known{valid_names(name, known, 'inputs')}")
     jumps: set[float] = set()
     times = _times(given[TIME]) if TIME in given else None
     by_name = {}

@@ -9,7 +9,7 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.codegen.python import load_model
-from kinfmu.errors import RequestError, listed, suggestion
+from kinfmu.errors import RequestError, listed, suggestion, valid_names
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_masses
 from kinfmu.mechanism.valid import is_number, quoted
@@ -107,7 +107,7 @@ def _initial_state(plan: SolvePlan, start: float, given: Mapping[str, float]) ->
     known = [name for driver in plan.drivers for name in driver.inputs[:2]]
     for name, value in given.items():
         if name not in known:
-            raise RequestError(f"state '{name}' is not known{suggestion(name, known)}; states: {listed(known)}")
+            raise RequestError(f"state '{name}' is not known{valid_names(name, known, 'states')}")
         if not (is_number(value) and np.isfinite(value)):
             raise RequestError(f"{name} = {quoted(value)} must be a finite number")
     u, ud, _ = load_model(plan).drive(start, tuple(constant.value for constant in plan.law_constants))
