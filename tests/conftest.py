@@ -23,7 +23,7 @@ GOLDEN = Path(__file__).parent / "golden"
 FLAGS = ((compiler, "FLAGS"), (compiler, "VECTORIZED"), (archive, "FLAGS"), (library, "FLAGS"))
 MEASURED = "kinfmu/seconds"  # in the cache of pytest: how long runs took, by their arguments
 MOST_MEASURED = 20  # runs
-USUAL_TIME = "the tests take about 4 min on two cores, 15 with --long; the first run compiles more"
+USUAL_TIME = "the tests take about 5 min on two cores, 20 with --long; the first run compiles more"
 STARTED = pytest.StashKey[float]()
 SHIPPED_FLAGS = {place: getattr(*place) for place in FLAGS}
 
