@@ -19,14 +19,8 @@ from .layout import MOTION, NOT_A_NUMBER, UNKNOWN_ERROR, Computer, Fetch, Layout
 from .motion import LAST_GOOD, ByInputs, ByLaw, Drive
 
 MOST_FETCHES = 256  # lists of value references kept, so that a host that reads at random does not fill the memory
-SETTINGS = (
-    "constants",
-    "parameters",
-    "tolerance",
-    "loads",
-    "efforts",
-)  # parts of numbers that are read as they are set
-_LATE = {  # by part of which nothing can be set once the FMU is initialized
+SETTINGS = ("constants", "parameters", "tolerance", "loads", "efforts")  # parts that are read as they are set
+_LATE = {  # why a set after initialization is refused, by part
     "parameters": "it is fixed once the FMU is initialized",
     "states": "it is a state, which the FMU integrates once it is initialized",
 }
@@ -52,10 +46,9 @@ class SlaveVariables(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         starts = {part.name: part.starts for part in self.layout.parts}
-        starting = (
-            [start + 0.0 for start in starts["states"]] if self.by_efforts else starts["inputs"]
-        )  # a state is no -0
-        self.inputs: list[float] = list(starting)  # value, speed, acceleration of each driver
+        # Value, speed, acceleration of each driver; 0.0 added to a state makes 0 of -0.
+        driven = [x + 0.0 for x in starts["states"]] if self.by_efforts else starts["inputs"]
+        self.inputs: list[float] = list(driven)
         self.input_starts = list(self.inputs)
         self._input_count = 0 if self.by_efforts else len(self.inputs)  # of drivers, which come first
         self.settings: dict[str, Numbers] = {part: starts.get(part, ()) for part in SETTINGS}

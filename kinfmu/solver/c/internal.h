@@ -1,4 +1,4 @@
-/* Declarations that the files of the solver share; no other file needs them, except those of kinfmu/simd. */
+/* Declarations that the files of the solver share, and what is built on it: lanes, FMUs, pages. */
 #ifndef KF_INTERNAL_H
 #define KF_INTERNAL_H
 
