@@ -111,8 +111,8 @@ def _singular(
 ) -> float | None:
     """Return the time of the smallest determinant within a step; None if it cannot be as low as `low_enough`.
 
-    Towards a limit the determinant is convex, |t - t0| or the root of a square and a little more. So between places it lies
-    above the lines through its neighbours: next to place k, above 2 m_k - max(m_k-1, m_k+1).
+    Towards a limit the determinant is convex, |t - t0| or the root of a square and a little more. So between places it
+    lies above the lines through its neighbours: next to place k, above 2 m_k - max(m_k-1, m_k+1).
     """
 
     def margin(t: float) -> float:
