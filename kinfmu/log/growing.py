@@ -21,6 +21,8 @@ from kinfmu.solver.python.pose import Status
 class McapLog:
     """A sink for `simulate` that writes the MCAP file of `write_mcap`, one chunk for each piece of the run.
 
+    What viewers draw is chosen and written when the run has ended, and by `recover`.
+
     The file replaces an older one of this name when the first samples are written. The name is locked until the run
     ends. If the process is killed, the file holds what was added; `recover` makes a complete file of it. If the file
     cannot be written any more, what was written stays, and the LogError states up to which time.
@@ -114,7 +116,6 @@ class McapLog:
 
     def _put(self, content: Content, run: Run) -> None:
         content.add(run)
-        content.draw(run)
         due = unexplained(self._held, run.events)
         new = unexplained(status_events(run, self._status), run.events)
         self._held = [change for change in new if change.level == "error"]

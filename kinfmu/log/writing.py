@@ -7,7 +7,7 @@
     /tf                   tf2_msgs/msg/TFMessage                 where they are [m]
     /log                  rcl_interfaces/msg/Log                 changes of status and events
 
-A complete run of more than MOST_DRAWN samples has about that many of them in the drawn topics.
+The drawn topics hold what a screen can show of the samples: `drawn_samples`. They are written when the run has ended.
 Samples without numbers (status 3 to 5) are a gap in the drawn topics; the full record keeps every sample unchanged, so
 `read` returns the same run, bit for bit. The mechanism file and the FMU's model description are attachments.
 Metadata: kinfmu.record (names, units, constants), kinfmu.info (of the run: token, parameters), kinfmu.about (versions,
@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import platform
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from io import FileIO
 from pathlib import Path
 
@@ -33,12 +33,14 @@ from kinfmu.log.target import replacing
 from kinfmu.log.topics import SOURCE, STATUS_SOURCE, JointTopic, LinkTopic, LogTopic, SampleTopic, joint_topics
 from kinfmu.run import Event, Run
 from kinfmu.run.axis import axis_of
-from kinfmu.run.channels import is_all_but, is_drawn, select
+from kinfmu.run.channels import is_all_but, is_drawn, kept_samples, select
 from kinfmu.run.verdict import sentence, status_events, unexplained
 from kinfmu.version import VERSION
 
 ROWS = 4096  # samples in a chunk of a complete run; larger chunks take more memory, smaller ones more time
-MOST_DRAWN = 10_000  # samples of a complete run in the topics that viewers draw; they take three times those of /sample
+FRAMES = 60.0  # samples drawn per second of playing
+PLAYED_SLOWLY = 40.0  # [s]; shorter runs are drawn as if they lasted so long: a plot may be 2400 pixels wide
+MOST_DRAWN = 20_000  # of a run; they take twice the bytes of those in /sample
 LARGEST_CHUNK = 2**26  # [bytes]; readers refuse what unpacks to more than twice that
 MECHANISM_FILE = "mechanism.toml"
 MODEL_DESCRIPTION = "modelDescription.xml"
@@ -69,23 +71,41 @@ def write_mcap(run: Run, path: str | Path, *, channels: Sequence[str] | None = N
     nanoseconds(run.t)  # reports invalid times before a file is made
     with replacing(path) as temporary, FileIO(temporary, "w") as file:
         content = Content(file, run, zero_of(run.t), drawn=is_drawn(channels))
-        drawn = run if len(run) <= MOST_DRAWN else run.part(_drawn_samples(run))
         try:
-            rows = max(1, min(ROWS, LARGEST_CHUNK // (64 + 8 * sum(1 for _ in run.places()))))
-            for write, samples in ((content.add, run), (content.draw, drawn)):
-                for start in range(0, len(samples), rows):
-                    write(samples.part(slice(start, start + rows)))
+            for part in _chunks(run):
+                content.add(part)
             content.log(unexplained(status_events(run), run.events), run.events)
             content.end(run)
         finally:
             content.close()
 
 
-def _drawn_samples(run: Run) -> IntArray:
-    """Return the samples of a long run that are drawn: evenly spaced ones, and both sides of changes of status."""
+def _chunks(run: Run) -> Iterator[Run]:
+    """Yield the samples of a run in the parts that are written at once."""
+    rows = max(1, min(ROWS, LARGEST_CHUNK // (64 + 8 * sum(1 for _ in run.places()))))
+    for start in range(0, len(run), rows):
+        yield run.part(slice(start, start + rows))
+
+
+def drawn_samples(run: Run) -> IntArray:
+    """Return the samples that viewers draw: FRAMES per second at most, and MOST_DRAWN in all, evenly spaced in time.
+
+    A short run is played slowly. Also the first and last one, those next to events such as limits, and both sides of each change of status.
+    """
+    if not len(run):
+        return np.arange(0)
     changed = np.flatnonzero(np.diff(run.status))
-    last = len(run) - 1
-    return np.unique(np.concatenate([np.arange(0, last, -(-len(run) // MOST_DRAWN)), changed, changed + 1, [last]]))
+    events = np.searchsorted(run.t, [event.t for event in run.events]).clip(max=len(run) - 1)
+    marked = _thinned(np.unique([0, len(run) - 1, *changed, *(changed + 1), *events]), MOST_DRAWN // 2)
+    most = MOST_DRAWN - len(marked)
+    span = float(np.ptp(run.t)) or 1.0
+    rate = min(FRAMES * max(1.0, PLAYED_SLOWLY / span), (most - 2) / span)
+    return np.union1d(marked, _thinned(kept_samples(run.t, rate), most))
+
+
+def _thinned(rows: IntArray, most: int) -> IntArray:
+    """Return rows, or so many of them, evenly spaced, if there are more."""
+    return rows if len(rows) <= most else rows[np.linspace(0, len(rows) - 1, most).astype(int)]
 
 
 class Content:
@@ -135,11 +155,12 @@ class Content:
         self._sample.add(run, stamps)
         self.until = float(run.t[-1])
 
-    def draw(self, run: Run) -> None:
-        """Write the next samples that viewers draw."""
-        stamps = nanoseconds(run.t) - self._zero * NANOSECONDS
-        for topic in self._topics if len(run) else ():
-            topic.add(run, stamps)
+    def _draw(self, run: Run) -> None:
+        """Write what viewers draw of the whole run."""
+        for part in _chunks(run.part(drawn_samples(run))) if self._topics else ():
+            stamps = nanoseconds(part.t) - self._zero * NANOSECONDS
+            for topic in self._topics:
+                topic.add(part, stamps)
 
     def log(self, changes: Iterable[Event], events: Iterable[Event]) -> None:
         """Write changes of status and the run's own events."""
@@ -148,7 +169,11 @@ class Content:
             self._log.add(sorted(entries, key=lambda entry: entry[1].t))
 
     def end(self, run: Run, outcome: str = "") -> None:
-        """Write the verdict and finish the file; outcome: why the run ended early, if no event states that."""
+        """Write what is drawn of the run, its verdict, and finish the file.
+
+        outcome: why the run ended early, if no event states that.
+        """
+        self._draw(run)
         failures = [event.text for event in run.events if event.level == "error"]
         texts = ending(run) | {"verdict": sentence(run), "outcome": outcome or (failures or ["completed"])[0]}
         self._writer.metadata(END, texts | {CHECKSUM: checksum(texts)})

@@ -19,7 +19,7 @@ from kinfmu.log import read, write_mcap
 from kinfmu.log.mcap_writer import McapWriter
 from kinfmu.log.topics import field_names
 from kinfmu.log.viewer.headless import executable
-from kinfmu.log.writing import MOST_DRAWN
+from kinfmu.log.writing import FRAMES, MOST_DRAWN, PLAYED_SLOWLY, drawn_samples
 from kinfmu.run import Event, Run
 from kinfmu.run.channels import select
 from tests.log.runs import fourbar, with_gap, without_samples
@@ -130,17 +130,51 @@ def test_a_part_of_a_run_reads_back_bit_for_bit(channels: list[str], run_with_ga
     assert_same(part, read(tmp_path / "run.mcap"))
 
 
+def times_of(path: Path, topic: str) -> np.ndarray:
+    """Log times [s] of a topic."""
+    return np.array([time for time, _ in messages(path, topic)]) * 1e-9
+
+
 def test_viewers_draw_evenly_spaced_samples_of_a_long_run(tmp_path: Path) -> None:
     n = 2 * MOST_DRAWN + 1
-    run = with_gap(fourbar(np.linspace(10.0, 170.0, n)), 4712, 5400)
+    run = with_gap(fourbar(np.linspace(0.0, 1800.0, n) / 10.0), 4712, 5400).replaced(t=np.linspace(0.0, 1800.0, n))
     write_mcap(run, tmp_path / "run.mcap")
-    times = np.array([time for time, _ in messages(tmp_path / "run.mcap", "/tf")]) * 1e-9
-    assert MOST_DRAWN / 2 < len(times) <= MOST_DRAWN
+    for topic in ("/tf", "/joint_states", "/joint_accelerations"):
+        assert MOST_DRAWN / 2 < len(times_of(tmp_path / "run.mcap", topic)) <= MOST_DRAWN
+    times = times_of(tmp_path / "run.mcap", "/tf")
     assert np.abs(times[:, None] - run.t[[0, 4711, 5401, n - 1]]).min(axis=0).max() < 1e-8  # ends, and those of the gap
     assert not np.any((times > run.t[4711] + 1e-8) & (times < run.t[5401] - 1e-8))
     apart = np.sort(np.diff(times))
-    assert apart[-2] < 3.1 * 160.0 / n  # without the gap
+    assert apart[-2] < 3.1 * 1800.0 / n  # without the gap
     assert_same(run, read(tmp_path / "run.mcap"))
+
+
+def test_viewers_draw_as_many_samples_per_second_as_a_screen_shows_and_those_at_events(tmp_path: Path) -> None:
+    run = fourbar(np.linspace(100.0, 150.0, 20_001))
+    events = tuple(Event(float(run.t[k]), "warning", f"event {k}") for k in (77, 12_345))
+    write_mcap(dataclasses.replace(run, events=events), tmp_path / "run.mcap")
+    times = times_of(tmp_path / "run.mcap", "/tf")
+    assert 50 * FRAMES < len(times) <= 50 * FRAMES + 4
+    np.testing.assert_allclose(np.abs(times[:, None] - run.t[[0, 77, 12_345, 20_000]]).min(axis=0), 0.0, atol=1e-8)
+    assert np.diff(times).max() < 1 / FRAMES + 50.0 / 20_000 + 1e-8
+    assert len(messages(tmp_path / "run.mcap", "/sample")) == len(run)
+
+
+def test_a_short_run_is_drawn_with_the_samples_that_a_plot_can_show() -> None:
+    run = fourbar(np.linspace(10.0, 10.01, 20_001))
+    assert len(drawn_samples(run)) == pytest.approx(PLAYED_SLOWLY * FRAMES, abs=3)
+    run = fourbar(np.linspace(10.0, 10.01, 1001))
+    assert len(drawn_samples(run)) == len(run)
+
+
+def test_a_run_that_changes_its_status_at_every_sample_is_drawn_within_the_limit() -> None:
+    run = fourbar(np.linspace(10.0, 170.0, 5 * MOST_DRAWN))
+    run = run.replaced(status=np.arange(len(run)) % 2)
+    rows = drawn_samples(run)
+    assert MOST_DRAWN / 2 < len(rows) <= MOST_DRAWN
+    assert (rows[0], rows[-1]) == (0, len(run) - 1)
+    assert len(drawn_samples(without_samples(run))) == 0
+    assert drawn_samples(run.part(slice(0, 1))).tolist() == [0]
 
 
 def test_what_is_not_logged_is_not_in_the_file(run: Run, tmp_path: Path) -> None:
@@ -221,7 +255,7 @@ def test_rerun_verifies_the_file(any_run: Run, tmp_path: Path) -> None:
 
 def test_log_times_are_rounded_to_whole_nanoseconds(tmp_path: Path) -> None:
     write_mcap(fourbar(np.arange(3000) * 1e-3), tmp_path / "run.mcap")
-    times = [time for time, _ in messages(tmp_path / "run.mcap", "/joint_states")]
+    times = [time for time, _ in messages(tmp_path / "run.mcap", "/sample")]
     assert times == [k * 1_000_000 for k in range(3000)]
 
 
