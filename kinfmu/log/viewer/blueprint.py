@@ -29,6 +29,7 @@ FEW = 4  # plots of two runs, up to which they are wide
 WIDTH, HEIGHT = 870.0, 820.0  # [points], of all plots and states on a usual screen
 NUMBERS, CAPTION = 65.0, 44.0  # [points] of a plot: width of the numbers of y, height of the title and of those of x
 EDGE_Y = 0.1  # of the distance of labels, by which an axis ends beyond a label
+FREE_Y = 0.05  # of the length of an axis, left free below and above its curves
 LABELLED = 24.0  # [points]; Rerun labels the multiples of that power of ten whose distance is at least this
 STATUS, LANES = 0.13, 0.17  # of the height of the right side, for the states of one run and of two
 LEAST_LEGEND, MOST_LEGEND = 0.15, 0.8  # of the run's time, left free after the curves for the legend
@@ -261,19 +262,22 @@ def plot(
 def with_two_labels(low: float, high: float, height: float) -> tuple[float, float]:
     """Return a range of y with at least two labels on an axis of this height [points]: one alone, 0, states no scale.
 
-    The range ends beyond a label if it holds less than two.
+    The range leaves a margin on both sides, and ends beyond a label if it holds less than two.
     """
-    step = 10.0 ** math.ceil(math.log10(LABELLED * (high - low) / max(height, LABELLED)))
-    first, last = math.ceil(low / step), math.floor(high / step)
+    margin = FREE_Y * (high - low)
+    bottom, top = low - margin, high + margin
+    step = 10.0 ** math.ceil(math.log10(LABELLED * (top - bottom) / max(height, LABELLED)))
+    first, last = math.ceil(bottom / step), math.floor(top / step)
     if last > first:
-        return low, high
+        return bottom, top
     below, above, edge = (first - 1) * step, (last + 1) * step, EDGE_Y * step
-    is_nearer_above = above - high < low - below
+    is_nearer_above = above - top < bottom - below
     if last < first or not is_nearer_above:
-        low = below - edge
+        bottom = below - edge
     if last < first or is_nearer_above:
-        high = above + edge
-    return low, high
+        top = above + edge
+    margin = FREE_Y * (top - bottom)
+    return min(bottom, low - margin), max(top, high + margin)
 
 
 def _legend_part(plot: Plot, width: float) -> float:
