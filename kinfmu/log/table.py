@@ -32,8 +32,8 @@ def write_table(
     Args:
         run: The run.
         path: The file; its suffix chooses the format.
-        columns: Names such as 'coupler.x', 'coupler.*', 'q' or '-error', see kinfmu.run.channels; time and status are
-            always written. Default: all columns.
+        columns: Names such as 'coupler.x', 'coupler.*', 'q' or '-error', see kinfmu.run.channels; status is always
+            written, and time or, of a run over driver values, the inputs. Default: all columns.
         degrees: True: angles, and their rates in time, in deg.
         **form: Of a CSV file: units=True for names such as 'coupler.x [m]' in the first line, and one character each as
             separator= (default: ",") and decimal= (default: ".").

@@ -329,10 +329,13 @@ class Run(Tabular, Displayed):
     def columns(self) -> Iterator[Column]:
         """Yield every column that was kept: time, inputs, values, rates, accelerations, diagnostics, watches.
 
-        The size of a force in a pin follows its components.
+        A run over driver values has no time: its first columns are the inputs, that of its axis before the others. The
+        size of a force in a pin follows its components.
         """
         sizes = self._sizes_after(kept=True)
-        for place in self.places():
+        has_time = axis_of(self).is_time
+        places = (place for place in self.places() if has_time or place.table != "t")
+        for place in sorted(places, key=lambda place: place.name != self.axis):
             yield Column(place.name, place.unit, self._column(place.table, place.column))
             if place.name in sizes:
                 yield Column(sizes[place.name], place.unit, self[sizes[place.name]])

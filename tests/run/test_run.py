@@ -31,6 +31,9 @@ def run() -> Run:
     return kinfmu.solve(kinfmu.load("fourbar"), np.arange(5.0) * 10.0)
 
 
+INPUTS = ("angle", "speed", "acceleration")
+
+
 def test_columns_come_in_the_order_of_the_contract(run: Run) -> None:
     coordinates = ["crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi", "A.x", "A.y"]
     rates = ["crank.omega", "coupler.vx", "coupler.vy", "coupler.omega", "rocker.omega", "A.vx", "A.vy"]
@@ -47,6 +50,19 @@ def test_columns_come_in_the_order_of_the_contract(run: Run) -> None:
         *(f"solver.{name}" for name in diagnostics),
         "watch.AB.length",
     ]
+
+
+@pytest.mark.parametrize("moved", ["left", "right", "both"])
+def test_columns_of_a_run_over_driver_values_begin_with_the_driver_and_have_no_time(moved: str) -> None:
+    angles = {f"{name}_angle": 1.0 + (moved in (name, "both")) * np.linspace(0.0, 0.1, 3) for name in ("left", "right")}
+    run = kinfmu.solve(kinfmu.load("five_bar"), **angles)
+    names = [column.name for column in run.columns()]
+    others = {"left": "right", "right": "left", "both": "right"}
+    first = moved if moved != "both" else "left"
+    assert names[0] == f"{first}_angle"
+    assert set(names[:6]) == {f"{name}_{kind}" for name in (first, others[moved]) for kind in INPUTS}
+    assert "time" not in names
+    assert len(set(names)) == len(names)
 
 
 def test_every_column_declares_its_unit_and_has_a_number_a_sample(run: Run) -> None:
