@@ -19,9 +19,7 @@ from kinfmu.errors import CompilerError, MissingPackageError
 from kinfmu.fmu.build import FLAVOURS, build
 from kinfmu.fmu.host.simulate import simulate
 from kinfmu.log import McapLog, read, write_mcap, write_rrd
-from kinfmu.log.cdr import nanoseconds
-from kinfmu.log.record import computed_when_read, layout, tables
-from kinfmu.log.topics import sample_template
+from kinfmu.log.record import computed_when_read
 from kinfmu.log.viewer.timeline import MOST_ROWS
 from kinfmu.mechanism.gallery import load
 from kinfmu.run import Run
@@ -29,7 +27,6 @@ from kinfmu.run.solve import solve
 
 ROUNDS = 5
 SAMPLES = 1_000_000
-PLAIN_SAMPLES = 100_000  # of them for the package mcap: its time a row does not depend on their number
 TURNS = 0.5  # of the crank
 STEPS = 20_000  # of an FMU, in a round
 STOP = 360.0  # [s]; the crank of the FMU turns once in this time
@@ -43,6 +40,7 @@ class LogTask(NamedTuple):
     rows: int
     take: Callable[[], object]
     file: Path
+    plain: int = 0  # place of the task of the package mcap with which it is compared
 
 
 def run(rounds: int = ROUNDS, samples: int = SAMPLES, steps: int = STEPS) -> str:
@@ -59,11 +57,10 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES, steps: int = STEPS) -> str
         sizes = [task.file.stat().st_size / task.rows for task in found]
     doubles = len(list(long_run.without(computed_when_read(long_run)).places()))
     rows = []
-    usual = spread([value / found[0].rows for value in processor[found[0].name][1:]]).median
-    for task, seconds, size in zip(found, clock, sizes, strict=True):
+    busy_in = [spread([one / task.rows for one in processor[task.name][1:]]).median for task in found]  # 0 warms up
+    for task, seconds, busy, size in zip(found, clock, busy_in, sizes, strict=True):
         speed = spread([task.rows / value / 1e6 for value in seconds])
-        busy = spread([value / task.rows for value in processor[task.name][1:]]).median  # the first round warms up
-        share = "" if absent else f"{usual / busy:.1f}"
+        share = "" if absent else f"{busy_in[task.plain] / busy:.1f}"
         cost = f"{busy * 1e6:.2f} us/row"
         rows.append((task.name, f"{speed.median:.2f}", f"{speed.high:.2f}", cost, share, f"{size:.1f} B/row"))
     lines = [f"{samples} samples of the four-bar, {doubles} columns of 8 bytes, {rounds} rounds in turn"]
@@ -93,7 +90,7 @@ def fourbar(samples: int) -> Run:
 
 
 def tasks(long_run: Run, folder: Path) -> tuple[list[LogTask], str]:
-    """Return the measurements, the package mcap first if it is installed, and a note if it is not."""
+    """Return the measurements, those of the package mcap first if it is installed, and a note if it is not."""
     n = len(long_run)
     record, everything = folder / "record.mcap", folder / "everything.mcap"
     short, recording = folder / "short.mcap", folder / "short.rrd"
@@ -101,40 +98,44 @@ def tasks(long_run: Run, folder: Path) -> tuple[list[LogTask], str]:
     write_mcap(reviewed, short)
     found = [
         LogTask("MCAP: the record", n, lambda: write_mcap(long_run, record, channels=["-drawn"]), record),
-        LogTask("MCAP by default: also what viewers draw", n, lambda: write_mcap(long_run, everything), everything),
+        LogTask("MCAP: with what viewers draw", n, lambda: write_mcap(long_run, everything), everything, plain=1),
         LogTask("the record read back", n, lambda: read(record), record),
         LogTask("the record read back from all that", n, lambda: read(everything), everything),
         LogTask("a record made into a recording", len(reviewed), lambda: write_rrd(read(short), recording), recording),
     ]
     try:
-        return [_plain(long_run, folder / "plain.mcap"), *found], ""
+        plain = [_plain("the record", found[0], folder), _plain("with what viewers draw", found[1], folder)]
     except MissingPackageError as error:
-        return found, str(error)
+        return [task._replace(plain=0) for task in found], str(error)
+    return [*plain, *found], ""
 
 
-def _plain(long_run: Run, file: Path) -> LogTask:
-    """Return the task of writing a record by the package mcap: messages that are ready bytes, one call each."""
+def _plain(name: str, task: LogTask, folder: Path) -> LogTask:
+    """Return the task of writing the messages of a record by the package mcap: ready bytes, one call each."""
     if find_spec("mcap") is None:
         raise MissingPackageError("mcap is not installed: pip install 'kinfmu[bench]'")
+    from mcap.reader import make_reader
     from mcap.writer import CompressionType, Writer
 
-    part = long_run.part(slice(0, PLAIN_SAMPLES)).without(computed_when_read(long_run))
-    stamps = nanoseconds(part.t)
-    template = sample_template(len(list(part.places())))
-    payloads = np.empty((len(part), template.length), np.uint8)
-    template.fill(payloads, stamps, tables(part, layout(part)))
-    messages = [(stamp, payload.tobytes()) for stamp, payload in zip(stamps.tolist(), payloads, strict=True)]
+    task.take()
+    with task.file.open("rb") as stream:
+        found = make_reader(stream).iter_messages(log_time_order=False)
+        messages = [(channel, schema, one.log_time, one.data, one.sequence) for schema, channel, one in found]
+    file = folder / f"plain {name}.mcap"
 
     def take() -> None:
         with file.open("wb") as stream:
             writer = Writer(stream, compression=CompressionType.ZSTD)
             writer.start(profile="ros2", library="")
-            channel = writer.register_channel("/sample", "cdr", writer.register_schema("Sample", "ros2msg", b""))
-            for number, (stamp, message) in enumerate(messages):
-                writer.add_message(channel, stamp, message, stamp, number)
+            places: dict[int, int] = {}
+            for channel, schema, time, data, number in messages:
+                if channel.id not in places:
+                    of = writer.register_schema(schema.name, schema.encoding, schema.data)
+                    places[channel.id] = writer.register_channel(channel.topic, channel.message_encoding, of)
+                writer.add_message(places[channel.id], time, data, time, number)
             writer.finish()
 
-    return LogTask("the record by the package mcap", len(part), take, file)
+    return LogTask(f"the package mcap: {name}", task.rows, take, file, plain=task.plain)
 
 
 def logged_steps(rounds: int, steps: int = STEPS) -> list[str]:
