@@ -34,6 +34,7 @@ from kinfmu.solver.python.pose import Vector
 from kinfmu.solver.python.solver import TOLERANCE
 
 WORTH_COMPILING = 300_000  # samples times blocks: Python needs a second or more for them
+WORTH_LOADING = 10_000  # samples times blocks: Python needs as long for them as loading a compiled library takes
 _SOLVERS_KEPT = 8  # of the last parameters
 
 
@@ -315,11 +316,18 @@ class Model:
 
         return Library(self.plan)
 
-    def is_native(self, count: int) -> bool:
-        """Return whether `count` samples are solved by the native engine; its library is compiled then.
+    def by(self, engine: str) -> Model:
+        """Return the model with another engine, with the same plan and the library, if it is loaded."""
+        model = Model(self.plan, engine)
+        model.__dict__ |= {name: value for name, value in self.__dict__.items() if name == "_library"}
+        return model
+
+    def is_native(self, count: int, *, if_cached: bool = False) -> bool:
+        """Return whether `count` samples are solved by the native engine; its library is loaded then.
 
         Args:
             count: Number of samples.
+            if_cached: True: also for fewer samples than pay for compiling, if the library is compiled already.
 
         Returns:
             True for C, False for Python.
@@ -329,8 +337,11 @@ class Model:
 
         """
         work = count * max(1, len(self.plan.blocks))
-        if self.engine == "python" or (self.engine == "auto" and work < WORTH_COMPILING):
+        if self.engine == "python":
             return False
+        if self.engine == "auto" and work < WORTH_COMPILING:
+            if not (if_cached and work >= WORTH_LOADING and self._is_compiled()):
+                return False
         try:
             self.load_library()
         except CompilerError:
@@ -338,6 +349,11 @@ class Model:
                 raise
             return False
         return True
+
+    def _is_compiled(self) -> bool:
+        from kinfmu.run.native_engine import is_cached
+
+        return "_library" in self.__dict__ or is_cached(self.plan)
 
     def _engine(self, count: int, setting: Setting, tolerance: float, *, by_law: bool) -> Engine:
         """Return an engine with the parameters set."""

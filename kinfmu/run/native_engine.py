@@ -189,6 +189,17 @@ class LawDriven(NamedTuple):
     start: float
 
 
+def is_cached(plan: SolvePlan) -> bool:
+    """Return whether the library of a plan is in the cache."""
+    return compiler.is_cached(_files(plan), FLAGS, rare=list(RARE))
+
+
+def _files(plan: SolvePlan) -> dict[str, str]:
+    """Return the C files of a plan's library, by name."""
+    files = emit(plan) | compiler.runtime() | sources(plan)
+    return files | {name: compiler.joined(names) for name, names in RARE.items()}
+
+
 class Library:
     """The compiled model and solver of a plan.
 
@@ -199,9 +210,7 @@ class Library:
 
     def __init__(self, plan: SolvePlan) -> None:
         self.plan = plan
-        files = emit(plan) | compiler.runtime() | sources(plan)
-        files |= {name: compiler.joined(names) for name, names in RARE.items()}
-        library = self._library = compiler.load(files, FLAGS, rare=list(RARE))
+        library = self._library = compiler.load(_files(plan), FLAGS, rare=list(RARE))
         self._idle: list[_Memory] = []
         self._values = ctypes.c_double * len(plan.parameters)
         for name, (result, *arguments) in _FUNCTIONS.items():

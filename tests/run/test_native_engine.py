@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from importlib import import_module
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 import kinfmu
 from kinfmu.codegen.c import compiler
 from kinfmu.codegen.lanes.lanes import emit_lanes
+from kinfmu.draw.scene.completed import COST, with_estimates
 from kinfmu.errors import CompilerError, KinfmuError
 from kinfmu.plan import compile_plan
 from kinfmu.run import Run
@@ -282,6 +284,26 @@ def test_auto_takes_python_for_few_samples_and_native_for_many(monkeypatch: pyte
     assert kinfmu.solve(kinfmu.load("fourbar"), t).info["engine"] == "python"
     monkeypatch.setattr(MODEL, "WORTH_COMPILING", 50)
     assert kinfmu.solve(kinfmu.load("fourbar"), t).info["engine"] == "native"
+
+
+def test_estimates_of_a_record_are_native_if_the_library_is_compiled(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
+    mechanism = kinfmu.load("crank_rocker")
+    run = with_estimates(kinfmu.solve(mechanism, np.linspace(0.0, 2.0, MODEL.WORTH_LOADING // COST)))
+    few = with_estimates(run.part(slice(0, 10)))
+    model = kinfmu.compile(mechanism)
+    assert not model.is_native(MODEL.WORTH_LOADING, if_cached=True)
+    estimates = run.part(slice(0, len(run))).error  # by Python
+    model.by("native").load_library()
+    assert model.is_native(MODEL.WORTH_LOADING, if_cached=True)
+    assert not model.is_native(10, if_cached=True)
+    assert not model.is_native(MODEL.WORTH_LOADING)
+    assert few.error.tobytes() == estimates[:10].tobytes()
+    by_c = with_estimates(run).error
+    assert by_c.tobytes() != estimates.tobytes()
+    np.testing.assert_allclose(by_c, estimates, rtol=0.9)
 
 
 def test_without_a_compiler_auto_is_python_and_native_raises(monkeypatch: pytest.MonkeyPatch) -> None:

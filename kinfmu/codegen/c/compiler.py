@@ -133,6 +133,14 @@ def load(files: Mapping[str, str], flags: Sequence[str] = (), rare: Sequence[str
         ) from None
 
 
+def is_cached(files: Mapping[str, str], flags: Sequence[str] = (), rare: Sequence[str] = ()) -> bool:
+    """Return whether `load` finds the library in the cache, so that nothing is compiled."""
+    with suppress(CompilerError, OSError):
+        build = _Build(files, flags, None, rare)
+        return library_cache.find(build.key, build.suffix) is not None
+    return False
+
+
 @contextmanager
 def _shown(line: str) -> Iterator[None]:
     """Show a line while this block runs, if stderr is a terminal."""

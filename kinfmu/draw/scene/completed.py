@@ -44,8 +44,8 @@ def _estimates(run: Run) -> tuple[FloatArray, FloatArray]:
             return margin, error
         outputs = tuple(map(str, run.outputs))
         model = kept_model(run.mechanism, outputs, (), "auto")
-        if model.is_native(COST * len(rows)):
-            model = kept_model(run.mechanism, outputs, (), "native")
+        if model.is_native(COST * len(rows), if_cached=True):
+            model = model.by("native")
         inputs: dict[str, Any] = dict(zip(run.input_names, run.inputs[rows].T, strict=True))
         closed = max(
             np.max(gaps, initial=TOLERANCE, where=np.isfinite(gaps)) for gaps in (run.residual, abs(run.watch))
