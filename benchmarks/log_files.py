@@ -120,7 +120,7 @@ def _plain(name: str, task: LogTask, folder: Path) -> LogTask:
     task.take()
     with task.file.open("rb") as stream:
         found = make_reader(stream).iter_messages(log_time_order=False)
-        messages = [(channel, schema, one.log_time, one.data, one.sequence) for schema, channel, one in found]
+        messages = [(channel, schema, one.log_time, one.data, one.sequence) for schema, channel, one in found if schema]
     file = folder / f"plain {name}.mcap"
 
     def take() -> None:

@@ -155,11 +155,15 @@ def _words(table: NDArray[np.generic]) -> NDArray[np.uint64]:
 
 def nanoseconds(t: FloatArray) -> NDArray[np.int64]:
     """Return times (n,) [s] as whole nanoseconds, rounded: truncation would make times of a 1 ms grid 1 ns too low."""
-    bad = ~(np.abs(t) <= LATEST)
-    if bad.any():
-        row = int(np.argmax(bad))
-        raise LogError(f"time of sample {row} is {t[row]} s; a log needs a number within +-{LATEST:.0f} s")
+    check_times(t)
     return np.rint(t * NANOSECONDS).astype(np.int64)
+
+
+def check_times(t: FloatArray) -> None:
+    """Raise a LogError if a time (n,) [s] is outside the range of a log."""
+    if len(t) and not (t.min() >= -LATEST and t.max() <= LATEST):
+        row = int(np.argmin(np.abs(t) <= LATEST))
+        raise LogError(f"time of sample {row} is {t[row]} s; a log needs a number within +-{LATEST:.0f} s")
 
 
 def zero_of(t: FloatArray) -> int:

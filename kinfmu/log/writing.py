@@ -26,7 +26,7 @@ import numpy as np
 
 from kinfmu.arrays import IntArray
 from kinfmu.errors import MechanismError
-from kinfmu.log.cdr import NANOSECONDS, nanoseconds, zero_of
+from kinfmu.log.cdr import NANOSECONDS, check_times, nanoseconds, zero_of
 from kinfmu.log.mcap_writer import McapWriter
 from kinfmu.log.record import computed_when_read, description, ending
 from kinfmu.log.target import replacing
@@ -34,9 +34,10 @@ from kinfmu.log.topics import SOURCE, STATUS_SOURCE, JointTopic, LinkTopic, LogT
 from kinfmu.run import Event, Run
 from kinfmu.run.axis import axis_of
 from kinfmu.run.channels import is_all_but, is_drawn, kept_samples, select
-from kinfmu.run.verdict import sentence, status_events, unexplained
+from kinfmu.run.verdict import changed_samples, sentence, status_events, unexplained
 from kinfmu.version import VERSION
 
+LOOKED_AT = 2**18  # samples at once, to choose those that are drawn
 ROWS = 4096  # samples in a chunk of a complete run; larger chunks take more memory, smaller ones more time
 FRAMES = 60.0  # samples drawn per second of playing
 PLAYED_SLOWLY = 40.0  # [s]; shorter runs are drawn as if they lasted so long: a plot may be 2400 pixels wide
@@ -68,7 +69,7 @@ def write_mcap(run: Run, path: str | Path, *, channels: Sequence[str] | None = N
     run = select(run, channels, rate)
     if not is_all_but(channels):
         run = run.replaced(margin=run.margin, error=run.error)
-    nanoseconds(run.t)  # reports invalid times before a file is made
+    check_times(run.t)  # before a file is made
     with replacing(path) as temporary, FileIO(temporary, "w") as file:
         content = Content(file, run, zero_of(run.t), drawn=is_drawn(channels))
         try:
@@ -90,20 +91,23 @@ def _chunks(run: Run) -> Iterator[Run]:
 def drawn_samples(run: Run) -> IntArray:
     """Return the samples that viewers draw: FRAMES per second at most, and MOST_DRAWN in all, evenly spaced in time.
 
-    A short run is played slowly. Also the first and last one, those next to events such as limits, and both sides of each change of status.
+    A short run is played slowly. Also the first and last one, those next to events such as limits, and both sides of
+    each change of status.
     """
     if not len(run):
         return np.arange(0)
-    changed = np.flatnonzero(np.diff(run.status))
+    changed = changed_samples(run)
     events = np.searchsorted(run.t, [event.t for event in run.events]).clip(max=len(run) - 1)
-    marked = _thinned(np.unique([0, len(run) - 1, *changed, *(changed + 1), *events]), MOST_DRAWN // 2)
+    marked = _decimated(np.unique([0, len(run) - 1, *(changed - 1), *changed, *events]), MOST_DRAWN // 2)
     most = MOST_DRAWN - len(marked)
+    starts = range(0, len(run), LOOKED_AT)
     span = float(np.ptp(run.t)) or 1.0
-    rate = min(FRAMES * max(1.0, PLAYED_SLOWLY / span), (most - 2) / span)
-    return np.union1d(marked, _thinned(kept_samples(run.t, rate), most))
+    rate = min(FRAMES * max(1.0, PLAYED_SLOWLY / span), (most - 2 * len(starts)) / span)
+    even = [start + kept_samples(run.t[start : start + LOOKED_AT], rate) for start in starts]
+    return np.union1d(marked, _decimated(np.concatenate(even), most))
 
 
-def _thinned(rows: IntArray, most: int) -> IntArray:
+def _decimated(rows: IntArray, most: int) -> IntArray:
     """Return rows, or so many of them, evenly spaced, if there are more."""
     return rows if len(rows) <= most else rows[np.linspace(0, len(rows) - 1, most).astype(int)]
 

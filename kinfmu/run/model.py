@@ -337,11 +337,9 @@ class Model:
 
         """
         work = count * max(1, len(self.plan.blocks))
-        if self.engine == "python":
+        is_ready = if_cached and work >= WORTH_LOADING and self.engine == "auto" and self._is_compiled()
+        if self.engine == "python" or (self.engine == "auto" and work < WORTH_COMPILING and not is_ready):
             return False
-        if self.engine == "auto" and work < WORTH_COMPILING:
-            if not (if_cached and work >= WORTH_LOADING and self._is_compiled()):
-                return False
         try:
             self.load_library()
         except CompilerError:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinfmu.arrays import FloatArray
+from kinfmu.arrays import FloatArray, IntArray
 from kinfmu.run import Event, Run
 from kinfmu.run.axis import axis_of
 from kinfmu.solver.python.pose import Status
@@ -49,23 +49,26 @@ def label(status: Status) -> str:
 
 def counts(run: Run) -> dict[Status, int]:
     """Return the number of samples by status, of those that occur, in the order of Status."""
-    values, numbers = np.unique(run.status, return_counts=True)
-    return {Status(int(value)): int(number) for value, number in zip(values, numbers, strict=True)}
+    return {Status(value): number for value, number in enumerate(np.bincount(run.status).tolist()) if number}
 
 
 def worst_residual(run: Run) -> Worst | None:
     """Return the largest residual; None if no sample holds numbers."""
-    rows = np.flatnonzero(run.good & np.isfinite(run.residual))
-    if not len(rows):
+    known = run.good & np.isfinite(run.residual)
+    if not known.any():
         return None
-    row = rows[np.argmax(run.residual[rows])]
-    return Worst(float(run.residual[row]), float(run.t[row]))
+    worst = float(np.max(run.residual, initial=-np.inf, where=known))
+    return Worst(worst, float(run.t[np.argmax(known & (run.residual == worst))]))
+
+
+def changed_samples(run: Run) -> IntArray:
+    """Return the samples whose status differs from the one before."""
+    return np.flatnonzero(run.status[1:] != run.status[:-1]) + 1
 
 
 def changes(run: Run) -> Iterator[Change]:
     """Yield every sample whose status differs from the one before, and the first sample."""
-    starts = np.flatnonzero(np.diff(run.status, prepend=run.status[:1] - 1))
-    for row in starts:
+    for row in (*range(min(1, len(run))), *changed_samples(run)):
         yield Change(int(row), float(run.t[row]), Status(int(run.status[row])))
 
 

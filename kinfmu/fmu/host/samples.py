@@ -8,6 +8,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kinfmu.draw.scene.completed import with_estimates
 from kinfmu.fmu.description import Description
@@ -66,7 +67,7 @@ class Samples:
         self._force_names = _force_names(interface, mechanism, _FORCES[:2])
         self._reaction_names = _force_names(interface, mechanism, _FORCES[2:])
         self._absent: frozenset[str] = frozenset()
-        self._asked: list[int] | None = None  # columns that are read; None: all
+        self._tables = self._layout(range(len(self._names)))
         self._mechanism, self._model_description = mechanism, model_description
         self._info = {
             "name": interface.name,
@@ -90,6 +91,14 @@ class Samples:
         if part == "loads":
             return self._interface.inputs(part)
         return self._interface.part(part) or (self._interface.part("states") if part == "driven" else ())
+
+    def _layout(self, asked: Sequence[int]) -> dict[str, tuple[slice, int, list[int]]]:
+        """Return the place of each part among the columns that are read, its width, and which of its columns are."""
+        found, end = {}, 0
+        for name, first, last in zip(_REALS, (0, *self._ends), self._ends, strict=False):
+            kept = [k - first for k in asked if first <= k < last]
+            found[name] = slice(end, end := end + len(kept)), last - first, kept
+        return found
 
     def log(self, status: int, text: str) -> None:
         """Store a message of the FMU as an event at the current time."""
@@ -135,7 +144,7 @@ class Samples:
         asked = [k for k, name in enumerate(columns) if name not in self._absent]
         if self._computes_estimates:
             asked = [k for k in asked if k < self._ends[-1 - _ESTIMATES]]
-        self._asked = asked if len(asked) < len(columns) else None
+        self._tables = self._layout(asked)
         self._reals = np.empty((self._most, len(asked)))
         part = _REALS.index("driven")
         self._drivers = [place for place, k in enumerate(asked) if self._ends[part - 1] <= k < self._ends[part]]
@@ -211,18 +220,14 @@ class Samples:
             self._full_at, self._due = self._size + self._piece, perf_counter() + PERIOD
 
     def _run(self, rows: slice, events: tuple[Event, ...] = ()) -> Run:
-        reals, iterations = self._reals[rows], self._iterations[rows].copy()
-        if self._asked is None:
-            reals = reals.copy()
-        else:
-            asked, reals = reals, np.full((len(reals), self._ends[-1]), np.nan)
-            reals[:, self._asked] = asked
-        part = dict(zip(_REALS, np.split(reals, self._ends[:-1], axis=1), strict=True))
+        """Return samples as a run, whose tables are views where they can be: rows that are read do not change."""
+        part = {name: self._table(rows, *place) for name, place in self._tables.items()}
+        iterations = self._iterations[rows]
         if "solver.iterations" in self._absent:
-            iterations[:] = 0
+            iterations = np.zeros_like(iterations)
         interface = self._interface
         run = Run.of_texts(
-            t=self._t[rows].copy(),
+            t=self._t[rows],
             outputs=tuple(variable.name for variable in interface.part("values")),
             coordinate_count=interface.coordinate_count,
             values=part["values"],
@@ -231,7 +236,7 @@ class Samples:
             fixed=self.fixed,
             input_names=tuple(variable.name for variable in interface.motion),
             inputs=part["driven"],
-            status=self._status[rows].copy(),
+            status=self._status[rows],
             iterations=iterations,
             residual=part["residual"][:, 0],
             margin=part["margin"][:, 0],
@@ -250,3 +255,14 @@ class Samples:
             absent=self._absent,
         )
         return with_estimates(run).without(self._absent) if self._computes_estimates else run
+
+    def _table(self, rows: slice, place: slice, width: int, kept: list[int]) -> NDArray[np.float64]:
+        """Return the columns of a part, NaN where they are not read."""
+        table = self._reals[rows, place]
+        if len(kept) == width:
+            return table
+        whole = np.broadcast_to(np.nan, (len(table), width))
+        if kept:
+            whole = whole.copy()
+            whole[:, kept] = table
+        return whole

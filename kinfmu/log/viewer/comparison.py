@@ -13,7 +13,7 @@ from kinfmu.arrays import FloatArray
 from kinfmu.draw.scene import palette
 from kinfmu.draw.scene.scene import drawable
 from kinfmu.errors import LogError, listed
-from kinfmu.log.cdr import nanoseconds
+from kinfmu.log.cdr import check_times
 from kinfmu.log.viewer.blueprint import compared
 from kinfmu.log.viewer.card import parameters_apart, plain
 from kinfmu.log.viewer.linkage import Linkage
@@ -70,7 +70,7 @@ def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = 
             f"{path}: the runs measure lengths in {a.length_unit} and {b.length_unit}; they need the same unit"
         )
     for run in (a, b):
-        nanoseconds(run.t)
+        check_times(run.t)
     timeline = _in_common(a, b, path)
     difference = difference_of(a, b)
     shown = [timeline.placed(decimated(run)) for run in (a, b)]

@@ -20,7 +20,7 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.errors import LogError
-from kinfmu.log.cdr import nanoseconds
+from kinfmu.log.cdr import check_times
 from kinfmu.log.viewer.blueprint import Drawn, single
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.headless import executable, last_error
@@ -87,7 +87,7 @@ class LiveView:
         """
         if not len(run) or not self._is_connected:
             return
-        nanoseconds(run.t)  # reports invalid times
+        check_times(run.t)
         timeline = timeline_of([run])
         shown = timeline.placed(decimated(run))
         drawn, _ = drawn_linkages(shown)

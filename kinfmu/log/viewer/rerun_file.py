@@ -37,7 +37,7 @@ from kinfmu.draw.scene.completed import component_runs
 from kinfmu.draw.scene.scene import drawable
 from kinfmu.errors import LogError
 from kinfmu.files import temporary_folder
-from kinfmu.log.cdr import nanoseconds
+from kinfmu.log.cdr import check_times
 from kinfmu.log.target import replacing
 from kinfmu.log.viewer.blueprint import Drawn, single
 from kinfmu.log.viewer.card import card
@@ -86,7 +86,7 @@ def write_rrd(run: Run, path: str | Path) -> None:
 
     """
     require_viewer(f"{path}: a recording")
-    nanoseconds(run.t)  # reports invalid times before a file is made
+    check_times(run.t)  # reports invalid times before a file is made
     timeline = timeline_of([run])
     shown = timeline.placed(decimated(run))
     drawn, note = drawn_linkages(shown)
