@@ -29,8 +29,8 @@ FEW = 4  # plots of two runs, up to which they are wide
 WIDTH, HEIGHT = 870.0, 820.0  # [points], of all plots and states on a usual screen
 NUMBERS, CAPTION = 65.0, 44.0  # [points] of a plot: width of the numbers of y, height of the title and of those of x
 EDGE_Y = 0.1  # of the distance of labels, by which an axis ends beyond a label
-FREE_Y = 0.05  # of the length of an axis, left free below and above its curves
-LABELLED = 24.0  # [points]; Rerun labels the multiples of that power of ten whose distance is at least this
+FREE_Y = 0.025  # of the length of an axis, left free below and above its curves
+LABELLED = 21.0  # [points]; Rerun labels the multiples of that power of ten whose distance is at least this, in grey
 STATUS, LANES = 0.13, 0.17  # of the height of the right side, for the states of one run and of two
 LEAST_LEGEND, MOST_LEGEND = 0.15, 0.8  # of the run's time, left free after the curves for the legend
 

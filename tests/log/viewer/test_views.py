@@ -175,7 +175,7 @@ def test_an_axis_has_two_labels_at_powers_of_ten(height: float) -> None:
         if not high > low:
             continue
         bottom, top = with_two_labels(low, high, height)
-        free = 0.045 * (top - bottom)  # a curve at the least or greatest value is not on the edge of the plot
+        free = 0.023 * (top - bottom)  # a curve at the least or greatest value is not on the edge of the plot
         assert bottom < low - free
         assert high + free < top
         assert top - bottom < 25.0 * (high - low)
