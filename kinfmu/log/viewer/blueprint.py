@@ -29,6 +29,7 @@ FEW = 4  # plots of two runs, up to which they are wide
 WIDTH, HEIGHT = 870.0, 820.0  # [points], of all plots and states on a usual screen
 NUMBERS, CAPTION = 65.0, 44.0  # [points] of a plot: width of the numbers of y, height of the title and of those of x
 EDGE_Y = 0.1  # of the distance of labels, by which an axis ends beyond a label
+CUT_OFF = 3.0  # [points]; of a label nearer to the end of an axis almost half is missing
 FREE_Y = 0.025  # of the length of an axis, left free below and above its curves
 LABELLED = 21.0  # [points]; Rerun labels the multiples of that power of ten whose distance is at least this, in grey
 STATUS, LANES = 0.13, 0.17  # of the height of the right side, for the states of one run and of two
@@ -267,15 +268,15 @@ def with_two_labels(low: float, high: float, height: float) -> tuple[float, floa
     margin = FREE_Y * (high - low)
     bottom, top = low - margin, high + margin
     step = 10.0 ** math.ceil(math.log10(LABELLED * (top - bottom) / max(height, LABELLED)))
-    first, last = math.ceil(bottom / step), math.floor(top / step)
+    cut = CUT_OFF * (top - bottom) / max(height, LABELLED)
+    first, last = math.ceil((bottom + cut) / step), math.floor((top - cut) / step)
     if last > first:
         return bottom, top
-    below, above, edge = (first - 1) * step, (last + 1) * step, EDGE_Y * step
-    is_nearer_above = above - top < bottom - below
-    if last < first or not is_nearer_above:
-        bottom = below - edge
-    if last < first or is_nearer_above:
-        top = above + edge
+    below, above = (first - 1) * step, (last + 1) * step
+    if last == first:  # one label more, on the nearer side
+        is_nearer_above = above - top < bottom - below
+        below, above = (first * step, above) if is_nearer_above else (below, last * step)
+    bottom, top = min(bottom, below - EDGE_Y * step), max(top, above + EDGE_Y * step)
     margin = FREE_Y * (top - bottom)
     return min(bottom, low - margin), max(top, high + margin)
 
