@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import tracemalloc
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -289,3 +290,20 @@ def test_a_run_that_fails_is_kept_with_the_reason(fmu: Callable[[], Path], tmp_p
     assert len(found) == 50
     assert found.events[-1] == Event(float(found.t[-1]), "error", "the host gave up")
     assert b"the host gave up" in messages(tmp_path / "run.mcap", "/log")[-1][1]
+
+
+@pytest.mark.parametrize("how", ["at once", "growing"])
+def test_writing_takes_little_memory_however_long_the_run_is(how: str, run: Run, tmp_path: Path) -> None:
+    n = 600_000
+    long_run = run.part(np.arange(n) % len(run)).replaced(t=0.01 * np.arange(n))
+    size = sum(column.values.nbytes for column in long_run.columns())
+    tracemalloc.start()
+    try:
+        if how == "growing":
+            grown(long_run, tmp_path / "run.mcap", 4096)
+        else:
+            write_mcap(long_run, tmp_path / "run.mcap")
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 0.25 * size, (peak, size)  # chunks, and a few bytes a sample
