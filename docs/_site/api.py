@@ -11,6 +11,7 @@ from pathlib import Path
 import kinfmu
 from _site.docstrings import declares_keys
 from _site.pages import Pages
+from kinfmu import lazy
 from kinfmu.run.tables import Tabular
 
 GROUPS = {  # the package, or part of `mechanism`, from which the stub imports a name: title of its page, what it is for
@@ -57,7 +58,7 @@ def write(pages: Pages) -> None:
 def _names() -> dict[str, list[str]]:
     """Return the full names of each group, in the order in which the stub lists them."""
     found: dict[str, list[str]] = defaultdict(list)
-    homes = {name: home for name, home in kinfmu._HOME.items() if name not in MODULES}
+    homes = {name: home for name, home in lazy.homes(vars(kinfmu)).items() if name not in MODULES}
     for name, home in homes.items():
         found[group_of(home)].append(f"kinfmu.{name}")
     for module in sorted(MODULES):

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from html import escape
 from itertools import pairwise
 from typing import NamedTuple
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -64,15 +64,15 @@ def robot_description(name: str, scene: Scene, metres: float) -> str:
     for shape in scene.shapes:
         if shape.kind in _PAINT:
             links[shape.frame] += brush.visuals(shape, _layer(scene, shape), _line(scene, shape))
-    lines = [f"<link name={quoteattr(link)}>{''.join(visuals)}</link>" for link, visuals in links.items()]
+    lines = [f'<link name="{escape(link)}">{"".join(visuals)}</link>' for link, visuals in links.items()]
     lines += [
-        f'<joint name={quoteattr(link + "_floats")} type="floating">'
-        f"<parent link={quoteattr(ROOT)}/><child link={quoteattr(link)}/></joint>"
+        f'<joint name="{escape(link)}_floats" type="floating">'
+        f'<parent link="{ROOT}"/><child link="{escape(link)}"/></joint>'
         for link in links
         if link != ROOT
     ]
     body_lines = "\n".join(lines)
-    return f'<?xml version="1.0"?>\n<robot name={quoteattr(name)}>\n{body_lines}\n</robot>\n'
+    return f'<?xml version="1.0"?>\n<robot name="{escape(name)}">\n{body_lines}\n</robot>\n'
 
 
 def _layer(scene: Scene, shape: Shape) -> int:
