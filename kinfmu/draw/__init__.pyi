@@ -5,4 +5,4 @@ from kinfmu.draw.cam_figure import cam as cam
 from kinfmu.draw.drawing import figure as figure
 from kinfmu.draw.dxf_file import dxf as dxf
 from kinfmu.draw.plots import plot as plot
-from kinfmu.draw.svaj import svaj as svaj
+from kinfmu.draw.svaj_figure import svaj as svaj

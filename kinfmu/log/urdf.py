@@ -13,7 +13,7 @@ from kinfmu.arrays import FloatArray
 from kinfmu.draw.scene import palette
 from kinfmu.draw.scene.placing import poses_of
 from kinfmu.draw.scene.scene import Scene
-from kinfmu.draw.scene.shape import Shape, die_frame, frames
+from kinfmu.draw.scene.shape import Shape, die_frame, distinct, frames
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.run import Run
@@ -124,7 +124,7 @@ class _Brush:
 
     def discs(self, points: FloatArray, colour: palette.Colour, width: float, height: float) -> Iterator[str]:
         """Yield one disc on each of the points (k, 2) [length]."""
-        for x, y in self._metres * np.unique(points, axis=0):
+        for x, y in self._metres * distinct(points):
             yield _visual(
                 f'xyz="{x:.9g} {y:.9g} {height:.9g}" rpy="0 0 0"',
                 f'<cylinder radius="{width:.9g}" length="{1.2 * width:.9g}"/>',
