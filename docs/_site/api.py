@@ -11,7 +11,6 @@ from pathlib import Path
 import kinfmu
 from _site.docstrings import declares_keys
 from _site.pages import Pages
-from kinfmu import lazy
 from kinfmu.run.tables import Tabular
 
 GROUPS = {  # the package, or part of `mechanism`, from which the stub imports a name: title of its page, what it is for
@@ -58,7 +57,7 @@ def write(pages: Pages) -> None:
 def _names() -> dict[str, list[str]]:
     """Return the full names of each group, in the order in which the stub lists them."""
     found: dict[str, list[str]] = defaultdict(list)
-    homes = {name: home for name, home in lazy.homes(vars(kinfmu)).items() if name not in MODULES}
+    homes = {name: home for name, home in kinfmu._homes(vars(kinfmu)).items() if name not in MODULES}
     for name, home in homes.items():
         found[group_of(home)].append(f"kinfmu.{name}")
     for module in sorted(MODULES):

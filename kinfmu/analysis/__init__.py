@@ -1,5 +1,5 @@
 """The report of `check`: mobility, redundancy, drivers, plan, loops, ranges, assemblies, the matrices of the method."""
 
-from kinfmu import lazy
+from kinfmu import _lazy
 
-__all__, __getattr__, __dir__ = lazy.names(globals())
+__all__, __getattr__, __dir__ = _lazy(globals())

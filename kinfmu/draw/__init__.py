@@ -3,6 +3,6 @@
 matplotlib and Pillow draw them; they are loaded when first used.
 """
 
-from kinfmu import lazy
+from kinfmu import _lazy
 
-__all__, __getattr__, __dir__ = lazy.names(globals())
+__all__, __getattr__, __dir__ = _lazy(globals())

@@ -7,6 +7,6 @@
 The writers and readers load their packages (zstandard, rerun, pyarrow) when first used, not on import.
 """
 
-from kinfmu import lazy
+from kinfmu import _lazy
 
-__all__, __getattr__, __dir__ = lazy.names(globals())
+__all__, __getattr__, __dir__ = _lazy(globals())

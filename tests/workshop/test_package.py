@@ -21,7 +21,6 @@ from typing import Any
 import pytest
 
 import kinfmu
-from kinfmu import lazy
 from kinfmu.mechanism import gallery
 from kinfmu.mechanism.drivers import Driver
 from kinfmu.mechanism.joints import Joint
@@ -103,7 +102,7 @@ def test_an_unknown_name_is_an_attribute_error(package: ModuleType) -> None:
 def test_no_name_that_is_imported_when_used_is_that_of_a_module_in_its_package(stub: Path) -> None:
     package = importlib.import_module(".".join(stub.parent.relative_to(CHECKOUT).parts))
     modules = {path.stem for path in stub.parent.glob("*.py")} | {path.name for path in stub.parent.iterdir()}
-    taken = modules & {name for name, home in lazy.homes(vars(package)).items() if home != package.__name__}
+    taken = modules & {name for name, home in kinfmu._homes(vars(package)).items() if home != package.__name__}
     assert not taken
 
 
