@@ -1,4 +1,4 @@
-"""scripts/bench: run time against error; cost of a sample, a sweep, a step, a record, an import and chains."""
+"""scripts/bench: run time against error; cost of a sample, a sweep, a step, a record, commands and chains."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ TEXTS: dict[str, tuple[str, tuple[str, ...]]] = {  # module of benchmarks, and t
     "step": ("fmu_step", ("fourbar",)),
     "native": ("native_step", ("fourbar",)),
     "log": ("log_files", ()),
-    "import": ("import_time", ()),
+    "commands": ("commands", ()),
     "chains": ("chains", ()),
     "size": ("sizes", ()),
 }
@@ -88,7 +88,7 @@ def main(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None,
     step      a step of the FMU, compared with the smallest pythonfmu FMU
     native    a step of the native FMU in a C host, without efforts and with them
     log       writing and reading records of a million samples, compared with mcap
-    import    `import kinfmu`, compared with bare Python
+    commands  whole commands and `import kinfmu`, compared with bare Python and numpy
     chains    chains of up to a thousand loops
     size      cost against size: loops, designs, rows, each next to the floor; a chart; takes minutes
     all       all of these

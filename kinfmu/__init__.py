@@ -6,37 +6,40 @@
     run = kinfmu.solve(mech, crank_angle=[0.0, 0.5, 1.0])
     run["tracer.x"]
 
-Names are imported when first used, so that `import kinfmu` takes a few milliseconds. They are listed once: as imports
-in `__init__.pyi`, which type checkers and editors read as well.
+Names are imported when first used, so that `import kinfmu` takes a few milliseconds, and a command imports only what it
+needs. They are listed once: as imports in `__init__.pyi`, which type checkers and editors read as well.
 """
 
 from kinfmu.version import VERSION
 
-__version__ = VERSION
 
-
-def _public_names():
-    """Return the package of every public name, as the stub next to this file imports it."""
-    stub = __loader__.get_data(f"{__path__[0]}/__init__.pyi").decode()  # in a folder or in a zip file
+def _homes(package):
+    """Return the public names of a package, from the globals of its `__init__.py`, each with its module."""
+    stub = package["__loader__"].get_data(f"{package['__path__'][0]}/__init__.pyi").decode()  # also in a zip file
     imports = [line.split() for line in stub.splitlines() if line.startswith("from ")]
-    return {name: package for _, package, _, name, *_ in imports}
+    return {name: module for _, module, _, name, *_ in imports}
 
 
-_HOME = _public_names()
-__all__ = ["VERSION", *_HOME]
+def _lazy(package):
+    """Return `__all__`, `__getattr__` and `__dir__` of a package, by its globals, that import names when first used.
+
+    A public name is not that of a module of the package, which would take its place when it is imported.
+    """
+    homes, own = _homes(package), package["__name__"]
+
+    def value_of(name):
+        from importlib import import_module
+
+        if name not in homes:
+            raise AttributeError(f"module '{own}' has no attribute '{name}'")
+        if homes[name] == own:
+            return import_module(f"{own}.{name}")
+        value = package[name] = getattr(import_module(homes[name]), name)
+        return value
+
+    return [*homes], value_of, lambda: sorted({*package, *homes})
 
 
-def __getattr__(name):
-    """Import a public name from its package when it is first used."""
-    from importlib import import_module
-
-    if name not in _HOME:
-        raise AttributeError(f"module 'kinfmu' has no attribute '{name}'")
-    if _HOME[name] == "kinfmu":
-        return import_module(f"kinfmu.{name}")
-    value = globals()[name] = getattr(import_module(_HOME[name]), name)
-    return value
-
-
-def __dir__():
-    return sorted({*globals(), *_HOME})
+__version__ = VERSION
+__all__, __getattr__, __dir__ = _lazy(globals())
+__all__.insert(0, "VERSION")

@@ -90,3 +90,5 @@ from kinfmu.solver.python.pose import Status as Status
 
 VERSION: str
 __version__: str
+
+def _homes(package: dict[str, object]) -> dict[str, str]: ...

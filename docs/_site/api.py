@@ -57,7 +57,7 @@ def write(pages: Pages) -> None:
 def _names() -> dict[str, list[str]]:
     """Return the full names of each group, in the order in which the stub lists them."""
     found: dict[str, list[str]] = defaultdict(list)
-    homes = {name: home for name, home in kinfmu._HOME.items() if name not in MODULES}
+    homes = {name: home for name, home in kinfmu._homes(vars(kinfmu)).items() if name not in MODULES}
     for name, home in homes.items():
         found[group_of(home)].append(f"kinfmu.{name}")
     for module in sorted(MODULES):

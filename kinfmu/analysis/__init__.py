@@ -1,9 +1,5 @@
 """The report of `check`: mobility, redundancy, drivers, plan, loops, ranges, assemblies, the matrices of the method."""
 
-from __future__ import annotations
+from kinfmu import _lazy
 
-from kinfmu.analysis.assemblies import Assemblies
-from kinfmu.analysis.cams import cam_profile
-from kinfmu.analysis.report import Report, check
-
-__all__ = ["Assemblies", "Report", "cam_profile", "check"]
+__all__, __getattr__, __dir__ = _lazy(globals())

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from kinfmu.arrays import FloatArray
 from kinfmu.codegen.python import load_model
@@ -34,10 +33,6 @@ _SAME = 1e-15  # of a driver value; places closer than this are equal
 _SAME_PLACE = 1e-9  # [rad]; values closer than this are one place of a cycle
 _MANY = 200  # poses among which no two extremes of a quantity are neighbours
 _NEAR_END = 16  # poses between the last one and a limit, where coordinates change with the root of the distance
-
-
-class _PathEndsError(Exception):
-    """A pose cannot be reached."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,24 +99,26 @@ class DriverPath:
         return tuple(pose for pose in (*poses, *last) if pose.good)
 
     def zero(self, value: Callable[[Pose], float], low: Pose, high: Pose) -> Pose:
-        """Return the pose between two where a value changes its sign; one where the path ends before it."""
-        from scipy.optimize import brentq
+        """Return the pose between two where a value changes its sign; one where the path ends before it.
 
-        last, ends = low, {low.u[0]: low, high.u[0]: high}
-
-        def at(u: float) -> float:
-            nonlocal last
-            pose = ends.get(u) or self.solver.solve(low, (u,))
+        Inverse quadratic interpolation where it is safe, else halving: Chandrupatla (1997), Advances in Engineering
+        Software 28, 145-149.
+        """
+        last, other = _ValueAtPose(high.u[0], value(high), high), _ValueAtPose(low.u[0], value(low), low)
+        part = 0.5  # of the interval from the last place to the other, where the value has the other sign
+        while True:
+            best = min(last, other, key=lambda place: abs(place.value))
+            width, finest = other.u - last.u, 0.5 * _SAME * (1.0 + abs(best.u))
+            if best.value == 0.0 or abs(width) <= 2.0 * finest:
+                return best.pose
+            u = last.u + min(max(part, finest / abs(width)), 1.0 - finest / abs(width)) * width
+            pose = self.solver.solve(low, (u,))
             if not pose.good:
-                raise _PathEndsError
-            last = pose
-            return value(pose)
-
-        with suppress(_PathEndsError):
-            u = brentq(at, low.u[0], high.u[0], xtol=_SAME, rtol=_SAME)
-            if u != last.u[0]:
-                at(u)
-        return last
+                return last.pose
+            before, last = last, _ValueAtPose(u, value(pose), pose)
+            if last.value * before.value < 0.0:
+                before, other = other, before
+            part = _part_to_zero(last, other, before)
 
     def at_limit(self, limit: Limit) -> dict[str, float]:
         """Return all coordinates by name at one of the limits.
@@ -140,6 +137,23 @@ class DriverPath:
         parts = [inwards * part * _NEAR_LIMIT * self.solver.model.REACH[0] for part in (1.0, 4.0, 9.0)]
         poses = [self.solver.solve(start, (limit.u[0] + part,)) for part in parts]
         return [pose for pose in poses if pose.good]
+
+
+class _ValueAtPose(NamedTuple):
+    """A value at a pose, by its driver value."""
+
+    u: float
+    value: float
+    pose: Pose
+
+
+def _part_to_zero(a: _ValueAtPose, b: _ValueAtPose, c: _ValueAtPose) -> float:
+    """Return the part of the way from a to b after which the value is 0; c: the place before."""
+    x, y = (a.u - b.u) / (c.u - b.u), (a.value - b.value) / (c.value - b.value)
+    if y * y >= x or (1.0 - y) ** 2 >= 1.0 - x:
+        return 0.5  # interpolation is not safe
+    of_c = a.value / (c.value - a.value) * b.value / (c.value - b.value)
+    return a.value / (b.value - a.value) * c.value / (b.value - c.value) + (c.u - a.u) / (b.u - a.u) * of_c
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import webbrowser
 
 import click
 
@@ -21,6 +20,8 @@ def play(mechanism: str, port: int, no_browser: bool) -> None:
     The page follows the file while you edit it; errors in the file are shown in the page. The page saves FMUs, tables,
     drawings and mechanism files with the lengths as set. Only this machine can open the address. Ctrl-C ends it.
     """
+    import webbrowser
+
     from kinfmu.page.player import PlayServer, PlaySource
 
     with patience():

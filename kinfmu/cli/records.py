@@ -57,6 +57,7 @@ def review(run: Path, other: Path | None, save: Path | None, screenshot: Path | 
     RUN and OTHER are records (.mcap) of simulate or solve; RUN may be a recording (.rrd).
     """
     from kinfmu.log import review as reviewed
+    from kinfmu.log.viewer.package import without_pandas
 
     if at is not None and screenshot is None:
         raise click.UsageError("--at needs --screenshot")
@@ -65,6 +66,7 @@ def review(run: Path, other: Path | None, save: Path | None, screenshot: Path | 
         return on_axis("--at", at or "", timeline.label, timeline.unit)
 
     place = None if at is None else moment
-    recording = reviewed(run, other, save=save, screenshot=screenshot, at=place, report=note)
+    with without_pandas():
+        recording = reviewed(run, other, save=save, screenshot=screenshot, at=place, report=note)
     made = [str(path) for path in (recording, screenshot) if path is not None]
     click.echo(f"written: {listed(made)}")

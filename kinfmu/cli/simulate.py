@@ -93,9 +93,7 @@ def simulate(
     killed run.
     """
     from kinfmu.fmu import simulate as simulated
-    from kinfmu.log import LiveView, McapLog, write_rrd
-    from kinfmu.log.viewer.package import INSTALL, has_viewer, require_viewer
-    from kinfmu.run.channels import is_drawn
+    from kinfmu.log.viewer.package import INSTALL, has_viewer, require_viewer, without_pandas
 
     if wrap and inputs is None:
         raise click.UsageError("--wrap needs --input")
@@ -113,8 +111,15 @@ def simulate(
         record, recording = _logs(model, mcap, rrd) if is_logged else (None, None)
         has_recording = rrd is not None or has_viewer()
         is_replaced = record is not None and record.exists()
-        sinks: list[Sink] = [McapLog(record, drawn=is_drawn(names))] if record else []
+        sinks: list[Sink] = []
+        if record:
+            from kinfmu.log import McapLog
+            from kinfmu.run.channels import is_drawn
+
+            sinks.append(McapLog(record, drawn=is_drawn(names)))
         if live:
+            from kinfmu.log import LiveView
+
             sinks.append(LiveView())
         with Progress() as progress, errors_as(str(fmu), model):
             run = simulated(
@@ -133,7 +138,9 @@ def simulate(
                 exchange=exchange,
             )
     if recording and has_recording:
-        with on_interrupt(f"stopped before the recording was written; the run is in {record}"):
+        with on_interrupt(f"stopped before the recording was written; the run is in {record}"), without_pandas():
+            from kinfmu.log import write_rrd
+
             write_rrd(run, recording)
     replaced = " (an older run of that name was replaced)" if is_replaced else ""
     files, review = f"{record} and {recording}", f"to review it: kinfmu review {quote(str(record))}"

@@ -94,7 +94,6 @@ def solve(
     Writes a table with one row per sample (positions, velocities and accelerations of all outputs, status, error
     estimates) or a record (.mcap), which also contains the mechanism, for review and export.
     """
-    from kinfmu.log import write_mcap, write_table
     from kinfmu.mechanism import RunSettings
     from kinfmu.run.driving import run_times
     from kinfmu.run.solve import solve as solved
@@ -132,8 +131,12 @@ def solve(
             **samples,
         )
     if suffix_of(output) == RECORD:
+        from kinfmu.log import write_mcap
+
         write_mcap(run, output)
     else:
+        from kinfmu.log import write_table
+
         write_table(run, output, degrees=degrees, **form)
     report(run, f"written to {output}", by_samples=angle is not None)
 

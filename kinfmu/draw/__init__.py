@@ -3,13 +3,6 @@
 matplotlib and Pillow draw them; they are loaded when first used.
 """
 
-from __future__ import annotations
+from kinfmu import _lazy
 
-from kinfmu.draw.animation import animate
-from kinfmu.draw.cam import cam
-from kinfmu.draw.drawing import figure
-from kinfmu.draw.dxf import dxf
-from kinfmu.draw.plots import plot
-from kinfmu.draw.svaj import svaj
-
-__all__ = ["animate", "cam", "dxf", "figure", "plot", "svaj"]
+__all__, __getattr__, __dir__ = _lazy(globals())

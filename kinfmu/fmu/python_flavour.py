@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import ast
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import distribution
 from importlib.resources import files
 from pathlib import Path
@@ -288,7 +288,7 @@ def _check_imports(contents: Mapping[str, bytes], package: str) -> None:
     for path, data in contents.items():
         if not path.endswith(".py"):
             continue
-        for node in ast.walk(ast.parse(data)):
+        for node in _statements(ast.parse(data)):
             names = []
             if isinstance(node, ast.Import):
                 names = [alias.name for alias in node.names]
@@ -302,3 +302,13 @@ def _check_imports(contents: Mapping[str, bytes], package: str) -> None:
             for name in names:
                 if name.partition(".")[0] not in (package, *sys.stdlib_module_names):
                     raise FmuError(f"{path} imports {name}; a python FMU may import the standard library only")
+
+
+def _statements(tree: ast.Module) -> Iterator[ast.AST]:
+    """Yield the statements of a module, also inner ones, without their expressions."""
+    waiting: list[ast.AST] = [tree]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        for name in ("body", "orelse", "handlers", "finalbody", "cases"):
+            waiting += getattr(node, name, ())

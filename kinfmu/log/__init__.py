@@ -7,14 +7,6 @@
 The writers and readers load their packages (zstandard, rerun, pyarrow) when first used, not on import.
 """
 
-from __future__ import annotations
+from kinfmu import _lazy
 
-from kinfmu.log.growing import McapLog
-from kinfmu.log.reading import read, recover
-from kinfmu.log.table import write_table
-from kinfmu.log.viewer.live import LiveView
-from kinfmu.log.viewer.rerun_file import write_rrd
-from kinfmu.log.viewer.reviewing import review
-from kinfmu.log.writing import write_mcap
-
-__all__ = ["LiveView", "McapLog", "read", "recover", "review", "write_mcap", "write_rrd", "write_table"]
+__all__, __getattr__, __dir__ = _lazy(globals())

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from html import escape
 from itertools import pairwise
 from typing import NamedTuple
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from kinfmu.arrays import FloatArray
 from kinfmu.draw.scene import palette
 from kinfmu.draw.scene.placing import poses_of
 from kinfmu.draw.scene.scene import Scene
-from kinfmu.draw.scene.shape import Shape, die_frame, frames
+from kinfmu.draw.scene.shape import Shape, die_frame, distinct, frames
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.run import Run
@@ -64,15 +64,15 @@ def robot_description(name: str, scene: Scene, metres: float) -> str:
     for shape in scene.shapes:
         if shape.kind in _PAINT:
             links[shape.frame] += brush.visuals(shape, _layer(scene, shape), _line(scene, shape))
-    lines = [f"<link name={quoteattr(link)}>{''.join(visuals)}</link>" for link, visuals in links.items()]
+    lines = [f'<link name="{escape(link)}">{"".join(visuals)}</link>' for link, visuals in links.items()]
     lines += [
-        f'<joint name={quoteattr(link + "_floats")} type="floating">'
-        f"<parent link={quoteattr(ROOT)}/><child link={quoteattr(link)}/></joint>"
+        f'<joint name="{escape(link)}_floats" type="floating">'
+        f'<parent link="{ROOT}"/><child link="{escape(link)}"/></joint>'
         for link in links
         if link != ROOT
     ]
     body_lines = "\n".join(lines)
-    return f'<?xml version="1.0"?>\n<robot name={quoteattr(name)}>\n{body_lines}\n</robot>\n'
+    return f'<?xml version="1.0"?>\n<robot name="{escape(name)}">\n{body_lines}\n</robot>\n'
 
 
 def _layer(scene: Scene, shape: Shape) -> int:
@@ -124,7 +124,7 @@ class _Brush:
 
     def discs(self, points: FloatArray, colour: palette.Colour, width: float, height: float) -> Iterator[str]:
         """Yield one disc on each of the points (k, 2) [length]."""
-        for x, y in self._metres * np.unique(points, axis=0):
+        for x, y in self._metres * distinct(points):
             yield _visual(
                 f'xyz="{x:.9g} {y:.9g} {height:.9g}" rpy="0 0 0"',
                 f'<cylinder radius="{width:.9g}" length="{1.2 * width:.9g}"/>',

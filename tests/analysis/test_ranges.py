@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,8 +22,11 @@ from kinfmu import (
     RunSettings,
     Translational,
 )
+from kinfmu.analysis.driver_path import follow
 from kinfmu.analysis.values import value_text
 from kinfmu.mechanism.toml_file import parse
+from kinfmu.plan import compile_plan
+from kinfmu.solver.python import Pose
 from tests.analysis.linkages import digger, five_bar_arm, pushed_crank
 from tests.mechanisms import five_bar, fourbar, slider_crank, tight_jaw, with_arm
 
@@ -314,3 +319,28 @@ def test_a_run_of_several_drivers_that_stops_is_noted_with_its_time() -> None:
     assert note.startswith("[run] at t = ")
     assert "cannot be reached: to these digits it is the limit" in note
     assert kinfmu.check(replace(five_bar(), run=RunSettings(0.0, 0.5, 0.1))).notes == ()
+
+
+@pytest.mark.parametrize("power", [1, 3, 9])
+@pytest.mark.parametrize("place", [1.3, 2.0 + 1e-9, 5.0])
+def test_the_place_where_a_value_changes_its_sign_is_found_to_round_off(place: float, power: int) -> None:
+    path = follow(compile_plan(fourbar(4.0, 1.0, 3.0, 3.0)), 0)
+    low = max((pose for pose in path.poses if pose.u[0] < place), key=lambda pose: pose.u[0])
+    high = min((pose for pose in path.poses if pose.u[0] > place), key=lambda pose: pose.u[0])
+    evaluated: list[float] = []
+
+    def value(pose: Pose) -> float:
+        evaluated.append(pose.u[0])
+        return (pose.u[0] - place) ** power
+
+    found = path.zero(value, low, high)
+    assert found.u[0] == pytest.approx(place, abs=(1.0 + place) * 1e-15)
+    assert len(evaluated) < (10 if power == 1 else 80)
+
+
+def test_where_the_path_ends_before_a_sign_changes_the_last_pose_is_returned() -> None:
+    path = follow(compile_plan(fourbar(4.0, 1.0, 3.0, 3.0)), 0)
+    low, high = path.poses[:2]
+    unsolvable: Any = SimpleNamespace(solve=lambda *_: SimpleNamespace(good=False))
+    middle = 0.5 * (low.u[0] + high.u[0])
+    assert replace(path, solver=unsolvable).zero(lambda pose: pose.u[0] - middle, low, high) is high

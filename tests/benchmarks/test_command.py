@@ -13,6 +13,7 @@ import pytest
 import kinfmu
 from benchmarks import accuracy, case, chains, crank_rockers, designs, log_files, native_sweep, singular
 from benchmarks.__main__ import ALL, MEASUREMENTS, default_folder
+from benchmarks.commands import COMMANDS
 from benchmarks.engines import ENGINES, SHIPPED
 from benchmarks.page import PAGE, SETTINGS_PAGE
 from benchmarks.singular_points import POINTS
@@ -182,7 +183,7 @@ def test_the_charts_name_every_engine_and_quantity(written: Path) -> None:
         (
             ("accurcy",),
             "Invalid value for '[WHAT]...': 'accurcy' is not a measurement; did you mean 'accuracy'?; "
-            "known: accuracy, sample, sweep, designs, forces, step, native, log, import, chains, size, all",
+            "known: accuracy, sample, sweep, designs, forces, step, native, log, commands, chains, size, all",
         ),
         (
             ("--mechanism", "slidercrank"),
@@ -191,7 +192,7 @@ def test_the_charts_name_every_engine_and_quantity(written: Path) -> None:
         ),
         (("--rounds", "0"), "Invalid value for '--rounds': 0 is not in the range x>=1."),
         (("sample", "--mechanism", "fourbar"), "--mechanism is for accuracy, not for sample"),
-        (("step", "import", "-o", "there"), "-o is for accuracy, size, not for step, import"),
+        (("step", "commands", "-o", "there"), "-o is for accuracy, size, not for step, commands"),
     ],
 )
 def test_wrong_words_are_refused_with_what_would_be_right(
@@ -212,7 +213,7 @@ def test_the_help_has_a_line_for_every_measurement(command: Command) -> None:
         ("sample", ["readable reference", "python engine", "kinfmu.solve", "the same, error"]),
         pytest.param("step", ["fourbar", "toy (sin, cos)", "ratio, round by round"], marks=pytest.mark.long),
         pytest.param("native", ["FMI 2.0, ", "FMI 3.0, "], marks=pytest.mark.long),
-        ("import", ["pass", "import kinfmu", "difference"]),
+        pytest.param("commands", ["pass", "import numpy", "import kinfmu", *COMMANDS], marks=pytest.mark.long),
     ],
 )
 @pytest.mark.few(1)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -224,17 +222,3 @@ def test_only_the_first_page_is_announced_to_take_a_minute(
     printed = capsys.readouterr().err
     assert printed.startswith("kinfmu: note: compiling the page")
     assert ("takes a minute" in printed) is is_first
-
-
-def test_build_states_how_to_do_without_the_page(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def slow(_: kinfmu.Mechanism) -> str:
-        time.sleep(0.2)
-        return "page"
-
-    command = import_module("kinfmu.cli.build")  # kinfmu.cli.build is the command of this module
-    monkeypatch.setattr(import_module("kinfmu.page"), "page", slow)
-    monkeypatch.setattr(command, "patience", partial(patience, seconds=0.0))
-    assert command._page(kinfmu.load("fourbar"), True) == "page"
-    assert capsys.readouterr().err.rstrip().endswith("; --no-page builds the FMU without it")

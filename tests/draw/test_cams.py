@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, RunSettings, Translational
 from kinfmu.analysis import cam_profile
-from kinfmu.draw.cam import _figure
+from kinfmu.draw.cam_figure import _figure
 from kinfmu.draw.instant import instant
 from kinfmu.draw.scene import palette
 from kinfmu.draw.scene.details import on_face

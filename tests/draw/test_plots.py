@@ -22,8 +22,8 @@ from kinfmu.draw.curves import gaps, rows_of
 from kinfmu.draw.overlay import overlay, overlay_sheet
 from kinfmu.draw.plots import _sheet, _shown
 from kinfmu.draw.stacks import _title_of, stacks_of, usual_coordinates
-from kinfmu.draw.svaj import _sheet as _svaj_sheet
-from kinfmu.draw.svaj import driver_axis
+from kinfmu.draw.svaj_figure import _sheet as _svaj_sheet
+from kinfmu.draw.svaj_figure import driver_axis
 from kinfmu.errors import FigureError, RequestError
 from kinfmu.motion.motion_curve import motion_curve, svaj_columns
 from kinfmu.run import Run

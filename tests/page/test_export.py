@@ -178,15 +178,33 @@ def test_build_puts_the_page_into_the_documentation_if_asked(tmp_path: Path) -> 
 
 
 @pytest.mark.long
-def test_an_fmu_whose_page_cannot_be_compiled(command: Command, fails: Callable[..., str], tmp_path: Path) -> None:
+def test_an_fmu_whose_page_cannot_be_compiled(fails: Callable[..., str], tmp_path: Path) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("kinfmu.codegen.c.compiler.wasm_module", _refused)
         assert "zig fails" in fails("build", "slider_crank", "--flavour", "python", "--page", "-o", "one.fmu")
         assert not (tmp_path / "one.fmu").exists()
-        patch.setattr("kinfmu.cli.build.find_spec", lambda _name: True)
-        built = command("build", "slider_crank", "--flavour", "python", "-o", "one.fmu")
-    assert built.exit_code == 0
-    assert built.stderr == "kinfmu: note: the FMU is built without the page of kinfmu play: zig fails\n"
+
+
+@pytest.mark.parametrize(
+    ("options", "has_zig", "note"),
+    [
+        ((), True, "kinfmu: note: built without the page of kinfmu play in its documentation; --page adds it\n"),
+        ((), False, ""),
+        (("--no-page",), True, ""),
+    ],
+)
+def test_a_build_without_the_option_does_not_wait_for_a_page(
+    command: Command,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    options: tuple[str, ...],
+    has_zig: bool,
+    note: str,
+) -> None:
+    monkeypatch.setattr("kinfmu.codegen.c.compiler.wasm_module", _refused)
+    monkeypatch.setattr("kinfmu.cli.build.find_spec", lambda _name: object() if has_zig else None)
+    built = command("build", "slider_crank", "--flavour", "python", *options, "-o", "one.fmu")
+    assert (built.exit_code, built.stderr) == (0, note)
     with zipfile.ZipFile(tmp_path / "one.fmu") as archive:
         assert "documentation/play.html" not in archive.namelist()
 

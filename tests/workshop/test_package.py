@@ -28,6 +28,7 @@ from kinfmu.mechanism.laws import Law
 from kinfmu.mechanism.loads import Load
 from kinfmu.mechanism.quantities import PoseQuantity
 
+CHECKOUT = Path(__file__).parents[2]
 PACKAGES = ["kinfmu", *(m.name for m in pkgutil.walk_packages(kinfmu.__path__, "kinfmu.") if m.ispkg)]
 MODULES = [m.name for m in pkgutil.walk_packages(kinfmu.__path__, "kinfmu.")]
 
@@ -91,15 +92,23 @@ def test_the_api_of_the_contract_is_exported() -> None:
     assert {"write_mcap", "write_rrd", "read"} <= set(kinfmu.log.__all__) <= set(dir(kinfmu.log))
 
 
-def test_an_unknown_name_is_an_attribute_error() -> None:
-    with pytest.raises(AttributeError, match="module 'kinfmu' has no attribute 'nothing'"):
-        _ = kinfmu.nothing
+@pytest.mark.parametrize("package", [kinfmu, kinfmu.log])
+def test_an_unknown_name_is_an_attribute_error(package: ModuleType) -> None:
+    with pytest.raises(AttributeError, match=f"module '{package.__name__}' has no attribute 'nothing'"):
+        _ = package.nothing
+
+
+@pytest.mark.parametrize("stub", [*(CHECKOUT / "kinfmu").rglob("__init__.pyi")], ids=lambda stub: stub.parent.name)
+def test_no_name_that_is_imported_when_used_is_that_of_a_module_in_its_package(stub: Path) -> None:
+    package = importlib.import_module(".".join(stub.parent.relative_to(CHECKOUT).parts))
+    modules = {path.stem for path in stub.parent.glob("*.py")} | {path.name for path in stub.parent.iterdir()}
+    taken = modules & {name for name, home in kinfmu._homes(vars(package)).items() if home != package.__name__}
+    assert not taken
 
 
 # --------------------------------------------------------------------------------------------------------- typed client
 
 
-CHECKOUT = Path(__file__).parents[2]
 CLIENT = """
 import kinfmu
 
@@ -195,7 +204,7 @@ def test_the_classes_looked_at_are_those_that_users_call() -> None:
 # ---------------------------------------------------------------------------------------------------------------- wheel
 
 
-TYPED = ("py.typed", "__init__.pyi")
+TYPED = ("py.typed", "__init__.pyi", "log/__init__.pyi")
 
 
 def test_the_gallery_its_references_and_the_types_are_installed(tmp_path: Path) -> None:
@@ -207,7 +216,8 @@ def test_the_gallery_its_references_and_the_types_are_installed(tmp_path: Path) 
     (tmp_path / "kinfmu").mkdir()
     (tmp_path / "kinfmu" / "__init__.py").touch()
     for name in TYPED:
-        shutil.copy(CHECKOUT / "kinfmu" / name, tmp_path / "kinfmu")
+        (tmp_path / "kinfmu" / name).parent.mkdir(exist_ok=True)
+        shutil.copy(CHECKOUT / "kinfmu" / name, tmp_path / "kinfmu" / name)
     (tmp_path / "setup.cfg").write_text(
         "[metadata]\nname = kinfmu\n[options]\npackages = kinfmu\n"
         f"[options.package_data]\nkinfmu = {', '.join(data)}\n",

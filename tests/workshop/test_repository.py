@@ -40,7 +40,7 @@ def loaded_by(statement: str) -> set[str]:
             "from kinfmu.log import read, review, write_mcap, write_rrd, write_table",
             HEAVY - {"numpy", "importlib.metadata"},
         ),
-        ("import kinfmu.draw", HEAVY - {"numpy", "scipy", "importlib.metadata"}),
+        ("from kinfmu.draw import animate, cam, dxf, figure, plot, svaj", HEAVY - {"numpy", "importlib.metadata"}),
         ("import kinfmu.fmu", HEAVY - {"numpy", "importlib.metadata"}),
     ],
 )
@@ -61,6 +61,37 @@ def test_building_and_stepping_an_fmu_loads_nothing_to_log_with(tmp_path: Path) 
     assert {"kinfmu.fmu.host.simulate", "fmpy"} <= loaded
     assert loaded & LOGGING == set()
     assert not [name for name in loaded if name.startswith("kinfmu.log")]
+
+
+COMMANDS = (
+    "list",
+    "new crank_rocker mine.toml",
+    "schema",
+    "check mine.toml --matrices",
+    "check fourbar --assemblies",
+    "check cam_roller",
+    "check flat_face_lever",
+    "check parallel_jaw",
+    "solve mine.toml -o run.csv",
+    "solve mine.toml -o run.mcap --times 0:1:0.1",
+    "export run.mcap -o again.csv",
+    "build mine.toml --flavour python -o mine.fmu",
+    "simulate mine.fmu --stop 0.1",
+)
+
+
+@pytest.mark.long
+def test_commands_load_neither_scipy_nor_pandas(tmp_path: Path) -> None:
+    statement = f"""
+import os, sys
+os.chdir({str(tmp_path)!r})
+sys.path.insert(0, {str(CHECKOUT)!r})
+from kinfmu.cli import main
+for command in {COMMANDS!r}:
+    main(command.split(), standalone_mode=False)
+    assert not {{"scipy", "pandas"}} & sys.modules.keys(), command
+"""
+    assert "fmpy" in loaded_by(statement)
 
 
 def test_writing_and_reading_a_record_loads_no_viewer(tmp_path: Path) -> None:

@@ -187,12 +187,17 @@ def points_of(body: Body) -> FloatArray:
     return np.array([tuple(point) for point in body.points.values()] or [(0.0, 0.0)])
 
 
+def distinct(points: FloatArray) -> FloatArray:
+    """Return points (p, 2) sorted by x, then y, each once; numpy's `unique` imports masked arrays for this."""
+    return np.array(sorted({*map(tuple, points.tolist())}))
+
+
 def rim(points: FloatArray) -> tuple[FloatArray, bool]:
     """Return the corners (k, 2) of a link with these points (p, 2), and True if they are a closed line.
 
     Points on one line are all corners, in order; other points give their convex hull, counter-clockwise.
     """
-    points = np.unique(points, axis=0)
+    points = distinct(points)
     if len(points) < 3:
         return points, False
     centred = points - points.mean(axis=0)
@@ -205,7 +210,7 @@ def rim(points: FloatArray) -> tuple[FloatArray, bool]:
 def ribs(points: FloatArray) -> FloatArray:
     """Return lines (r, 2, 2) from the rim of a link with points (p, 2) to each point inside."""
     corners, is_closed = rim(points)
-    inside = [point for point in np.unique(points, axis=0) if not (corners == point).all(axis=1).any()]
+    inside = [point for point in distinct(points) if not (corners == point).all(axis=1).any()]
     if not is_closed:
         return np.empty((0, 2, 2))
     return np.array([[corners[np.argmin(np.hypot(*(corners - at).T))], at] for at in inside]).reshape(-1, 2, 2)

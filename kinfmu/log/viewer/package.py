@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 
 from kinfmu.errors import MissingPackageError
@@ -21,3 +24,23 @@ def require_viewer(what: str) -> None:
     """Raise a MissingPackageError if the viewer is not installed; what: what needs it, as 'run.rrd: a recording'."""
     if not has_viewer():
         raise MissingPackageError(f"{what} needs the Rerun viewer: {INSTALL}")
+
+
+@contextmanager
+def without_pandas() -> Iterator[None]:
+    """Keep pyarrow from importing pandas in this block: it asks of each list of Rerun whether it is a series of pandas.
+
+    The import takes longer than writing a recording. For commands only: afterwards pyarrow takes a series for a list.
+    """
+    sys.meta_path.insert(0, _NoPandas)
+    try:
+        yield
+    finally:
+        sys.meta_path.remove(_NoPandas)
+
+
+class _NoPandas:
+    @staticmethod
+    def find_spec(name: str, *_: object) -> None:
+        if name == "pandas":
+            raise ModuleNotFoundError(f"No module named '{name}'", name=name)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from kinfmu.mechanism.valid import quoted
 
 def folder() -> Path:
     """Return the folder of the gallery: `fmus/` of a checkout, or inside the installed package."""
-    package = Path(str(files("kinfmu")))
+    package = Path(__file__).parents[2]
     installed, checkout = package / "fmus", package.parent / "fmus"
     return installed if installed.is_dir() else checkout
 

@@ -14,6 +14,8 @@ from kinfmu.motion.cams.profile import TURN, envelope
 from kinfmu.motion.cams.traced import ComplexArray, Traced, traced
 
 _SAMPLES = 721  # in a turn, between which extremes are searched
+_REFINED = 33  # places in an interval that is searched
+_FINEST, _FINEST_END = 1e-10, 2e-12  # [rad]; width of the interval that holds an extreme, and the end of a part
 _EDGE = 1e-12  # [rad] before a jump of the law, where the values of the left side count
 _SAME_ANGLE = 1e-7  # [rad]; places of extremes are known to half the digits
 _NOISE = 1e-13  # of the largest value; smaller differences are rounding
@@ -146,31 +148,35 @@ class _Search:
         best, at = float(values[k]), float(self.s[k])
         a, b = next(part for part in self.parts if part[0] <= at <= part[1])
         low, high = max(a, self.s[max(k - 1, 0)]), min(b, self.s[min(k + 1, len(self.s) - 1)])
-        if low < high:
-            from scipy.optimize import minimize_scalar
-
-            refined = minimize_scalar(
-                lambda x: float(of(self._at(x))[0]), bounds=(low, high), method="bounded", options={"xatol": 1e-10}
-            )
-            if refined.fun < best - noise:
-                best, at = float(refined.fun), float(refined.x)
+        refined, there = best, at
+        while high - low > _FINEST:
+            s = np.linspace(low, high, _REFINED)
+            values = of(traced(self.placed, s))
+            k = int(np.argmin(values))
+            if values[k] < refined:
+                refined, there = float(values[k]), float(s[k])
+            low, high = s[max(k - 1, 0)], s[min(k + 1, len(s) - 1)]
+        if refined < best - noise:
+            best, at = refined, there
         return CamExtreme(best, _in_turn(float(self._at(at).angle[0])))
 
     def below(self, of: Callable[[Traced], FloatArray]) -> tuple[Cut, ...]:
-        """Return the parts of the turn where a quantity is negative, their ends by Brent's method."""
+        """Return the parts of the turn where a quantity is negative."""
         negative = of(self.found) < 0.0
         if negative.all():
             return (Cut(0.0, TURN),)
         if not negative.any():
             return ()
-        from scipy.optimize import brentq
-
         ends: list[tuple[float, bool]] = []
         for k in np.flatnonzero(negative[1:] != negative[:-1]):
             low, high = float(self.s[k]), float(self.s[k + 1])
-            a, b = (float(of(self._at(x))[0]) for x in (low, high))
-            at = brentq(lambda x: float(of(self._at(x))[0]), low, high, xtol=1e-12) if a * b < 0.0 else high
-            ends.append((float(at), bool(negative[k + 1])))
+            while high - low > _FINEST_END:
+                s = np.linspace(low, high, _REFINED)
+                has_changed = (of(traced(self.placed, s)) < 0.0) == negative[k + 1]
+                has_changed[-1] = True  # also where rounding differs from that of the samples
+                after = max(int(np.argmax(has_changed)), 1)
+                low, high = float(s[after - 1]), float(s[after])
+            ends.append((high, bool(negative[k + 1])))
         if not ends:
             return ()
         first = next(k for k, (_, begins) in enumerate(ends) if begins)

@@ -233,9 +233,10 @@ def dependent_rows(gradients: FloatArray) -> dict[int, list[int]]:
             triangle[:count, count], triangle[count, count] = parts, length
             independent.append(index)
         else:
-            from scipy.linalg import solve_triangular  # here, since few mechanisms need it
-
-            weights = solve_triangular(triangle[:count, :count], parts)
+            weights = parts
+            for k in range(count - 1, -1, -1):  # backward substitution
+                weights[k] /= triangle[k, k]
+                weights[:k] -= weights[k] * triangle[:k, k]
             dependent[index] = [
                 row for row, weight in zip(independent, weights, strict=True) if abs(weight) > _DEPENDENT
             ]

@@ -11,7 +11,7 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.draw.chart import SMALL, degree_ticks, dress
-from kinfmu.draw.dxf import DXF_UNITS, POINT_STYLE, without_date
+from kinfmu.draw.dxf_file import DXF_UNITS, POINT_STYLE, without_date
 from kinfmu.draw.marks import COLOUR
 from kinfmu.draw.scene import palette
 from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, arc, ink
