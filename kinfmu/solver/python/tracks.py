@@ -66,7 +66,7 @@ class TrackModel:
         self.LAW_UNITS, self.LAW_TURNS, self.LAW_LENGTHS = model.LAW_UNITS, model.LAW_TURNS, model.LAW_LENGTHS
         if model.LAW_UNITS:
             self.law_positions = model.law_positions
-            self.law_steps, self.law_slopes = model.law_steps, model.law_slopes
+            self.law_steps, self.law_slopes, self.law_added = model.law_steps, model.law_slopes, model.law_added
         ends = [0]
         for k in self.blocks:
             low, high = model.BLOCKS[k]
