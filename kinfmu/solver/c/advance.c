@@ -174,13 +174,15 @@ static void step(kf_solver *solver, const kf_pose *start, kf_path *path)
             }
             kf_path_accept(path, trial, s, trial->found.margin);
             if (!path->is_ended && path->length < KF_STRIDE * path->longest) {
-                path->is_ended = kf_pole_before(solver, pose, trial, path->direction, path->distance, &path->limit);
+                path->is_ended = kf_pole_before(solver, pose, trial, path->direction, path->distance, KF_FAR_AWAY,
+                                                &path->limit);
             }
             return;
         }
     }
     if (kf_path_shorten(path, s)) {
-        if (!path->is_limited) {
+        if (!path->is_limited
+            && !kf_pole_before(solver, path->before, pose, path->direction, path->distance, 0.0, &path->limit)) {
             kf_limit_beyond(solver, path->before, pose, path->direction, &path->limit);
         }
         kf_path_limit(path, s);

@@ -93,7 +93,7 @@ typedef struct {
 /* Make a limit at driver values. */
 void kf_limit_at(kf_limit *limit, const double *u, int block);
 bool kf_pole_before(kf_solver *solver, kf_pose *before, kf_pose *pose, const double *direction, double distance,
-                    kf_limit *limit);
+                    double least, kf_limit *limit);
 void kf_limit_beyond(kf_solver *solver, const kf_pose *before, kf_pose *pose, const double *direction, kf_limit *limit);
 bool kf_is_beyond(const double *target, const double *limit, const double *direction, double s);
 void kf_append_limit(char *message, const kf_limit *limit, const double *target, int driver);

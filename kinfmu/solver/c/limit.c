@@ -79,19 +79,19 @@ static void derivatives_along(kf_solver *solver, kf_pose *pose, const double *di
     if (KF_IS_ONE(solver)) {
         kf_tangent(&solver->model, pose);
     } else {
-        KF_VELOCITY(&solver->model, &pose->found, direction, NULL, NULL, pose->x1);
-        KF_ACCELERATION(&solver->model, &pose->found, kf_at_rest, pose->x1, NULL, NULL, pose->x2);
+        kf_rates_in_time(&solver->model, pose, direction, kf_at_rest);
     }
 }
 
-/* Find the pole that lies ahead of a pose within a distance along the path; return false if there is none.
+/* Find the pole that lies ahead of a pose within a distance along the path; return false if there is none; least: how far
+ * away [sizes] what runs to infinity must be, 0 where no step is left.
  *
  * At the distance x from a pole of order p an unknown length grows like 1 / x^p, as that of a slide whose pin's path
  * becomes parallel to it. There f = z'/z'' = x / (p + 1) (1 + k x^2), and two poses give f and its slope, so x without
  * k. Steps become as short as x^(5/3), and do not pass it.
  */
 bool kf_pole_before(kf_solver *solver, kf_pose *before, kf_pose *pose, const double *direction, double distance,
-                    kf_limit *limit)
+                    double least, kf_limit *limit)
 {
     const double unit = KF_IS_ONE(solver) ? kf_reach[KF_ALONG(solver)] : 1.0;
     double between = 0.0, square = 0.0;
@@ -109,7 +109,7 @@ bool kf_pole_before(kf_solver *solver, kf_pose *before, kf_pose *pose, const dou
             double there, here, slope, order, ahead;
             if (kf_is_outside(&solver->model, block) || kf_unknown_is_angle[k] || before->x2[k] * between == 0.0
                 || !(fabs(first) * unit > KF_STEEP * scale && second != 0.0
-                     && first * first > KF_FAR_AWAY * scale * fabs(second))) {
+                     && first * first > least * scale * fabs(second))) {
                 continue;
             }
             there = before->x1[k] / before->x2[k];

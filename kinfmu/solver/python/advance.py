@@ -180,7 +180,13 @@ def _step(model: Model, path: Path) -> None:
             if path.end is None and path.length < STRIDE * path.longest:
                 path.end = pole_before(model, pose, trial, direction, path.distance)
             return
-    path.shorten(s, lambda: limit_beyond(model, path.before, pose, direction))
+    path.shorten(
+        s,
+        lambda: (
+            pole_before(model, path.before, pose, direction, path.distance, least=0.0)
+            or limit_beyond(model, path.before, pose, direction)
+        ),
+    )
 
 
 def _cross_bridge(path: Path) -> bool:

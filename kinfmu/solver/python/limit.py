@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 from .pose import STEEP, Model, Pose, Vector, directed
@@ -62,20 +63,31 @@ def _extrapolated(before: Pose, pose: Pose, near: float, far: float) -> Vector:
     return tuple(b + (b - a) * beyond for a, b in zip(before.u, pose.u, strict=True))
 
 
-def pole_before(model: Model, before: Pose, pose: Pose, direction: Vector, distance: float) -> Limit | None:
+def pole_before(
+    model: Model,
+    before: Pose,
+    pose: Pose,
+    direction: Vector,
+    distance: float,
+    derivatives: Callable[[Model, Pose, Vector], tuple[Vector, Vector]] = directed,
+    least: float = FAR_AWAY,
+) -> Limit | None:
     """Return the pole that lies ahead of a pose within a distance along the path, or None.
 
     At the distance x from a pole of order p an unknown length grows like 1 / x^p, as that of a slide whose pin's path
     becomes parallel to it. There f = z'/z'' = x / (p + 1) (1 + k x^2), and two poses give f and its slope, so x without
     k. Steps become as short as x^(5/3), and do not pass it.
+
+    derivatives: first and second of z on a straight path; least: how far away [sizes] it must be, 0 where no step is
+    left.
     """
     square = sum([d * d for d in direction])
     between = sum([(b - a) * d for a, b, d in zip(before.u, pose.u, direction)]) / square  # noqa: B905  one per driver
     unit = model.REACH[0] if len(direction) == 1 else 1.0
-    (old, older), (new, newer) = directed(model, before, direction), directed(model, pose, direction)
+    (old, older), (new, newer) = derivatives(model, before, direction), derivatives(model, pose, direction)
     for k, scale in enumerate(model.UNKNOWN_SCALES):
-        is_far = abs(new[k]) * unit > STEEP * scale and new[k] * new[k] > FAR_AWAY * scale * abs(newer[k]) > 0.0
-        if model.UNKNOWN_IS_ANGLE[k] or not is_far or older[k] * between == 0.0:
+        is_far = abs(new[k]) * unit > STEEP * scale and new[k] * new[k] > least * scale * abs(newer[k])
+        if model.UNKNOWN_IS_ANGLE[k] or not is_far or newer[k] * older[k] * between == 0.0:
             continue
         there, here = old[k] / older[k], new[k] / newer[k]
         slope = (here - there) / between
