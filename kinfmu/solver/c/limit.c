@@ -163,20 +163,30 @@ void kf_append_limit(char *message, const kf_limit *limit, const double *target,
     }
     if (limit->block == KF_NEGATIVE) {
         kf_append(message, "; beyond it a distance would be negative");
-        return;
-    }
-    if (limit->pole != KF_NO_POLE) {
+    } else if (limit->pole != KF_NO_POLE) {
         kf_append(message, ", where %s runs to infinity", kf_unknown_names[limit->pole]);
-        return;
+    } else {
+        kf_append(message, limit->crosses ? ", where branches of " : "; beyond it ");
+        kf_append(message, limit->block == KF_NO_BLOCK ? "the joints" : limit->crosses ? "" : "the loop of ");
+        for (k = kf_first_of(limit->block); limit->block >= 0 && k < kf_block_ends[limit->block]; ++k) {
+            kf_append(message, "%s%s", k == kf_first_of(limit->block) ? "" : ", ", kf_unknown_names[k]);
+        }
+        kf_append(message, limit->crosses ? " cross" : " cannot close");
     }
-    kf_append(message, limit->crosses ? ", where branches of " : "; beyond it ");
-    kf_append(message, limit->block == KF_NO_BLOCK ? "the joints" : limit->crosses ? "" : "the loop of ");
-    for (k = kf_first_of(limit->block); limit->block >= 0 && k < kf_block_ends[limit->block]; ++k) {
-        kf_append(message, "%s%s", k == kf_first_of(limit->block) ? "" : ", ", kf_unknown_names[k]);
-    }
-    kf_append(message, limit->crosses ? " cross" : " cannot close");
     if (limit->crosses && KF_DRIVERS > 1 && driver < 0) {
         kf_append(message, "; the crossing depends on several drivers, so no bridge is built");
+    }
+    kf_append_rounding(message);
+}
+
+void kf_append_rounding(char *message)
+{
+    if (kf_row_offset > KF_FAR_FROM_ORIGIN) {
+        kf_append(message, "; ");
+        kf_append_number(message, "%.1e", kf_row_offset);
+        kf_append(message, " sizes from the world's origin the rows are rounded to ");
+        kf_append_number(message, "%.1e", kf_row_offset * KF_EPS);
+        kf_append(message, " sizes");
     }
 }
 

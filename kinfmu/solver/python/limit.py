@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from .pose import STEEP, Model, Pose, Vector, directed
+from .pose import EPS, STEEP, Model, Pose, Vector, directed
 
 MOST_STEPS = 1_000_000  # of a path: seconds, and more than any intended motion
 NO_BLOCK, TOO_FAR, NEGATIVE = -1, -2, -3  # in place of a block: no determinant vanishes; too many steps; see VANISHING
 VANISHING = 1e-6  # [sizes] of a length that a law gives: where steps end there, it would be negative beyond
+FAR_FROM_ORIGIN = 1e6  # [sizes]; rows tied to the world's origin are rounded there to a tenth of the usual tolerance
 NO_POLE = -1  # in place of an unknown that runs to infinity
 FAR_AWAY = 100.0  # [sizes]; what runs to infinity is at least as far away
 AT_POLE = 0.999  # of the distance to a pole; beyond it an unknown is more than a thousand times as far away
@@ -122,10 +123,18 @@ def limit_message(model: Model, limit: Limit, target: Vector) -> str:
         why = f", where {model.UNKNOWNS[limit.pole]} runs to infinity"
     if limit.crosses and len(target) > 1:
         why += "; the crossing depends on several drivers, so no bridge is built"
+    why += rounding_far_from_origin(model)
     if not differs(model, target, limit.u, LOCATED):
         return f"{place(model, target, LOCATED)} cannot be reached: to these digits it is the limit{why}"
     asked = place(model, target, ROUGHLY if differs(model, target, limit.u, ROUGHLY) else LOCATED)
     return f"{asked} cannot be reached: the limit is {place(model, limit.u, LOCATED)}{why}"
+
+
+def rounding_far_from_origin(model: Model) -> str:
+    """Return the end of a message that states how rows tied to the world's origin are rounded; empty near it."""
+    off: float = model.ROW_OFFSET
+    is_far = off > FAR_FROM_ORIGIN
+    return f"; {off:.1e} sizes from the world's origin the rows are rounded to {off * EPS:.1e} sizes" if is_far else ""
 
 
 def place(model: Model, u: Vector, digits: int = ROUGHLY) -> str:
