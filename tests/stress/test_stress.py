@@ -131,6 +131,13 @@ def test_an_ok_sample_may_be_off_by_some_roundings_of_its_driver_values(
     assert verdict.blurred == 1 - faults
 
 
+def test_where_a_rise_ends_the_rounding_of_a_driver_value_counts_to_both_sides() -> None:
+    """A sample at the end of a rise of 0.06 within 3.5e-7 rad: all rests beyond it, before it not."""
+    verdict = trial(10077, "led by laws").judged()
+    assert verdict.faults == []
+    assert verdict.blurred >= 1
+
+
 # --------------------------------------------------------------------------------------------------- the oracle
 
 
