@@ -27,9 +27,10 @@ from kinfmu import (
     Run,
     Translational,
 )
-from kinfmu.errors import InconsistentError
+from kinfmu.errors import AssemblyError, InconsistentError
 from kinfmu.plan import compile_plan
 from kinfmu.solver.python import Status
+from kinfmu.solver.python.trusted_step import trusted_step
 from tests import oracle
 from tests.analysis.linkages import pushed_crank
 from tests.gallery_members import every_member
@@ -415,7 +416,10 @@ def far_rack(x: float, y: float) -> tuple[Mechanism, Residual]:
     return mechanism, residual
 
 
-@pytest.mark.parametrize("made", [far_slider_crank, far_bar, far_tip, far_coupling, far_rack])
+TIED = (far_slider_crank, far_bar, far_tip, far_coupling, far_rack)
+
+
+@pytest.mark.parametrize("made", TIED)
 @pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.few(2)
 def test_estimates_count_the_offset_of_what_is_tied_to_the_world(
@@ -431,3 +435,36 @@ def test_estimates_count_the_offset_of_what_is_tied_to_the_world(
             off = [largest_error(row, true) for row, true in zip(ours, wanted, strict=True)]
             assert (np.array(off) <= estimate).all()
         assert np.median(run.error[:, 0]) < 500.0 * sizes * 2.0**-52
+
+
+@pytest.mark.parametrize("at", [(1e8 + 0.7, -1e8 - 0.7), (78596057.401366, -8518.29741191125)])
+def test_a_rod_that_rounding_keeps_from_closing_far_from_the_origin_is_refused(at: tuple[float, float]) -> None:
+    """The square of a length between ends that are known to 1e-8 has no zero."""
+    mechanism, _ = far_bar(*at)
+    message = (
+        r"gap \S+e-09 m at 'rod' .*; this is rounding, \S+e\+07 sizes from the world's origin, to which it is tied"
+    )
+    with pytest.raises(AssemblyError, match=message):
+        kinfmu.solve(mechanism, [0.0])
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_a_path_whose_steps_are_lost_in_the_rounding_of_its_driver_ends(
+    monkeypatch: pytest.MonkeyPatch, engine: Literal["python", "native"]
+) -> None:
+    """Up to 1e-6 steps do not move a driver at -5e9."""
+    steps = 0
+
+    def counted(*arguments: Any) -> Any:
+        nonlocal steps
+        steps += 1
+        return trusted_step(*arguments)
+
+    monkeypatch.setattr("kinfmu.solver.python.advance.trusted_step", counted)
+    mechanism, _ = far_bar(-4820000000.0, -188.244405023817)
+    run = kinfmu.solve(mechanism, [0.0, 0.1, 0.2], engine=engine)
+    assert run.status.tolist() == [0, 3, 3]
+    assert steps < 200
+    reason = "; 1.9e+09 sizes from the world's origin the rows are rounded to 4.2e-07 sizes"
+    assert all(event.text.endswith(reason) for event in run.events if "cannot be reached" in event.text)
+    assert any("cannot be reached" in event.text for event in run.events)

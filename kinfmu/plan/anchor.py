@@ -10,10 +10,11 @@ import numpy as np
 from kinfmu.arrays import FloatArray
 from kinfmu.errors import AmbiguousStartError, AssemblyError, MobilityError, listed
 from kinfmu.plan.equations.assembly import SINGULAR, Assembled, AssembledStart, closes_nearby
-from kinfmu.plan.equations.closing import branches, close, margin
+from kinfmu.plan.equations.closing import OFFSET_ROUNDING, branches, close, margin
 from kinfmu.plan.equations.start_poses import StartValues, open_joints_text, start_from_poses
 from kinfmu.plan.equations.system import System
 from kinfmu.plan.open_loop import find_open_loop
+from kinfmu.plan.origin import far_rows
 
 
 def find_anchor(system: System, assembly: AssembledStart, kept: Sequence[int]) -> Assembled:
@@ -60,8 +61,12 @@ def does_not_close(system: System, start: StartValues, kept: Sequence[int]) -> A
     cure = (
         "check start poses: the loop closes from others" if loop.closes_elsewhere else "check lengths and start poses"
     )
+    away = far_rows(system, loop.pose).offset
+    scale = 1.0 if loop.unit == "rad" else system.size
     opened = open_joints_text(system, start_from_poses(system).q)
-    if opened:  # an earlier loop may have closed far from its start poses
+    if 0.0 < loop.gap <= OFFSET_ROUNDING * away * scale:
+        cure = f"this is rounding, {away:.2g} sizes from the world's origin, to which it is tied: place it nearer"
+    elif opened:  # an earlier loop may have closed far from its start poses
         cure += f"; in the start poses of the file {opened}"
     if len(kept) > len(system.coordinates):
         cure += f"; {len(kept)} rows of the joints hold {len(system.coordinates)} coordinates: is a joint too many?"

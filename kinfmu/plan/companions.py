@@ -21,6 +21,7 @@ from kinfmu.units import CoordinateName
 
 _POSES = 64  # of the motion at which a block is looked at; with their steps, one turn each way
 _STEP = 0.2  # [rad, sizes]; between them
+_WALKS = 4  # in random directions where there are as many degrees of freedom: one alone may pass no singular pose
 _LOOKS = 3  # poses at which the combination of rows is found that equals a redundant row
 _IN_SPAN = 1e-7  # part of a gradient outside the span of the others, or weight in a combination, that counts as zero
 _CLOSED = 1e-9  # residual relative to the size up to which a sampled pose counts as closed
@@ -200,8 +201,9 @@ def _regular_only_with(
     if rank == len(part.columns):
         return False
     joined = [*joined, *(block for block in before if all(_only(system, row, touched) for row in block.all_rows))]
+    walks = min(len(part.columns) - rank, _WALKS)
     last: list[tuple[FloatArray, list[float]]] = []
-    for q in _motion(part, pose[part.columns], rank, _POSES):
+    for q in (q for seed in range(walks) for q in _motion(part, pose[part.columns], rank, _POSES, seed)):
         poses = [q]
         alone = _jacobians(system, without, part.whole(q))
         determinants = [float(np.linalg.det(one)) for one in alone if one.shape[0] == one.shape[1]]
@@ -217,12 +219,12 @@ def _regular_only_with(
     return False
 
 
-def _motion(part: Part, q: FloatArray, rank: int, count: int) -> Iterator[FloatArray]:
+def _motion(part: Part, q: FloatArray, rank: int, count: int, seed: int = 0) -> Iterator[FloatArray]:
     """Yield poses along the motion that rows of a rank leave free: in one direction, then in the other.
 
     Directions are random (seeded) with several degrees of freedom. It ends where all rows together are singular.
     """
-    rng = np.random.default_rng(1989)
+    rng = np.random.default_rng(1989 + seed)
     free = _free(part, q, rank)
     start = free @ rng.standard_normal(free.shape[1])
     for direction in (start, -start):

@@ -23,6 +23,7 @@ class PathLaws(NamedTuple):
         turns: After which each argument jumps back, 0 if it does not.
         steps: `Law.fewest_steps` of each argument, over the symbols `argument_symbol`.
         slopes: Bounds of the slopes of `steps`, over parameters.
+        added: `Law.most_added` of each argument, over parameters.
         lengths: How many lengths there are.
         units: 1 rad or the size, for each item of the motions.
 
@@ -32,12 +33,13 @@ class PathLaws(NamedTuple):
     turns: tuple[float, ...] = ()
     steps: tuple[Node, ...] = ()
     slopes: tuple[Node, ...] = ()
+    added: tuple[Node, ...] = ()
     lengths: int = 0
     units: tuple[float, ...] = ()
 
     @property
     def nodes(self) -> tuple[tuple[Node, ...], ...]:
-        return (*self.motions, self.steps, self.slopes)
+        return (*self.motions, self.steps, self.slopes, self.added)
 
 
 def argument_symbol(number: int) -> str:
@@ -53,7 +55,7 @@ def find_path_laws(
     moving = {name for block in blocks for name in block.coordinates} | {node.name for node in tracer.targets.values()}
     arguments: list[Node] = []
     lengths: list[Node] = []
-    steps, slopes, turns, units, curved = [], [], [], [], set()
+    steps, slopes, added, turns, units, curved = [], [], [], [], [], set()
     for joint in tracer.joints:
         at = tracer.placement(joint.bodies(), known)
         led = joint.led_by(at)
@@ -77,13 +79,14 @@ def find_path_laws(
             arguments.append(argument)
             steps.append(fewest)
             slopes.append(graph.lift(law.most_steps(**constants)))
+            added.append(graph.lift(law.most_added(**constants)))
             turns.append(TURN if argument.op == "atan2" else 0.0)
             units.append(1.0 if is_angle else size)
     given = _given(blocks, curved)
     nodes = [*arguments, *lengths, *(tracer.symbols[name] for name in given)]
     units += [*([size] * len(lengths)), *(1.0 if name.is_angle else size for name in given)]
     motions = tuple(map(tuple, (nodes, rates.of(nodes), rates.second(nodes))))
-    return PathLaws(motions, tuple(turns), tuple(steps), tuple(slopes), len(lengths), tuple(units))
+    return PathLaws(motions, tuple(turns), tuple(steps), tuple(slopes), tuple(added), len(lengths), tuple(units))
 
 
 def _given(blocks: Sequence[Block], curved: Collection[str]) -> list[CoordinateName]:

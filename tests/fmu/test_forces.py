@@ -382,6 +382,44 @@ def test_model_exchange_has_the_forces_of_a_run(fmu_of: Callable[..., Path], fmi
     host.free()
 
 
+RESTING = {"crank_angle": 0.7, "crank_speed": 3.0, "crank_acceleration": 0.0, "work_force": -150.0}
+
+
+def resting_forces(names: Sequence[str], t: float) -> list[float]:
+    """Forces of the press at time t, with its inputs as in RESTING."""
+    passing = {"crank.start": 0.7 - 3.0 * t, "crank.speed": 3.0}
+    run = kinfmu.compile(press()).solve([t], parameters=passing, work_force=-150.0)
+    return [run[name][0] for name in names]
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_loads_follow_the_time_that_model_exchange_sets_while_inputs_rest(
+    fmu_of: Callable[..., Path], fmi: int, tmp_path: Path
+) -> None:
+    host = Host(fmu_of(press(), "native", fmi, "inputs"), tmp_path / "model", model_exchange=True)
+    host.set(RESTING)
+    host.initialize(0.0)
+    host.fmu.enterContinuousTimeMode()
+    names = [variable.name for variable in force_outputs(host)]
+    for t in (0.0, 0.25, 1.0, 0.5):
+        host.fmu.setTime(t)
+        np.testing.assert_allclose(host.get(*names), resting_forces(names, t), rtol=1e-12, atol=1e-11)
+    host.free()
+
+
+@of_each_flavour
+def test_loads_follow_the_time_of_steps_while_inputs_rest(start: Callable[..., Host], flavour: str, fmi: int) -> None:
+    """The sample of a step is at its begin; an input that is set again is a sample at the end of the last step."""
+    host = start(flavour, fmi)
+    host.set(RESTING)
+    names = [variable.name for variable in force_outputs(host)]
+    for t in (0.0, 0.25, 0.5):
+        assert host.step(t, 0.25) == OK
+        np.testing.assert_allclose(host.get(*names), resting_forces(names, t), rtol=1e-12, atol=1e-11)
+    host.set(RESTING)
+    np.testing.assert_allclose(host.get(*names), resting_forces(names, 0.75), rtol=1e-12, atol=1e-11)
+
+
 def sixth_order(value_at: Callable[[float], float], h: float) -> float:
     weights = ((1, 45.0), (2, -9.0), (3, 1.0))
     return sum(weight / (60.0 * h) * (value_at(j * h) - value_at(-j * h)) for j, weight in weights)

@@ -13,8 +13,19 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import AngleDriver, Body, ConstantSpeed, Distance, Mechanism, PointOnLine, Revolute, Translational
+from kinfmu import (
+    AngleDriver,
+    Body,
+    ConstantSpeed,
+    Distance,
+    DistanceDriver,
+    Mechanism,
+    PointOnLine,
+    Revolute,
+    Translational,
+)
 from kinfmu.codegen.python import load_model
+from kinfmu.mechanism.drivers import Driver
 from kinfmu.mechanism.joints import Joint
 from kinfmu.plan import compile_plan
 from kinfmu.solver.python import Pose, Solver, Status, singularity_map
@@ -309,6 +320,117 @@ def test_check_calls_a_pole_no_dead_centre() -> None:
     ]
     assert "dead centre" not in str(report)
     assert "pi (180 deg), where a slide runs to infinity" in str(report)
+
+
+def crossing_lines(moved_by: str, *, has_shoes: bool = False, is_whole: bool = True) -> Mechanism:
+    """Two arms, about (0, 0) and (1, 0), with slots that a pin slides in: where they are parallel it is at infinity.
+
+    moved_by: what moves the left arm: its own driver, the crank of a four-bar, that of a parallelogram or a cylinder.
+    is_whole: with pin and right arm.
+    """
+    start = 2.5 if moved_by == "parallelogram" else 1.2
+    other = start + 1.0
+    pin = cmath.rect(math.sin(other) / math.sin(other - start), start)
+    bodies = [Body("left", {"O": (0, 0), "Q": (0.8, 0)}, (0, 0, start))]
+    joints: list[Joint] = [Revolute("O", ("ground.O", "left.O"))]
+    crank = 1.0 if moved_by == "rocker" else start
+    end, top = cmath.rect(0.5 if moved_by == "rocker" else 0.8, crank) - 3.0, cmath.rect(0.8, start)
+    driver: Driver = AngleDriver("drive", "crank", ConstantSpeed(crank, 1.0))
+    if moved_by == "driver":
+        driver = AngleDriver("drive", "left", ConstantSpeed(start, 1.0))
+    elif moved_by == "cylinder":
+        driver = DistanceDriver("drive", ("ground.M", "left.Q"), ConstantSpeed(abs(top + 1.0 + 0.3j), 1.0))
+    else:
+        bodies += [
+            Body("crank", {"A": (0, 0), "P": (abs(end + 3.0), 0)}, (-3, 0, crank)),
+            Body("rod", {"P": (0, 0), "Q": (abs(top - end), 0)}, (end.real, end.imag, cmath.phase(top - end))),
+        ]
+        joints += [
+            Revolute("A", ("ground.A", "crank.A")),
+            Revolute("P", ("crank.P", "rod.P")),
+            Revolute("Q", ("rod.Q", "left.Q")),
+        ]
+    drivers = [driver]
+    if is_whole:
+        bodies += [
+            Body("right", {"C": (0, 0)}, (1, 0, other)),
+            Body("pin", {"S": (0, 0)}, (pin.real, pin.imag, start)),
+        ]
+        joints += [Revolute("C", ("ground.C", "right.C")), Translational("left_slot", ("left.O", "pin.S"))]
+        if has_shoes:
+            bodies.append(Body("shoe", {"S": (0, 0)}, (pin.real, pin.imag, other)))
+            joints += [Revolute("S", ("pin.S", "shoe.S")), Translational("right_slot", ("right.C", "shoe.S"))]
+        else:
+            joints.append(PointOnLine("right_slot", ("right.C", "pin.S")))
+        drivers.append(AngleDriver("right", "right", ConstantSpeed(other, 1.0)))
+    ground = Body("ground", {"O": (0, 0), "C": (1, 0), "A": (-3, 0), "M": (-1, -0.3)})
+    return Mechanism("crossing_lines", [ground, *bodies], joints, drivers)
+
+
+CROSSING_LINES = [
+    ("driver", False, (0.3, -1.3)),
+    ("driver", True, (0.8, -0.6)),
+    ("rocker", False, (0.2, -1.2)),
+    ("rocker", True, (-0.2, -1.5)),
+    ("rocker", False, (0.0, -1.5)),
+    ("cylinder", False, (0.1, -1.5)),
+    ("cylinder", True, (-0.2, -1.5)),
+    ("parallelogram", False, (1.0, -0.5)),  # beyond the change point of the track
+    ("parallelogram", False, (1.0, -0.56)),  # next to it, where the slots almost coincide
+]
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize(("moved_by", "has_shoes", "change"), CROSSING_LINES)
+@pytest.mark.few(5)
+def test_a_pole_that_depends_on_two_drivers_ends_a_path_early(
+    monkeypatch: pytest.MonkeyPatch, engine: str, moved_by: str, has_shoes: bool, change: tuple[float, float]
+) -> None:
+    """Oracle: bisection of the angle between the slots, without a pin."""
+    bare = Solver(load_model(compile_plan(crossing_lines(moved_by, is_whole=False))))
+    plan = compile_plan(crossing_lines(moved_by, has_shoes=has_shoes))
+    solver = Solver(load_model(plan))
+    start = solver.anchor.u
+
+    def between(part: float) -> float:
+        pose = bare.solve(bare.anchor, (start[0] + part * change[0],))
+        assert pose.good
+        left = bare.outputs(pose)[bare.model.OUTPUTS.index("left.phi")]
+        return start[1] + part * change[1] - left
+
+    low, high = 0.0, 1.0
+    assert between(low) > 0.0 > between(high)
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if between(middle) > 0.0 else (low, middle)
+    pole = [a + low * d for a, d in zip(start, change, strict=True)]
+    steps = 0
+
+    def counted(*arguments: Any) -> Pose | None:
+        nonlocal steps
+        steps += 1
+        return trusted_step(*arguments)
+
+    for module in ("advance", "tracks"):
+        monkeypatch.setattr(f"kinfmu.solver.python.{module}.trusted_step", counted)
+    values = [[a, a + 0.9 * low * d, a + d] for a, d in zip(start, change, strict=True)]
+    names = [driver.inputs[0] for driver in plan.drivers]
+    run = kinfmu.solve(plan, engine=engine, **dict(zip(names, values, strict=True)))
+    assert run.good.tolist() == [True, True, False]
+    assert steps < 5000
+    (text,) = [event.text for event in run.events if "cannot be reached" in event.text]
+    assert re.search(r", where (pin|shoe)\.[xy] runs to infinity$", text)
+    located = [float(re.findall(rf"{driver.name} = (\S+) ", text)[-1]) for driver in plan.drivers]
+    assert located == pytest.approx(pole, abs=1e-9)
+
+
+@pytest.mark.parametrize("moved_by", ["driver", "rocker", "cylinder"])
+@pytest.mark.few(1)
+def test_check_calls_a_pole_of_two_drivers_no_dead_centre(moved_by: str) -> None:
+    report = kinfmu.check(crossing_lines(moved_by))
+    (reach,) = [reach for reach in report.ranges if reach.driver == "right"]
+    expected = [(pytest.approx(1.2 + turn, abs=1e-10), "pole", ()) for turn in (0.0, math.pi)]
+    assert [(limit.value, limit.kind, limit.bodies) for limit in reach.limits] == expected
 
 
 @pytest.mark.parametrize("engine", ["python", "native"])

@@ -255,17 +255,23 @@ def _floor(x: Any) -> Any:
 
 
 def _risen(numbers: Numbers, s: Jet, shape: str) -> Jet:
-    """A normalized curve, 0 before 0 and 1 after 1."""
+    """A normalized curve, 0 before 0 and 1 after 1.
+
+    The second half is formed from its end: there sums of powers of s would be off by the rounding of their terms.
+    """
     if shape == "cycloidal":
         turn = 2 * numbers.pi
-        inside = s - (s * turn).sin_cos()[0] / turn
+        curve = s - (s * turn).sin_cos()[0] / turn
     else:
-        inside = s * s * s * (s * (s * 6 + -15) + 10)
-    before, after = s.d0 < 0, s.d0 > 1
+        lower, upper = (x * x * x * (x * (x * 6 + -15) + 10) for x in (s, 1 - s))
+        curve = _where(s.d0 * 2 > 1, 1 - upper, lower)
+    ends = [s * numbers.number(0) + numbers.number(end) for end in (0, 1)]
+    return _where(s.d0 < 0, ends[0], _where(s.d0 > 1, ends[1], curve))
 
-    def chosen(table: Array, beyond: int) -> Array:
-        return np.where(before, numbers.number(0), np.where(after, numbers.number(beyond), table))
 
-    if isinstance(s, Value):
-        return Value(numbers, chosen(inside.d0, 1))
-    return Jet(numbers, chosen(inside.d0, 1), chosen(inside.d1, 0), chosen(inside.d2, 0))
+def _where(chosen: Array, one: Jet, other: Jet) -> Jet:
+    """Each element from one jet where `chosen`, else from the other."""
+    if isinstance(one, Value):
+        return Value(one.numbers, np.where(chosen, one.d0, other.d0))
+    pairs = ((one.d0, other.d0), (one.d1, other.d1), (one.d2, other.d2))
+    return Jet(one.numbers, *(np.where(chosen, a, b) for a, b in pairs))

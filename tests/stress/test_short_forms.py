@@ -23,6 +23,7 @@ from kinfmu.run.sensitivities import Sensitivities
 from tests.fmu.host import OK, Host
 from tests.fmu.native.test_memory import CC, check_under_sanitizers
 from tests.mechanisms import fourbar
+from tests.stress import far
 from tests.stress.designs import faults
 from tests.stress.forces import ENERGY
 from tests.stress.forces import WRONG as WRONG_FORCES
@@ -55,6 +56,17 @@ def test_a_repeating_law_is_exact_after_up_to_a_million_periods(
 ) -> None:
     faults = [(seed, fault) for seed in range(count) for fault in compared(seed, engine).faults]
     assert faults == [], f"python -m tests.stress.repeating --engine {engine}"
+
+
+# ------------------------------------------------------------------------------------------------------------------ far
+
+
+@pytest.mark.parametrize(("engine", "count"), [("python", 20), ("native", 10)])
+def test_far_from_the_origin_samples_are_within_their_estimates_or_refused(
+    engine: Literal["python", "native"], count: int
+) -> None:
+    faults = [(seed, fault) for seed in range(count) for fault in far.compared(seed, engine).faults]
+    assert faults == [], f"python -m tests.stress.far --engine {engine}"
 
 
 # ----------------------------------------------------------------------------------------------------------- sanitizers

@@ -21,11 +21,10 @@ from tests.stress.drawn import Drawn, Frame
 from tests.stress.families import FAMILIES, Draw
 from tests.stress.jets import DIGITS, LONG
 from tests.stress.report import Report
-from tests.stress.trial import BEYOND, Trial, trial
+from tests.stress.trial import Trial, trial
 
 ROOT = Path(__file__).parents[2]
 MECHANISMS = 4  # of each family
-LEAST = 1e-14  # [rad, sizes] of estimates: a speed of 0 where a rise begins is off by the rounding's square
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -52,16 +51,21 @@ def test_a_sample_solved_in_one_order_and_not_in_another_has_an_estimate(
 
 @pytest.mark.parametrize(
     ("engine", "seed"),
-    [("python", 36), ("python", 252), ("python", 530), ("native", 1055), ("native", 1114), ("native", 1197)],
+    [
+        *(("python", seed) for seed in (36, 46, 68, 252, 530)),
+        *(("native", seed) for seed in (68, 1055, 1114, 1197)),
+    ],
 )
-def test_estimates_count_the_rounding_of_arguments_of_steep_laws(
+def test_estimates_count_the_rounding_of_arguments_of_laws(
     engine: Literal["python", "native"], seed: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
+    """What is off by less than the rounding of its column's largest magnitude does not count."""
     verdict = trial(seed, "led by laws", engine).judged()
     known = ~np.isnan(verdict.absolute)
     assert verdict.faults == []
-    assert (verdict.absolute[known] <= BEYOND * np.fmax(verdict.estimate[known], LEAST)).all()
+    is_rounding = verdict.relative[known] <= np.finfo(float).eps
+    assert (is_rounding | (verdict.absolute[known] <= verdict.estimate[known])).all()
 
 
 @pytest.mark.parametrize("engine", ["python", "native"])
@@ -125,6 +129,13 @@ def test_an_ok_sample_may_be_off_by_some_roundings_of_its_driver_values(
     verdict = trial(1322, "machines with a robot", "native").judged()
     assert len(verdict.faults) == faults
     assert verdict.blurred == 1 - faults
+
+
+def test_where_a_rise_ends_the_rounding_of_a_driver_value_counts_to_both_sides() -> None:
+    """A sample at the end of a rise of 0.06 within 3.5e-7 rad: all rests beyond it, before it not."""
+    verdict = trial(10077, "led by laws").judged()
+    assert verdict.faults == []
+    assert verdict.blurred >= 1
 
 
 # --------------------------------------------------------------------------------------------------- the oracle

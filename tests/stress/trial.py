@@ -233,17 +233,22 @@ class Trial:
         return large.qd[name] * drive if order == 1 else large.qdd[name] * drive * drive + large.qd[name] * more
 
     def _rounded(self, k: int, outputs: Iterable[str]) -> Floats:
-        """(3,) how much one rounding of each driver value changes q, qd, qdd of a sample, as errors are measured."""
+        """(3,) how much one rounding of each driver value changes q, qd, qdd of a sample, as errors are measured.
+
+        Up or down, whatever changes more: where a rise ends, all rests on one side.
+        """
         drivers = self.inputs[0].shape[1]
-        u, ud, udd = (np.repeat(table[[k]], drivers + 1, axis=0) for table in self.inputs)
+        u, ud, udd = (np.repeat(table[[k]], 2 * drivers + 1, axis=0) for table in self.inputs)
         for driver in range(drivers):
             u[driver + 1, driver] = np.nextafter(u[0, driver], np.inf)
+            u[drivers + driver + 1, driver] = np.nextafter(u[0, driver], -np.inf)
         columns = self.drawn.exactly(DIGITS, u, ud, udd).columns
         changes = np.zeros(3)
         for name in outputs:
             for order, exact in enumerate((columns[name].d0, columns[name].d1, columns[name].d2)):
-                values = np.broadcast_to(exact, (drivers + 1,))
-                change = np.abs(np.asarray(values[1:] - values[0], dtype=float)).sum()
+                values = np.broadcast_to(exact, (2 * drivers + 1,))
+                sides = np.abs(np.asarray(values[1:] - values[0], dtype=float)).reshape(2, drivers)
+                change = sides.max(axis=0).sum()
                 scale = max(self._largest(name, order, ud, udd)[0], abs(float(values[0])))
                 changes[order] = max(changes[order], change / scale if change else 0.0)
         return changes

@@ -209,6 +209,7 @@ def _laws(parts: Parts) -> list[str]:
         (f"rates({pose}, const double *x1, double *rates)", laws.motions[1]),
         (f"accelerations({pose}, const double *x1, const double *x2, double *accelerations)", laws.motions[2]),
         ("slopes(const kf_model *model, double *slopes)", laws.slopes),
+        ("added(const kf_model *model, double *added)", laws.added),
         ("steps(const kf_model *model, const double *arguments, double *steps)", laws.steps),
     )
     return [line for head, nodes in functions for line in _filled(parts, f"void kf_law_{head}", nodes)]

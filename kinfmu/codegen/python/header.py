@@ -36,6 +36,7 @@ _FUNCTIONS = {
     "law_positions": ("values", "Positions that steps monitor."),
     "law_steps": ("arguments", "The fewest steps of a path through each law up to its argument."),
     "law_slopes": ("", "Bounds of the slopes of `law_steps`."),
+    "law_added": ("", "Bounds of the numbers that each law adds to its argument."),
     "watches": ("values", "Rows set aside as redundant, relative to the size: zero as long as they hold."),
     "jacobians": ("values", "Jacobian of each block."),
     "residuals": ("values", "Residuals of each block, relative to the size."),
@@ -119,12 +120,17 @@ def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str
 
 
 def law_steps(plan: SolvePlan, names: Names, prolog: Sequence[Node]) -> list[str]:
-    """Return the functions of the fewest steps through laws, and of the bounds of their slopes."""
+    """Return the functions of the fewest steps through laws, of bounds of their slopes and of what laws add."""
     laws = plan.path_laws
     arguments = unpacking([identifier(argument_symbol(k)) for k in range(len(laws.steps))], "arguments")
     body, steps = Writer(names, (), prolog).formulas(laws.steps)
     bounds, slopes = Writer(names, (), prolog).formulas(laws.slopes)
-    return stage("law_steps", [*arguments, *body], tupled(steps)) + stage("law_slopes", bounds, tupled(slopes))
+    sums, added = Writer(names, (), prolog).formulas(laws.added)
+    return [
+        *stage("law_steps", [*arguments, *body], tupled(steps)),
+        *stage("law_slopes", bounds, tupled(slopes)),
+        *stage("law_added", sums, tupled(added)),
+    ]
 
 
 def places(solved: Sequence[Block]) -> list[tuple[int, int]]:

@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import Annotated, Any, ClassVar, NamedTuple, get_type_hints
 
 from kinfmu.errors import MechanismError
-from kinfmu.mechanism.quantities.arithmetic import Value
+from kinfmu.mechanism.quantities.arithmetic import Value, sqrt
 from kinfmu.solver.python.curve import CurveData, curve
 from kinfmu.units import Quantity
 
@@ -115,6 +115,11 @@ class Law(ABC):
     def most_steps(self, **constants: Value) -> Value:  # noqa: ARG002
         """Return a bound of the slope of `fewest_steps`; within its inverse, x passes over nothing."""
         return 0.0
+
+    def most_added(self, **constants: Value) -> Value:
+        """Return a bound of the numbers that are added to x, such as where a period begins: x is rounded like these."""
+        added = [constants[name] for name, number in self.constants().items() if number.measures[:2] == ("argument", 0)]
+        return sum((sqrt(number * number) for number in added), start=0.0)
 
     def own_breaks(self, order: int = 2) -> Jumps:
         """Return the arguments at which f or a derivative up to an order jumps, with the law's own constants."""

@@ -99,6 +99,10 @@ class Spline(Law):
     def most_steps(self, **constants: Value) -> Value:  # noqa: ARG002  it has none
         return max(slope for _, (slope, *_), *_ in self._steps[1])
 
+    def most_added(self, **constants: Value) -> Value:  # noqa: ARG002  it has none
+        first, last = self.points[0][0], self.points[-1][0]
+        return abs(first) + abs(last)
+
     def breaks(self, order: int, /, **constants: Value) -> Jumps:  # noqa: ARG002  it has none
         if self.ends != PERIODIC:
             return Jumps(jumping_breaks(self.data, order))

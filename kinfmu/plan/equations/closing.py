@@ -17,7 +17,7 @@ _DEPENDENT = 1e-6  # part of a row outside the span of others that counts as zer
 _APART = 1e-6  # [rad, sizes]; poses further apart are different branches
 _ITERATIONS = 200
 _SLOW, _SLOW_STEPS = 0.9, 4  # a small residual that falls more slowly in so many steps does not close
-_OFFSET_ROUNDING = 8.0 * 2.0**-52  # of what is far from the origin, in the residual that it leaves
+OFFSET_ROUNDING = 8.0 * 2.0**-52  # of what is far from the origin, in the residual that it leaves
 _TOLERANCE = 1e-9  # residual relative to the size up to which samples are good, by default
 _ROUNDED = 1e-14  # residual relative to the size that rounding leaves
 _FAR_FROM_SINGULAR = 1e-3  # least singular value over the largest; gradients keep the digits to tell what depends
@@ -82,7 +82,7 @@ def close(part: System | Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray
 def gap_of(part: Part, q: FloatArray, residual: ArrayLike) -> float:
     """Return the largest residual of a pose, less what the rounding of its offset from the origin leaves of it."""
     away = float(np.abs(part.whole(q).reshape(-1, 3)[:, :2]).max(initial=0.0)) / part.system.size
-    rounding = min(_OFFSET_ROUNDING * away, _TOLERANCE) if away > FAR else 0.0
+    rounding = min(OFFSET_ROUNDING * away, _TOLERANCE) if away > FAR else 0.0
     return max(0.0, float(np.abs(residual).max(initial=0.0)) - rounding)
 
 

@@ -63,16 +63,29 @@ inline void kf_path_accept(kf_path *path, kf_pose *trial, double s, double margi
     path->length = fmin(2.0 * path->length, path->longest);
 }
 
+/* Return whether the next step is lost in the rounding of the driver values. */
+static bool is_lost(kf_path *path)
+{
+    double s;
+    const double *const u = kf_path_ahead(path, &s);
+    int k = 0;
+    while (k < KF_DRIVERS && u[k] == KF_POSE_U(path->pose)[k]) {
+        ++k;
+    }
+    return k == KF_DRIVERS;
+}
+
 bool kf_path_shorten(kf_path *path, double s)
 {
     path->length = 0.5 * fabs(s);
-    return path->length < (KF_LAW_ARGUMENTS ? KF_GIVE_UP : KF_SHORTEST_STEP) * path->longest; /* rises may be short, too */
+    return path->length < (KF_LAW_ARGUMENTS ? KF_GIVE_UP : KF_SHORTEST_STEP) * path->longest /* rises may be short, too */
+           || is_lost(path);
 }
 
 void kf_path_limit(kf_path *path, double s)
 {
     path->is_limited = true;
-    path->is_ended = path->length < KF_GIVE_UP * path->longest
+    path->is_ended = path->length < KF_GIVE_UP * path->longest || is_lost(path)
                      || kf_is_beyond(path->target, path->limit.u, path->direction, s);
 }
 
@@ -174,13 +187,15 @@ static void step(kf_solver *solver, const kf_pose *start, kf_path *path)
             }
             kf_path_accept(path, trial, s, trial->found.margin);
             if (!path->is_ended && path->length < KF_STRIDE * path->longest) {
-                path->is_ended = kf_pole_before(solver, pose, trial, path->direction, path->distance, &path->limit);
+                path->is_ended = kf_pole_before(solver, pose, trial, path->direction, path->distance, KF_FAR_AWAY,
+                                                &path->limit);
             }
             return;
         }
     }
     if (kf_path_shorten(path, s)) {
-        if (!path->is_limited) {
+        if (!path->is_limited
+            && !kf_pole_before(solver, path->before, pose, path->direction, path->distance, 0.0, &path->limit)) {
             kf_limit_beyond(solver, path->before, pose, path->direction, &path->limit);
         }
         kf_path_limit(path, s);

@@ -67,16 +67,17 @@ static void make_source(kf_solver *solver, const kf_pose *pose, const kf_driven 
 static double rounding_of_laws(const kf_solver *solver, const kf_pose *pose)
 {
 #if KF_LAWS
-    double slopes[KF_ROOM(KF_LAW_ARGUMENTS)], here[KF_LAWS], largest = -1.0;
+    double slopes[KF_ROOM(KF_LAW_ARGUMENTS)], added[KF_ROOM(KF_LAW_ARGUMENTS)], here[KF_LAWS], largest = -1.0;
     int k;
     if (KF_LAW_ARGUMENTS == 0) {
         return 0.0;
     }
     kf_law_slopes(&solver->model, slopes);
+    kf_law_added(&solver->model, added);
     kf_law_positions(&solver->model, &pose->found, here);
     for (k = 0; k < KF_LAW_ARGUMENTS; ++k) {
         if (slopes[k] * kf_law_units[k] > KF_STEEP_LAW) {
-            largest = fmax(largest, fabs(here[k]) / kf_law_units[k]);
+            largest = fmax(largest, (fabs(here[k]) + added[k]) / kf_law_units[k]);
         }
     }
     return largest < 0.0 ? 0.0 : KF_ROUNDINGS * KF_EPS * (1.0 + largest);

@@ -93,10 +93,11 @@ typedef struct {
 /* Make a limit at driver values. */
 void kf_limit_at(kf_limit *limit, const double *u, int block);
 bool kf_pole_before(kf_solver *solver, kf_pose *before, kf_pose *pose, const double *direction, double distance,
-                    kf_limit *limit);
+                    double least, kf_limit *limit);
 void kf_limit_beyond(kf_solver *solver, const kf_pose *before, kf_pose *pose, const double *direction, kf_limit *limit);
 bool kf_is_beyond(const double *target, const double *limit, const double *direction, double s);
 void kf_append_limit(char *message, const kf_limit *limit, const double *target, int driver);
+void kf_append_rounding(char *message); /* of rows tied to the world's origin, far from it */
 void kf_append(char *message, const char *format, ...);
 void kf_append_number(char *message, const char *format, double value);
 void kf_append_place(char *message, const double *u, int digits, int driver); /* -1: all of them */

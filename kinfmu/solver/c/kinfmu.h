@@ -130,6 +130,7 @@ void kf_law_accelerations(const kf_model *model, const kf_found *found, const do
                           double *accelerations);
 void kf_law_steps(const kf_model *model, const double *arguments, double *steps); /* the fewest up to each argument */
 void kf_law_slopes(const kf_model *model, double *slopes); /* bounds of their slopes */
+void kf_law_added(const kf_model *model, double *added); /* bounds of the numbers that laws add to their arguments */
 #endif
 void kf_fixed(const kf_model *model, double *fixed);
 void kf_jacobian(const kf_model *model, const kf_found *found, int block, double *jacobian); /* row after row */

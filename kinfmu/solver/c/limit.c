@@ -79,19 +79,19 @@ static void derivatives_along(kf_solver *solver, kf_pose *pose, const double *di
     if (KF_IS_ONE(solver)) {
         kf_tangent(&solver->model, pose);
     } else {
-        KF_VELOCITY(&solver->model, &pose->found, direction, NULL, NULL, pose->x1);
-        KF_ACCELERATION(&solver->model, &pose->found, kf_at_rest, pose->x1, NULL, NULL, pose->x2);
+        kf_rates_in_time(&solver->model, pose, direction, kf_at_rest);
     }
 }
 
-/* Find the pole that lies ahead of a pose within a distance along the path; return false if there is none.
+/* Find the pole that lies ahead of a pose within a distance along the path; return false if there is none; least: how far
+ * away [sizes] what runs to infinity must be, 0 where no step is left.
  *
  * At the distance x from a pole of order p an unknown length grows like 1 / x^p, as that of a slide whose pin's path
  * becomes parallel to it. There f = z'/z'' = x / (p + 1) (1 + k x^2), and two poses give f and its slope, so x without
  * k. Steps become as short as x^(5/3), and do not pass it.
  */
 bool kf_pole_before(kf_solver *solver, kf_pose *before, kf_pose *pose, const double *direction, double distance,
-                    kf_limit *limit)
+                    double least, kf_limit *limit)
 {
     const double unit = KF_IS_ONE(solver) ? kf_reach[KF_ALONG(solver)] : 1.0;
     double between = 0.0, square = 0.0;
@@ -109,7 +109,7 @@ bool kf_pole_before(kf_solver *solver, kf_pose *before, kf_pose *pose, const dou
             double there, here, slope, order, ahead;
             if (kf_is_outside(&solver->model, block) || kf_unknown_is_angle[k] || before->x2[k] * between == 0.0
                 || !(fabs(first) * unit > KF_STEEP * scale && second != 0.0
-                     && first * first > KF_FAR_AWAY * scale * fabs(second))) {
+                     && first * first > least * scale * fabs(second))) {
                 continue;
             }
             there = before->x1[k] / before->x2[k];
@@ -163,20 +163,30 @@ void kf_append_limit(char *message, const kf_limit *limit, const double *target,
     }
     if (limit->block == KF_NEGATIVE) {
         kf_append(message, "; beyond it a distance would be negative");
-        return;
-    }
-    if (limit->pole != KF_NO_POLE) {
+    } else if (limit->pole != KF_NO_POLE) {
         kf_append(message, ", where %s runs to infinity", kf_unknown_names[limit->pole]);
-        return;
+    } else {
+        kf_append(message, limit->crosses ? ", where branches of " : "; beyond it ");
+        kf_append(message, limit->block == KF_NO_BLOCK ? "the joints" : limit->crosses ? "" : "the loop of ");
+        for (k = kf_first_of(limit->block); limit->block >= 0 && k < kf_block_ends[limit->block]; ++k) {
+            kf_append(message, "%s%s", k == kf_first_of(limit->block) ? "" : ", ", kf_unknown_names[k]);
+        }
+        kf_append(message, limit->crosses ? " cross" : " cannot close");
     }
-    kf_append(message, limit->crosses ? ", where branches of " : "; beyond it ");
-    kf_append(message, limit->block == KF_NO_BLOCK ? "the joints" : limit->crosses ? "" : "the loop of ");
-    for (k = kf_first_of(limit->block); limit->block >= 0 && k < kf_block_ends[limit->block]; ++k) {
-        kf_append(message, "%s%s", k == kf_first_of(limit->block) ? "" : ", ", kf_unknown_names[k]);
-    }
-    kf_append(message, limit->crosses ? " cross" : " cannot close");
     if (limit->crosses && KF_DRIVERS > 1 && driver < 0) {
         kf_append(message, "; the crossing depends on several drivers, so no bridge is built");
+    }
+    kf_append_rounding(message);
+}
+
+void kf_append_rounding(char *message)
+{
+    if (kf_row_offset > KF_FAR_FROM_ORIGIN) {
+        kf_append(message, "; ");
+        kf_append_number(message, "%.1e", kf_row_offset);
+        kf_append(message, " sizes from the world's origin the rows are rounded to ");
+        kf_append_number(message, "%.1e", kf_row_offset * KF_EPS);
+        kf_append(message, " sizes");
     }
 }
 

@@ -59,6 +59,7 @@ static KF_RARE kf_status rejected(kf_solver *solver, kf_pose *pose)
         kf_append(message, ": the rows do not close: residual ");
         kf_append_number(message, "%.2g", pose->found.residual);
         kf_append(message, " of the size");
+        kf_append_rounding(message);
         return pose->status = KF_NOT_CONVERGED;
     }
     kf_append(message, ": ");

@@ -375,16 +375,21 @@ kf_status kf_advance_mixed(kf_solver *solver, kf_pose *start, const double *targ
     for (turn = 0; turn < path.most_steps && !path.is_ended; ++turn) {
         double s;
         const double *const u = kf_path_ahead(&path, &s);
-        kf_pose *const trial = kf_path_spare(&path);
-        if ((!(u == target && path.pose == start) && is_near_by_tracks(solver, path.pose, u, trial))
-            || mixed_step(solver, path.pose, u, target, trial)) {
+        kf_pose *const before = path.pose, *const trial = kf_path_spare(&path);
+        if ((!(u == target && path.pose == start) && is_near_by_tracks(solver, before, u, trial))
+            || mixed_step(solver, before, u, target, trial)) {
             if (!KF_GOOD(trial->status)) {
                 return kf_failed(found, trial->status);
             }
             path.iterations += trial->found.iterations;
             kf_path_accept(&path, trial, s, share_of(trial, solver->scratch.share)->found.margin);
+            if (!path.is_ended && path.length < KF_STRIDE * path.longest) {
+                path.is_ended = kf_pole_before(solver, before, trial, path.direction, path.distance, KF_FAR_AWAY,
+                                               &path.limit);
+            }
         } else if (kf_path_shorten(&path, s)) {
-            if (!path.is_limited) {
+            if (!path.is_limited
+                && !kf_pole_before(solver, path.before, path.pose, path.direction, path.distance, 0.0, &path.limit)) {
                 mixed_limit(solver, path.before, path.pose, path.direction, &path.limit);
             }
             kf_path_limit(&path, s);

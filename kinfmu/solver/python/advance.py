@@ -84,9 +84,11 @@ class Path:
     def shorten(self, s: float, limit_here: Callable[[], Limit]) -> None:
         """Go on with shorter steps; end at the limit if no step is left or if the target lies beyond it."""
         self.length = 0.5 * abs(s)
-        if self.length < self.shortest:
+        is_lost = self.ahead()[1] == self.pose.u  # in the rounding of the driver values
+        if self.length < self.shortest or is_lost:
             self.limit = self.limit or limit_here()
-            if self.length < GIVE_UP * self.longest or is_beyond(self.target, self.limit.u, self.direction, s):
+            is_last = is_lost or self.length < GIVE_UP * self.longest
+            if is_last or is_beyond(self.target, self.limit.u, self.direction, s):
                 self.end = self.limit
 
     def terminate(self) -> Pose | Limit:
@@ -180,7 +182,13 @@ def _step(model: Model, path: Path) -> None:
             if path.end is None and path.length < STRIDE * path.longest:
                 path.end = pole_before(model, pose, trial, direction, path.distance)
             return
-    path.shorten(s, lambda: limit_beyond(model, path.before, pose, direction))
+    path.shorten(
+        s,
+        lambda: (
+            pole_before(model, path.before, pose, direction, path.distance, least=0.0)
+            or limit_beyond(model, path.before, pose, direction)
+        ),
+    )
 
 
 def _cross_bridge(path: Path) -> bool:

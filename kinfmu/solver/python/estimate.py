@@ -24,7 +24,7 @@ from .worst_case_step import worst_case_step
 ROUNDINGS = 2.0  # of a row's terms, and of what is formed of them
 UNBOUNDED = 0.5  # relative change of a determinant within a pose's error from which rates are unknown
 MOST_SOURCES = 3  # with more blocks, those that move farthest represent all
-STEEP_LAW = 40.0  # steps through a law per radian or size of its argument, from which the argument's rounding counts
+STEEP_LAW = 8.0  # steps through a law per radian or size of its argument, above which the argument's rounding counts
 UNKNOWN_ERRORS = inf, inf, inf
 
 
@@ -264,8 +264,9 @@ def _sources(model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRates
 
 def _rounding_of_laws(model: Model, pose: Pose) -> float:
     """Return how well the arguments of steep laws are known, in radians and sizes; 0 without such laws."""
-    arguments = zip(model.law_slopes(), model.law_positions(pose.values), model.LAW_UNITS)  # noqa: B905  more positions
-    steep = [abs(here) / unit for slope, here, unit in arguments if slope * unit > STEEP_LAW]
+    slopes, added, positions = model.law_slopes(), model.law_added(), model.law_positions(pose.values)
+    arguments = zip(slopes, added, positions, model.LAW_UNITS)  # noqa: B905  more positions
+    steep = [(abs(here) + more) / unit for slope, more, here, unit in arguments if slope * unit > STEEP_LAW]
     return ROUNDINGS * EPS * (1.0 + max(steep)) if steep else 0.0
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
-from .pose import STEEP, Model, Pose, Vector, directed
+from .pose import EPS, STEEP, Model, Pose, Vector, directed
 
 MOST_STEPS = 1_000_000  # of a path: seconds, and more than any intended motion
 NO_BLOCK, TOO_FAR, NEGATIVE = -1, -2, -3  # in place of a block: no determinant vanishes; too many steps; see VANISHING
 VANISHING = 1e-6  # [sizes] of a length that a law gives: where steps end there, it would be negative beyond
+FAR_FROM_ORIGIN = 1e6  # [sizes]; rows tied to the world's origin are rounded there to a tenth of the usual tolerance
 NO_POLE = -1  # in place of an unknown that runs to infinity
 FAR_AWAY = 100.0  # [sizes]; what runs to infinity is at least as far away
 AT_POLE = 0.999  # of the distance to a pole; beyond it an unknown is more than a thousand times as far away
@@ -62,20 +64,31 @@ def _extrapolated(before: Pose, pose: Pose, near: float, far: float) -> Vector:
     return tuple(b + (b - a) * beyond for a, b in zip(before.u, pose.u, strict=True))
 
 
-def pole_before(model: Model, before: Pose, pose: Pose, direction: Vector, distance: float) -> Limit | None:
+def pole_before(
+    model: Model,
+    before: Pose,
+    pose: Pose,
+    direction: Vector,
+    distance: float,
+    derivatives: Callable[[Model, Pose, Vector], tuple[Vector, Vector]] = directed,
+    least: float = FAR_AWAY,
+) -> Limit | None:
     """Return the pole that lies ahead of a pose within a distance along the path, or None.
 
     At the distance x from a pole of order p an unknown length grows like 1 / x^p, as that of a slide whose pin's path
     becomes parallel to it. There f = z'/z'' = x / (p + 1) (1 + k x^2), and two poses give f and its slope, so x without
     k. Steps become as short as x^(5/3), and do not pass it.
+
+    derivatives: first and second of z on a straight path; least: how far away [sizes] it must be, 0 where no step is
+    left.
     """
     square = sum([d * d for d in direction])
     between = sum([(b - a) * d for a, b, d in zip(before.u, pose.u, direction)]) / square  # noqa: B905  one per driver
     unit = model.REACH[0] if len(direction) == 1 else 1.0
-    (old, older), (new, newer) = directed(model, before, direction), directed(model, pose, direction)
+    (old, older), (new, newer) = derivatives(model, before, direction), derivatives(model, pose, direction)
     for k, scale in enumerate(model.UNKNOWN_SCALES):
-        is_far = abs(new[k]) * unit > STEEP * scale and new[k] * new[k] > FAR_AWAY * scale * abs(newer[k]) > 0.0
-        if model.UNKNOWN_IS_ANGLE[k] or not is_far or older[k] * between == 0.0:
+        is_far = abs(new[k]) * unit > STEEP * scale and new[k] * new[k] > least * scale * abs(newer[k])
+        if model.UNKNOWN_IS_ANGLE[k] or not is_far or newer[k] * older[k] * between == 0.0:
             continue
         there, here = old[k] / older[k], new[k] / newer[k]
         slope = (here - there) / between
@@ -110,10 +123,18 @@ def limit_message(model: Model, limit: Limit, target: Vector) -> str:
         why = f", where {model.UNKNOWNS[limit.pole]} runs to infinity"
     if limit.crosses and len(target) > 1:
         why += "; the crossing depends on several drivers, so no bridge is built"
+    why += rounding_far_from_origin(model)
     if not differs(model, target, limit.u, LOCATED):
         return f"{place(model, target, LOCATED)} cannot be reached: to these digits it is the limit{why}"
     asked = place(model, target, ROUGHLY if differs(model, target, limit.u, ROUGHLY) else LOCATED)
     return f"{asked} cannot be reached: the limit is {place(model, limit.u, LOCATED)}{why}"
+
+
+def rounding_far_from_origin(model: Model) -> str:
+    """Return the end of a message that states how rows tied to the world's origin are rounded; empty near it."""
+    off: float = model.ROW_OFFSET
+    is_far = off > FAR_FROM_ORIGIN
+    return f"; {off:.1e} sizes from the world's origin the rows are rounded to {off * EPS:.1e} sizes" if is_far else ""
 
 
 def place(model: Model, u: Vector, digits: int = ROUGHLY) -> str:

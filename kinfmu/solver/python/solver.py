@@ -8,7 +8,7 @@ from typing import Any
 
 from .advance import CLOSE, NEAR, advance
 from .estimate import estimated_errors, margin_of, with_driver_errors
-from .limit import Limit, limit_message, place
+from .limit import Limit, limit_message, place, rounding_far_from_origin
 from .pose import UNIT_SPEED, Model, Pose, Status, Vector, evaluated, failed, tangent_of, with_map
 from .singularity_map import restored_map, surveyed
 from .span import REGULAR
@@ -132,6 +132,7 @@ class Solver:
             pose.status = Status.NOT_CONVERGED
             pose.message = (
                 f"{place(self.model, pose.u)}: the rows do not close: residual {pose.residual:.2g} of the size"
+                f"{rounding_far_from_origin(self.model)}"
             )
             return
         open_rows = zip(self.model.WATCHES, self.watch(pose), strict=True)

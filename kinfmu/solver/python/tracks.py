@@ -13,8 +13,8 @@ from itertools import pairwise
 from math import inf, sqrt
 from typing import Any, Protocol
 
-from .advance import NEAR, Path
-from .limit import NO_BLOCK, Limit, limit_beyond, limit_message
+from .advance import NEAR, STRIDE, Path
+from .limit import NO_BLOCK, Limit, limit_beyond, limit_message, pole_before
 from .linear import Matrix
 from .pose import Found, Model, Pose, Status, Vector, evaluated, failed, tangent_of
 from .singularity_map import restored_map
@@ -66,7 +66,7 @@ class TrackModel:
         self.LAW_UNITS, self.LAW_TURNS, self.LAW_LENGTHS = model.LAW_UNITS, model.LAW_TURNS, model.LAW_LENGTHS
         if model.LAW_UNITS:
             self.law_positions = model.law_positions
-            self.law_steps, self.law_slopes = model.law_steps, model.law_slopes
+            self.law_steps, self.law_slopes, self.law_added = model.law_steps, model.law_slopes, model.law_added
         ends = [0]
         for k in self.blocks:
             low, high = model.BLOCKS[k]
@@ -334,6 +334,11 @@ def rates_in_time(model: Model, pose: Pose, ud: Vector, udd: Vector | None) -> t
     return zd, () if udd is None else tuple(model.acceleration(pose.values, ud, udd, zd, second, held))
 
 
+def rates_along(model: Model, pose: Pose, direction: Vector) -> tuple[Vector, Vector]:
+    """Return first and second derivative of the unknowns on a straight path of the drivers."""
+    return rates_in_time(model, pose, direction, (0.0,) * len(direction))
+
+
 def sample_rates(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple[Vector, Vector, Vector]:
     """Return first and second derivative of the unknowns in time, and dz/du, for one driver after another."""
     if len(ud) == 1:
@@ -368,14 +373,17 @@ def advance_mixed(tracks: Tracks, mixed: TrackModel, start: Pose, target: Vector
             path.shorten(s, lambda: _mixed_limit(tracks, mixed, path))
         elif trial.good:
             path.iterations += trial.iterations
+            before = path.pose
             path.accept(trial, s, min([abs(trial.determinants[k]) for k in mixed.blocks]))
+            if path.end is None and path.length < STRIDE * path.longest:
+                path.end = pole_before(tracks.model, before, trial, path.direction, path.distance, rates_along)
         else:
             return failed(start, target, Status(trial.status), trial.message)
         if path.end is not None:
             break
     end = path.terminate()
     if isinstance(end, Limit):
-        return failed(start, target, Status.OUTSIDE, limit_message(mixed, end, target))
+        return failed(start, target, Status.OUTSIDE, limit_message(tracks.model, end, target))
     return end
 
 
@@ -417,6 +425,9 @@ def _mixed_step(tracks: Tracks, mixed: TrackModel, pose: Pose, u: Vector, target
 def _mixed_limit(tracks: Tracks, mixed: TrackModel, path: Path) -> Limit:
     """Return where the path of the blocks that depend on several drivers ends, just beyond its last pose."""
     pose, direction = path.pose, path.direction
-    slopes, _ = rates_in_time(tracks.model, pose, direction, None)
-    mixed = mixed.with_rest(pose.z, slopes)
-    return limit_beyond(mixed, on_track(mixed, path.before), on_track(mixed, pose), direction)
+    pole = pole_before(tracks.model, path.before, pose, direction, path.distance, rates_along, least=0.0)
+    if pole is not None:
+        return pole
+    mixed = mixed.with_rest(pose.z, rates_along(tracks.model, pose, direction)[0])
+    limit = limit_beyond(mixed, on_track(mixed, path.before), on_track(mixed, pose), direction)
+    return limit if limit.block < 0 else limit._replace(block=mixed.blocks[limit.block])

@@ -72,6 +72,15 @@ def test_steps_of_a_path_through_a_law_never_turn_back_and_are_bounded(cls: type
 
 
 @every_law
+@given(data=st.data())
+def test_numbers_that_a_law_adds_are_as_large_as_its_breaks_and_its_period(cls: type[Law], data: st.DataObject) -> None:
+    law = data.draw(laws(cls))
+    added = float(law.most_added(**{name: constant.value for name, constant in law.constants().items()}))
+    breaks, period = law.own_breaks()
+    assert max(map(abs, (*breaks, period))) <= added * (1.0 + 1e-11)
+
+
+@every_law
 @given(data=st.data(), x=coordinates)
 def test_a_traced_law_has_the_bits_of_the_formula_and_its_exact_derivatives(
     cls: type[Law], data: st.DataObject, x: float

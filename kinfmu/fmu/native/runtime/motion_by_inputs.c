@@ -150,6 +150,8 @@ void kf_time_changed(kf_state *s)
 {
     if (s->driven_by_time) {
         kf_forget(s);
+    } else {
+        s->known &= ~KF_FORCE_PARTS; /* loads may depend on time */
     }
 }
 
