@@ -135,11 +135,7 @@ def _in_period(begin: float, end: float, period: float) -> tuple[float, float]:
 def cam_driver(plan: SolvePlan, placed: PlacedCam, paths: Sequence[DriverPath] | None) -> CamDriver:
     """Return the driver that turns a cam; the cam itself where no single driver turns it all the way round.
 
-    Args:
-        plan: The plan of the mechanism.
-        placed: The cam.
-        paths: Of the drivers; None: the path is followed where it is needed.
-
+    paths: Of the drivers; None: the path is followed where it is needed.
     """
     drivers = plan.mechanism.drivers
     direct = _turns(drivers, placed)

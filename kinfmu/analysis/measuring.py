@@ -15,7 +15,7 @@ from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.laws import ConstantSpeed, ConstantValue, External, Law, Polynomial
 from kinfmu.mechanism.laws.law import NEARLY
-from kinfmu.mechanism.loads.following import Following
+from kinfmu.mechanism.loads.load import Following
 from kinfmu.motion import MeasuredValue, measure
 from kinfmu.plan import SolvePlan
 from kinfmu.run import Run
@@ -47,11 +47,6 @@ def measurements(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> Measure
     """Measure the motion of a mechanism; None if it declares no measures.
 
     They are those of the motion of `motion_of_check`.
-
-    Args:
-        mechanism: The mechanism.
-        ranges: Ranges of its drivers.
-
     """
     if not mechanism.measures:
         return None

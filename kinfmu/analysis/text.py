@@ -8,12 +8,12 @@ from functools import partial
 from typing import NamedTuple
 
 from kinfmu.analysis.cams import cam_lines
+from kinfmu.analysis.driver_path import degrees, driver_text, multiple_of_pi, place_text, value_text
 from kinfmu.analysis.findings import Findings
 from kinfmu.analysis.loading import ForcePeak, LeftTable, LiftOff, UnknownContact
 from kinfmu.analysis.loops import FourBar, Link, SliderCrank
 from kinfmu.analysis.singular import DriverRange, LimitPosition
 from kinfmu.analysis.transmission import NamedLoop, TransmissionRange
-from kinfmu.analysis.values import degrees, driver_text, multiple_of_pi, place_text, value_text
 from kinfmu.errors import MOST_SHOWN, listed, some
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.measures import counted_from
@@ -65,9 +65,8 @@ def _rest(parts: Sized, most: int, what: str) -> Iterator[ReportLine]:
 def _count(report: Findings) -> Iterator[ReportLine]:
     mechanism = report.mechanism
     rows = sum(len(joint.labels) for joint in mechanism.joints)
-    yield ReportLine(
-        "bodies", f"{len(mechanism.moving_bodies)} moving: {some(b.name for b in mechanism.moving_bodies)}"
-    )
+    moving = mechanism.moving_bodies
+    yield ReportLine("bodies", f"{len(moving)} moving: {some(body.name for body in moving)}")
     yield ReportLine("joint rows", f"{rows} over {len(mechanism.coordinate_names)} coordinates")
     driven = [f"driven by {some(driver.name for driver in mechanism.drivers)}"] if mechanism.drivers else []
     invalid = [name for name in report.left_out if name.startswith("[drivers")]
@@ -120,9 +119,8 @@ def _advice(report: Findings) -> Iterator[ReportLine]:
         cure = "drive another quantity" if advice.missing else "remove it"
         yield ReportLine("surplus", f"driver {surplus.name}: {by} determine what it drives; {cure}")
     if advice.missing:
-        more = (
-            f"{advice.missing} more driver{'s' * (advice.missing > 1)} needed" if report.mobility else "nothing drives"
-        )
+        needed = f"{advice.missing} more driver{'s' * (advice.missing > 1)} needed"
+        more = needed if report.mobility else "nothing drives"
         yield ReportLine("loose", f"{some(advice.loose)}: {more}")
     for name in advice.stiff:
         yield ReportLine("could be", f'[joints.{name}] type = "revolute" in place of "fixed", which leaves no motion')
@@ -224,19 +222,14 @@ def _transmission(angle: TransmissionRange, unit: str) -> str:
         for u in (angle.at_smallest, angle.at_largest)
     ]
     span = f"{degrees(angle.smallest)} ({at[0]}) to {degrees(angle.largest)} ({at[1]})"
-    verdict = {
-        "good": "good",
-        "poor": "poor (40 deg from 0 and 180 deg is usual)",
-        "locks": _in_line(angle),
-    }
+    verdict = {"good": "good", "poor": "poor (40 deg from 0 and 180 deg is usual)", "locks": _in_line(angle)}
     return f"transmission angle {span}: {verdict[angle.verdict]}"
 
 
 def _in_line(angle: TransmissionRange) -> str:
     """Return the position of the links at a transmission angle of 0 or 180 degrees."""
-    if angle.is_slide:
-        return f"{angle.coupler} is perpendicular to the slide"
-    return f"{angle.coupler} and {angle.output} fall in line"
+    both = f"{angle.coupler} and {angle.output} fall in line"
+    return f"{angle.coupler} is perpendicular to the slide" if angle.is_slide else both
 
 
 def _motion(report: Findings) -> Iterator[ReportLine]:
@@ -271,9 +264,8 @@ def _measures(report: Findings) -> Iterator[ReportLine]:
         return
     yield ReportLine("measures", f"over {measured.over}{_without_loads(report)}")
     for value in measured.values:
-        yield ReportLine(
-            "", f"{value.name} = {measured_text(value)}" if not value.reason else _no_value(value.name, value.reason)
-        )
+        text = _no_value(value.name, value.reason) if value.reason else f"{value.name} = {measured_text(value)}"
+        yield ReportLine("", text)
     for name, reason in measured.refused.items():
         yield ReportLine("", _no_value(name, reason))
 
@@ -303,12 +295,9 @@ def _forces(report: Findings) -> Iterator[ReportLine]:
         yield ReportLine("", f"largest reaction: {loading.reaction.name} {_peak_text(loading.reaction)}")
     for peak in loading.shaking:
         yield ReportLine("", f"{peak.name}: peak {_peak_text(peak)}")
-    for one in loading.left_tables:
-        yield ReportLine("", _left_table_text(one))
-    for lift in loading.lift_offs:
-        yield ReportLine("", _lift_off_text(lift))
-    for contact in loading.unknown_contacts:
-        yield ReportLine("", contact_text(contact))
+    texts = (*map(_left_table_text, loading.left_tables), *map(_lift_off_text, loading.lift_offs))
+    for text in (*texts, *map(contact_text, loading.unknown_contacts)):
+        yield ReportLine("", text)
     redundant = {row.row.name: row.row.owner for row in report.redundant}
     for names, rows in loading.undetermined:
         others = [row for row in rows if row in redundant]
@@ -385,14 +374,10 @@ def _change_points(report: Findings, reach: DriverRange, several: bool) -> Itera
     changes = [point.value for point in reach.points if point.kind == "change point" and point.value not in ends]
     if changes:
         places = some(value_text(value, report.mechanism.length_unit, reach.kind) for value in changes)
-        every = "k pi: " if reach.turns == 1 and _all_multiples_of_pi(changes) else ""
+        turned = {multiple_of_pi(value % math.tau) for value in changes}
+        every = "k pi: " if reach.turns == 1 and len(changes) == 2 and turned <= {"0", "pi", "2 pi"} else ""
         goes_on = "with several drivers no run can cross it" if several else "the motion goes on (bridged)"
         yield ReportLine("singular", f"{reach.driver} = {every}{places}; branches cross, {goes_on}")
-
-
-def _all_multiples_of_pi(values: list[float]) -> bool:
-    """Return True for 0 and pi, modulo whole turns: k pi for every integer k."""
-    return len(values) == 2 and {multiple_of_pi(value % math.tau) for value in values} <= {"0", "pi", "2 pi"}
 
 
 def _range(report: Findings, reach: DriverRange) -> Iterator[ReportLine]:

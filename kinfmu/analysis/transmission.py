@@ -76,16 +76,8 @@ class TransmissionRange:
 
     def as_json(self) -> dict[str, Any]:
         """Return the extremes as plain data."""
-        return {
-            "driver": self.driver,
-            "coupler": self.coupler,
-            "output": self.output,
-            "smallest": self.smallest,
-            "at_smallest": self.at_smallest,
-            "largest": self.largest,
-            "at_largest": self.at_largest,
-            "verdict": self.verdict,
-        }
+        keys = ("driver", "coupler", "output", "smallest", "at_smallest", "largest", "at_largest", "verdict")
+        return {key: getattr(self, key) for key in keys}
 
 
 class _Cosine(NamedTuple):

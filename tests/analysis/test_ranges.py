@@ -20,7 +20,7 @@ from kinfmu import (
     RunSettings,
     Translational,
 )
-from kinfmu.analysis.values import value_text
+from kinfmu.analysis.driver_path import value_text
 from kinfmu.mechanism.toml_file import parse
 from tests.analysis.linkages import digger, five_bar_arm, pushed_crank
 from tests.mechanisms import five_bar, fourbar, slider_crank, tight_jaw, with_arm

@@ -193,10 +193,8 @@ def crossings(u: FloatArray, curve: Curve, levels: FloatArray) -> FloatArray:
 
     Where it has a value several times, the one nearest to the argument before counts; for the first value the first.
 
-    Args:
-        u: (n,) arguments of samples of the whole motion.
-        curve: Values, rates and accelerations (m, 1) at arguments (m,).
-        levels: (m,).
+    u: (n,) arguments of samples of the whole motion. curve: Values, rates and accelerations (m, 1) at arguments (m,).
+    levels: (m,).
 
     Raises:
         NotReachedError: The output never has one of the values.

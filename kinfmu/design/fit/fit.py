@@ -297,11 +297,8 @@ _equations: Equations  # of a process of the team
 class Team:
     """Processes that search from many starts, with one worker this process; the results do not depend on their number.
 
-    Args:
-        problem: The problem.
-        engine: 'auto', 'python' or 'native'; 'auto' is native where a compiler is found.
-        designs: How many are solved, roughly.
-        workers: Number of processes; None: one for each core.
+    engine: 'auto', 'python' or 'native'; 'auto' is native where a compiler is found. designs: How many are solved,
+    roughly. workers: Number of processes; None: one for each core.
 
     Raises:
         RequestError: `workers` is not a positive whole number.

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.design.fit.numbers import read_weights
-from kinfmu.design.fit.targets import GrashofConstraint
+from kinfmu.design.fit.targets import GrashofConstraint, read_weights
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.expression import Expression

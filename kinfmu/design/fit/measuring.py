@@ -11,8 +11,14 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.design.fit.argument import Argument
-from kinfmu.design.fit.numbers import read_weights
-from kinfmu.design.fit.targets import Constraint, MarginConstraint, MeasureConstraint, MeasureTarget, Target
+from kinfmu.design.fit.targets import (
+    Constraint,
+    MarginConstraint,
+    MeasureConstraint,
+    MeasureTarget,
+    Target,
+    read_weights,
+)
 from kinfmu.errors import KinfmuError, MechanismError, valid_names
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.laws import ConstantSpeed
@@ -69,11 +75,8 @@ class Aim:
 class Measuring:
     """The measures of a problem.
 
-    Args:
-        model: The mechanism with the outputs that the measures need.
-        inputs: What moves it, as arguments of `Model.solve`.
-        aims: Measures with values or limits.
-
+    model: The mechanism with the outputs that the measures need. inputs: What moves it, as arguments of `Model.solve`.
+    aims: Measures with values or limits.
     """
 
     def __init__(self, model: Model, inputs: Mapping[str, Any], aims: Sequence[Aim]) -> None:
@@ -151,7 +154,8 @@ def measuring_of(
 
     """
     tables = [(f"[targets.{one.name}]", one) for one in targets if isinstance(one, MeasureTarget)]
-    more = [(f"[constraints.{one.name}]", one) for one in constraints if _is_measured(one)]
+    measured = (MarginConstraint, MeasureConstraint)
+    more = [(f"[constraints.{one.name}]", one) for one in constraints if isinstance(one, measured)]
     both: list[tuple[str, Any]] = [*tables, *more]
     if not both:
         return None
@@ -164,9 +168,10 @@ def measuring_of(
     for (where, one), reading in zip(both, readings, strict=True):
         unit = units[one.name]
         quantity = Quantity("number") if unit == "1" else quantity_in(unit, mechanism.length_unit)
+        given = {key: getattr(one, key, None) for key in ("value", "minimum", "maximum")}
         limits = {
-            key: None if (value := getattr(one, key, None)) is None else _number(where, key, value, quantity, mechanism)
-            for key in ("value", "minimum", "maximum")
+            key: None if value is None else read_constant(f"{where} {key}", value, quantity, mechanism.length_unit)
+            for key, value in given.items()
         }
         if all(value is None for value in limits.values()):
             raise MechanismError(f"{where} needs 'minimum' or 'maximum', or both")
@@ -200,14 +205,6 @@ def _parts(reading: Reading, value: float | None, minimum: float | None) -> Iter
 
 def _renamed(reading: Reading, name: str) -> Reading:
     return replace(reading, name=name)  # type: ignore[type-var]  # leaves are dataclasses
-
-
-def _is_measured(one: Constraint) -> bool:
-    return isinstance(one, MarginConstraint | MeasureConstraint)
-
-
-def _number(where: str, key: str, value: object, quantity: Quantity, mechanism: Mechanism) -> float:
-    return read_constant(f"{where} {key}", value, quantity, mechanism.length_unit)
 
 
 def _reading(where: str, one: Any, mechanism: Mechanism) -> Reading:

@@ -11,8 +11,7 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.design.fit.argument import Argument
-from kinfmu.design.fit.numbers import Bounds, read_free, read_rows, read_weights
-from kinfmu.design.fit.targets import FunctionTarget, PathTarget, PoseTarget
+from kinfmu.design.fit.targets import Bounds, FunctionTarget, PathTarget, PoseTarget, read_free, read_rows, read_weights
 from kinfmu.errors import MechanismError, valid_names
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.number import read_constant

@@ -168,18 +168,7 @@ def define(
 ) -> Study:
     """Return a study; arguments as `kinfmu.study` has them.
 
-    Args:
-        mechanism: The mechanism, or what `kinfmu.load` takes.
-        parameters: For each parameter a table, as `read_variation` reads it.
-        measures: Names of measures of the mechanism, and measures. Default: those of the mechanism.
-        sampling: 'sobol' or 'latin_hypercube'.
-        designs: Number of samples of the parameters that are not on a grid.
-        seed: Seed of the random numbers, a whole number from 0.
-        t: (n,) times [s]. Default: `inputs`, or without these one cycle of the driver or the run of the file.
-        over: Description of the motion. Default: made from it.
-        engine: 'auto', 'python' or 'native'.
-        file_text: Text of the study file.
-        inputs: Driver values and rates by input, such as 'crank_angle': numbers or (n,) [rad or length].
+    over: Description of the motion. Default: made from it. file_text: Text of the study file.
 
     Raises:
         RequestError: An argument is invalid.
@@ -267,7 +256,8 @@ def _motion(
         longest = max(arrays, key=lambda name: np.size(arrays[name]))
         values = np.atleast_1d(arrays[longest])
         return StudyMotion(None, arrays, over or f"{longest} = {values[0]:.6g} to {values[-1]:.6g}")
-    if len(mechanism.drivers) == 1 and (can_cycle(mechanism) or not changes_law):
+    can_cycle = not changes_law or isinstance(mechanism.drivers[0].law, ConstantSpeed)  # at the speed of each design
+    if len(mechanism.drivers) == 1 and can_cycle:
         try:
             found, over = driver_cycle(compile_plan(mechanism))
         except KinfmuError as error:
@@ -312,10 +302,7 @@ def _identified(value: FloatArray | float) -> Any:
 def law_changing(mechanism: Mechanism, names: Collection[str]) -> list[str]:
     """Return those of some parameters and law constants that change the law of a driver.
 
-    Args:
-        mechanism: The mechanism.
-        names: Names of parameters and law constants.
-
+    names: Names of parameters and law constants.
     """
     constants = {constant.name for constant in mechanism.law_constants}
 
@@ -356,8 +343,3 @@ def own_cycles(
     if count == 1:
         return {angle: begin[0] + turned, speed: float(own["speed"][0])}
     return {angle: begin[:, None] + turned, speed: np.repeat(own["speed"][:, None], len(turned), axis=1)}
-
-
-def can_cycle(mechanism: Mechanism) -> bool:
-    """Return whether the law of the only driver has a speed, at which each design can make its cycle."""
-    return len(mechanism.drivers) == 1 and isinstance(mechanism.drivers[0].law, ConstantSpeed)

@@ -61,10 +61,7 @@ class Job:
 def run_chunk(packed: bytes, version: str, parameters: Mapping[str, FloatArray]) -> Columns:
     """Return the columns of some designs: what workers run.
 
-    Args:
-        packed: The job.
-        version: Of the kinfmu that sent it.
-        parameters: (m,) by name.
+    packed: The job. version: Of the kinfmu that sent it. parameters: (m,) by name.
 
     Raises:
         StudyError: The worker has another version of kinfmu.
