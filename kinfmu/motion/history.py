@@ -251,14 +251,8 @@ class History:
         rate, acceleration = np.where(self.value == 0.0, 0.0, (self.rate, self.acceleration))
         near = np.abs(np.concatenate([rate[..., 1:2], rate, rate[..., -2:-1]], axis=-1))
         steepest = np.where(self.value == 0.0, np.maximum(near[..., 2:], near[..., :-2]), rate)
-        return History(
-            self.x,
-            self.value**2,
-            2.0 * self.value * rate,
-            2.0 * (steepest**2 + self.value * acceleration),
-            self.is_closed,
-            self.is_seamed,
-        )
+        bend = 2.0 * (steepest**2 + self.value * acceleration)
+        return History(self.x, self.value**2, 2.0 * self.value * rate, bend, self.is_closed, self.is_seamed)
 
     @cached_property
     def _found(self) -> dict[float, Extreme]:
