@@ -50,13 +50,7 @@ def mechanism_html(mechanism: Mechanism) -> str:
 
 @svg_of.register
 def drawing(mechanism: Mechanism) -> str:
-    """Return the drawing of a mechanism as SVG.
-
-    Raises:
-        MissingPackageError: matplotlib is not installed.
-        AssemblyError: The mechanism does not close.
-
-    """
+    """Return the drawing of a mechanism as SVG; AssemblyError if it does not close."""
     return svg_text("this picture", lambda: sheet_of(instant(mechanism)).figure)
 
 
@@ -118,12 +112,7 @@ def run_html(run: Run) -> str:
 
 @svg_of.register
 def plot(run: Run) -> str:
-    """Return the plot of a run's outputs, with a panel for each unit, as SVG.
-
-    Raises:
-        MissingPackageError: matplotlib is not installed.
-
-    """
+    """Return the plot of a run's outputs, with a panel for each unit, as SVG."""
     return svg_text("this picture", lambda: overview(run))
 
 
@@ -244,13 +233,7 @@ def study_html(result: StudyResult) -> str:
 
 @svg_of.register
 def study_svg(result: StudyResult) -> str:
-    """Return the picture of a study as SVG.
-
-    Raises:
-        MissingPackageError: matplotlib is not installed.
-        FigureError: There are too many parameters and measures for one picture.
-
-    """
+    """Return the picture of a study as SVG; FigureError for too many parameters and measures."""
     return svg_text("this picture", lambda: figure_of(result, result.measures))
 
 
@@ -273,12 +256,7 @@ def fit_html(result: FitResult) -> str:
 
 @svg_of.register
 def fit_svg(result: FitResult) -> str:
-    """Return the picture of a fit as SVG.
-
-    Raises:
-        MissingPackageError: matplotlib is not installed.
-
-    """
+    """Return the picture of a fit as SVG."""
     return svg_text("this picture", lambda: fitted.figure_of(content_of(result)))
 
 
@@ -288,10 +266,7 @@ MOST_ROWS = 12  # of a table
 def picture(draw: Callable[[], str], alternative: str) -> str:
     """Return the SVG text of `draw` as an image, which styles of the page do not change; of an error the reason.
 
-    Args:
-        draw: Returns the SVG.
-        alternative: Text for readers who do not see the image.
-
+    alternative: Text for readers who do not see the image.
     """
     try:
         image = b64encode(draw().encode()).decode()

@@ -94,13 +94,10 @@ class Assemblies:
 def find_assemblies(mechanism: Mechanism, plan: SolvePlan | None = None) -> Assemblies:
     """Return the assemblies found of a mechanism at its start driver values, independent of its start poses.
 
-    plan: that of the mechanism; None if its start poses do not close or leave several branches.
-    Poses that differ by whole turns count as one.
+    Raise a KinfmuError if the mechanism cannot be planned, an AssemblyError if no assembly is found.
 
-    Raises:
-        KinfmuError: If the mechanism cannot be planned.
-        AssemblyError: If no assembly is found.
-
+    plan: that of the mechanism; None if its start poses do not close or leave several branches. Poses that differ by
+    whole turns count as one.
     """
     whole = replace(mechanism, coordinates="all")
     chosen = None

@@ -162,11 +162,7 @@ def follow(plan: SolvePlan, number: int) -> DriverPath:
     """Return the path of one driver, by its number, the others at the values of the plan's anchor.
 
     An angle turns until the mechanism repeats (at most 12 turns), a length moves by three sizes in both directions, a
-    distance down to 0.
-
-    Raises:
-        KinfmuError: If the driver cannot be planned alone.
-
+    distance down to 0. Raise a KinfmuError if the driver cannot be planned alone.
     """
     single = alone(plan, number)
     driver = plan.mechanism.drivers[number]

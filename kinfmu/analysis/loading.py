@@ -27,7 +27,7 @@ from kinfmu.mechanism.laws import Spline
 from kinfmu.mechanism.loads.load import Following
 from kinfmu.motion.cams import pressing_sign
 from kinfmu.motion.history import History
-from kinfmu.motion.motion import Motion, break_places, force_of
+from kinfmu.motion.motion import Motion, break_places
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import effort_noun
 from kinfmu.plan.undetermined import shared_reactions, unknown_contacts, why_unknown
@@ -216,7 +216,7 @@ class _Forces:
         if len(run.input_names) == 3:
             driver, at_unit = run.input_names[0].driver, unit_of(run.input_names[0].quantity, run.length_unit)
         unit = next((place.unit for place in run.places() if place.name == name), "N")
-        return ForcePeak(name, value, unit, driver, at, at_unit, _rms(run, force_of(run, name)))
+        return ForcePeak(name, value, unit, driver, at, at_unit, _rms(run, np.asarray(run[name], dtype=float)))
 
     def ranges(self, names: Iterable[ForceName]) -> tuple[ForceRange, ...]:
         """Return the ranges of forces that have numbers."""
@@ -262,7 +262,7 @@ class _Forces:
 
     def _extremes(self, name: str) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the smallest and the largest value of a force, each with the driver value or time at which it is."""
-        run, values = self._run, force_of(self._run, name)
+        run, values = self._run, np.asarray(self._run[name], dtype=float)
         if self._motion is not None and np.isfinite(values).all():
             motion, history = self._motion, self._motion.history(name)
             low, high = history.extremes()

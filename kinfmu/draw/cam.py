@@ -13,8 +13,7 @@ from kinfmu.draw.dxf import imported_ezdxf, written_drawing
 from kinfmu.draw.marks import COLOUR
 from kinfmu.draw.scene import palette
 from kinfmu.draw.sheet import GREY, INK, arc, ink, titled_figure
-from kinfmu.draw.writing import SUFFIXES, write
-from kinfmu.errors import FigureError, listed
+from kinfmu.draw.writing import SUFFIXES, check_suffix, write
 from kinfmu.files import suffix_of
 from kinfmu.motion.cams import CamProfile
 
@@ -49,14 +48,11 @@ def cam(profile: CamProfile, path: str | Path) -> None:
 
     """
     path = Path(str(path))
+    check_suffix(path, (*SUFFIXES, _DXF), "cam profiles")
     if suffix_of(path) == _DXF:
         _write_drawing(profile, path)
-    elif suffix_of(path) in SUFFIXES:
-        write(path, lambda: _figure(profile))
     else:
-        raise FigureError(
-            f"{path}: '{path.suffix}' is not a known format of cam profiles; known: {listed((*SUFFIXES, _DXF))}"
-        )
+        write(path, lambda: _figure(profile))
 
 
 def _base_radius(profile: CamProfile) -> float:

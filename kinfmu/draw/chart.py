@@ -89,18 +89,10 @@ def numbers(axes: Axes, unit: str) -> str:
 
 def named(axes: Axes, at: tuple[float, float], text: str, colour: Colour, **where: Any) -> None:
     """Write a name next to its curve, in its colour, on a white background."""
-    axes.annotate(
-        text,
-        at,
-        xytext=where.pop("offset", (0.0, 0.0)),
-        textcoords="offset points",
-        color=ink(colour),
-        fontsize=SMALL,
-        parse_math=False,
-        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8},
-        zorder=10.0,
-        **where,
-    )
+    look: dict[str, Any] = {"color": ink(colour), "fontsize": SMALL, "parse_math": False, "zorder": 10.0}
+    look["bbox"] = {"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8}
+    offset = where.pop("offset", (0.0, 0.0))
+    axes.annotate(text, at, xytext=offset, textcoords="offset points", **look, **where)
 
 
 @dataclass(frozen=True, eq=False)

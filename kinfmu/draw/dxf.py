@@ -19,9 +19,8 @@ from kinfmu.draw.scene.instant import Instant
 from kinfmu.draw.scene.palette import Colour
 from kinfmu.draw.scene.placing import poses_after, poses_of
 from kinfmu.draw.scene.shapes import shapes
-from kinfmu.draw.writing import write_bytes
+from kinfmu.draw.writing import check_suffix, write_bytes
 from kinfmu.errors import FigureError, MissingPackageError
-from kinfmu.files import suffix_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.laws import External
@@ -60,8 +59,7 @@ def dxf(run: Run, path: str | Path, at: float | None = None) -> None:
 
     """
     path = Path(str(path))
-    if suffix_of(path) != ".dxf":
-        raise FigureError(f"{path}: '{path.suffix}' is not a known format of CAD drawings; known: .dxf")
+    check_suffix(path, (".dxf",), "CAD drawings")
     good = np.flatnonzero(run.good)
     if not len(good):
         raise FigureError(f"{path}: the run has no sample with numbers to draw")
@@ -121,12 +119,10 @@ def written_drawing(ezdxf: Any, path: Path, length_unit: str) -> Iterator[Any]:
 def pose_at(run: Run, mechanism: Mechanism, at: float, path: Path) -> dict[str, FloatArray]:
     """Return poses (1, 3) by body and for the ground.
 
+    Raise a FigureError if the value is outside the run, in a gap, or its pose cannot be solved.
+
     run: The run, with a sample at least. at: Value on the axis of the run, in the unit of `axis_of`. path: The file to
     draw, for messages.
-
-    Raises:
-        FigureError: The value is outside the run, in a gap, or its pose cannot be solved.
-
     """
     axis = axis_of(run)
     asked = f"at t = {at:g} s" if axis.is_time else f"at {axis.name} = {at:.9g} {axis.unit}".rstrip()

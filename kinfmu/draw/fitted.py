@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -177,13 +177,6 @@ def _draw(axes: Axes, curve: Curve, marker: float = _MARKER) -> None:
     for wanted, reached in zip(curve.wanted, curve.reached, strict=True):
         axes.plot(*np.array([wanted, reached]).T, color=ink(WANTED), linewidth=0.8, zorder=901.0)
     axes.plot(*curve.reached.T, ".", color=ink(REACHED), markersize=0.8 * marker, zorder=902.0)
-    axes.plot(
-        *curve.wanted.T,
-        "o",
-        markerfacecolor="none",
-        markeredgecolor=ink(WANTED),
-        markersize=marker,
-        markeredgewidth=min(1.0, 0.2 * marker),
-        zorder=903.0,
-        label=f"{curve.name}: wanted",
-    )
+    look: dict[str, Any] = {"markerfacecolor": "none", "markeredgecolor": ink(WANTED), "markersize": marker}
+    look |= {"markeredgewidth": min(1.0, 0.2 * marker), "zorder": 903.0}
+    axes.plot(*curve.wanted.T, "o", label=f"{curve.name}: wanted", **look)

@@ -181,19 +181,10 @@ class Sheet:
     def text(self, at: ArrayLike, text: str, colour: Colour, *, italic: bool = False) -> None:
         """Write a name, of one or several lines, with its middle at `at` [pt from the lower left corner]."""
         x, y = self.low + np.asarray(at, dtype=float) * self.point
-        self.axes.text(
-            x,
-            y,
-            text,
-            color=ink(colour),
-            fontsize=FONT,
-            fontstyle="italic" if italic else "normal",
-            ha="center",
-            va="center" if "\n" in text else "center_baseline",
-            linespacing=1.2,  # of the height of a letter, which gives LINE
-            parse_math=False,
-            zorder=1000.0,
-        )
+        look: dict[str, Any] = {"color": ink(colour), "fontsize": FONT, "parse_math": False, "zorder": 1000.0}
+        look |= {"ha": "center", "va": "center" if "\n" in text else "center_baseline"}
+        look["linespacing"] = 1.2  # of the height of a letter, which gives LINE
+        self.axes.text(x, y, text, fontstyle="italic" if italic else "normal", **look)
 
     def note(self, text: str) -> None:
         """Write a sentence below the right end of the title's line."""

@@ -114,9 +114,7 @@ class Equations:
     def at(self, z: FloatArray) -> tuple[Evaluation, FloatArray]:
         """Return the evaluation and the Jacobian (r, n) by z, without the rows of measures, which are 0.
 
-        Raises:
-            NotAssembledError: The design cannot be assembled, or does not reach a sample.
-
+        Raise a NotAssembledError if the design cannot be assembled or does not reach a sample.
         """
         values = self.problem.vector(z)
         parameters = {name: values[name] for name in self.problem.parameters}

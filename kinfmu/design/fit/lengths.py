@@ -51,9 +51,7 @@ class Lengths:
     def of(cls, constraint: GrashofConstraint, where: str, mechanism: Mechanism) -> Lengths:
         """Return the conditions of a constraint.
 
-        Raises:
-            MechanismError: A length is not an expression of parameters, or there are not four.
-
+        Raise a MechanismError if a length is not an expression of parameters, or there are not four.
         """
         links, unit = constraint.links, mechanism.length_unit
         if isinstance(links, str) or not isinstance(links, Sequence) or len(links) != 4:

@@ -89,9 +89,7 @@ class Measuring:
     def values(self, parameters: Mapping[str, float]) -> FloatArray:
         """Return the measured values (aims,).
 
-        Raises:
-            KinfmuError: The design cannot be assembled, or a measure has no value.
-
+        Raise a KinfmuError if the design cannot be assembled, or a measure has no value.
         """
         reasons: dict[int, str] = {}
         found = self._measured({name: np.array([value]) for name, value in parameters.items()}, self.aims, reasons)
@@ -148,10 +146,7 @@ def measuring_of(
 ) -> Measuring | None:
     """Return the measures of targets and constraints; None if there are none.
 
-    Raises:
-        MechanismError: A name or a value is invalid.
-        KinfmuError: The mechanism as written cannot be measured.
-
+    Raise a MechanismError if a name or a value is invalid, another KinfmuError if the mechanism cannot be measured.
     """
     tables = [(f"[targets.{one.name}]", one) for one in targets if isinstance(one, MeasureTarget)]
     measured = (MarginConstraint, MeasureConstraint)

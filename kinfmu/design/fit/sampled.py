@@ -85,12 +85,7 @@ class TracedPoints:
         self.points = dict(mechanism.points)
 
     def outputs(self, where: str, of: str) -> tuple[CoordinateName, ...]:
-        """Return the names of a point's coordinates.
-
-        Raises:
-            MechanismError: There is no such point.
-
-        """
+        """Return the names of a point's coordinates; raise a MechanismError if there is no such point."""
         known = self._written.body_points
         if of in self.points:
             return tuple(CoordinateName(of, axis) for axis in "xy")

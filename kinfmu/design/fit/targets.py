@@ -238,9 +238,7 @@ class Bounds(NamedTuple):
 def read_bounds(where: str, value: object, quantity: Quantity, unit: str) -> Bounds:
     """Return bounds [low, high], low below high.
 
-    Raises:
-        MechanismError: The value is not two numbers in ascending order.
-
+    Raise a MechanismError if the value is not two numbers in ascending order.
     """
     if isinstance(value, str) or not isinstance(value, Sequence) or len(value) != 2:
         raise MechanismError(f"{where} = {quoted(value)} must be bounds [low, high]")
@@ -267,9 +265,7 @@ def flat(value: Any) -> Iterable[object]:
 def read_rows(where: str, rows: Any, quantities: Sequence[Quantity], unit: str, example: str) -> FloatArray:
     """Return rows of numbers (m, d), one of each quantity.
 
-    Raises:
-        MechanismError: There are no rows, or a row has other than d numbers.
-
+    Raise a MechanismError if there are no rows, or a row has other than d numbers.
     """
     valid = f"{where} must be a list {example}"
     if isinstance(rows, str) or not isinstance(rows, Sequence | np.ndarray) or not len(rows):
@@ -285,9 +281,7 @@ def read_rows(where: str, rows: Any, quantities: Sequence[Quantity], unit: str, 
 def read_weights(where: str, value: Any, count: int) -> FloatArray:
     """Return weights (count,), each at least 0 and not all 0.
 
-    Raises:
-        MechanismError: A weight is no such number, or there are other than `count`.
-
+    Raise a MechanismError if a weight is no such number, or there are other than `count`.
     """
     weights = [value] * count if is_number(value) else value
     if isinstance(weights, str) or not isinstance(weights, Sequence | np.ndarray) or not all(map(is_number, weights)):

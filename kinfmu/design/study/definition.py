@@ -168,12 +168,9 @@ def define(
 ) -> Study:
     """Return a study; arguments as `kinfmu.study` has them.
 
+    Raise a RequestError if an argument is invalid, a MechanismError if the mechanism or a table of a parameter is.
+
     over: Description of the motion. Default: made from it. file_text: Text of the study file.
-
-    Raises:
-        RequestError: An argument is invalid.
-        MechanismError: The mechanism, or a table of a parameter, is invalid.
-
     """
     if isinstance(mechanism, str | Path):
         mechanism = gallery.load(mechanism)

@@ -61,11 +61,9 @@ class Job:
 def run_chunk(packed: bytes, version: str, parameters: Mapping[str, FloatArray]) -> Columns:
     """Return the columns of some designs: what workers run.
 
+    Raise a StudyError if the worker has another version of kinfmu.
+
     packed: The job. version: Of the kinfmu that sent it. parameters: (m,) by name.
-
-    Raises:
-        StudyError: The worker has another version of kinfmu.
-
     """
     if version != VERSION:
         raise StudyError(f"a worker has kinfmu {VERSION}, and this is kinfmu {version}: install the same there")

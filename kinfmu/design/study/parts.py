@@ -22,11 +22,9 @@ _END, _END_SIZE = b"PK\5\6", 22  # record at the end of a .npz file
 class PartsFolder:
     """The folder FILE.parts next to the results FILE while a study runs.
 
+    Raises a StudyError if the folder belongs to another study, or a run in progress uses it.
+
     target: The file of the results. restart: Remove the parts of another study, or of an earlier run.
-
-    Raises:
-        StudyError: The folder belongs to another study, or a run in progress uses it.
-
     """
 
     def __init__(self, target: Path, study: Study, *, restart: bool = False) -> None:

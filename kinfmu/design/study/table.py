@@ -195,10 +195,7 @@ def require_parquet(what: str) -> None:
 def table_in(path: Path) -> Table:
     """Return the table of a study in a file, a .csv file with its FILE.json or a .parquet file.
 
-    Raises:
-        StudyError: The file cannot be read, or is not one of a study.
-        MissingPackageError: Parquet without pyarrow.
-
+    Raise a StudyError if it cannot be read or is not one of a study, a MissingPackageError for Parquet without pyarrow.
     """
     if path.suffix != CSV:
         return ParquetTable(path)
@@ -241,13 +238,9 @@ def part_bytes(rows: Rows) -> bytes:
 
 
 def joined(layout: TableLayout, parts: Iterable[tuple[int, int, Path]]) -> Iterator[Rows]:
-    """Yield the rows of parts, one after another.
+    """Yield the rows of parts, one after another; raise a StudyError if a part cannot be read, or holds other designs.
 
     layout: Of the table. parts: First design, number of designs and file of each part.
-
-    Raises:
-        StudyError: A part cannot be read, or holds other designs.
-
     """
     for first, count, path in parts:
         try:
