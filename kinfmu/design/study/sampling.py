@@ -34,44 +34,30 @@ _EXAMPLE = '{ from = 1, to = 2, count = 5 }, { from = 1, to = 2 } or { tolerance
 
 
 @dataclass(frozen=True)
-class Grid:
-    """A parameter that takes given values.
-
-    Attributes:
-        name: The parameter or law constant.
-        unit: Its unit.
-        values: The values, in this order.
-        display_unit: The unit in which people wrote them.
-
-    """
+class _Varied:
+    """A parameter or law constant, its unit, and the one in which people wrote its numbers."""
 
     name: str
     unit: str
+    display_unit: str = field(default="", compare=False, kw_only=True)
+
+
+@dataclass(frozen=True)
+class Grid(_Varied):
+    """A parameter that takes given values, in this order."""
+
     values: tuple[float, ...]
-    display_unit: str = field(default="", compare=False)
 
     def as_json(self) -> dict[str, Any]:
         return {"unit": self.unit, "values": list(self.values)}
 
 
 @dataclass(frozen=True)
-class UniformRange:
-    """A parameter that is sampled evenly between two values.
+class UniformRange(_Varied):
+    """A parameter that is sampled evenly between two values."""
 
-    Attributes:
-        name: The parameter or law constant.
-        unit: Its unit.
-        low: Lower end.
-        high: Upper end.
-        display_unit: The unit in which people wrote them.
-
-    """
-
-    name: str
-    unit: str
     low: float
     high: float
-    display_unit: str = field(default="", compare=False)
 
     def at(self, points: FloatArray) -> FloatArray:
         """Return the values at points of the unit interval."""
@@ -82,27 +68,17 @@ class UniformRange:
 
 
 @dataclass(frozen=True)
-class Tolerance:
-    """A parameter that scatters about its nominal value.
+class Tolerance(_Varied):
+    """A parameter that scatters about its nominal value, within nominal - tolerance to nominal + tolerance.
 
-    Attributes:
-        name: The parameter or law constant.
-        unit: Its unit.
-        nominal: Its value without deviation.
-        tolerance: Half of the tolerance zone: nominal - tolerance to nominal + tolerance.
-        distribution: 'normal', or 'uniform' over the zone.
-        deviations: Of a normal distribution: how many standard deviations the tolerance is.
-        display_unit: The unit in which people wrote it.
-
+    distribution: 'normal', or 'uniform' over this zone; deviations: of a normal one, how many standard deviations the
+    tolerance is.
     """
 
-    name: str
-    unit: str
     nominal: float
     tolerance: float
     distribution: Literal["normal", "uniform"]
     deviations: float
-    display_unit: str = field(default="", compare=False)
 
     @property
     def deviation(self) -> float:
@@ -177,17 +153,17 @@ def read_variation(where: str, name: str, table: Mapping[str, Any], mechanism: M
     if kind == "values":
         if not isinstance(values, list | tuple | np.ndarray) or not len(values):
             raise MechanismError(f"{where} values = {quoted(values)} must be a list of numbers")
-        return Grid(name, unit, tuple(number("values", value) for value in values), shown)
+        return Grid(name, unit, tuple(number("values", value) for value in values), display_unit=shown)
     if kind == "from":
         if "to" not in table:
             raise MechanismError(f"{where} needs the key 'to'")
         low, high = number("from", table["from"]), number("to", table["to"])
         if "count" in table:
             count = whole_number(f"{where} count", table["count"], 2, MOST_OF_A_GRID)
-            return Grid(name, unit, tuple(np.linspace(low, high, count).tolist()), shown)
+            return Grid(name, unit, tuple(np.linspace(low, high, count).tolist()), display_unit=shown)
         if low == high:
             raise MechanismError(f"{where}: 'from' and 'to' are equal: {low:.9g}")
-        return UniformRange(name, unit, min(low, high), max(low, high), shown)
+        return UniformRange(name, unit, min(low, high), max(low, high), display_unit=shown)
     nominal = number("nominal", table.get("nominal", float(setting.value)))
     tolerance = number("tolerance", table["tolerance"], above=0.0)
     distribution = table.get("distribution", "normal")
@@ -200,7 +176,7 @@ def read_variation(where: str, name: str, table: Mapping[str, Any], mechanism: M
         raise MechanismError(f"{where} deviations = {quoted(deviations)} must be a positive number")
     if "deviations" in table and distribution != "normal":
         raise MechanismError(f"{where} deviations: only a normal distribution has them")
-    return Tolerance(name, unit, nominal, tolerance, distribution, float(deviations), shown)
+    return Tolerance(name, unit, nominal, tolerance, distribution, float(deviations), display_unit=shown)
 
 
 def whole_number(where: str, value: object, least: int, most: int = MOST_DESIGNS) -> int:
