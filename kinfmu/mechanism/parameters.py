@@ -75,17 +75,11 @@ def read_parameter(name: str, parameter: Parameter | float | str, length_unit: s
 
 
 def resolve_parameters(parameters: Mapping[str, Parameter], alone: Mapping[str, set[Quantity]]) -> dict[str, Parameter]:
-    """Compute values and quantities of all parameters.
+    """Return the parameters in the given order with their values and quantities.
 
     parameters: As `read_parameter` returns them, by name. alone: For a parameter the quantities of the places where its
-    name, or its negative, is the whole expression.
-
-    Returns:
-        The parameters in the given order.
-
-    Raises:
-        MechanismError: An unknown name, a parameter that needs itself, or a unit that does not fit.
-
+    name, or its negative, is the whole expression. Raise a MechanismError for an unknown name, a parameter that needs
+    itself, or a unit that does not fit.
     """
     expressions: dict[str, Any] = {name: p.value for name, p in parameters.items() if isinstance(p.value, Expression)}
     order = in_order(parameters, expressions)

@@ -176,13 +176,9 @@ class Settable:
         )
 
     def display_unit(self, name: str, values: Iterable[object] = ()) -> DisplayUnit:
-        """Return the unit in which people read a parameter or law constant.
+        """Return the unit in which people read a parameter or law constant: that of the first value with a unit.
 
-        Args:
-            name: Its name.
-            values: Values that a user gave. The unit is that of the first one with a unit. Default: that of the
-                mechanism file, or the unit used inside.
-
+        values: Those that a user gave. Default: the unit of the mechanism file, or the unit used inside.
         """
         setting = self[name]
         unit = written_unit(values, self._length_unit) or _unit_in_file(setting)

@@ -176,11 +176,7 @@ def text_of(where: str, value: object, valid: str = "text") -> str:
 def explained(text: str, error: ValueError) -> str:
     """Return the message of an error of tomllib with the line's content and what to write, where that is known.
 
-    text: The whole text. error: As `tomllib.loads` raises it.
-
-    Returns:
-        One line, to follow 'not valid TOML: '.
-
+    It is one line, to follow 'not valid TOML: '. text: The whole text. error: As `tomllib.loads` raises it.
     """
     place = _PLACE.match(str(error))
     lines = text.replace("\t", " ").split("\n")

@@ -390,13 +390,9 @@ class BatchReading:
 
 
 def points_of_designs(mechanism: Mechanism, given: Mapping[str, FloatArray]) -> dict[str, tuple[Value, Value]]:
-    """Return body-fixed coordinates of every point by 'body.point'.
+    """Return body-fixed coordinates of every point by 'body.point'; (m, 1) those that differ between designs.
 
     mechanism: The mechanism as written. given: Arrays (m,) of parameters by name.
-
-    Returns:
-        Pairs of numbers; (m, 1) those that differ between designs.
-
     """
     with np.errstate(all="ignore"):  # designs without a solution may have any numbers
         values = parameter_values(mechanism.parameters, {name: array[:, None] for name, array in given.items()})

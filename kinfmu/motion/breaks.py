@@ -281,11 +281,8 @@ def _weights(distances: tuple[float, ...], orders: int) -> FloatArray:
 def law_breaks(history: History, jumps: Jumps, sharp: Jumps) -> list[Break]:
     """Return where the argument of a law takes the values at which the law has breaks.
 
-    Args:
-        history: The argument over the motion; angles from an arc tangent may jump by whole turns.
-        jumps: Where derivatives up to `ORDER` jump.
-        sharp: Those of them at which already the value, first or second derivative jumps.
-
+    history: The argument over the motion; angles from an arc tangent may jump by whole turns. jumps: Where derivatives
+    up to `ORDER` jump. sharp: Those of them at which already the value, first or second derivative jumps.
     """
     value, period = np.unwrap(history.value), float(jumps.period)
     along = History(history.x, value, history.rate, history.acceleration)

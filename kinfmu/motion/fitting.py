@@ -80,15 +80,9 @@ class Circle(FittedShape):
 
 
 def deviation(x: History, y: History, shape: type[Line] | type[Circle]) -> FloatArray:
-    """Return the largest distance of a path from the line or circle for which it is smallest.
+    """Return the largest distances (...) of paths (..., n) from the line or circle for which they are smallest.
 
-    A line is a circle whose radius grows without bound.
-
-    x: World coordinate x of the path, (..., n).
-
-    Returns:
-        (...) the distances; NaN for designs with unknown samples.
-
+    A line is a circle whose radius grows without bound. Designs with unknown samples have NaN.
     """
     leading = x.value.shape[:-1]
     known = (x.is_known & y.is_known).reshape(-1)

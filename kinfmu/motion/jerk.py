@@ -150,16 +150,10 @@ class MotionEquations:
         self.system = System(mechanism)
 
     def solved(self, q: Sequence[Taylor], targets: Sequence[Taylor], order: int) -> tuple[FloatArray, FloatArray]:
-        """Return what a derivative of the coordinates lacks to satisfy the equations.
+        """Return what a derivative of the coordinates lacks to satisfy the equations, (n, coordinates), to be added.
 
-        Args:
-            q: The coordinates; derivatives below the order satisfy the equations, or are close to that for order 0.
-            targets: The drivers' values.
-            order: 0 to 3.
-
-        Returns:
-            (n, coordinates), to be added to the derivative; (n,) 1 / condition of the scaled Jacobian.
-
+        It also returns (n,) 1 / condition of the scaled Jacobian. q: The coordinates; derivatives below the order
+        satisfy the equations, or are close to that for order 0. targets: The drivers' values. order: 0 to 3.
         """
         delta = -self._columns(self._evaluate(q, targets), order)  # (n, rows)
         u, sizes, v = self._decomposed(q, targets)

@@ -108,19 +108,10 @@ def sampled(
     argument: Argument,
     unit: str,
 ) -> Sampled:
-    """Return a target in the common form.
+    """Return a target, as declared, in the common form; raise a MechanismError if a value is invalid.
 
-    Args:
-        target: As declared.
-        where: Its table in messages, such as '[targets.foot]'.
-        traced: Names of the outputs of points.
-        coordinates: Known outputs, by their names.
-        argument: What the samples go by.
-        unit: Unit of length.
-
-    Raises:
-        MechanismError: A value is invalid.
-
+    where: Its table in messages, such as '[targets.foot]'. traced: Names of the outputs of points. coordinates: Known
+    outputs, by their names. argument: What the samples go by. unit: Unit of length.
     """
     common: dict[str, Any] = {
         "name": target.name,

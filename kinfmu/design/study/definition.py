@@ -313,16 +313,11 @@ def law_changing(mechanism: Mechanism, names: Collection[str]) -> list[str]:
 def own_cycles(
     mechanism: Mechanism, cycle: Mapping[str, FloatArray | float], designs: Mapping[str, FloatArray]
 ) -> dict[str, Any]:
-    """Return the driver values (m, n) of one cycle at the start and the speed of each design, as `solve` takes them.
+    """Return the driver values of one cycle at the start and the speed of each design, as `solve` takes them.
 
-    Args:
-        mechanism: The mechanism, with a single driver whose law is `constant_speed`.
-        cycle: The cycle of the design as written: angles (n,) and speed, by input.
-        designs: Arrays (m,) of the parameters and law constants that vary, by name.
-
-    Returns:
-        Angles and speeds; of a single design (n,) and a number.
-
+    They are (m, n) angles and speeds; of a single design (n,) and a number. cycle: That of the design as written,
+    angles (n,) and speed by input; its single driver has a law `constant_speed`. designs: Arrays (m,) of what varies,
+    by name.
     """
     (driver,) = mechanism.drivers
     law: Any = driver.law
