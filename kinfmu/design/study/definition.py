@@ -297,10 +297,7 @@ def _identified(value: FloatArray | float) -> Any:
 
 
 def law_changing(mechanism: Mechanism, names: Collection[str]) -> list[str]:
-    """Return those of some parameters and law constants that change the law of a driver.
-
-    names: Names of parameters and law constants.
-    """
+    """Return those of some parameters and law constants that change the law of a driver."""
     constants = {constant.name for constant in mechanism.law_constants}
 
     def is_behind_law(name: str) -> bool:
