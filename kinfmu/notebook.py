@@ -18,10 +18,10 @@ from kinfmu.design.fit.picture import content_of
 from kinfmu.design.fit.text import parameter_rows
 from kinfmu.design.study import StudyResult
 from kinfmu.design.study.figure import figure_of
-from kinfmu.design.study.summary import about, disagreement, failures, measure_rows
+from kinfmu.design.study.result import about, disagreement, failures, measure_rows
 from kinfmu.display import escaped, html_of, page, svg_of, table, widget_of
 from kinfmu.draw import fitted
-from kinfmu.draw.curves import overview, shown_outputs
+from kinfmu.draw.chart import overview, shown_outputs
 from kinfmu.draw.drawing import sheet_of
 from kinfmu.draw.instant import instant
 from kinfmu.draw.writing import svg_text
@@ -36,7 +36,6 @@ from kinfmu.run.axis import axis_of
 from kinfmu.run.designs import Designs
 from kinfmu.run.sensitivities import Sensitivities
 from kinfmu.run.verdict import notable_events, sentence
-from kinfmu.units import CoordinateName
 
 _LARGEST = 300  # coordinates; mobility and plan of larger mechanisms take seconds
 _KEPT = 8  # drawings
@@ -45,19 +44,13 @@ _KEPT = 8  # drawings
 @html_of.register
 def mechanism_html(mechanism: Mechanism) -> str:
     """Return the drawing of a mechanism, or the reason why there is none, and the table of its parts."""
-    title = f"{mechanism.name}: {mechanism.title}" if mechanism.title else mechanism.name
-    return page(title, picture(lambda: drawing(mechanism), f"Drawing of {title}"), table(_parts(mechanism)))
+    name = title(mechanism)
+    return page(name, picture(lambda: drawing(mechanism), f"Drawing of {name}"), table(_parts(mechanism)))
 
 
 @svg_of.register
 def drawing(mechanism: Mechanism) -> str:
-    """Return the drawing of a mechanism as SVG.
-
-    Raises:
-        MissingPackageError: matplotlib is not installed.
-        AssemblyError: The mechanism does not close.
-
-    """
+    """Return the drawing of a mechanism as SVG; AssemblyError if it does not close."""
     return svg_text("this picture", lambda: sheet_of(instant(mechanism)).figure)
 
 
@@ -111,20 +104,15 @@ _MOST_EVENTS = 5
 @html_of.register
 def run_html(run: Run) -> str:
     """Return the verdict, the plot and the tables of a run."""
-    title = run.info.get("title") or run.info.get("name") or "run"
+    name = run.info.get("title") or run.info.get("name") or "run"
     verdict = f"<p>{escaped('; '.join(filter(None, (axis_of(run).range(), sentence(run)))))}</p>"
-    shown = picture(lambda: plot(run), f"Plot of {title}") if len(run) and shown_outputs(run) else ""
-    return page(title, verdict, shown, _events(run), _column_ranges(run))
+    shown = picture(lambda: plot(run), f"Plot of {name}") if len(run) and shown_outputs(run) else ""
+    return page(name, verdict, shown, _events(run), _column_ranges(run))
 
 
 @svg_of.register
 def plot(run: Run) -> str:
-    """Return the plot of a run's outputs, with a panel for each unit, as SVG.
-
-    Raises:
-        MissingPackageError: matplotlib is not installed.
-
-    """
+    """Return the plot of a run's outputs, with a panel for each unit, as SVG."""
     return svg_text("this picture", lambda: overview(run))
 
 
@@ -140,17 +128,18 @@ def _events(run: Run) -> str:
 def _column_ranges(run: Run) -> str:
     """Return the ranges of the outputs as a table."""
     names = shown_outputs(run)
-    rows: list[Sequence[object]] = [(name, *_range(run, name)) for name in names[:MOST_ROWS]]
-    if len(names) > MOST_ROWS:
-        rows.append((f"and {len(names) - MOST_ROWS} more", "", "", "", ""))
-    return table(rows, ("output", "unit", "first", "smallest", "largest"))
+    rows: list[Sequence[object]] = []
+    for name in names[:MOST_ROWS]:
+        values = run[name][run.good]
+        first = float(values[0]) if len(values) else "none"
+        rows.append((name, "rad" if name.is_angle else run.length_unit, first, *_ends(values)))
+    return table([*rows, *_more(len(names), 5)], ("output", "unit", "first", "smallest", "largest"))
 
 
-def _range(run: Run, name: CoordinateName) -> Iterator[object]:
-    """Yield the unit, and the first, smallest and largest value of the samples that hold numbers."""
-    values = run[name][run.good]
-    yield "rad" if name.is_angle else run.length_unit
-    yield from ([float(values[0]), float(np.min(values)), float(np.max(values))] if len(values) else ["none"] * 3)
+def _ends(values: FloatArray) -> tuple[object, object]:
+    """Return the smallest and the largest of the numbers that are finite."""
+    known = values[np.isfinite(values)]
+    return (float(known.min()), float(known.max())) if len(known) else ("none", "none")
 
 
 @html_of.register
@@ -170,12 +159,14 @@ def measures_html(values: MeasuredValues) -> str:
 def designs_html(designs: Designs) -> str:
     """Return the ranges of the outputs over all designs, and the first designs with gaps with their reasons."""
     count, samples = designs.status.shape
-    whole = int(designs.good.all(axis=1).sum())
+    whole, lost = int(designs.good.all(axis=1).sum()), (~designs.good).sum(axis=1)
+    gaps = [(number, int(lost[number]), reason) for number, reason in designs.reasons.items()]
+    rows = [*gaps[:MOST_ROWS], *_more(len(gaps), 3)]
     return page(
         f"{count} designs at {samples} samples, {whole} of them without gaps",
         table(_ranges(designs.parameters), ("parameter", "smallest", "largest")),
         table(_outputs(designs), ("output", "unit", "smallest", "largest")),
-        table(_gaps(designs), ("design", "samples without numbers", "reason")) if designs.reasons else "",
+        table(rows, ("design", "samples without numbers", "reason")) if gaps else "",
     )
 
 
@@ -194,28 +185,18 @@ def design_measures_html(designs: DesignMeasures) -> str:
 
 
 def _ranges(columns: Mapping[str, FloatArray]) -> list[Sequence[object]]:
-    """Return the range of each of the first columns, of the numbers that are finite."""
-    rows: list[Sequence[object]] = []
-    for name, values in list(columns.items())[:MOST_ROWS]:
-        known = values[np.isfinite(values)]
-        rows.append((name, *((float(known.min()), float(known.max())) if len(known) else ("none", "none"))))
+    """Return the range of each of the first columns."""
+    rows = [(name, *_ends(values)) for name, values in list(columns.items())[:MOST_ROWS]]
     return [*rows, *_more(len(columns), 3)]
 
 
 def _outputs(designs: Designs) -> list[Sequence[object]]:
     """Return the range of each output over all designs and samples that hold numbers."""
-    rows: list[Sequence[object]] = []
-    for k, name in enumerate(designs.outputs[:MOST_ROWS]):
-        values = designs.values[:, :, k][designs.good]
-        ends = (float(values.min()), float(values.max())) if len(values) else ("none", "none")
-        rows.append((name, "rad" if name.is_angle else "length", *ends))
+    rows = [
+        (name, "rad" if name.is_angle else "length", *_ends(designs.values[:, :, k][designs.good]))
+        for k, name in enumerate(designs.outputs[:MOST_ROWS])
+    ]
     return [*rows, *_more(len(designs.outputs), 4)]
-
-
-def _gaps(designs: Designs) -> list[Sequence[object]]:
-    lost = (~designs.good).sum(axis=1)
-    rows = [(number, int(lost[number]), reason) for number, reason in designs.reasons.items()]
-    return [*rows[:MOST_ROWS], *_more(len(rows), 3)]
 
 
 @html_of.register
@@ -252,13 +233,7 @@ def study_html(result: StudyResult) -> str:
 
 @svg_of.register
 def study_svg(result: StudyResult) -> str:
-    """Return the picture of a study as SVG.
-
-    Raises:
-        MissingPackageError: matplotlib is not installed.
-        FigureError: There are too many parameters and measures for one picture.
-
-    """
+    """Return the picture of a study as SVG; FigureError for too many parameters and measures."""
     return svg_text("this picture", lambda: figure_of(result, result.measures))
 
 
@@ -281,12 +256,7 @@ def fit_html(result: FitResult) -> str:
 
 @svg_of.register
 def fit_svg(result: FitResult) -> str:
-    """Return the picture of a fit as SVG.
-
-    Raises:
-        MissingPackageError: matplotlib is not installed.
-
-    """
+    """Return the picture of a fit as SVG."""
     return svg_text("this picture", lambda: fitted.figure_of(content_of(result)))
 
 
@@ -296,10 +266,7 @@ MOST_ROWS = 12  # of a table
 def picture(draw: Callable[[], str], alternative: str) -> str:
     """Return the SVG text of `draw` as an image, which styles of the page do not change; of an error the reason.
 
-    Args:
-        draw: Returns the SVG.
-        alternative: Text for readers who do not see the image.
-
+    alternative: Text for readers who do not see the image.
     """
     try:
         image = b64encode(draw().encode()).decode()

@@ -1,9 +1,10 @@
-"""Assemblies: the distinct closed poses of a mechanism at its start driver values."""
+"""Assemblies: the distinct closed poses of a mechanism at its start driver values, and the search for them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Any
@@ -11,25 +12,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.analysis.assembly_search import IN_VAIN, SEED, TRIES, AssemblySearch
-from kinfmu.analysis.driver_path import started
-from kinfmu.analysis.values import degrees, driver_text
+from kinfmu.analysis.driver_path import degrees, driver_text, place_text, started
+from kinfmu.analysis.loops import Place
 from kinfmu.arrays import FloatArray
+from kinfmu.codegen.python import load_model
 from kinfmu.errors import AmbiguousStartError, AssemblyError, KinfmuError, listed
 from kinfmu.mechanism import Mechanism, Start
-from kinfmu.plan import SolvePlan, compile_plan, localized
+from kinfmu.mechanism.drivers import Driver
+from kinfmu.mechanism.joints import Joint
+from kinfmu.mechanism.members import texts_of
+from kinfmu.mechanism.quantities.placement import body_of
+from kinfmu.plan import Block, SolvePlan, compile_plan, localized
 from kinfmu.plan.anchor import find_anchor
-from kinfmu.plan.equations.assembly import Assembled, find_assembly, start_values
+from kinfmu.plan.equations.assembly import SINGULAR, Assembled, find_assembly, start_values
 from kinfmu.plan.equations.closing import CLOSED, close
 from kinfmu.plan.equations.system import System
-from kinfmu.plan.origin import in_world
+from kinfmu.plan.origin import in_world, relative_to
 from kinfmu.units import CoordinateName
 
 MOST = 64  # assemblies after which the search ends
 _STARTS = 60  # random poses from which a mechanism without a plan is assembled
 _SPREAD = 2.0  # [sizes] to either side, range of random positions
 _LARGE = 150  # coordinates; more take minutes
-_SAME = 1e-6  # [rad, sizes]; poses closer than this count as one
+_SAME = 1e-6  # [rad, sizes of the mechanism or of a block]; poses and solutions closer than this count as one
 _APART = 1e-3  # [rad, sizes]; smallest difference that distinguishes assemblies in the report
 _STEPS = 4  # in which a pose is moved to nearby driver values
 _ADVISED = 8  # assemblies for which few start poses are searched
@@ -73,7 +78,10 @@ class Assemblies:
                 {
                     "chosen": one.is_chosen,
                     "coordinates": dict(one.coordinates),
-                    "start": {body: _given(start) for body, start in one.start.items()},
+                    "start": {
+                        body: {key: float(value) for key, value in start._asdict().items() if value is not None}
+                        for body, start in one.start.items()
+                    },
                 }
                 for one in self.found
             ],
@@ -86,13 +94,10 @@ class Assemblies:
 def find_assemblies(mechanism: Mechanism, plan: SolvePlan | None = None) -> Assemblies:
     """Return the assemblies found of a mechanism at its start driver values, independent of its start poses.
 
-    plan: that of the mechanism; None if its start poses do not close or leave several branches.
-    Poses that differ by whole turns count as one.
+    Raise a KinfmuError if the mechanism cannot be planned, an AssemblyError if no assembly is found.
 
-    Raises:
-        KinfmuError: If the mechanism cannot be planned.
-        AssemblyError: If no assembly is found.
-
+    plan: that of the mechanism; None if its start poses do not close or leave several branches. Poses that differ by
+    whole turns count as one.
     """
     whole = replace(mechanism, coordinates="all")
     chosen = None
@@ -107,7 +112,9 @@ def find_assemblies(mechanism: Mechanism, plan: SolvePlan | None = None) -> Asse
     order = sorted(range(len(poses)), key=lambda k: (not is_chosen[k], [round(c, 6) for c in poses[k].tolist()]))
     poses, is_chosen = [poses[k] for k in order], [is_chosen[k] for k in order]
     apart = _distinguishing(planned, poses)
-    undecided = _undecided(planned, poses, is_at_start=chosen is not None or _is_at_start(mechanism, planned))
+    targets = start_values(System(localized(mechanism)[0])).u  # where the start poses or the laws put the drivers
+    is_at_start = chosen is not None or bool(np.abs(planned.anchor.u - targets).max(initial=0.0) <= _SAME)
+    undecided = _undecided(planned, poses, is_at_start=is_at_start)
     is_quick = not planned.watches  # with redundant rows each try takes seconds
     found = []
     for k, pose in enumerate(poses):
@@ -170,12 +177,6 @@ def _undecided(plan: SolvePlan, poses: Sequence[FloatArray], *, is_at_start: boo
     if is_at_start and len(poses) > 1:
         undecided &= np.max([_apart(plan, poses[0], pose) for pose in poses[1:]], axis=0) > _APART
     return undecided.reshape(-1, 3)
-
-
-def _is_at_start(mechanism: Mechanism, plan: SolvePlan) -> bool:
-    """Return True if the plan's drivers are where the start poses or the laws of the mechanism put them."""
-    targets = start_values(System(localized(mechanism)[0])).u
-    return bool(np.abs(plan.anchor.u - targets).max(initial=0.0) <= _SAME)
 
 
 def _choice(
@@ -301,10 +302,6 @@ def _assemble_from_random_starts(mechanism: Mechanism) -> FloatArray | None:
     return None
 
 
-def _given(start: Start) -> dict[str, float]:
-    return {key: float(value) for key, value in start._asdict().items() if value is not None}
-
-
 def _lines(assemblies: Assemblies) -> Iterator[str]:
     mechanism = assemblies.mechanism
     at = listed(
@@ -315,17 +312,16 @@ def _lines(assemblies: Assemblies) -> Iterator[str]:
     yield f"  assemblies  {len(assemblies.found)} found at {at}{apart}"
     yield f"              there may be more: the search ended {assemblies.ended}"
     for k, one in enumerate(assemblies.found, start=1):
-        values = [_value(name, one.coordinates[name], mechanism.length_unit) for name in assemblies.distinguished_by]
+        values = [
+            f"{name} {place_text(one.coordinates[name], 'rad' if name.is_angle else mechanism.length_unit)}"
+            for name in assemblies.distinguished_by
+        ]
         if one.is_chosen:
             values.append("that of the file")
         yield f"  {'*' if one.is_chosen else ' '} {k:<8}  {listed(values)}"
         for number, (body, start) in enumerate(one.start.items()):
             how = "and by" if number else "choose it by"
             yield f"              {how} [bodies.{body}] start{_start(given[body], start)}"
-
-
-def _value(name: CoordinateName, value: float, unit: str) -> str:
-    return f"{name} {degrees(value)}" if name.is_angle else f"{name} {value:.6g} {unit}"
 
 
 def _start(given: Start, start: Start) -> str:
@@ -337,3 +333,127 @@ def _start(given: Start, start: Start) -> str:
         if start._replace(**{key: getattr(given, key)}) == given:
             return f".{key} = {value}"
     return f" = {{ {listed(f'{key} = {value}' for key, value in entries.items())} }}"
+
+
+IN_VAIN = 30  # times the square of the unknowns: known solutions in a row after which the search of a block ends
+TRIES = 300  # times the same: most runs of Newton's method for a block
+SEED = 1989
+
+Coordinates = Mapping[str, float]
+
+
+class AssemblySearch:
+    """The search for the assemblies of a plan with all coordinates as outputs.
+
+    Each solution of a block is followed by the search for those of the blocks after it.
+    """
+
+    def __init__(self, plan: SolvePlan) -> None:
+        self._plan, self._model, self._rng = plan, load_model(plan), np.random.default_rng(SEED)
+        self._u, self._anchor = self._model.ANCHOR
+        self._rest = (0.0,) * len(self._anchor)
+        self._found: tuple[Any, ...] = ()  # what the model returned for the latest solution
+        mechanism = localized(plan.mechanism)[0]
+        at = dict(zip(mechanism.coordinate_names, plan.anchor.q.tolist(), strict=True))
+        self._blocks = [_BlockSpace(plan, mechanism, block, at) for block in plan.blocks if block.unknowns]
+
+    def poses(self) -> Iterator[FloatArray]:
+        """Yield all coordinates of each assembly, relative to the plan's origin: the anchor's first, each once.
+
+        Those that differ from the anchor's in the last blocks alone are the next ones.
+        """
+        anchor = np.array(self._anchor, dtype=float)
+        if not self._blocks:
+            yield self._pose(self._position(anchor, 0))
+            return
+        searches = [self._solutions(0, anchor)]
+        while searches:
+            z = next(searches[-1], None)
+            if z is None:
+                searches.pop()
+            elif len(searches) < len(self._blocks):
+                searches.append(self._solutions(len(searches), z))
+            elif self._found[3] <= CLOSED and self._found[6] <= CLOSED:  # redundant rows close too
+                yield self._pose(self._found)
+
+    def _solutions(self, number: int, z: FloatArray) -> Iterator[FloatArray]:
+        """Yield all unknowns with each regular solution of a block; first with the one near `z`."""
+        block, (start, end) = self._blocks[number], self._model.BLOCKS[number]
+        before: Coordinates = {}
+        if block.has_lengths:
+            q = self._pose(self._position(z, number - 1)).tolist()
+            before = dict(zip(self._plan.mechanism.coordinate_names, q, strict=True))
+        known: list[FloatArray] = []
+        trial, in_vain, extent = z, 0, (end - start) ** 2
+        for _ in range(TRIES * extent):
+            with suppress(ArithmeticError, ValueError):  # singular, or diverged
+                found = self._position(trial, number)
+                own = np.array(found[0][start:end])
+                if abs(found[1][number]) > SINGULAR:  # elsewhere links may fold without end
+                    in_vain += 1
+                    if in_vain > IN_VAIN * extent:
+                        return
+                    if all(block.distance(own, other) > _SAME for other in known):
+                        known.append(own)
+                        self._found, in_vain = found, 0
+                        yield np.array([*found[0][:end], *self._anchor[end:]])
+            trial = np.concatenate([z[:start], block.drawn(self._rng, before), z[end:]])
+
+    def _position(self, z: FloatArray, number: int) -> tuple[Any, ...]:
+        """Return what the model finds near unknowns `z` for the blocks up to a number; those after it are held."""
+        held = (1 << len(self._blocks)) - (1 << (number + 1))
+        found: tuple[Any, ...] = self._model.position(self._u, tuple(z.tolist()), self._rest, self._rest, -0.0, held)
+        return found
+
+    def _pose(self, found: tuple[Any, ...]) -> FloatArray:
+        names, plan = self._plan.mechanism.coordinate_names, self._plan
+        at = {**plan.fixed, **dict(zip(plan.outputs, self._model.outputs(found[-1]), strict=True))}
+        return relative_to(plan.origin, names, at)
+
+
+class _BlockSpace:
+    """Where the unknowns of a block may be: angles anywhere, bodies about the points that hold them.
+
+    has_lengths: False if all unknowns are angles.
+    """
+
+    def __init__(self, plan: SolvePlan, mechanism: Mechanism, block: Block, at: Coordinates) -> None:
+        """Take the block's own size from the points that its rows name, in a closed pose `at`."""
+        owners = {row.owner for row in (*block.rows, *block.assigned_by)}
+        own = {name.owner for name in block.coordinates}
+        members: list[Joint | Driver] = [*mechanism.joints, *mechanism.drivers]
+        points = mechanism.body_points
+        texts = {str(text) for one in members if one.name in owners for text in texts_of(one)}
+        names = sorted(texts & {*points}) or list(points)
+        places = [Place(body_of(name), *map(float, points[name])) for name in names]
+        spans = np.ptp([place.world(at) for place in places], axis=0) if places else (plan.size,)
+        self._unknowns = block.unknowns
+        self._is_angle = np.array([name.is_angle for name in block.unknowns])
+        self._scales = np.where(self._is_angle, 1.0, math.hypot(*spans) or plan.size)
+        self._holding = [place for place in places if place.body not in own] or places
+        self._middles = {body: _middle(body, places) for body in own}
+        self.has_lengths = not self._is_angle.all()
+
+    def drawn(self, rng: np.random.Generator, before: Coordinates) -> FloatArray:
+        """Return random unknowns; before: coordinates, of which those of the blocks before this one count."""
+        reach = np.where(self._is_angle, math.pi, rng.uniform())  # near the centre other solutions attract less
+        z = self._scales * reach * rng.uniform(-1.0, 1.0, len(self._unknowns))
+        if self.has_lengths:
+            at = {**before, **dict(zip(self._unknowns, z.tolist(), strict=True))}
+            centre = np.mean([place.world(before) for place in self._holding] or [(0.0, 0.0)], axis=0)
+            for k, name in enumerate(self._unknowns):
+                if not name.is_angle:  # the middle of the body's points is there, wherever its frame is
+                    at_rest = {**at, f"{name.owner}.x": 0.0, f"{name.owner}.y": 0.0}
+                    axis = ("x", "y").index(name.axis)
+                    z[k] += centre[axis] - self._middles[name.owner].world(at_rest)[axis]
+        return z
+
+    def distance(self, a: FloatArray, b: FloatArray) -> float:
+        """Return the largest difference of two solutions, modulo whole turns [rad, sizes of the block]."""
+        around = np.abs(np.remainder(b - a + math.pi, math.tau) - math.pi)
+        return float(np.where(self._is_angle, around, np.abs(b - a) / self._scales).max())
+
+
+def _middle(body: str, places: Sequence[Place]) -> Place:
+    own = [place for place in places if place.body == body] or [Place(body, 0.0, 0.0)]
+    return Place(body, sum(place.x for place in own) / len(own), sum(place.y for place in own) / len(own))

@@ -42,14 +42,10 @@ class CamDriver:
     def parts(self, begin: float, end: float) -> tuple[tuple[float, float], ...]:
         """Return the parts of a period of the driver in which the cam is between two angles.
 
-        Args:
-            begin: Angle of the cam [rad], from which the part goes on in the direction of growing angles.
-            end: Angle of the cam [rad] at most a turn further, or less than `begin`: the part goes on past the turn.
-
-        Returns:
-            Each part from begin to end in the direction of growing values of the driver; an end is less than its begin
-            where the part goes on past the period.
-
+        Each is from begin to end in the direction of growing values of the driver; its end is less than its begin where
+        it goes on past the period. begin: Angle of the cam [rad], from which the part goes on in the direction of
+        growing angles. end: Angle of the cam [rad] at most a turn further, or less than `begin`: the part goes on past
+        the turn.
         """
         if self.transmission is None:
             return (_in_period(begin, end, TURN),)
@@ -135,11 +131,7 @@ def _in_period(begin: float, end: float, period: float) -> tuple[float, float]:
 def cam_driver(plan: SolvePlan, placed: PlacedCam, paths: Sequence[DriverPath] | None) -> CamDriver:
     """Return the driver that turns a cam; the cam itself where no single driver turns it all the way round.
 
-    Args:
-        plan: The plan of the mechanism.
-        placed: The cam.
-        paths: Of the drivers; None: the path is followed where it is needed.
-
+    paths: Of the drivers; None: the path is followed where it is needed.
     """
     drivers = plan.mechanism.drivers
     direct = _turns(drivers, placed)

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kinfmu.analysis.cam_driver import CamDriver, cam_driver
-from kinfmu.analysis.driver_path import DriverPath
-from kinfmu.analysis.values import degrees
+from kinfmu.analysis.driver_path import DriverPath, degrees
 from kinfmu.errors import KinfmuError, MechanismError, RequestError, listed, valid_names
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME

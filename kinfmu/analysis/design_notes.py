@@ -9,10 +9,9 @@ from itertools import combinations, pairwise
 from statistics import median_low
 from typing import Any, NamedTuple
 
-from kinfmu.analysis.driver_path import DriverPath
+from kinfmu.analysis.driver_path import DriverPath, law_values
 from kinfmu.analysis.loops import FourBar, Place, SliderCrank
 from kinfmu.analysis.transmission import NamedLoop
-from kinfmu.analysis.values import law_values
 from kinfmu.errors import listed
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME

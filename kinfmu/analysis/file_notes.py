@@ -7,9 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from kinfmu.analysis.driver_path import follow
+from kinfmu.analysis.driver_path import LOOKS, degrees, follow, law_values, value_text
 from kinfmu.analysis.singular import DriverRange, driver_range
-from kinfmu.analysis.values import LOOKS, degrees, law_values, value_text
 from kinfmu.errors import KinfmuError, listed
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME

@@ -24,10 +24,10 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import names_of_rows
 from kinfmu.mechanism.joints.cam import Cam
 from kinfmu.mechanism.laws import Spline
-from kinfmu.mechanism.loads.following import Following
+from kinfmu.mechanism.loads.load import Following
 from kinfmu.motion.cams import pressing_sign
 from kinfmu.motion.history import History
-from kinfmu.motion.motion import Motion, break_places, force_of
+from kinfmu.motion.motion import Motion, break_places
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import effort_noun
 from kinfmu.plan.undetermined import shared_reactions, unknown_contacts, why_unknown
@@ -140,12 +140,6 @@ def loading(plan: SolvePlan, ranges: Sequence[DriverRange], cams: Sequence[CamFi
     """Return the forces of a mechanism over its motion; None without masses and loads.
 
     They are those of the motion of `motion_of_check`.
-
-    Args:
-        plan: The plan of the mechanism.
-        ranges: Ranges of its drivers.
-        cams: Its cams.
-
     """
     mechanism = plan.mechanism
     if not (mechanism.has_masses or mechanism.loads):
@@ -173,7 +167,8 @@ def _over_motion(mechanism: Mechanism, ranges: Sequence[DriverRange], cams: Sequ
         if missing == len(run):
             return Loading(over, reason="no sample has numbers", missing=missing)
         forces = _Forces(run)
-        efforts = tuple(map(forces.peak, _efforts(mechanism)))
+        names = [f"{driver.name}.{effort_noun(driver.quantity.kind)}" for driver in mechanism.drivers]
+        efforts = tuple(map(forces.peak, names))
         loads = {load.name for load in mechanism.loads if load.columns}
         inertias = forces.ranges(name for name in run.force_names if name.noun.startswith("reduced_inertia"))
         of_loads = forces.ranges(name for name in run.force_names if name.owner in loads)
@@ -181,18 +176,9 @@ def _over_motion(mechanism: Mechanism, ranges: Sequence[DriverRange], cams: Sequ
         metre = METRES[mechanism.length_unit]
         gravity = None if mechanism.gravity is None else (mechanism.gravity.x * metre, mechanism.gravity.y * metre)
         reaction, lifts = forces.largest_reaction(), forces.lift_offs(cams)
-        return Loading(
-            over,
-            gravity,
-            efforts,
-            inertias,
-            of_loads,
-            reaction,
-            shaking,
-            missing=missing,
-            left_tables=tuple(forces.left_tables(mechanism)),
-            lift_offs=lifts,
-        )
+        left = tuple(forces.left_tables(mechanism))
+        found = Loading(over, gravity, efforts, inertias, of_loads, reaction, shaking, missing=missing)
+        return replace(found, left_tables=left, lift_offs=lifts)
     except KinfmuError as reason:
         return Loading("no motion", reason=str(reason))
 
@@ -208,10 +194,6 @@ def _with_breaks(run: Run, mechanism: Mechanism, arguments: dict[str, Any]) -> R
         if added:
             return solve(mechanism, **{**arguments, name: np.sort(np.concatenate([samples, added]))})
     return run
-
-
-def _efforts(mechanism: Mechanism) -> list[str]:
-    return [f"{driver.name}.{effort_noun(driver.quantity.kind)}" for driver in mechanism.drivers]
 
 
 class _Forces:
@@ -234,7 +216,7 @@ class _Forces:
         if len(run.input_names) == 3:
             driver, at_unit = run.input_names[0].driver, unit_of(run.input_names[0].quantity, run.length_unit)
         unit = next((place.unit for place in run.places() if place.name == name), "N")
-        return ForcePeak(name, value, unit, driver, at, at_unit, _rms(run, force_of(run, name)))
+        return ForcePeak(name, value, unit, driver, at, at_unit, _rms(run, np.asarray(run[name], dtype=float)))
 
     def ranges(self, names: Iterable[ForceName]) -> tuple[ForceRange, ...]:
         """Return the ranges of forces that have numbers."""
@@ -280,7 +262,7 @@ class _Forces:
 
     def _extremes(self, name: str) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the smallest and the largest value of a force, each with the driver value or time at which it is."""
-        run, values = self._run, force_of(self._run, name)
+        run, values = self._run, np.asarray(self._run[name], dtype=float)
         if self._motion is not None and np.isfinite(values).all():
             motion, history = self._motion, self._motion.history(name)
             low, high = history.extremes()
@@ -332,17 +314,10 @@ class LiftOff:
 
     def as_json(self) -> dict[str, Any]:
         """Return the values as plain data."""
-        return {
-            "joint": self.joint,
-            "force": self.force,
-            "sense": self.sense,
-            "unit": self.unit,
-            "driver": self.driver,
-            "at_unit": self.at_unit,
-            "parts": [{"begin": begin, "end": end} for begin, end in self.parts],
-            "extent": self.extent,
-            "largest_tension": {"value": self.largest, "at": self.at},
-        }
+        values = asdict(self)
+        tension = {"value": values.pop("largest"), "at": values.pop("at")}
+        parts = [{"begin": begin, "end": end} for begin, end in self.parts]
+        return {**values, "parts": parts, "largest_tension": tension}
 
 
 def lift_offs(motion: Motion, cams: Sequence[CamFindings]) -> Iterator[LiftOff]:

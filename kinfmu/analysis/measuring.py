@@ -15,7 +15,7 @@ from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.laws import ConstantSpeed, ConstantValue, External, Law, Polynomial
 from kinfmu.mechanism.laws.law import NEARLY
-from kinfmu.mechanism.loads.following import Following
+from kinfmu.mechanism.loads.load import Following
 from kinfmu.motion import MeasuredValue, measure
 from kinfmu.plan import SolvePlan
 from kinfmu.run import Run
@@ -47,11 +47,6 @@ def measurements(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> Measure
     """Measure the motion of a mechanism; None if it declares no measures.
 
     They are those of the motion of `motion_of_check`.
-
-    Args:
-        mechanism: The mechanism.
-        ranges: Ranges of its drivers.
-
     """
     if not mechanism.measures:
         return None
@@ -75,11 +70,8 @@ def motion_of_check(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> tupl
     """Return the motion of which `check` reports measures and forces, as `solve` takes it, and what it is as text.
 
     A single driver that turns all the way round makes one cycle if its speed is constant: at that speed, or at 1 rad/s
-    if the file does not move it. Any other motion is the run of the file: both are empty. `[run] over` chooses.
-
-    Raises:
-        RequestError: `[run] over` asks for a turn that the drivers cannot make.
-
+    if the file does not move it. Any other motion is the run of the file: both are empty. `[run] over` chooses. Raise a
+    RequestError if `[run] over` asks for a turn that the drivers cannot make.
     """
     inputs, over = _cycle(mechanism, ranges)
     if inputs and (mechanism.loads or mechanism.has_masses) and (speed := constant_speed(mechanism.drivers[0].law)):
@@ -121,11 +113,7 @@ def turns_of_cycle(mechanism: Mechanism, turns: int) -> int:
 def driver_cycle(plan: SolvePlan) -> tuple[dict[str, Any], str]:
     """Return the driver values of one cycle of a single driver, as `solve` takes them, and what it is as text.
 
-    Both are empty if the driver does not turn all the way round.
-
-    Raises:
-        KinfmuError: The driver cannot be followed.
-
+    Both are empty if the driver does not turn all the way round. Raise a KinfmuError if the driver cannot be followed.
     """
     return _cycle(plan.mechanism, [driver_range(follow(plan, 0))])
 

@@ -109,21 +109,8 @@ def check(mechanism: Mechanism, *, written: Mechanism | None = None) -> Report:
     cut = next((problem for problem in (cam.problem() for cam in cams) if problem is not None), None)
     measured = measurements(mechanism, ranges)
     forces = loading(plan, ranges, cams)
-    return Report(
-        mechanism,
-        redundancy,
-        cut,
-        plan,
-        ranges,
-        loops,
-        None,
-        tuple(notes),
-        measured,
-        forces,
-        cams,
-        dyads=further,
-        toggles=toggle_positions(mechanism, paths, loops),
-    )
+    report = Report(mechanism, redundancy, cut, plan, ranges, loops, None, tuple(notes), measured, forces, cams)
+    return replace(report, dyads=further, toggles=toggle_positions(mechanism, paths, loops))
 
 
 def leaving_out(report: Report, problem: KinfmuError, left_out: tuple[str, ...]) -> Report:

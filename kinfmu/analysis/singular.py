@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from kinfmu.analysis.driver_path import DriverPath
-from kinfmu.analysis.values import driver_text
+from kinfmu.analysis.driver_path import DriverPath, driver_text
 from kinfmu.arrays import FloatArray
 from kinfmu.errors import listed
 from kinfmu.plan import SolvePlan, localized
@@ -55,12 +54,7 @@ class LimitPosition:
 
     def as_json(self) -> dict[str, Any]:
         """Return the limit as plain data."""
-        return {
-            "value": self.value,
-            "kind": self.kind,
-            "bodies": list(self.bodies),
-            "coordinates": dict(self.coordinates),
-        }
+        return asdict(self) | {"bodies": list(self.bodies)}
 
 
 @dataclass(frozen=True)
@@ -113,15 +107,10 @@ class DriverRange:
 def driver_range(path: DriverPath) -> DriverRange:
     """Return the singular points and limits of a path."""
     limits = [limit for limit in (path.low, path.high) if limit is not None]
-    found = [
-        SingularPoint(
-            limit.u[0],
-            "change point" if _kind(limit) == "change point" else "limit",
-            max(limit.block, -1) + 1,
-            path.name,
-        )
-        for limit in limits
-    ]
+    found = []
+    for limit in limits:
+        kind = "change point" if _kind(limit) == "change point" else "limit"
+        found.append(SingularPoint(limit.u[0], kind, max(limit.block, -1) + 1, path.name))
     found += [
         _change_point(path, bridge)
         for bridge in path.bridges
@@ -159,7 +148,8 @@ def _kind(limit: Limit) -> str:
 def _change_point(path: DriverPath, bridge: Bridge) -> SingularPoint:
     """Return the zero of the determinant inside a bridge's window, by ternary search of its magnitude."""
     low, high = bridge.centre - 0.999 * bridge.half, bridge.centre + 0.999 * bridge.half
-    block = _block(bridge)
+    held = [block for block in range(len(bridge.nodes[2].determinants)) if bridge.span.held >> block & 1]
+    block = min(held, key=lambda block: abs(bridge.nodes[2].determinants[block]))  # of several interpolated ones
     for _ in range(90):
         third = (high - low) / 3.0
         if _determinant(bridge, low + third, block) < _determinant(bridge, high - third, block):
@@ -167,12 +157,6 @@ def _change_point(path: DriverPath, bridge: Bridge) -> SingularPoint:
         else:
             low += third
     return SingularPoint(0.5 * (low + high), "change point", block + 1, path.name)
-
-
-def _block(bridge: Bridge) -> int:
-    """Return the interpolated block; of several, the one with the smallest determinant near the point."""
-    held = [block for block in range(len(bridge.nodes[2].determinants)) if bridge.span.held >> block & 1]
-    return min(held, key=lambda block: abs(bridge.nodes[2].determinants[block]))
 
 
 def _determinant(bridge: Bridge, u: float, block: int) -> float:

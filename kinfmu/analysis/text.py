@@ -8,12 +8,12 @@ from functools import partial
 from typing import NamedTuple
 
 from kinfmu.analysis.cams import cam_lines
+from kinfmu.analysis.driver_path import degrees, driver_text, multiple_of_pi, place_text, value_text
 from kinfmu.analysis.findings import Findings
-from kinfmu.analysis.loading import ForcePeak, LeftTable, LiftOff, UnknownContact
+from kinfmu.analysis.loading import ForcePeak, ForceRange, LeftTable, LiftOff, UnknownContact
 from kinfmu.analysis.loops import FourBar, Link, SliderCrank
 from kinfmu.analysis.singular import DriverRange, LimitPosition
 from kinfmu.analysis.transmission import NamedLoop, TransmissionRange
-from kinfmu.analysis.values import degrees, driver_text, multiple_of_pi, place_text, value_text
 from kinfmu.errors import MOST_SHOWN, listed, some
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.measures import counted_from
@@ -65,9 +65,8 @@ def _rest(parts: Sized, most: int, what: str) -> Iterator[ReportLine]:
 def _count(report: Findings) -> Iterator[ReportLine]:
     mechanism = report.mechanism
     rows = sum(len(joint.labels) for joint in mechanism.joints)
-    yield ReportLine(
-        "bodies", f"{len(mechanism.moving_bodies)} moving: {some(b.name for b in mechanism.moving_bodies)}"
-    )
+    moving = mechanism.moving_bodies
+    yield ReportLine("bodies", f"{len(moving)} moving: {some(body.name for body in moving)}")
     yield ReportLine("joint rows", f"{rows} over {len(mechanism.coordinate_names)} coordinates")
     driven = [f"driven by {some(driver.name for driver in mechanism.drivers)}"] if mechanism.drivers else []
     invalid = [name for name in report.left_out if name.startswith("[drivers")]
@@ -120,9 +119,8 @@ def _advice(report: Findings) -> Iterator[ReportLine]:
         cure = "drive another quantity" if advice.missing else "remove it"
         yield ReportLine("surplus", f"driver {surplus.name}: {by} determine what it drives; {cure}")
     if advice.missing:
-        more = (
-            f"{advice.missing} more driver{'s' * (advice.missing > 1)} needed" if report.mobility else "nothing drives"
-        )
+        needed = f"{advice.missing} more driver{'s' * (advice.missing > 1)} needed"
+        more = needed if report.mobility else "nothing drives"
         yield ReportLine("loose", f"{some(advice.loose)}: {more}")
     for name in advice.stiff:
         yield ReportLine("could be", f'[joints.{name}] type = "revolute" in place of "fixed", which leaves no motion')
@@ -224,19 +222,14 @@ def _transmission(angle: TransmissionRange, unit: str) -> str:
         for u in (angle.at_smallest, angle.at_largest)
     ]
     span = f"{degrees(angle.smallest)} ({at[0]}) to {degrees(angle.largest)} ({at[1]})"
-    verdict = {
-        "good": "good",
-        "poor": "poor (40 deg from 0 and 180 deg is usual)",
-        "locks": _in_line(angle),
-    }
+    verdict = {"good": "good", "poor": "poor (40 deg from 0 and 180 deg is usual)", "locks": _in_line(angle)}
     return f"transmission angle {span}: {verdict[angle.verdict]}"
 
 
 def _in_line(angle: TransmissionRange) -> str:
     """Return the position of the links at a transmission angle of 0 or 180 degrees."""
-    if angle.is_slide:
-        return f"{angle.coupler} is perpendicular to the slide"
-    return f"{angle.coupler} and {angle.output} fall in line"
+    both = f"{angle.coupler} and {angle.output} fall in line"
+    return f"{angle.coupler} is perpendicular to the slide" if angle.is_slide else both
 
 
 def _motion(report: Findings) -> Iterator[ReportLine]:
@@ -259,10 +252,9 @@ def _toggles(report: Findings) -> Iterator[ReportLine]:
 
 
 def _cams(report: Findings) -> Iterator[ReportLine]:
-    for k, cam in enumerate(report.cams):
-        texts = cam_lines(cam)
-        for text in texts:
-            yield ReportLine("cam" if k == 0 and text is texts[0] else "", text)
+    texts = [text for cam in report.cams for text in cam_lines(cam)]
+    for k, text in enumerate(texts):
+        yield ReportLine("" if k else "cam", text)
 
 
 def _measures(report: Findings) -> Iterator[ReportLine]:
@@ -271,9 +263,8 @@ def _measures(report: Findings) -> Iterator[ReportLine]:
         return
     yield ReportLine("measures", f"over {measured.over}{_without_loads(report)}")
     for value in measured.values:
-        yield ReportLine(
-            "", f"{value.name} = {measured_text(value)}" if not value.reason else _no_value(value.name, value.reason)
-        )
+        text = _no_value(value.name, value.reason) if value.reason else f"{value.name} = {measured_text(value)}"
+        yield ReportLine("", text)
     for name, reason in measured.refused.items():
         yield ReportLine("", _no_value(name, reason))
 
@@ -291,30 +282,27 @@ def _forces(report: Findings) -> Iterator[ReportLine]:
     for effort in loading.efforts:
         yield ReportLine("", f"{effort.name}: peak {_peak_text(effort)}, rms {effort.rms:.6g} {effort.unit}")
     for inertia in loading.inertias:
-        ends = f"{inertia.smallest:.6g} to {inertia.largest:.6g} {inertia.unit}"
-        yield ReportLine("", f"{inertia.name}: {ends}")
+        yield ReportLine("", f"{inertia.name}: {_extent(inertia)}")
     for of_effort, of_quantity in zip(loading.loads[::2], loading.loads[1::2], strict=True):
         name, _, noun = of_effort.name.rpartition(".")
-        ends = f"{noun} {of_effort.smallest:.6g} to {of_effort.largest:.6g} {of_effort.unit}"
-        noun = of_quantity.name.rpartition(".")[2]
-        unit = of_quantity.unit
-        yield ReportLine("", f"{name}: {ends}, {noun} {of_quantity.smallest:.6g} to {of_quantity.largest:.6g} {unit}")
+        quantity = f"{of_quantity.name.rpartition('.')[2]} {_extent(of_quantity)}"
+        yield ReportLine("", f"{name}: {noun} {_extent(of_effort)}, {quantity}")
     if loading.reaction is not None:
         yield ReportLine("", f"largest reaction: {loading.reaction.name} {_peak_text(loading.reaction)}")
-    for peak in loading.shaking:
-        yield ReportLine("", f"{peak.name}: peak {_peak_text(peak)}")
-    for one in loading.left_tables:
-        yield ReportLine("", _left_table_text(one))
-    for lift in loading.lift_offs:
-        yield ReportLine("", _lift_off_text(lift))
-    for contact in loading.unknown_contacts:
-        yield ReportLine("", contact_text(contact))
+    texts = [f"{peak.name}: peak {_peak_text(peak)}" for peak in loading.shaking]
+    texts += [*map(_left_table_text, loading.left_tables), *map(_lift_off_text, loading.lift_offs)]
+    for text in (*texts, *map(contact_text, loading.unknown_contacts)):
+        yield ReportLine("", text)
     redundant = {row.row.name: row.row.owner for row in report.redundant}
     for names, rows in loading.undetermined:
         others = [row for row in rows if row in redundant]
         joints = {redundant[row] for row in others}
         shared = [name for name in names if name.partition(".")[0] not in joints]
         yield ReportLine("", f"statically indeterminate: {some(shared)} share the load with {some(others)}")
+
+
+def _extent(span: ForceRange) -> str:
+    return f"{span.smallest:.6g} to {span.largest:.6g} {span.unit}"
 
 
 def _left_table_text(one: LeftTable) -> str:
@@ -385,14 +373,10 @@ def _change_points(report: Findings, reach: DriverRange, several: bool) -> Itera
     changes = [point.value for point in reach.points if point.kind == "change point" and point.value not in ends]
     if changes:
         places = some(value_text(value, report.mechanism.length_unit, reach.kind) for value in changes)
-        every = "k pi: " if reach.turns == 1 and _all_multiples_of_pi(changes) else ""
+        turned = {multiple_of_pi(value % math.tau) for value in changes}
+        every = "k pi: " if reach.turns == 1 and len(changes) == 2 and turned <= {"0", "pi", "2 pi"} else ""
         goes_on = "with several drivers no run can cross it" if several else "the motion goes on (bridged)"
         yield ReportLine("singular", f"{reach.driver} = {every}{places}; branches cross, {goes_on}")
-
-
-def _all_multiples_of_pi(values: list[float]) -> bool:
-    """Return True for 0 and pi, modulo whole turns: k pi for every integer k."""
-    return len(values) == 2 and {multiple_of_pi(value % math.tau) for value in values} <= {"0", "pi", "2 pi"}
 
 
 def _range(report: Findings, reach: DriverRange) -> Iterator[ReportLine]:
@@ -400,26 +384,23 @@ def _range(report: Findings, reach: DriverRange) -> Iterator[ReportLine]:
     seen = [value_text(end, unit, reach.kind) for end in reach.reach]
     limits = reach.limits
     ends = [value_text(limit.value, unit, reach.kind) for limit in limits]
+    kinds = [_END[limit.kind] for limit in limits]
     if reach.stopped is not None:
-        yield ReportLine("range", f"{reach.driver} was followed from {seen[0]} to {seen[1]}; then: {reach.stopped}")
+        text = f" was followed from {seen[0]} to {seen[1]}; then: {reach.stopped}"
+    elif all(limit.kind == "dead centre" for limit in limits) and len(limits) == 2:
+        text = f" from {ends[0]} to {ends[1]}; dead centre at each limit"
     elif len(limits) == 2:
-        low, high = (_END[limit.kind] for limit in limits)
-        if limits[0].kind == limits[1].kind == "dead centre":
-            yield ReportLine("range", f"{reach.driver} from {ends[0]} to {ends[1]}; dead centre at each limit")
-        else:
-            yield ReportLine("range", f"{reach.driver} from {ends[0]}, {low}, to {ends[1]}, {high}")
+        text = f" from {ends[0]}, {kinds[0]}, to {ends[1]}, {kinds[1]}"
     elif reach.lowest is not None:
-        yield ReportLine("range", f"{reach.driver} from {ends[0]}, {_END[limits[0].kind]}; no limit up to {seen[1]}")
+        text = f" from {ends[0]}, {kinds[0]}; no limit up to {seen[1]}"
     elif reach.highest is not None:
-        yield ReportLine("range", f"{reach.driver} up to {ends[0]}, {_END[limits[0].kind]}; no limit down to {seen[0]}")
-    elif reach.turns == 1:
-        yield ReportLine("range", f"{reach.driver} turns all the way round")
+        text = f" up to {ends[0]}, {kinds[0]}; no limit down to {seen[0]}"
     elif reach.turns is not None:
-        yield ReportLine(
-            "range", f"{reach.driver} turns all the way round; the mechanism repeats after {reach.turns} turns"
-        )
+        repeats = f"; the mechanism repeats after {reach.turns} turns" if reach.turns > 1 else ""
+        text = f" turns all the way round{repeats}"
     else:
-        yield ReportLine("range", f"{reach.driver}: no limit from {seen[0]} to {seen[1]}")
+        text = f": no limit from {seen[0]} to {seen[1]}"
+    yield ReportLine("range", f"{reach.driver}{text}")
     for limit, end in zip(limits, ends, strict=True):
         if limit.bodies:
             yield ReportLine("", f"at {end} {_limit_reason(report, reach, limit)}")
@@ -427,9 +408,8 @@ def _range(report: Findings, reach: DriverRange) -> Iterator[ReportLine]:
 
 def _limit_reason(report: Findings, reach: DriverRange, limit: LimitPosition) -> str:
     """Return the reason of a limit: two links in line, or bodies that can move."""
-    angles = [one.transmission for one in report.loops] + [one.transmission for one in report.dyads]
-    for found in angles:
-        for angle in found:
-            if angle.driver == reach.driver and limit.value in angle.in_line_at:
-                return _in_line(angle)
+    angles = [angle for named in report.loops for angle in named.transmission]
+    for angle in angles + [angle for named in report.dyads for angle in named.transmission]:
+        if angle.driver == reach.driver and limit.value in angle.in_line_at:
+            return _in_line(angle)
     return f"{some(limit.bodies)} can move while {reach.driver} is fixed"

@@ -76,16 +76,8 @@ class TransmissionRange:
 
     def as_json(self) -> dict[str, Any]:
         """Return the extremes as plain data."""
-        return {
-            "driver": self.driver,
-            "coupler": self.coupler,
-            "output": self.output,
-            "smallest": self.smallest,
-            "at_smallest": self.at_smallest,
-            "largest": self.largest,
-            "at_largest": self.at_largest,
-            "verdict": self.verdict,
-        }
+        keys = ("driver", "coupler", "output", "smallest", "at_smallest", "largest", "at_largest", "verdict")
+        return {key: getattr(self, key) for key in keys}
 
 
 class _Cosine(NamedTuple):
@@ -332,7 +324,12 @@ def find_named_loops(
     """
     four_bars, slider_cranks = named_loops(mechanism, {row.row.owner for row in redundancy.dependent})
     followed = paths if len(mechanism.coordinate_names) <= MOST else ()
-    return (*_four_bars(mechanism, four_bars, paths, followed), *_slider_cranks(slider_cranks, followed))
+    found = [*_four_bars(mechanism, four_bars, paths, followed)]
+    for loop in slider_cranks:
+        angles = (transmission_angle(path, loop) for path in followed)
+        kind = slider_crank_class(loop.crank.length, loop.rod.length, loop.offset)
+        found.append(NamedLoop(loop, kind, tuple(angle for angle in angles if angle is not None)))
+    return tuple(found)
 
 
 def _four_bars(
@@ -350,13 +347,6 @@ def _four_bars(
         if kind.shape == "parallelogram" and assembly == "crossed":
             kind = replace(kind, shape="antiparallelogram")
         yield NamedLoop(read, kind, tuple(angle for angle in angles if angle is not None), assembly)
-
-
-def _slider_cranks(loops: Sequence[SliderCrank], followed: Sequence[DriverPath]) -> Iterator[NamedLoop]:
-    for loop in loops:
-        angles = (transmission_angle(path, loop) for path in followed)
-        kind = slider_crank_class(loop.crank.length, loop.rod.length, loop.offset)
-        yield NamedLoop(loop, kind, tuple(angle for angle in angles if angle is not None))
 
 
 @dataclass(frozen=True)
@@ -394,14 +384,11 @@ def find_dyads(
     if len(mechanism.coordinate_names) > MOST or not paths:
         return ()
     known = {frozenset((angle.coupler, angle.output)) for loop in loops for angle in loop.transmission}
-    return tuple(_found(dyads(mechanism, {row.row.owner for row in redundancy.dependent}), paths, known))
-
-
-def _found(candidates: Sequence[Dyad], paths: Sequence[DriverPath], known: set[frozenset[str]]) -> Iterator[NamedDyad]:
-    for dyad in candidates:
+    found = []
+    for dyad in dyads(mechanism, {row.row.owner for row in redundancy.dependent}):
         key = frozenset((dyad.first.name, dyad.second.name))
-        results = [] if key in known else [dyad_angle(path, dyad) for path in paths]
-        found = [result for result in results if result is not None]
-        if found:
+        angles = [] if key in known else [angle for path in paths if (angle := dyad_angle(path, dyad)) is not None]
+        if angles:
             known.add(key)
-            yield NamedDyad(dyad, found[0][1], tuple(angle for angle, _ in found))
+            found.append(NamedDyad(dyad, angles[0][1], tuple(angle for angle, _ in angles)))
+    return tuple(found)

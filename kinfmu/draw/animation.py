@@ -22,7 +22,7 @@ from kinfmu.draw.scene.instant import Instant
 from kinfmu.draw.scene.placing import poses_of, remedy, world
 from kinfmu.draw.scene.shapes import shapes
 from kinfmu.draw.sheet import GREY, PAPER, Sheet, ink
-from kinfmu.draw.writing import figure_style, write_bytes
+from kinfmu.draw.writing import check_suffix, figure_style, write_bytes
 from kinfmu.errors import FigureError, MechanismError, MissingPackageError, listed
 from kinfmu.files import suffix_of, temporary_folder
 from kinfmu.mechanism import Mechanism
@@ -97,8 +97,7 @@ def animate(run: Run, path: str | Path, *, width: int | None = None) -> None:
 
     """
     path = Path(path)
-    if suffix_of(path) not in SUFFIXES:
-        raise FigureError(f"{path}: '{path.suffix}' is not a known format of animations; known: {listed(SUFFIXES)}")
+    check_suffix(path, SUFFIXES, "animations")
     if width is not None and (isinstance(width, bool) or not isinstance(width, int) or width < NARROWEST):
         raise FigureError(f"{path}: width {width!r} must be a whole number of pixels, {NARROWEST} or more")
     is_video = suffix_of(path) == ".mp4"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,12 +9,11 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.draw.chart import SMALL, degree_ticks, dress
-from kinfmu.draw.dxf_file import DXF_UNITS, POINT_STYLE, without_date
+from kinfmu.draw.dxf_file import imported_ezdxf, written_drawing
 from kinfmu.draw.marks import COLOUR
 from kinfmu.draw.scene import palette
-from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, arc, ink
-from kinfmu.draw.writing import SUFFIXES, write, write_bytes
-from kinfmu.errors import FigureError, MissingPackageError, listed
+from kinfmu.draw.sheet import GREY, INK, arc, ink, titled_figure
+from kinfmu.draw.writing import SUFFIXES, check_suffix, write
 from kinfmu.files import suffix_of
 from kinfmu.motion.cams import CamProfile
 
@@ -51,29 +48,19 @@ def cam(profile: CamProfile, path: str | Path) -> None:
 
     """
     path = Path(str(path))
+    check_suffix(path, (*SUFFIXES, _DXF), "cam profiles")
     if suffix_of(path) == _DXF:
-        write_bytes(path, _drawing(profile, path).encode())
-    elif suffix_of(path) in SUFFIXES:
-        write(path, lambda: _figure(profile))
+        _write_drawing(profile, path)
     else:
-        raise FigureError(
-            f"{path}: '{path.suffix}' is not a known format of cam profiles; known: {listed((*SUFFIXES, _DXF))}"
-        )
+        write(path, lambda: _figure(profile))
 
 
 def _base_radius(profile: CamProfile) -> float:
-    """Return the radius of the base circle: the smallest distance of the profile from the axle."""
     return float(np.hypot(*(profile.profile - profile.axle).T).min())
 
 
-def _drawing(profile: CamProfile, path: Path) -> str:
-    try:
-        ezdxf: Any = import_module("ezdxf")
-    except ImportError:
-        raise MissingPackageError(f"{path}: a DXF file needs ezdxf: pip install 'kinfmu[dxf]'") from None
-    with without_date(ezdxf):
-        drawing = ezdxf.new("R2010", units=DXF_UNITS.get(profile.length_unit, 0))
-        drawing.header["$PDMODE"] = POINT_STYLE
+def _write_drawing(profile: CamProfile, path: Path) -> None:
+    with written_drawing(imported_ezdxf(path), path, profile.length_unit) as drawing:
         space, axle = drawing.modelspace(), tuple(map(float, profile.axle))
         for layer, curve in (("PROFILE", profile.profile), ("PITCH", profile.pitch)):
             if curve is not None:
@@ -83,9 +70,6 @@ def _drawing(profile: CamProfile, path: Path) -> str:
             drawing.layers.add(layer)
         space.add_circle(axle, _base_radius(profile), dxfattribs={"layer": "BASE"})
         space.add_point(axle, dxfattribs={"layer": "AXLE"})
-        text = io.StringIO()
-        drawing.write(text)
-        return text.getvalue()
 
 
 def _open(curve: FloatArray) -> FloatArray:
@@ -95,15 +79,10 @@ def _open(curve: FloatArray) -> FloatArray:
 
 
 def _figure(profile: CamProfile) -> Figure:
-    from matplotlib.figure import Figure
-
     width = _LEFT + _FIGURE + _GAP + _PLOT[0] + _EDGE
     height = _TOP + _FIGURE + _BOTTOM
-    made = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
-    look: dict[str, Any] = {"fontsize": TITLE_FONT, "va": "top", "color": ink(INK), "parse_math": False}
-    title = f"{profile.cam}, {'flat face' if profile.pitch is None else f'roller {profile.roller_radius:.4g} '}"
-    title += "" if profile.pitch is None else profile.length_unit
-    made.text(_EDGE / width, 1.0 - _EDGE / height, f"{title}: joint {profile.joint}", **look)
+    element = "flat face" if profile.pitch is None else f"roller {profile.roller_radius:.4g} {profile.length_unit}"
+    made = titled_figure(width, height, [f"{profile.cam}, {element}: joint {profile.joint}"], _EDGE)
     axes = made.add_axes((_LEFT / width, _BOTTOM / height, _FIGURE / width, _FIGURE / height))
     _outline(axes, profile)
     left = (_LEFT + _FIGURE + _GAP) / width
@@ -130,9 +109,8 @@ def _outline(axes: Axes, profile: CamProfile) -> None:
     if profile.pitch is not None:
         axes.plot(*profile.pitch.T, color=ink(GREY), lw=0.8, ls="--", label="pitch curve")
         if profile.roller_radius:
-            axes.plot(
-                *(profile.pitch[0] + profile.roller_radius * circle).T, color=ink(INK), lw=1.0, label=f"roller {first}"
-            )
+            roller = profile.pitch[0] + profile.roller_radius * circle
+            axes.plot(*roller.T, color=ink(INK), lw=1.0, label=f"roller {first}")
     else:
         along = profile.face[0]
         ends = np.array([profile.offset.min(), profile.offset.max()]) - profile.offset[0]

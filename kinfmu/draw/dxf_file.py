@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from itertools import pairwise
@@ -16,11 +16,11 @@ from kinfmu.arrays import FloatArray
 from kinfmu.draw.animation import placed_run
 from kinfmu.draw.drawing import placed
 from kinfmu.draw.scene.instant import Instant
+from kinfmu.draw.scene.palette import Colour
 from kinfmu.draw.scene.placing import poses_after, poses_of
 from kinfmu.draw.scene.shapes import shapes
-from kinfmu.draw.writing import write_bytes
+from kinfmu.draw.writing import check_suffix, write_bytes
 from kinfmu.errors import FigureError, MissingPackageError
-from kinfmu.files import suffix_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.laws import External
@@ -59,30 +59,21 @@ def dxf(run: Run, path: str | Path, at: float | None = None) -> None:
 
     """
     path = Path(str(path))
-    if suffix_of(path) != ".dxf":
-        raise FigureError(f"{path}: '{path.suffix}' is not a known format of CAD drawings; known: .dxf")
+    check_suffix(path, (".dxf",), "CAD drawings")
     good = np.flatnonzero(run.good)
     if not len(good):
         raise FigureError(f"{path}: the run has no sample with numbers to draw")
-    try:
-        ezdxf: Any = import_module("ezdxf")
-    except ImportError:
-        raise MissingPackageError(f"{path}: a DXF file needs ezdxf: pip install 'kinfmu[dxf]'") from None
+    ezdxf = imported_ezdxf(path)
     mechanism, poses = placed_run(run, path)
     drawn = {body: pose[good[:1]] for body, pose in poses.items()} if at is None else pose_at(run, mechanism, at, path)
-    shown = Instant(mechanism, drawn, {})
-    with without_date(ezdxf):
-        text = _drawing(ezdxf, shown, mechanism.length_unit)
-    write_bytes(path, text.encode())
+    with written_drawing(ezdxf, path, mechanism.length_unit) as drawing:
+        _fill(drawing, Instant(mechanism, drawn, {}), ezdxf.rgb2int)
 
 
-def _drawing(ezdxf: Any, shown: Instant, length_unit: str) -> str:
-    """Return the text of the drawing."""
-    drawing = ezdxf.new("R2010", units=DXF_UNITS.get(length_unit, 0))
-    drawing.header["$PDMODE"] = POINT_STYLE
+def _fill(drawing: Any, shown: Instant, colour_number: Callable[[Colour], int]) -> None:
     space = drawing.modelspace()
     for body in (GROUND_NAME, *(body.name for body in shown.mechanism.moving_bodies)):
-        drawing.layers.add(body, true_color=ezdxf.rgb2int(shown.colour(body)))
+        drawing.layers.add(body, true_color=colour_number(shown.colour(body)))
     drawn = [shape for shape in placed(shown, shapes(shown)) if shape.kind in _DRAWN]
     extent = float(np.ptp(np.concatenate([shape.points for shape in drawn]), axis=0).max()) if drawn else 0.0
     lines: dict[str, Lines] = {}
@@ -99,34 +90,39 @@ def _drawing(ezdxf: Any, shown: Instant, length_unit: str) -> str:
         space.add_circle((x, y), radius, dxfattribs={"layer": layer})
     for name in shown.body_points:
         space.add_point(tuple(map(float, shown.point(name))), dxfattribs={"layer": body_of(name)})
-    text = io.StringIO()
-    drawing.write(text)
-    return text.getvalue()
+
+
+def imported_ezdxf(path: Path) -> Any:
+    """Return the package ezdxf; MissingPackageError about `path` if it is not installed."""
+    try:
+        return import_module("ezdxf")
+    except ImportError:
+        raise MissingPackageError(f"{path}: a DXF file needs ezdxf: pip install 'kinfmu[dxf]'") from None
 
 
 @contextmanager
-def without_date(ezdxf: Any) -> Iterator[None]:
-    """Let ezdxf write no dates and no random identifiers in this block."""
+def written_drawing(ezdxf: Any, path: Path, length_unit: str) -> Iterator[Any]:
+    """Give this block an empty drawing, and write it into a file, without dates and random identifiers."""
     before = ezdxf.options.write_fixed_meta_data_for_testing
     ezdxf.options.write_fixed_meta_data_for_testing = True
     try:
-        yield
+        drawing = ezdxf.new("R2010", units=DXF_UNITS.get(length_unit, 0))
+        drawing.header["$PDMODE"] = POINT_STYLE
+        yield drawing
+        text = io.StringIO()
+        drawing.write(text)
     finally:
         ezdxf.options.write_fixed_meta_data_for_testing = before
+    write_bytes(path, text.getvalue().encode())
 
 
 def pose_at(run: Run, mechanism: Mechanism, at: float, path: Path) -> dict[str, FloatArray]:
     """Return poses (1, 3) by body and for the ground.
 
-    Args:
-        run: The run, with a sample at least.
-        mechanism: Its mechanism.
-        at: Value on the axis of the run, in the unit of `axis_of`.
-        path: The file to draw, for messages.
+    Raise a FigureError if the value is outside the run, in a gap, or its pose cannot be solved.
 
-    Raises:
-        FigureError: The value is outside the run, in a gap, or its pose cannot be solved.
-
+    run: The run, with a sample at least. at: Value on the axis of the run, in the unit of `axis_of`. path: The file to
+    draw, for messages.
     """
     axis = axis_of(run)
     asked = f"at t = {at:g} s" if axis.is_time else f"at {axis.name} = {at:.9g} {axis.unit}".rstrip()
@@ -179,9 +175,7 @@ def _driver_values(run: Run, mechanism: Mechanism, axis: Axis, at: float, row: i
 class Lines:
     """The straight lines of a layer.
 
-    Args:
-        extent: Of the drawing.
-
+    extent: Of the drawing.
     """
 
     def __init__(self, extent: float) -> None:

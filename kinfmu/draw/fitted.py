@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -62,10 +62,8 @@ class Fitted(NamedTuple):
 def fitted(path: str | Path | None, ax: Axes | None, content: Callable[[], Fitted]) -> None:
     """Draw a fitted mechanism.
 
-    Args:
-        path: The .svg or .png file.
-        ax: Axes to draw into, in place of a file: the mechanism and curves, or the first chart without curves.
-        content: Returns what is drawn.
+    path: The .svg or .png file. ax: Axes to draw into, in place of a file: the mechanism and curves, or the first chart
+    without curves. content: Returns what is drawn.
 
     Raises:
         FigureError: As in `figure`.
@@ -158,16 +156,18 @@ def _enlarged(axes: Axes, curve: Curve, unit: str) -> None:
     axes.set_xlim(low[0] - space, high[0] + space)
     axes.set_ylim(low[1] - space, high[1] + space)
     axes.set_aspect("equal", adjustable="box")
-    axes.set_xlabel(f"x [{unit}]", fontsize=SMALL)
-    axes.set_ylabel(f"y [{unit}]", fontsize=SMALL)
-    axes.legend(loc="best", fontsize=SMALL, frameon=True, framealpha=0.85, edgecolor="none")
+    _label(axes, f"x [{unit}]", f"y [{unit}]")
 
 
 def _chart(axes: Axes, chart: Chart) -> None:
     dress(axes, chart.curve.name)
     _draw(axes, chart.curve)
-    axes.set_xlabel(chart.labels[0], fontsize=SMALL)
-    axes.set_ylabel(chart.labels[1], fontsize=SMALL)
+    _label(axes, *chart.labels)
+
+
+def _label(axes: Axes, x: str, y: str) -> None:
+    axes.set_xlabel(x, fontsize=SMALL)
+    axes.set_ylabel(y, fontsize=SMALL)
     axes.legend(loc="best", fontsize=SMALL, frameon=True, framealpha=0.85, edgecolor="none")
 
 
@@ -177,13 +177,6 @@ def _draw(axes: Axes, curve: Curve, marker: float = _MARKER) -> None:
     for wanted, reached in zip(curve.wanted, curve.reached, strict=True):
         axes.plot(*np.array([wanted, reached]).T, color=ink(WANTED), linewidth=0.8, zorder=901.0)
     axes.plot(*curve.reached.T, ".", color=ink(REACHED), markersize=0.8 * marker, zorder=902.0)
-    axes.plot(
-        *curve.wanted.T,
-        "o",
-        markerfacecolor="none",
-        markeredgecolor=ink(WANTED),
-        markersize=marker,
-        markeredgewidth=min(1.0, 0.2 * marker),
-        zorder=903.0,
-        label=f"{curve.name}: wanted",
-    )
+    look: dict[str, Any] = {"markerfacecolor": "none", "markeredgecolor": ink(WANTED), "markersize": marker}
+    look |= {"markeredgewidth": min(1.0, 0.2 * marker), "zorder": 903.0}
+    axes.plot(*curve.wanted.T, "o", label=f"{curve.name}: wanted", **look)

@@ -62,9 +62,6 @@ class Pin(Mark):
     text: str
     colour: palette.Colour | None
 
-    def extent(self) -> FloatArray:
-        return self.at[None]
-
     def draw(self, sheet: Sheet) -> list[Name]:
         size = BAR * sheet.fine * sheet.point
         if self.kind == "pin":
@@ -86,14 +83,14 @@ class Pin(Mark):
 class PathMark(Mark):
     """The path of a point of interest over the run: points (n, 2), NaN in gaps."""
 
-    points: FloatArray
+    at: FloatArray
     colour: palette.Colour
 
     def extent(self) -> FloatArray:
-        return self.points[np.isfinite(self.points).all(axis=1)]
+        return self.at[np.isfinite(self.at).all(axis=1)]
 
     def draw(self, sheet: Sheet) -> list[Name]:
-        sheet.track(self.points, 0.9, self.colour)
+        sheet.track(self.at, 0.9, self.colour)
         return []
 
 
@@ -170,24 +167,16 @@ class Turn(Mark):
     """A curved arrow about a pin; sense: 1.0 counter-clockwise, -1.0 clockwise; heading: of the driven body [rad]."""
 
     text: str
-    centre: FloatArray
+    at: FloatArray
     sense: float
     heading: float
 
-    def extent(self) -> FloatArray:
-        return self.centre[None]
-
     def draw(self, sheet: Sheet) -> list[Name]:
-        route = self._route(sheet)
-        return _driving_arrow(sheet, route, self.text, route[[len(route) // 2, -1, 0]])
-
-    def _route(self, sheet: Sheet) -> FloatArray:
-        """Return the arc that covers least; the first one compared begins just ahead of the body."""
         radii = [radius * sheet.ornament for radius in _RADII]
         starts = [self.heading + self.sense * (math.radians(25.0) + k * math.tau / _TRIES) for k in range(_TRIES)]
-        return _freest(
-            sheet, [arc(self.centre, radius, start, start + self.sense * _TURN) for radius in radii for start in starts]
-        )
+        arcs = [arc(self.at, radius, start, start + self.sense * _TURN) for radius in radii for start in starts]
+        route = _freest(sheet, arcs)  # the first one compared begins just ahead of the body
+        return _driving_arrow(sheet, route, self.text, route[[len(route) // 2, -1, 0]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,34 +187,25 @@ class Push(Mark):
     at: FloatArray
     along: FloatArray
 
-    def extent(self) -> FloatArray:
-        return self.at[None]
-
     def draw(self, sheet: Sheet) -> list[Name]:
-        route = self._route(sheet)
-        return _driving_arrow(sheet, route, self.text, np.array([route.mean(axis=0), *route[::-1]]))
-
-    def _route(self, sheet: Sheet) -> FloatArray:
         size = sheet.ornament
         across = np.array([-self.along[1], self.along[0]])
         half = 0.5 * _PUSH * size * self.along
         shaft = np.array([part * half for part in (-1.0, -0.5, 0.0, 0.5, 1.0)]) + self.at
         offsets = [way * side * across for way in (1.0, 1.6) for side in (1.0, -1.0)]
-        return _freest(sheet, [shaft + _DISTANCE * size * offset for offset in offsets])
+        route = _freest(sheet, [shaft + _DISTANCE * size * offset for offset in offsets])
+        return _driving_arrow(sheet, route, self.text, np.array([route.mean(axis=0), *route[::-1]]))
 
 
 @dataclass(frozen=True, eq=False)
 class Length(Mark):
-    """The name and value of a cylinder: ends (2, 2)."""
+    """The name and value of a cylinder between its ends (2, 2)."""
 
     text: str
-    ends: FloatArray
-
-    def extent(self) -> FloatArray:
-        return self.ends
+    at: FloatArray
 
     def draw(self, sheet: Sheet) -> list[Name]:  # noqa: ARG002  it is only a name
-        anchors = np.array([self.ends[0] + part * (self.ends[1] - self.ends[0]) for part in (0.4, 0.55, 0.25, 0.75)])
+        anchors = np.array([self.at[0] + part * (self.at[1] - self.at[0]) for part in (0.4, 0.55, 0.25, 0.75)])
         return [Name(self.text, anchors, 8.0, COLOUR, rank=1)]
 
 
@@ -303,17 +283,14 @@ def _arrow(
 
 @dataclass(frozen=True, eq=False)
 class GapMark(Mark):
-    """A gap between two points: ends (2, 2), and its name."""
+    """A gap between two points (2, 2), and its name."""
 
-    ends: FloatArray
+    at: FloatArray
     text: str
 
-    def extent(self) -> FloatArray:
-        return self.ends
-
     def draw(self, sheet: Sheet) -> list[Name]:
-        sheet.line(self.ends, 2.2, _RED, matters=2.0)
-        return [Name(self.text, self.ends.mean(axis=0)[None], 0.5 * BAR * sheet.fine + 1.0, _RED, rank=0)]
+        sheet.line(self.at, 2.2, _RED, matters=2.0)
+        return [Name(self.text, self.at.mean(axis=0)[None], 0.5 * BAR * sheet.fine + 1.0, _RED, rank=0)]
 
 
 def gaps(shown: Instant) -> Iterator[GapMark]:
@@ -336,8 +313,9 @@ def gravity(sheet: Sheet, mechanism: Mechanism) -> list[Name]:
     along = gravity_direction(mechanism)
     if along is None:
         return []
-    for corner in _CORNERS:
-        middle = _corner_middle(sheet, np.array(corner))
+    for corner in map(np.array, _CORNERS):
+        inside = (0.5 * _BOX + _EDGE) * (1.0 - 2.0 * corner)
+        middle = corner * sheet.to_paper(sheet.high) + inside - [0.0, _BELOW_NOTE * (corner == 1.0).all()]  # [pt]
         near = np.abs(sheet.covered[:, :2] - middle) < 0.5 * _BOX
         if not near.all(axis=1).any():
             _gravity_arrow(sheet, middle, _LENGTH * along)
@@ -355,12 +333,6 @@ def gravity_in_margin(sheet: Sheet, mechanism: Mechanism) -> None:
     _gravity_arrow(sheet, middle, _SMALL * along)
     aside = np.array([1.0, 0.0]) if abs(along[1]) >= abs(along[0]) else np.array([0.0, -1.0])
     sheet.text(middle + _LETTER * aside, "g", GREY, italic=True)
-
-
-def _corner_middle(sheet: Sheet, corner: FloatArray) -> FloatArray:
-    """Return the middle of the square in a corner [pt]."""
-    inside = (0.5 * _BOX + _EDGE) * (1.0 - 2.0 * corner)
-    return np.asarray(corner * sheet.to_paper(sheet.high) + inside - [0.0, _BELOW_NOTE * (corner == 1.0).all()])
 
 
 def _gravity_arrow(sheet: Sheet, middle: FloatArray, arrow: FloatArray) -> None:

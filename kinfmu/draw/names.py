@@ -10,7 +10,7 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.draw.scene.palette import Colour
-from kinfmu.draw.sheet import FONT, INK, LINE, Sheet
+from kinfmu.draw.sheet import FONT, INK, LINE, Sheet, text_width
 
 _DIRECTIONS = 16  # from an anchor to a place for its name
 _FURTHER = (0.0, 4.0, 9.0, 16.0, 26.0, 38.0)  # [pt], additional distances
@@ -52,9 +52,11 @@ class Name:
 class Mark(ABC):
     """A thing that figures show and no other picture does: an arrow, a named place, a path; in world coordinates."""
 
-    @abstractmethod
+    at: FloatArray  # world coordinates, (2,) or (k, 2)
+
     def extent(self) -> FloatArray:
         """Return world coordinates (k, 2) that must be on the sheet."""
+        return np.atleast_2d(self.at)
 
     @abstractmethod
     def draw(self, sheet: Sheet) -> list[Name]:
@@ -132,12 +134,8 @@ def _options(name: Name, sheet: Sheet) -> _Options:
 
 def _half_size(text: str, *, italic: bool) -> FloatArray:
     """Return half of width and height of a name [pt]."""
-    from matplotlib.font_manager import FontProperties
-    from matplotlib.textpath import text_to_path
-
-    font = FontProperties(size=FONT, style="italic" if italic else "normal")
     lines = text.split("\n")
-    width = max(text_to_path.get_text_width_height_descent(line, font, ismath=False)[0] for line in lines)
+    width = max(text_width(line, FONT, "italic" if italic else "normal") for line in lines)
     return np.array([width / 2.0 + _GAP, (FONT + (len(lines) - 1) * LINE) / 2.0 + _AIR])
 
 

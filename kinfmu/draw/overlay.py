@@ -10,21 +10,23 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.draw.chart import (
+    LIGHT,
+    LOST,
     SMALL,
     Abscissa,
     abscissa,
     degree_ticks,
     dress,
+    gaps,
     label_size,
     labelled,
     numbers,
     powers_of_ten,
+    rows_of,
     unit_in,
 )
-from kinfmu.draw.curves import LOST, gaps, rows_of
 from kinfmu.draw.scene import palette
-from kinfmu.draw.scene.palette import Colour
-from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
+from kinfmu.draw.sheet import GREY, TITLE_EDGE, TITLE_LINE, ink, title_lines, titled_figure
 from kinfmu.errors import FigureError
 from kinfmu.run import Run
 from kinfmu.run.axis import ROUND_OFF, axis_of, shown_range
@@ -38,20 +40,14 @@ if TYPE_CHECKING:
 
 MOST_PANELS = 8  # more make a sheet too large to print
 MOST_CURVES = 18  # of a panel: so many colours differ
-_WIDTH, _HEIGHT, _SQUARE = (
-    420.0,
-    130.0,
-    330.0,
-)  # [pt] of a panel; longest side of an equal or polar one
+_WIDTH, _HEIGHT, _SQUARE = 420.0, 130.0, 330.0  # [pt] of a panel; longest side of an equal or polar one
 _LONGEST = 28  # letters of a name with its unit that fit next to a panel in one line
 _TICK = 36.0  # [pt] for a number along the horizontal axis of an equal panel
 _LEFT, _RIGHT, _TOP, _BOTTOM, _GAP = 60.0, 24.0, 34.0, 34.0, 16.0  # [pt] around and between panels
 _LEGEND_LINE, _LEGEND_COLUMNS = 12.0, 3  # [pt]; names in a line of a legend
-_EDGE = 8.0  # [pt] around the title
 _WIDE, _NARROW = 3.6, 1.2  # [pt], curves of the first of two runs and of the second one or of a single one
 LOGARITHMIC = ("solver.residual", "solver.margin", "solver.error_", "watch.")  # columns on a scale of powers of ten
 LEAST = 1e-18  # smallest value on such a scale: zeros have no logarithm
-_GRID: Colour = (228, 228, 228)
 _ROOM = 0.25  # of the range of the values, between the centre and the least value if that is negative
 _INNERMOST = 0.15  # of the radius; numbers nearer to the centre would be on one another
 _PLACES = np.radians(np.arange(11.25, 360.0, 22.5))  # of the numbers, between the lines of the grid
@@ -155,23 +151,19 @@ def _check_angle(run: Run, across: Abscissa) -> None:
 
 def overlay_sheet(shown: Overlay) -> Figure:
     """Return the figure of an overlay: the panels of all units below each other, with a legend above each."""
-    from matplotlib.figure import Figure
-
     panels = shown.panels()
     equal = [_is_map(shown, panel) for panel in panels]
     sizes = [_size(shown, panel, is_map=is_map) for panel, is_map in zip(panels, equal, strict=True)]
     legends = [_legend_height(shown, panel) for panel in panels]
     title = sheet_title(shown.runs, shown.names)
     width = _LEFT + max(size[0] for size in sizes) + _RIGHT
-    lines = title_lines(title, width - 2.0 * _EDGE)
+    lines = title_lines(title, width - 2.0 * TITLE_EDGE)
     above = _TOP + max(len(lines) - 1, 0) * TITLE_LINE
     polar_margin = 22.0 if shown.polar else 0.0  # [pt]; angles are written around
     heights = [size[1] + legend + _GAP + 2.0 * polar_margin for size, legend in zip(sizes, legends, strict=True)]
     labels_below = any(equal)
     height = above + sum(heights) - _GAP + _BOTTOM + (_BOTTOM * (len(panels) - 1) if labels_below else 0.0)
-    made = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
-    look: dict[str, Any] = {"fontsize": TITLE_FONT, "va": "top", "color": ink(INK), "parse_math": False}
-    made.text(_EDGE / width, 1.0 - _EDGE / height, "\n".join(lines), **look)
+    made = titled_figure(width, height, lines)
     top = height - above
     for number, panel in enumerate(panels):
         (wide, high), legend = sizes[number], legends[number]
@@ -365,7 +357,7 @@ def radial_scale(axes: Any, curves: Sequence[tuple[FloatArray, FloatArray]]) -> 
 
     grey = ink(GREY)
     axes.tick_params(labelsize=SMALL, labelcolor=grey)
-    axes.grid(linewidth=0.5, color=ink(_GRID))
+    axes.grid(linewidth=0.5, color=ink(LIGHT))
     axes.spines["polar"].set(linewidth=0.6, color=grey)
     known = np.concatenate([values[np.isfinite(values)] for _, values in curves])
     if not len(known):

@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,6 +37,7 @@ _FINEST = 0.45  # smallest factor of the sizes of details, for short links
 _SPACING = 3.0  # [pt] between the dots that record what is covered
 TITLE_FONT = 11.0  # [pt]
 TITLE_LINE = 15.0  # [pt], from line to line
+TITLE_EDGE = 8.0  # [pt] around the title of a figure
 MOST_LINES = 2  # of a title
 _NOTE_FONT = 8.0  # [pt]
 _THINNEST = 2.0  # [pt], width of the narrowest letters, i and l
@@ -180,19 +181,10 @@ class Sheet:
     def text(self, at: ArrayLike, text: str, colour: Colour, *, italic: bool = False) -> None:
         """Write a name, of one or several lines, with its middle at `at` [pt from the lower left corner]."""
         x, y = self.low + np.asarray(at, dtype=float) * self.point
-        self.axes.text(
-            x,
-            y,
-            text,
-            color=ink(colour),
-            fontsize=FONT,
-            fontstyle="italic" if italic else "normal",
-            ha="center",
-            va="center" if "\n" in text else "center_baseline",
-            linespacing=1.2,  # of the height of a letter, which gives LINE
-            parse_math=False,
-            zorder=1000.0,
-        )
+        look: dict[str, Any] = {"color": ink(colour), "fontsize": FONT, "parse_math": False, "zorder": 1000.0}
+        look |= {"ha": "center", "va": "center" if "\n" in text else "center_baseline"}
+        look["linespacing"] = 1.2  # of the height of a letter, which gives LINE
+        self.axes.text(x, y, text, fontstyle="italic" if italic else "normal", **look)
 
     def note(self, text: str) -> None:
         """Write a sentence below the right end of the title's line."""
@@ -241,6 +233,16 @@ def _paper_of(given: Axes, size: FloatArray) -> tuple[FloatArray, float]:
     return paper, float((free / np.maximum(size, 1e-9 * side)).min())
 
 
+def titled_figure(width: float, height: float, title: Sequence[str], edge: float = TITLE_EDGE) -> Figure:
+    """Return a figure of a size [pt] with the lines of a title, `edge` [pt] from its upper left corner."""
+    from matplotlib.figure import Figure
+
+    made = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
+    look: dict[str, Any] = {"fontsize": TITLE_FONT, "va": "top", "color": ink(INK), "parse_math": False}
+    made.text(edge / width, 1.0 - edge / height, "\n".join(title), **look)
+    return made
+
+
 def _new_axes(paper: FloatArray, has_names: bool, title: str) -> Axes:
     """Return axes of size `paper` [pt] in a new figure."""
     from matplotlib.figure import Figure
@@ -287,15 +289,15 @@ def title_lines(title: str, width: float) -> list[str]:
         lines = textwrap.wrap(title, count)
         if len(lines) > MOST_LINES:
             lines = [*lines[: MOST_LINES - 1], f"{lines[MOST_LINES - 1]}\N{HORIZONTAL ELLIPSIS}"]
-        if all(_width(line) <= width for line in lines):
+        if all(text_width(line, TITLE_FONT) <= width for line in lines):
             return lines
     return [title] if title else []
 
 
-def _width(line: str) -> float:
-    """Return the width of a line of a title [pt]."""
+def text_width(line: str, size: float, style: Literal["normal", "italic"] = "normal") -> float:
+    """Return the width of a line of text [pt]."""
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import text_to_path
 
-    width: float = text_to_path.get_text_width_height_descent(line, FontProperties(size=TITLE_FONT), ismath=False)[0]
-    return width
+    font = FontProperties(size=size, style=style)
+    return float(text_to_path.get_text_width_height_descent(line, font, ismath=False)[0])

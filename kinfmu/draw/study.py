@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from kinfmu.arrays import FloatArray
 from kinfmu.draw.chart import SMALL, dress, span
 from kinfmu.draw.scene import palette
-from kinfmu.draw.sheet import FONT, GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
+from kinfmu.draw.sheet import FONT, GREY, INK, TITLE_EDGE, TITLE_LINE, ink, title_lines, titled_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
-EDGE = 8.0  # [pt] around the title
 MOST_COLUMNS = 10  # of a matrix that can be read
 MOST_DOTS = 4000  # of a panel
 FAILED: palette.Colour = (200, 40, 40)  # designs that lack a measure
@@ -69,16 +68,12 @@ class PanelGrid(NamedTuple):
 
 def sheet_of(layout: PanelGrid, title: str) -> tuple[Figure, list[list[Axes]]]:
     """Return a figure with a title and its panels, row by row."""
-    from matplotlib.figure import Figure
-
     across, down = layout.between
     width = layout.left + layout.columns * layout.width + (layout.columns - 1) * across + layout.right
-    lines = title_lines(title, width - 2.0 * EDGE)
-    top = EDGE + len(lines) * TITLE_LINE + 14.0
+    lines = title_lines(title, width - 2.0 * TITLE_EDGE)
+    top = TITLE_EDGE + len(lines) * TITLE_LINE + 14.0
     height = top + layout.rows * layout.height + (layout.rows - 1) * down + layout.bottom
-    figure = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
-    look: dict[str, Any] = {"fontsize": TITLE_FONT, "va": "top", "color": ink(INK), "parse_math": False}
-    figure.text(EDGE / width, 1.0 - EDGE / height, "\n".join(lines), **look)
+    figure = titled_figure(width, height, lines)
     panels = []
     for row in range(layout.rows):
         low = height - top - (row + 1) * layout.height - row * down
@@ -121,11 +116,7 @@ def scatter_matrix(parameters: Sequence[Quantities], measures: Sequence[Quantiti
 
     Panels of a row and of a column have one axis. Designs that lack a measure are marked where their numbers are known.
 
-    Args:
-        parameters: The parameters of the designs.
-        measures: Their measures, NaN for designs without a value.
-        title: Title of the figure.
-
+    parameters: The parameters of the designs. measures: Their measures, NaN for designs without a value.
     """
     columns = [*parameters, *measures]
     count = len(columns)
@@ -211,12 +202,8 @@ def _name_failed(figure: Figure, failed: int, count: int) -> None:
 def contours(x: Quantities, y: Quantities, measures: Sequence[Quantities], title: str) -> Figure:
     """Return a figure of measures over a grid of two parameters; designs without a value stay white.
 
-    Args:
-        x: The first parameter, its values (p,) on the grid.
-        y: The second parameter, its values (q,) on the grid.
-        measures: The measures, (p, q) each.
-        title: Title of the figure.
-
+    x: The first parameter, its values (p,) on the grid. y: The second parameter, its values (q,) on the grid. measures:
+    The measures, (p, q) each.
     """
     columns = min(_ABREAST, len(measures))
     layout = PanelGrid(-(-len(measures) // columns), columns, WIDTH, HEIGHT, (118.0, 56.0), left=52.0, right=66.0)
@@ -273,11 +260,7 @@ def _ends(values: FloatArray) -> tuple[float, float]:
 def response(over: Quantities, measures: Sequence[Quantities], title: str) -> Figure:
     """Return a figure of measures over a parameter; designs without a value are gaps.
 
-    Args:
-        over: The parameter.
-        measures: The measures of the same designs.
-        title: Title of the figure.
-
+    over: The parameter. measures: The measures of the same designs.
     """
     figure, panels = sheet_of(PanelGrid(len(measures), 1, 360.0, 110.0, (0.0, 22.0)), title)
     for k, (measure, (axes,)) in enumerate(zip(measures, panels, strict=True)):
@@ -315,13 +298,7 @@ class Contributed(NamedTuple):
 
 
 def contributions(measures: Sequence[Contributed], title: str) -> Figure:
-    """Return a figure with a panel of bars for each measure.
-
-    Args:
-        measures: The measures.
-        title: Title of the figure.
-
-    """
+    """Return a figure with a panel of bars for each measure."""
     most = max([min(len(one.parts), MOST_BARS) for one in measures] + [1])
     layout = PanelGrid(len(measures), 1, 330.0, most * _BAR + 4.0, (0.0, 40.0), left=100.0, right=48.0)
     figure, panels = sheet_of(layout, title)
@@ -336,26 +313,15 @@ def contributions(measures: Sequence[Contributed], title: str) -> Figure:
 def contributions_into(axes: Axes, measure: Contributed, place: int = 0, most: int = 0) -> None:
     """Draw the bars of a measure.
 
-    Args:
-        axes: The Axes.
-        measure: The measure.
-        place: Its place among others, which decides the colour.
-        most: Number of bars that the Axes hold. Default: those of the measure.
-
+    place: Its place among others, which decides the colour. most: Number of bars that the Axes hold. Default: those of
+    the measure.
     """
     shown = list(measure.parts.items())[:MOST_BARS]
     places = range(len(shown))
     axes.barh(places, [100.0 * part for _, part in shown], height=0.7, color=ink(colour_of(place)))
     for k, (_, part) in zip(places, shown, strict=True):
-        axes.annotate(
-            f"{100.0 * part:.1f} %",
-            (100.0 * part, k),
-            xytext=(4.0, 0.0),
-            textcoords="offset points",
-            va="center",
-            fontsize=SMALL,
-            color=ink(INK),
-        )
+        look: dict[str, Any] = {"va": "center", "fontsize": SMALL, "color": ink(INK), "textcoords": "offset points"}
+        axes.annotate(f"{100.0 * part:.1f} %", (100.0 * part, k), xytext=(4.0, 0.0), **look)
     if not shown:
         axes.text(0.5, 0.5, "unknown", fontsize=SMALL, ha="center", transform=axes.transAxes, color=ink(GREY))
     axes.set_yticks(list(places), [name for name, _ in shown])

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.chart import SMALL, Abscissa, abscissa, degree_ticks, dress, labelled, numbers
-from kinfmu.draw.curves import rows_of
+from kinfmu.draw.chart import SMALL, Abscissa, abscissa, degree_ticks, dress, labelled, numbers, rows_of
 from kinfmu.draw.overlay import curve_colour, range_of, sheet_title
-from kinfmu.draw.sheet import GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
+from kinfmu.draw.sheet import GREY, TITLE_EDGE, TITLE_LINE, ink, title_lines, titled_figure
 from kinfmu.draw.writing import check_suffix, write
 from kinfmu.errors import FigureError
 from kinfmu.motion.motion_curve import MotionCurve, motion_curve, units_of
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 LETTERS = ("s", "v", "a", "j")
 _COLOURS = (0, 2, 1, 3)  # of curves
 _WIDTH, _HEIGHT = 420.0, 104.0  # [pt] of a panel
-_LEFT, _RIGHT, _TOP, _BOTTOM, _GAP, _EDGE = 70.0, 24.0, 34.0, 34.0, 12.0, 8.0  # [pt]
+_LEFT, _RIGHT, _TOP, _BOTTOM, _GAP = 70.0, 24.0, 34.0, 34.0, 12.0  # [pt]
 
 
 def svaj(run: Run, path: str | Path, name: str, *, degrees: bool = False) -> None:
@@ -71,16 +70,12 @@ def driver_axis(run: Run, curve: MotionCurve) -> Abscissa:
 
 
 def _sheet(run: Run, across: Abscissa, name: str, table: FloatArray, units: list[str], *, degrees: bool) -> Figure:
-    from matplotlib.figure import Figure
-
     width = _LEFT + _WIDTH + _RIGHT
     title = sheet_title((run,), ("", ""))
-    lines = title_lines(f"{title}: {name}" if title else name, width - 2.0 * _EDGE)
+    lines = title_lines(f"{title}: {name}" if title else name, width - 2.0 * TITLE_EDGE)
     above = _TOP + max(len(lines) - 1, 0) * TITLE_LINE
     height = above + 4.0 * _HEIGHT + 3.0 * _GAP + _BOTTOM
-    made = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
-    look: dict[str, Any] = {"fontsize": TITLE_FONT, "va": "top", "color": ink(INK), "parse_math": False}
-    made.text(_EDGE / width, 1.0 - _EDGE / height, "\n".join(lines), **look)
+    made = titled_figure(width, height, lines)
     for order, letter in enumerate(LETTERS):
         bottom = height - above - (order + 1) * _HEIGHT - order * _GAP
         axes = made.add_axes((_LEFT / width, bottom / height, _WIDTH / width, _HEIGHT / height))

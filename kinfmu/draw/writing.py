@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -83,10 +83,10 @@ def write_bytes(path: Path, image: bytes) -> None:
         write_whole(path, image)
 
 
-def check_suffix(path: Path) -> None:
-    """Raise a FigureError unless the suffix of a file is a known format."""
-    if suffix_of(path) not in SUFFIXES:
-        raise FigureError(f"{path}: '{path.suffix}' is not a known format of figures; known: {listed(SUFFIXES)}")
+def check_suffix(path: Path, known: Sequence[str] = SUFFIXES, what: str = "figures") -> None:
+    """Raise a FigureError unless the suffix of a file is a known format; what: is written there, in messages."""
+    if suffix_of(path) not in known:
+        raise FigureError(f"{path}: '{path.suffix}' is not a known format of {what}; known: {listed(known)}")
 
 
 def _image(figure: Figure, suffix: str) -> bytes:

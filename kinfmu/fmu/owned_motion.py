@@ -17,7 +17,7 @@ from kinfmu.fmu.force_variables import load_variables
 from kinfmu.fmu.interface import InterfacePart, Variable
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.laws import External
-from kinfmu.mechanism.loads.following import Following
+from kinfmu.mechanism.loads.load import Following
 from kinfmu.mechanism.mechanism import require_masses
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.efforts import LedLaws, effort_inputs, effort_names, inertia_steps, led_laws

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Protocol
+from typing import Any
 
 from kinfmu.errors import MechanismError, listed, suggestion, valid_names
 from kinfmu.mechanism.body import GROUND_NAME, Body
@@ -27,16 +27,6 @@ _EFFORTS = ("torque", "force", "power")  # nouns of forces of drivers; joints ha
 _OF_MECHANISM = ("shaking_force", "shaking_moment", "kinetic_energy", "potential_energy")
 _KEY = re.compile(r"^.*\.|_\d+$")  # what a key has around its word: 'rise' of 'law.rise_1'
 MOST_BODIES = 20_000  # fits into the memory of an ordinary computer
-
-
-class HasCoordinates(Protocol):
-    """What a mechanism has coordinates of: its moving bodies and its points of interest."""
-
-    @property
-    def coordinate_names(self) -> tuple[CoordinateName, ...]: ...
-
-    @property
-    def points(self) -> Mapping[str, str]: ...
 
 
 def check_header(name: str, title: str, length_unit: str) -> None:
@@ -75,7 +65,10 @@ def check_members(
     if not members.moving_bodies:
         raise MechanismError("[bodies] has only the ground; a mechanism needs a body that can move")
     for body in members.bodies:
-        _check_body_itself(body)
+        for name in body.points:
+            check_name(f"[bodies.{body.name}] points", name)
+        if body.is_ground and any(value is not None for value in body.start):
+            raise MechanismError("[bodies.ground] start: the ground does not move, its frame is the world's")
     bodies = members.bodies_by_name
     for body in members.bodies:
         _with_causes(("bodies", body.name), body.check_mass, parameters, expressions, length_unit)
@@ -116,12 +109,10 @@ def check_readings(members: Members, known: Mapping[str, Any]) -> None:
         _check_reading(members, known, reading)
 
 
-def coordinate_orders(mechanism: HasCoordinates) -> dict[str, tuple[CoordinateName, int]]:
+def coordinate_orders(names: Iterable[CoordinateName], points: Iterable[str]) -> dict[str, tuple[CoordinateName, int]]:
     """Return each coordinate of a body or of a point of interest, and its rates, with the coordinate and the order."""
-    points = [CoordinateName(name, axis) for name in mechanism.points for axis in ("x", "y")]
-    return {
-        name.derivative(order): (name, order) for name in (*mechanism.coordinate_names, *points) for order in range(3)
-    }
+    of_points = (CoordinateName(point, axis) for point in points for axis in ("x", "y"))
+    return {name.derivative(order): (name, order) for name in (*names, *of_points) for order in range(3)}
 
 
 def _check_reading(members: Members, known: Mapping[str, Any], reading: Reading) -> None:
@@ -169,7 +160,7 @@ def _why_no_force(members: Members, name: str) -> str:
         near = suggestion(owner, drivers)
         return f"there is no driver '{owner}'{near}; drivers: {listed(member.name for member in members.drivers)}"
     is_force = (noun in _EFFORTS and owner in joints | drivers) or name in _OF_MECHANISM
-    if is_force and not (members.loads or any(body.has_mass for body in members.bodies)):
+    if is_force and not (members.loads or members.has_masses):
         return "without masses and loads there are no forces; give a body a mass, such as mass = '1.2 kg'"
     return ""
 
@@ -181,13 +172,6 @@ def _check_names(table: str, names: Iterable[str]) -> None:
         if name in seen:
             raise MechanismError(f"[{table}] '{name}' is defined twice")
         seen.add(name)
-
-
-def _check_body_itself(body: Body) -> None:
-    for name in body.points:
-        check_name(f"[bodies.{body.name}] points", name)
-    if body.is_ground and any(value is not None for value in body.start):
-        raise MechanismError("[bodies.ground] start: the ground does not move, its frame is the world's")
 
 
 def _check_names_of_results(members: Members, parameters: Mapping[str, Parameter]) -> None:

@@ -75,7 +75,7 @@ class Expression:
     def __post_init__(self) -> None:
         object.__setattr__(self, "text", self.text.strip(" \t"))
         if not self.steps:
-            object.__setattr__(self, "steps", steps_of(self.text, self.length_unit))
+            object.__setattr__(self, "steps", _Parser(self.text, self.length_unit).parsed())
 
     def __repr__(self) -> str:
         return f"Expression({self.text!r})"
@@ -198,20 +198,6 @@ class Computed(float):
         return float(self), self.expression
 
 
-def steps_of(text: str, length_unit: str) -> tuple[ExpressionStep, ...]:
-    """Return the steps of an expression in postfix order.
-
-    Args:
-        text: Such as "2*a + 5 mm".
-        length_unit: Unit of length to which lengths with other units are converted.
-
-    Raises:
-        MechanismError: The text is not an expression; the message states the position.
-
-    """
-    return _Parser(text, length_unit).parsed()
-
-
 def error_at(text: str, at: int, what: str) -> MechanismError:
     return MechanismError(f"{quoted(text)}, character {at + 1}: {what}")
 
@@ -223,7 +209,7 @@ class _Token(NamedTuple):
 
 
 class _Parser:
-    """Parser from text to steps, by recursive descent."""
+    """Parser from text to steps in postfix order, by recursive descent."""
 
     def __init__(self, text: str, length_unit: str) -> None:
         self._text = text

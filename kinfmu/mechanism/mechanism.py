@@ -25,17 +25,17 @@ from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.joints import Joint
 from kinfmu.mechanism.loads import Load
 from kinfmu.mechanism.measures import Reading
-from kinfmu.mechanism.members import Members, NumberPath, texts_of
+from kinfmu.mechanism.members import Members, NumberPath, Parts, texts_of
 from kinfmu.mechanism.metres import in_metres
 from kinfmu.mechanism.parameters import Parameter, parameter_values, resolve
 from kinfmu.mechanism.quantities.arithmetic import Value
 from kinfmu.mechanism.quantities.placement import body_of
 from kinfmu.mechanism.settings import LawConstant, Settable, law_constants, with_law_constants
-from kinfmu.units import OTHER_SPELLINGS, CoordinateName, Quantity
+from kinfmu.units import OTHER_SPELLINGS, Quantity
 
 
 @dataclass(frozen=True)
-class Mechanism(Live):
+class Mechanism(Parts, Live):
     """A planar mechanism: bodies, the joints between them, and the drivers that move it.
 
     Every number can also be given as text with a unit or as an expression of parameters ("60 deg", "a/2 + 5 mm"). The
@@ -101,7 +101,7 @@ class Mechanism(Live):
         check_members(members, parameters, expressions, self.length_unit)
         check_outputs(members, self.points, self.coordinates)
         if self.measures:
-            check_readings(members, coordinate_orders(self))
+            check_readings(members, coordinate_orders(self.coordinate_names, self.points))
 
     def __repr__(self) -> str:
         parts = {"moving bodies": self.moving_bodies, "joints": self.joints, "drivers": self.drivers}
@@ -110,21 +110,6 @@ class Mechanism(Live):
     def __hash__(self) -> int:
         members = (self.bodies, self.joints, self.drivers, self.gravity, self.loads)
         return hash((self.name, members, tuple(self.points.items()), self.coordinates))
-
-    @property
-    def moving_bodies(self) -> tuple[Body, ...]:
-        """Bodies other than the ground, in file order."""
-        return self.members.moving_bodies
-
-    @property
-    def has_masses(self) -> bool:
-        """True if a body has a mass."""
-        return any(body.has_mass for body in self.bodies)
-
-    @property
-    def body_points(self) -> dict[str, tuple[float, float]]:
-        """Body-fixed coordinates of every point, by 'body.point'."""
-        return self.members.body_points
 
     @cached_property
     def named_points(self) -> dict[str, tuple[float, float]]:
@@ -137,11 +122,6 @@ class Mechanism(Live):
     def ground_points(self) -> list[tuple[float, float]]:
         """The places of those of `named_points` that are on the ground, in file order."""
         return [point for name, point in self.named_points.items() if body_of(name) == GROUND_NAME]
-
-    @property
-    def coordinate_names(self) -> tuple[CoordinateName, ...]:
-        """All generalized coordinates x, y, phi of the moving bodies, in file order."""
-        return self.members.coordinate_names
 
     @property
     def own_parameters(self) -> tuple[str, ...]:

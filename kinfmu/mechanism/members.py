@@ -41,8 +41,37 @@ _MASSES = {
 _START = {"x": LENGTH, "y": LENGTH, "phi": ANGLE}
 
 
+class Parts:
+    """What follows from the bodies, joints, drivers and loads of a mechanism, or of its members."""
+
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]
+    drivers: tuple[Driver, ...]
+    loads: tuple[Load, ...]
+
+    @property
+    def moving_bodies(self) -> tuple[Body, ...]:
+        """Bodies other than the ground, in file order."""
+        return tuple(body for body in self.bodies if not body.is_ground)
+
+    @property
+    def has_masses(self) -> bool:
+        """True if a body has a mass."""
+        return any(body.has_mass for body in self.bodies)
+
+    @property
+    def coordinate_names(self) -> tuple[CoordinateName, ...]:
+        """All generalized coordinates x, y, phi of the moving bodies, in file order."""
+        return tuple(CoordinateName(body.name, axis) for body in self.moving_bodies for axis in COORDINATES)
+
+    @property
+    def body_points(self) -> dict[str, tuple[Value, Value]]:
+        """Body-fixed coordinates of every point, by 'body.point'."""
+        return {f"{body.name}.{name}": point for body in self.bodies for name, point in body.points.items()}
+
+
 @dataclass(frozen=True)
-class Members:
+class Members(Parts):
     """The parts of a mechanism that contain numbers, in any arithmetic."""
 
     bodies: tuple[Body, ...]
@@ -54,24 +83,9 @@ class Members:
     loads: tuple[Load, ...] = ()
 
     @property
-    def moving_bodies(self) -> tuple[Body, ...]:
-        """Bodies other than the ground, in file order."""
-        return tuple(body for body in self.bodies if not body.is_ground)
-
-    @property
     def bodies_by_name(self) -> Bodies:
         """All bodies by their names."""
         return {body.name: body for body in self.bodies}
-
-    @property
-    def coordinate_names(self) -> tuple[CoordinateName, ...]:
-        """All generalized coordinates x, y, phi of the moving bodies, in file order."""
-        return tuple(CoordinateName(body.name, axis) for body in self.moving_bodies for axis in COORDINATES)
-
-    @property
-    def body_points(self) -> dict[str, tuple[Value, Value]]:
-        """Body-fixed coordinates of every point, by 'body.point'."""
-        return {f"{body.name}.{name}": point for body in self.bodies for name, point in body.points.items()}
 
     @property
     def driver_kind(self) -> str:

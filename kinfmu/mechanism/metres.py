@@ -62,12 +62,8 @@ def _power(quantity: Quantity) -> int:
 def _text(expression: Expression, dimensions: Mapping[str, Dimension], needed: Dimension, bare: int) -> str:
     """Return the text of an expression that gives in metres what it gives in its unit of length.
 
-    Args:
-        expression: The expression.
-        dimensions: Dimensions of the parameters.
-        needed: Dimension of the result.
-        bare: Power of the unit of length in a result without a unit.
-
+    dimensions: Dimensions of the parameters. needed: Dimension of the result. bare: Power of the unit of length in a
+    result without a unit.
     """
     if expression.alone or _terms_have_units(expression, dimensions, needed):
         return expression.text

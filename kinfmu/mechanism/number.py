@@ -129,9 +129,7 @@ def in_unit_of(old: object, value: float, quantity: Quantity, length_unit: str) 
 def read_constant(where: str, value: object, quantity: Quantity, length_unit: str) -> float:
     """Return a number, or the number of text such as '30 rpm', in the units used inside.
 
-    Raises:
-        MechanismError: The value is not a number, has a wrong unit or is an expression.
-
+    Raise a MechanismError if it is not a number, has a wrong unit or is an expression.
     """
     if isinstance(value, str):
         number = read_number(where, value, quantity, length_unit)
@@ -164,11 +162,8 @@ def _wrong_unit(where: str, value: str, unit: str, known: Collection[str]) -> Me
 def unit_advice(name: str, number: float, length_unit: str) -> Iterator[None]:
     """Complete the error about a unit of a value of a parameter that has none: where to write the unit.
 
-    Args:
-        name: The parameter; of constants of laws nothing is added.
-        number: Its value in the mechanism file.
-        length_unit: Unit of length of the mechanism.
-
+    name: The parameter; of constants of laws nothing is added. number: Its value in the mechanism file. length_unit:
+    Unit of length of the mechanism.
     """
     try:
         yield
@@ -205,11 +200,8 @@ class DisplayUnit(NamedTuple):
 def display_unit(quantity: Quantity | None, length_unit: str, wanted: str = "") -> DisplayUnit:
     """Return a unit to show a quantity in.
 
-    Args:
-        quantity: The quantity; None: a pure number.
-        length_unit: Unit of length of the mechanism.
-        wanted: The unit. Default, and for units of other quantities: the unit used inside.
-
+    quantity: The quantity; None: a pure number. length_unit: Unit of length of the mechanism. wanted: The unit.
+    Default, and for units of other quantities: the unit used inside.
     """
     if quantity is None or quantity.kind == "number":
         return DisplayUnit()

@@ -119,14 +119,8 @@ def sum_of(a: Dimension, b: Dimension) -> Dimension:
 
 def product_of(a: Dimension, b: Dimension) -> Dimension:
     """Dimension of a * b."""
-    return Dimension(
-        a.length + b.length,
-        a.time + b.time,
-        a.mass + b.mass,
-        is_angle=a.is_angle or b.is_angle,
-        is_bare=a.is_bare or b.is_bare,
-        is_known=a.is_known and b.is_known,
-    )
+    powers = (a.length + b.length, a.time + b.time, a.mass + b.mass)
+    return Dimension(*powers, a.is_angle or b.is_angle, a.is_bare or b.is_bare, a.is_known and b.is_known)
 
 
 def quotient_of(a: Dimension, b: Dimension) -> Dimension:
@@ -185,18 +179,6 @@ class Operation(NamedTuple):
     dimension: Callable[..., Dimension]
 
 
-def _tan(x: Value) -> Value:
-    return sin(x) / cos(x)
-
-
-def _asin(x: Value) -> Value:
-    return atan2(x, sqrt((1.0 - x) * (1.0 + x)))
-
-
-def _acos(x: Value) -> Value:
-    return atan2(sqrt((1.0 - x) * (1.0 + x)), x)
-
-
 def _power(base: Value, exponent: int) -> Value:
     """Return base ** exponent, by products only, so that every arithmetic gives the same bits."""
     product = base
@@ -217,10 +199,10 @@ CONSTANTS = {"pi": Operation(0, lambda: math.pi, lambda: BARE)}
 FUNCTIONS = {
     "sin": Operation(1, sin, ratio_of_angle),
     "cos": Operation(1, cos, ratio_of_angle),
-    "tan": Operation(1, _tan, ratio_of_angle),
+    "tan": Operation(1, lambda x: sin(x) / cos(x), ratio_of_angle),
     "sqrt": Operation(1, sqrt, lambda a: power_of(a, Fraction(1, 2))),
-    "asin": Operation(1, _asin, angle_of_ratio),
-    "acos": Operation(1, _acos, angle_of_ratio),
+    "asin": Operation(1, lambda x: atan2(x, sqrt((1.0 - x) * (1.0 + x))), angle_of_ratio),
+    "acos": Operation(1, lambda x: atan2(sqrt((1.0 - x) * (1.0 + x)), x), angle_of_ratio),
     "atan2": Operation(2, atan2, angle_of_pair),
 }
 OPERATIONS = {**OPERATORS, **CONSTANTS, **FUNCTIONS}

@@ -75,18 +75,11 @@ def read_parameter(name: str, parameter: Parameter | float | str, length_unit: s
 
 
 def resolve_parameters(parameters: Mapping[str, Parameter], alone: Mapping[str, set[Quantity]]) -> dict[str, Parameter]:
-    """Compute values and quantities of all parameters.
+    """Return the parameters in the given order with their values and quantities.
 
-    Args:
-        parameters: As `read_parameter` returns them, by name.
-        alone: For a parameter the quantities of the places where its name, or its negative, is the whole expression.
-
-    Returns:
-        The parameters in the given order.
-
-    Raises:
-        MechanismError: An unknown name, a parameter that needs itself, or a unit that does not fit.
-
+    parameters: As `read_parameter` returns them, by name. alone: For a parameter the quantities of the places where its
+    name, or its negative, is the whole expression. Raise a MechanismError for an unknown name, a parameter that needs
+    itself, or a unit that does not fit.
     """
     expressions: dict[str, Any] = {name: p.value for name, p in parameters.items() if isinstance(p.value, Expression)}
     order = in_order(parameters, expressions)
@@ -274,14 +267,10 @@ class Resolved(NamedTuple):
 def resolve(members: Members, given: Mapping[str, Parameter], unit: str) -> Resolved:
     """Replace texts with units and expressions by numbers, and list the expressions.
 
-    Args:
-        members: Bodies, joints, drivers, run, measures, gravity and loads as written.
-        given: Parameters as written.
-        unit: Unit of length.
+    Raise a MechanismError if a value is not a number, a name is not a parameter, or a quantity does not fit its key.
 
-    Raises:
-        MechanismError: A value is not a number, a name is not a parameter, or a quantity does not fit its key.
-
+    members: Bodies, joints, drivers, run, measures, gravity and loads as written. given: Parameters as written. unit:
+    Unit of length.
     """
     if len(given) > MOST_PARAMETERS:
         raise MechanismError(f"[parameters] holds {len(given)} parameters; {MOST_PARAMETERS} at most")

@@ -37,11 +37,8 @@ _NUMBER = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:([+-])\s*([0-9]{1,5}))?\s*", re.AS
 def expanded(document: Mapping[str, Any]) -> dict[str, Any]:
     """Return the document with the tables of [repeat.NAME] in place and numbers in place of braces.
 
-    A document without [counts] and [repeat] is returned unchanged: braces have no meaning in it.
-
-    Raises:
-        MechanismError: A count, a range or a text in braces is invalid, or two copies define the same name.
-
+    A document without [counts] and [repeat] is returned unchanged: braces have no meaning in it. Raise a MechanismError
+    if a count, a range or a text in braces is invalid, or two copies define the same name.
     """
     if COUNTS not in document and REPEAT not in document:
         return dict(document)

@@ -29,11 +29,7 @@ Schema = dict[str, Any]
 DIALECT = "http://json-schema.org/draft-07/schema#"  # the newest that editors of TOML agree on
 NAME = "^[A-Za-z_][A-Za-z0-9_]{0,99}$"
 _BRACED = r"(?:[A-Za-z_]|\{[A-Za-z0-9_+\- ]+\})(?:[A-Za-z0-9_]|\{[A-Za-z0-9_+\- ]+\})*"  # with numbers of repeats
-_REFERRED = {
-    "point": "point",
-    "body": "braced_name",
-    "coordinate": "point",
-}  # definitions by what a reference refers to
+_REFERRED = {"point": "point", "body": "braced_name", "coordinate": "point"}  # definitions by what is referred to
 
 
 def schema_text() -> str:
@@ -43,17 +39,12 @@ def schema_text() -> str:
 
 def schema() -> Schema:
     """Return the schema of a mechanism file, as a tree of JSON values."""
-    names = {"propertyNames": _ref("name")}
+    counts = {"type": "integer", "minimum": 0, "maximum": LARGEST_COUNT}
     tables = {
         "name": _ref("name", description="The mechanism's name, and its FMU's"),
         "title": {"type": "string", "description": "One line for people"},
         "units": _table({"length": {"enum": [*METRES, "inch"], "description": "Unit of bare lengths; default: m"}}),
-        "parameters": {
-            "type": "object",
-            "description": "Numbers that expressions refer to by name",
-            "additionalProperties": _ref("parameter"),
-            **names,
-        },
+        "parameters": _named(_ref("parameter"), "Numbers that expressions refer to by name"),
         "run": _table(
             {
                 "start": _number(Quantity("time"), "First sample [s]; default: 0"),
@@ -66,9 +57,9 @@ def schema() -> Schema:
                 },
             }
         ),
-        "bodies": _named("body", f"Bodies; '{GROUND_NAME}' does not move", **names),
-        "joints": _named("joint", "Joints between the bodies", **names),
-        "drivers": _named("driver", "What moves the mechanism", **names),
+        "bodies": _named(_ref("body"), f"Bodies; '{GROUND_NAME}' does not move"),
+        "joints": _named(_ref("joint"), "Joints between the bodies"),
+        "drivers": _named(_ref("driver"), "What moves the mechanism"),
         "gravity": _table(
             {
                 axis: _number(Quantity("length", 2), f"Acceleration of free fall along {axis}, in the world")
@@ -76,14 +67,9 @@ def schema() -> Schema:
             },
             required=("x", "y"),
         ),
-        "loads": _named("load", "Forces and torques on the bodies", **names),
-        "points": {
-            "type": "object",
-            "description": "Points of interest, as 'body.point'",
-            "additionalProperties": _ref("point"),
-            **names,
-        },
-        "measures": _named("reading", "What `kinfmu check` reads off a motion, such as a stroke", **names),
+        "loads": _named(_ref("load"), "Forces and torques on the bodies"),
+        "points": _named(_ref("point"), "Points of interest, as 'body.point'"),
+        "measures": _named(_ref("reading"), "What `kinfmu check` reads off a motion, such as a stroke"),
         "outputs": _table(
             {
                 "coordinates": {
@@ -93,18 +79,8 @@ def schema() -> Schema:
             }
         ),
     }
-    tables["counts"] = {
-        "type": "object",
-        "description": "Whole numbers that braces and repeats refer to by name",
-        "additionalProperties": {"type": "integer", "minimum": 0, "maximum": LARGEST_COUNT},
-        **names,
-    }
-    tables["repeat"] = {
-        "type": "object",
-        "description": "Tables that are read once for each number of a range",
-        "additionalProperties": _repeat(tables),
-        **names,
-    }
+    tables["counts"] = _named(counts, "Whole numbers that braces and repeats refer to by name")
+    tables["repeat"] = _named(_repeat(tables), "Tables that are read once for each number of a range")
     return {
         "$schema": DIALECT,
         "title": "kinfmu mechanism",
@@ -294,21 +270,13 @@ def _list(items: Schema, least: int, most: int | None = None) -> Schema:
     return {"type": "array", "items": items, "minItems": least, **({} if most is None else {"maxItems": most})}
 
 
-def _named(definition: str, description: str, **more: Any) -> Schema:
-    """Describe a table of named tables."""
-    return {
-        "type": "object",
-        "description": description,
-        "additionalProperties": _ref(definition),
-        **more,
-    }
+def _named(member: Schema, description: str) -> Schema:
+    """Describe a table of named members."""
+    names = {"propertyNames": _ref("name")}
+    return {"type": "object", "description": description, "additionalProperties": member, **names}
 
 
 def _table(properties: Schema, required: Iterable[str] = ()) -> Schema:
     needed = list(required)
-    return {
-        "type": "object",
-        "properties": properties,
-        "additionalProperties": False,
-        **({"required": needed} if needed else {}),
-    }
+    found: Schema = {"type": "object", "properties": properties, "additionalProperties": False}
+    return {**found, "required": needed} if needed else found

@@ -12,7 +12,7 @@ from kinfmu.errors import MechanismError, RequestError, listed, valid_names
 from kinfmu.mechanism.drivers import Driver
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.loads import Load
-from kinfmu.mechanism.loads.following import Following
+from kinfmu.mechanism.loads.load import Following
 from kinfmu.mechanism.members import NumberPath
 from kinfmu.mechanism.number import (
     DisplayUnit,
@@ -47,10 +47,8 @@ class LawConstant(NamedTuple):
 def law_constants(owners: Sequence[Driver | Load], computed: Collection[NumberPath]) -> Iterator[LawConstant]:
     """Yield the constants of the laws of drivers or loads in file order, without those given by an expression.
 
-    Args:
-        owners: Drivers or loads. Most loads have no law, and the effort of external ones is an input.
-        computed: Places of the numbers that are given by expressions.
-
+    owners: Drivers or loads. Most loads have no law, and the effort of external ones is an input. computed: Places of
+    the numbers that are given by expressions.
     """
     for owner in owners:
         if isinstance(owner, Driver) or (isinstance(owner, Following) and not owner.inputs()):
@@ -178,13 +176,9 @@ class Settable:
         )
 
     def display_unit(self, name: str, values: Iterable[object] = ()) -> DisplayUnit:
-        """Return the unit in which people read a parameter or law constant.
+        """Return the unit in which people read a parameter or law constant: that of the first value with a unit.
 
-        Args:
-            name: Its name.
-            values: Values that a user gave. The unit is that of the first one with a unit. Default: that of the
-                mechanism file, or the unit used inside.
-
+        values: Those that a user gave. Default: the unit of the mechanism file, or the unit used inside.
         """
         setting = self[name]
         unit = written_unit(values, self._length_unit) or _unit_in_file(setting)

@@ -53,11 +53,7 @@ _DECIMAL = re.compile(r"\s*+[+-]?+(?:(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?
 def text_in(path: Path, what: str, where: str = "") -> str:
     """Return the text of a file, or raise a MechanismError.
 
-    Args:
-        path: The file.
-        what: What it should be, such as 'a mechanism file'.
-        where: The key that names it, in messages. Default: the path.
-
+    what: What it should be, such as 'a mechanism file'. where: The key that names it, in messages. Default: the path.
     """
     begin, what_is = (where, "is ") if where else (f"{path}:", "")
     try:
@@ -180,13 +176,7 @@ def text_of(where: str, value: object, valid: str = "text") -> str:
 def explained(text: str, error: ValueError) -> str:
     """Return the message of an error of tomllib with the line's content and what to write, where that is known.
 
-    Args:
-        text: The whole text.
-        error: As `tomllib.loads` raises it.
-
-    Returns:
-        One line, to follow 'not valid TOML: '.
-
+    It is one line, to follow 'not valid TOML: '. text: The whole text. error: As `tomllib.loads` raises it.
     """
     place = _PLACE.match(str(error))
     lines = text.replace("\t", " ").split("\n")
@@ -203,7 +193,9 @@ def explained(text: str, error: ValueError) -> str:
         if wrong and not _is_quoted(line, wrong.start("value")):
             blanks = {"key": wrong["key"], "value": wrong["value"].strip(), "small": wrong["value"].lower()}
             blanks["point"] = blanks["value"].replace(",", ".")
-            return f"line {number}: {_shown(wrong[0].strip())}: {rule}: {cure.format(**blanks)}"
+            found = wrong[0].strip()
+            found = found if len(found) <= _LONGEST else f"{found[:_LONGEST]}..."
+            return f"line {number}: {found}: {rule}: {cure.format(**blanks)}"
     return str(error)
 
 
@@ -262,24 +254,15 @@ def _is_quoted(line: str, at: int) -> bool:
     return bool(quote)
 
 
-def _shown(line: str) -> str:
-    return line if len(line) <= _LONGEST else f"{line[:_LONGEST]}..."
-
-
 def read_table(where: str, name: Any, folder: Path | None) -> tuple[tuple[Any, Any], ...]:
     """Return the rows of a CSV file of two columns, x and u, as numbers, or as text where the header gives a unit.
 
     The first line may be a header with units in brackets: `angle [deg], lift [mm]`. Columns are separated by commas,
     semicolons or tabs; empty lines and lines that begin with # are skipped.
 
-    Args:
-        where: The key in messages.
-        name: Path of the file.
-        folder: Where a relative path starts; None: files are refused.
+    Raise a MechanismError that states file and line if the file cannot be read, or a line is wrong.
 
-    Raises:
-        MechanismError: The file cannot be read, or a line is wrong; the message states file and line.
-
+    where: The key in messages. name: Path of the file. folder: Where a relative path starts; None: files are refused.
     """
     if not isinstance(name, str):
         raise MechanismError(f"{where} = {quoted(name)} must be the name of a CSV file")

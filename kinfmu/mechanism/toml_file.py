@@ -40,21 +40,8 @@ from kinfmu.mechanism.valid import check_name, quoted
 _QUANTITY = '{ measure = "angle", of = "rocker" }'  # in messages
 _SEGMENT = ("law", "rise", "duration")
 _TABLES = (
-    "name",
-    "title",
-    "units",
-    "parameters",
-    "run",
-    "bodies",
-    "joints",
-    "drivers",
-    "gravity",
-    "loads",
-    "points",
-    "outputs",
-    "measures",
-    COUNTS,
-    REPEAT,
+    *("name", "title", "units", "parameters", "run", "bodies", "joints", "drivers", "gravity", "loads", "points"),
+    *("outputs", "measures", COUNTS, REPEAT),
 )
 
 
@@ -104,6 +91,8 @@ def mechanism_of(document: dict[str, Any], folder: Path | None) -> Mechanism:
     if "name" not in document:
         raise MechanismError("name is missing; the first line should be such as name = 'fourbar'")
     laws_of_joints = [law for law in LAWS if law is not External]  # nothing from outside moves a cam
+    run = table_of(document, "run")
+    check_keys("[run]", run, (*RUN_TIMES, "over"))
     return Mechanism(
         name=text_of("name", document["name"]),
         title=text_of("title", document.get("title", "")),
@@ -117,7 +106,7 @@ def mechanism_of(document: dict[str, Any], folder: Path | None) -> Mechanism:
         },
         coordinates=coordinates,
         parameters={name: _parameter(name, value) for name, value in named_values(document, "parameters")},
-        run=_run(table_of(document, "run")),
+        run=RunSettings(**run),
         measures=read_measures(document, folder),
         gravity=_gravity(document),
         loads=_members(document, "loads", LOADS, LAWS, folder),
@@ -255,11 +244,6 @@ def _segment(where: str, table: Mapping[str, Any]) -> Segment:
     return Segment(**table)
 
 
-def _run(table: Mapping[str, Any]) -> RunSettings:
-    check_keys("[run]", table, (*RUN_TIMES, "over"))
-    return RunSettings(**table)
-
-
 def _parameter(name: str, value: Any) -> Parameter:
     """Return a parameter from a number, text, or a table { value = ..., description = "..." }."""
     if not isinstance(value, dict):
@@ -340,15 +324,12 @@ def _without_entries(document: Mapping[str, Any], folder: Path) -> PartialFile |
 
 def _present(document: Mapping[str, Any], names: Collection[str]) -> list[str]:
     """Return those of the tables that a document has."""
-    return [name for name in names if name in document or (name == _MASSES and _has_masses(document))]
+    has_masses = any(key in body for body in _bodies(document).values() for key in MASS_KEYS)
+    return [name for name in names if name in document or (name == _MASSES and has_masses)]
 
 
 def _title(name: str) -> str:
     return name if name == _MASSES else f"[{name}]"
-
-
-def _has_masses(document: Mapping[str, Any]) -> bool:
-    return any(key in body for body in _bodies(document).values() for key in MASS_KEYS)
 
 
 def _bodies(document: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:

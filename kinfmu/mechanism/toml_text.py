@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -21,11 +21,8 @@ from kinfmu.units import Quantity, unit_of
 def text(mechanism: Mechanism, *, as_written: bool = False) -> str:
     """Return the mechanism as TOML; `parse(text(m)) == m`, numbers to the last bit.
 
-    Args:
-        mechanism: The mechanism.
-        as_written: Write numbers in the units of its file. Default: in the units used inside, so that equal mechanisms
-            have equal texts.
-
+    as_written: Write numbers in the units of its file. Default: in the units used inside, so that equal mechanisms have
+    equal texts.
     """
     parts = mechanism.members
     if as_written:
@@ -33,17 +30,12 @@ def text(mechanism: Mechanism, *, as_written: bool = False) -> str:
     lines = [f"name = {toml_value(mechanism.name)}"]
     if mechanism.title:
         lines.append(f"title = {toml_value(mechanism.title)}")
-    lines += ["", "[units]", f"length = {toml_value(mechanism.length_unit)}"]
+    lines += _table("units", {"length": mechanism.length_unit})
     if mechanism.parameters:
-        lines += [
-            "",
-            "[parameters]",
-            *(_parameter(name, p, mechanism, as_written) for name, p in mechanism.parameters.items()),
-        ]
-    lines += ["", "[run]"]
-    lines += [f"{key} = {toml_value(getattr(parts.run, key))}" for key in RUN_TIMES]
-    if parts.run.over:
-        lines.append(f"over = {toml_value(parts.run.over)}")
+        lines += ["", "[parameters]"]
+        lines += [_parameter(name, one, mechanism, as_written) for name, one in mechanism.parameters.items()]
+    keys = (*RUN_TIMES, "over") if parts.run.over else RUN_TIMES
+    lines += _table("run", {key: getattr(parts.run, key) for key in keys})
     for body in parts.bodies:
         lines += ["", f"[bodies.{body.name}]"]
         points = ", ".join(f"{name} = {toml_value(point)}" for name, point in body.points.items())
@@ -56,14 +48,16 @@ def text(mechanism: Mechanism, *, as_written: bool = False) -> str:
         lines += [f"{key} = {toml_value(value)}" for key, value in body.given_masses.items()]
     lines += _tables("joints", parts.joints)
     lines += _tables("drivers", parts.drivers)
-    if parts.gravity is not None:
-        lines += ["", "[gravity]", *(f"{key} = {toml_value(value)}" for key, value in parts.gravity._asdict().items())]
+    lines += _table("gravity", parts.gravity._asdict()) if parts.gravity else []
     lines += _tables("loads", parts.loads)
-    if mechanism.points:
-        lines += ["", "[points]", *(f"{name} = {toml_value(target)}" for name, target in mechanism.points.items())]
-    lines += ["", "[outputs]", f"coordinates = {toml_value(mechanism.coordinates)}"]
+    lines += _table("points", mechanism.points) if mechanism.points else []
+    lines += _table("outputs", {"coordinates": mechanism.coordinates})
     lines += _tables("measures", parts.measures)
     return "\n".join(lines) + "\n"
+
+
+def _table(name: str, values: Mapping[str, object]) -> list[str]:
+    return ["", f"[{name}]", *(f"{key} = {toml_value(value)}" for key, value in values.items())]
 
 
 def _tables(table: str, members: Iterable[Any]) -> Iterator[str]:

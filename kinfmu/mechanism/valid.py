@@ -49,13 +49,8 @@ def check_line(where: str, text: str) -> None:
 
 def is_line(text: str) -> bool:
     """Return True for one line of text that terminals, TOML and XML accept."""
-    return all(map(_is_text, text))
-
-
-def _is_text(character: str) -> bool:
-    """Return False for control characters, line breaks, surrogates and noncharacters."""
-    is_none = ord(character) & 0xFFFE == 0xFFFE
-    return not is_none and unicodedata.category(character) not in ("Cc", "Cs", "Zl", "Zp")
+    controls = ("Cc", "Cs", "Zl", "Zp")  # control characters, surrogates, line breaks
+    return all(ord(sign) & 0xFFFE != 0xFFFE and unicodedata.category(sign) not in controls for sign in text)
 
 
 LONGEST = 120

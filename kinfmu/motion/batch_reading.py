@@ -19,6 +19,7 @@ from kinfmu.mechanism.measures import LowestMargin, PressureAngle, Reading
 from kinfmu.mechanism.parameters import in_order, parameter_values
 from kinfmu.mechanism.quantities.arithmetic import Value, atan2_like, cos, sin, sqrt
 from kinfmu.mechanism.settings import LawConstant
+from kinfmu.motion.breaks import has_breaks
 from kinfmu.motion.history import FEWEST
 from kinfmu.motion.measure import (
     listed_measures,
@@ -32,7 +33,6 @@ from kinfmu.motion.motion import Motion
 from kinfmu.motion.quantities import QuantityNames, QuantityRead, coordinates_behind, quantity_model
 from kinfmu.motion.quintic import use_compiled
 from kinfmu.motion.samples import driven_samples, is_crowded
-from kinfmu.motion.splitting import has_breaks
 from kinfmu.plan.equations.graph import Node, evaluate, symbols
 from kinfmu.plan.plan import PlanParameter
 from kinfmu.plan.trace import parameter_symbol
@@ -390,15 +390,9 @@ class BatchReading:
 
 
 def points_of_designs(mechanism: Mechanism, given: Mapping[str, FloatArray]) -> dict[str, tuple[Value, Value]]:
-    """Return body-fixed coordinates of every point by 'body.point'.
+    """Return body-fixed coordinates of every point by 'body.point'; (m, 1) those that differ between designs.
 
-    Args:
-        mechanism: The mechanism as written.
-        given: Arrays (m,) of parameters by name.
-
-    Returns:
-        Pairs of numbers; (m, 1) those that differ between designs.
-
+    mechanism: The mechanism as written. given: Arrays (m,) of parameters by name.
     """
     with np.errstate(all="ignore"):  # designs without a solution may have any numbers
         values = parameter_values(mechanism.parameters, {name: array[:, None] for name, array in given.items()})

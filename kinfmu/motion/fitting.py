@@ -7,6 +7,7 @@ these points are found by exchange (the dual simplex method for the linearized d
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -79,18 +80,9 @@ class Circle(FittedShape):
 
 
 def deviation(x: History, y: History, shape: type[Line] | type[Circle]) -> FloatArray:
-    """Return the largest distance of a path from the line or circle for which it is smallest.
+    """Return the largest distances (...) of paths (..., n) from the line or circle for which they are smallest.
 
-    A line is a circle whose radius grows without bound.
-
-    Args:
-        x: World coordinate x of the path, (..., n).
-        y: World coordinate y.
-        shape: Line or Circle.
-
-    Returns:
-        (...) the distances; NaN for designs with unknown samples.
-
+    A line is a circle whose radius grows without bound. Designs with unknown samples have NaN.
     """
     leading = x.value.shape[:-1]
     known = (x.is_known & y.is_known).reshape(-1)
@@ -191,7 +183,7 @@ def _turned(fitted: FloatArray, x: History, y: History, contacts: IntArray) -> F
     parameters = fitted.copy()
     if not is_double.any():
         return parameters
-    x, y = (History(t.x, t.value[is_double], t.rate[is_double], t.acceleration[is_double]) for t in (x, y))
+    x, y = (t.of_designs(np.flatnonzero(is_double)) for t in (x, y))
 
     def strip(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the half width of the strip at an angle, and its offset."""
@@ -199,14 +191,18 @@ def _turned(fitted: FloatArray, x: History, y: History, contacts: IntArray) -> F
         low, high = (extreme.value for extreme in across.extremes())
         return 0.5 * (high - low), 0.5 * (high + low)
 
-    low, high = (fitted[is_double, 1] + side * _NEAR for side in (-1.0, 1.0))
-    for _ in range(_SECTIONS):
-        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-        is_left = strip(left)[0] < strip(right)[0]
-        low, high = np.where(is_left, low, left), np.where(is_left, right, high)
-    theta = 0.5 * (low + high)
+    theta = _least(lambda angle: strip(angle)[0], fitted[is_double, 1] - _NEAR, fitted[is_double, 1] + _NEAR)
     parameters[is_double] = np.stack([strip(theta)[1], theta], axis=-1)
     return parameters
+
+
+def _least(size: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the arguments (n,) between bounds at which sizes are smallest, by golden sections."""
+    for _ in range(_SECTIONS):
+        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+        is_left = size(left) < size(right)
+        low, high = np.where(is_left, low, left), np.where(is_left, right, high)
+    return np.asarray(0.5 * (low + high))
 
 
 def _along_normal(fitted: FloatArray, x: History, y: History, contacts: IntArray) -> FloatArray:
@@ -247,12 +243,8 @@ def _along_normal(fitted: FloatArray, x: History, y: History, contacts: IntArray
         shape.parameters = circles(stretch)
         return _largest(shape, x, y)
 
-    low, high = np.full(len(rows), -_STRETCH), np.full(len(rows), _STRETCH)
-    for _ in range(_SECTIONS):
-        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-        is_left = size(left) < size(right)
-        low, high = np.where(is_left, low, left), np.where(is_left, right, high)
-    parameters[is_double] = circles(0.5 * (low + high))
+    most = np.full(len(rows), _STRETCH)
+    parameters[is_double] = circles(_least(size, -most, most))
     return parameters
 
 

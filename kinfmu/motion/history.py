@@ -155,14 +155,9 @@ class History:
         return self.value.reshape(-1, n), self.rate.reshape(-1, n), self.acceleration.reshape(-1, n)
 
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return value, rate and acceleration at arguments.
+        """Return value, rate and acceleration (..., k) at arguments, (k,) or (..., k) for each design.
 
-        Args:
-            x: (k,) equal for all designs, or (..., k) with the designs' leading axes.
-
-        Returns:
-            Three arrays (..., k). Arguments outside the motion are taken in the first or last interval.
-
+        Arguments outside the motion are taken in the first or last interval.
         """
         k = np.clip(np.searchsorted(self.x, x, side="right") - 1, 0, len(self.x) - 2)
         h = self.x[k + 1] - self.x[k]
@@ -179,13 +174,7 @@ class History:
         return polynomial(c, s), polynomial(c1, s) / h, polynomial(derived(c1), s) / h**2
 
     def part(self, begin: float, end: float) -> History:
-        """Return the history between two arguments; of a motion that goes round also across its end.
-
-        Args:
-            begin: First argument.
-            end: Last argument, at most one period after `begin`.
-
-        """
+        """Return the history between two arguments, at most a period apart; if it goes round, also across its end."""
         whole = self
         if self.is_closed and end > self.x[-1]:
             turn = self.value[..., -1:] - self.value[..., :1]
@@ -251,14 +240,8 @@ class History:
         rate, acceleration = np.where(self.value == 0.0, 0.0, (self.rate, self.acceleration))
         near = np.abs(np.concatenate([rate[..., 1:2], rate, rate[..., -2:-1]], axis=-1))
         steepest = np.where(self.value == 0.0, np.maximum(near[..., 2:], near[..., :-2]), rate)
-        return History(
-            self.x,
-            self.value**2,
-            2.0 * self.value * rate,
-            2.0 * (steepest**2 + self.value * acceleration),
-            self.is_closed,
-            self.is_seamed,
-        )
+        bend = 2.0 * (steepest**2 + self.value * acceleration)
+        return History(self.x, self.value**2, 2.0 * self.value * rate, bend, self.is_closed, self.is_seamed)
 
     @cached_property
     def _found(self) -> dict[float, Extreme]:
@@ -266,14 +249,9 @@ class History:
         return {}
 
     def crossings(self, level: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Return where the quantity takes a value.
+        """Return where the quantity takes a value, (...) for each design.
 
-        Args:
-            level: (...) the value for each design.
-
-        Returns:
-            The numbers of the designs, counted over all leading axes, and the arguments, both (crossings,).
-
+        It returns the numbers of the designs, counted over all leading axes, and the arguments, both (crossings,).
         """
         flat = (self.value - level[..., None]).reshape(-1, len(self.x))
         rows = [flat, *(row.reshape(flat.shape) for row in (self.rate, self.acceleration))]
@@ -322,13 +300,8 @@ class History:
     def stay(self, band: float) -> tuple[FloatArray, FloatArray]:
         """Return where the quantity enters and leaves the band below its maximum, around the place of the maximum.
 
-        Args:
-            band: Height of the band.
-
-        Returns:
-            Two arguments for each design: those of the first crossings before and after the maximum, or the ends of the
-            motion; of a motion that goes round they may lie one period further.
-
+        band: its height. These are two arguments for each design: the first crossings before and after the maximum, or
+        the ends of the motion; of a motion that goes round they may lie one period further.
         """
         highest = self.maximum()
         top = highest.x.reshape(-1)

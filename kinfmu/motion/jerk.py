@@ -10,15 +10,12 @@ import numpy as np
 from kinfmu.arrays import FloatArray
 from kinfmu.errors import RequestError, listed, valid_names
 from kinfmu.mechanism import Mechanism
-from kinfmu.mechanism.joints.cam import Cam
-from kinfmu.mechanism.joints.cam_flat_face import CamFlatFace
-from kinfmu.mechanism.joints.cam_roller import CamRoller
+from kinfmu.mechanism.joints.cam import Cam, CamFlatFace, CamRoller
 from kinfmu.mechanism.joints.joint import Joint
 from kinfmu.mechanism.laws import External
 from kinfmu.mechanism.quantities.placement import Placement
 from kinfmu.motion.breaks import OneSided
-from kinfmu.motion.motion_equations import LEAST_MARGIN, MotionEquations, derivative
-from kinfmu.plan.equations.system import placement
+from kinfmu.plan.equations.system import System, placement
 from kinfmu.plan.equations.taylor import Taylor
 from kinfmu.run import Run
 from kinfmu.run.axis import TIME
@@ -58,7 +55,7 @@ def motion_of(run: Run, name: str) -> tuple[FloatArray, str]:
     if missing:
         raise RequestError(f"the jerk needs all coordinates, and the run does not hold {listed(missing)}")
     columns = [tuple(np.asarray(run[place.derivative(k)], dtype=float) for k in range(3)) for place in places]
-    along = [Taylor.of(3, *_whole(run, one)) for one in columns]
+    along = [Taylor.of(3, *(np.where(run.good, column, 0.0) for column in one)) for one in columns]
     jerks, margin = MotionEquations(mechanism, len(run)).solved(along, targets_at(run, mechanism), 3)
     is_known = run.good & (run.status != Status.BRIDGED) & (margin > LEAST_MARGIN)
     full = [Taylor((*number.c[:3], jerks[:, k] / 6.0)) for k, number in enumerate(along)]
@@ -99,25 +96,12 @@ def _quantity(mechanism: Mechanism, joints: Sequence[Joint], name: str, at: Plac
     return xy["xy".index(coordinate.axis)], kind
 
 
-def _whole(run: Run, columns: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
-    """Return columns with 0 where a sample has no numbers."""
-    return tuple(np.where(run.good, column, 0.0) for column in columns)
-
-
 def targets_at(
     run: Run, mechanism: Mechanism, place: FloatArray | None = None, side: FloatArray | None = None
 ) -> list[Taylor]:
-    """Return the values of all drivers with three derivatives.
+    """Return the values of all drivers with three derivatives; raise a RequestError if a third derivative is not known.
 
-    Args:
-        run: The run.
-        mechanism: Its mechanism.
-        place: (n,) where, in samples. Default: at the samples.
-        side: (n,) -1: before these places, 1: after them.
-
-    Raises:
-        RequestError: A third derivative is not known.
-
+    place: (n,) where, in samples. Default: at the samples. side: (n,) -1: before these places, 1: after them.
     """
     samples = np.arange(len(run))
     found = []
@@ -126,12 +110,13 @@ def targets_at(
         given = [np.where(np.isfinite(column), column, 0.0) for column in given]
         if run.axis == TIME and not isinstance(driver.law, External):
             of_law = _lifted(driver.law.at(Taylor.of(3, run.t, 1.0)))
-            if all(map(_agrees, given, map(of_law.derivative, range(3)))):
+            within = [SAME * max(float(np.abs(column).max(initial=0.0)), 1e-300) for column in given]
+            apart = [np.abs(column - of_law.derivative(order)) for order, column in enumerate(given)]
+            if all(bool(np.all(gap <= most)) for gap, most in zip(apart, within, strict=True)):
                 if place is not None:
                     t = np.interp(place, samples, run.t)
-                    of_law = _lifted(
-                        (OneSided(driver.law, side) if side is not None else driver.law).at(Taylor.of(3, t, 1.0))
-                    )
+                    law = driver.law if side is None else OneSided(driver.law, side)
+                    of_law = _lifted(law.at(Taylor.of(3, t, 1.0)))
                 found.append(of_law)
                 continue
         if given[2].any():
@@ -147,5 +132,66 @@ def _lifted(value: Any) -> Taylor:
     return value if isinstance(value, Taylor) else Taylor.of(3, value)
 
 
-def _agrees(given: FloatArray, of_law: Any) -> bool:
-    return bool(np.all(np.abs(given - of_law) <= SAME * max(float(np.abs(given).max(initial=0.0)), 1e-300)))
+LEAST_MARGIN = 1e-6  # 1 / condition of the scaled Jacobian; below it a third derivative has no digits
+
+
+class MotionEquations:
+    """The constraint equations of a mechanism at n poses, in Taylor numbers.
+
+        Phi_q q^(k) = -Phi^(k) along q + qd t + ... without q^(k), u(t)
+
+    joints: Its joints, those with other laws in place of the mechanism's own. Default: its own.
+    """
+
+    def __init__(self, mechanism: Mechanism, count: int, joints: Sequence[Joint] = ()) -> None:
+        self.mechanism = mechanism
+        self.joints = tuple(joints) or mechanism.joints
+        self.count = count
+        self.system = System(mechanism)
+
+    def solved(self, q: Sequence[Taylor], targets: Sequence[Taylor], order: int) -> tuple[FloatArray, FloatArray]:
+        """Return what a derivative of the coordinates lacks to satisfy the equations, (n, coordinates), to be added.
+
+        It also returns (n,) 1 / condition of the scaled Jacobian. q: The coordinates; derivatives below the order
+        satisfy the equations, or are close to that for order 0. targets: The drivers' values. order: 0 to 3.
+        """
+        delta = -self._columns(self._evaluate(q, targets), order)  # (n, rows)
+        u, sizes, v = self._decomposed(q, targets)
+        solved = np.einsum("nij,ni->nj", u, delta / self.system.scales / self.system.size)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            missing = np.einsum("nij,ni->nj", v, solved / sizes) * self.system.column_scales
+            margin = sizes[:, -1] / sizes[:, 0]
+        return missing, margin
+
+    def slopes(self, q: Sequence[Taylor], targets: Sequence[Taylor]) -> FloatArray:
+        """Return the rates of the coordinates (n, coordinates) that follow from those of the drivers."""
+        return self.solved([Taylor.of(3, one.c[0]) for one in q], targets, 1)[0]
+
+    def _decomposed(self, q: Sequence[Taylor], targets: Sequence[Taylor]) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the singular values and vectors of the scaled Jacobian."""
+        at_rest = [Taylor((target.c[0], 0.0)) for target in targets]
+        units = ([Taylor((one.c[0], float(j == k))) for j, one in enumerate(q)] for k in range(len(q)))
+        jacobian = np.stack([self._columns(self._evaluate(unit, at_rest), 1) for unit in units], -1)
+        scaled = jacobian / self.system.scales[:, None] * self.system.column_scales / self.system.size
+        u, sizes, v = np.linalg.svd(np.nan_to_num(scaled), full_matrices=False)
+        return u, sizes, v
+
+    def _evaluate(self, q: Sequence[Taylor], targets: Sequence[Taylor]) -> list[Any]:
+        at = placement(self.mechanism, q)
+        phi = [value for joint in self.joints for value in joint.residual(at)]
+        return phi + [one.residual(at, u) for one, u in zip(self.mechanism.drivers, targets, strict=True)]
+
+    def _columns(self, values: Sequence[Any], order: int) -> FloatArray:
+        return np.stack([derivative(value, order, self.count) for value in values], -1)
+
+
+def derivative(value: Any, order: int, count: int) -> FloatArray:
+    """Return a derivative of a Taylor number or a float at all of `count` poses."""
+    found = value.derivative(order) if isinstance(value, Taylor) else (0.0 if order else value)
+    return np.broadcast_to(np.asarray(found, dtype=float), (count,)).copy()
+
+
+def with_derivative(number: Taylor, order: int, value: FloatArray) -> Taylor:
+    """Return a number with a value added to a derivative."""
+    added = Taylor.of(3, *(value if k == order else 0.0 for k in range(order + 1)))
+    return Taylor((number + added).c, number.side)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -58,17 +58,8 @@ class MeasuredValue:
 
     def as_json(self) -> dict[str, Any]:
         """Return the fields as plain data; unknown numbers are null."""
-        known = np.isfinite(self.value)
-        return {
-            "name": self.name,
-            "type": self.type,
-            "value": self.value if known else None,
-            "unit": self.unit,
-            "driver": self.driver,
-            "at": [value if np.isfinite(value) else None for value in self.at],
-            "at_unit": self.at_unit,
-            "reason": self.reason or None,
-        }
+        value, *at = (number if np.isfinite(number) else None for number in (self.value, *self.at))
+        return asdict(self) | {"value": value, "at": at, "reason": self.reason or None}
 
 
 class MeasuredValues(dict[str, MeasuredValue], Displayed):
@@ -120,9 +111,7 @@ def with_measures(mechanism: Mechanism, measures: Iterable[Reading | str] | Read
 def listed_measures(measures: Iterable[Reading | str] | Reading | str) -> list[Reading | str]:
     """Return the measures of a call, of which one can come without a list.
 
-    Raises:
-        RequestError: They are neither measures nor names.
-
+    Raise a RequestError if they are neither measures nor names.
     """
     alone = isinstance(measures, str | Reading)
     if not alone and not isinstance(measures, Iterable):
@@ -173,9 +162,7 @@ class Values(NamedTuple):
 def read_values(motion: Motion, reading: Reading) -> Values:
     """Return a measure of all designs of a motion, which goes round or does not for all of them.
 
-    Raises:
-        RequestError: The motion does not fit; the message names the measure.
-
+    Raise a RequestError that names the measure if the motion does not fit.
     """
     with _named_in_errors(reading), np.errstate(all="ignore"):  # quotients at samples where the driver rests are NaN
         found = reading.read(motion.part(reading.begin, reading.end))
@@ -224,15 +211,10 @@ def moves_evenly(drive: History) -> bool:
 def geometry_of(run: Run, motion: Motion, reading: Reading, solved: Callable[..., Run] | None = None) -> Motion:
     """Return the motion on which a measure is read: of one that compares rates the geometry of the run.
 
-    Args:
-        run: The run.
-        motion: Its motion.
-        reading: The measure. A rate over another is not geometry.
-        solved: Solves the run's mechanism for inputs. Default: `solve`.
+    Raise a RequestError if the driver does not move.
 
-    Raises:
-        RequestError: The driver does not move.
-
+    reading: The measure. A rate over another is not geometry. solved: Solves the run's mechanism for inputs. Default:
+    `solve`.
     """
     drive, orders = motion.drive, motion.names.orders
     if not reading.compares_rates or drive is None or moves_evenly(drive) or not run.good.all():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from kinfmu.mechanism.members import kind_of_measured
 from kinfmu.mechanism.quantities import PoseQuantity, cosine_between
 from kinfmu.mechanism.quantities.arithmetic import Value, sqrt
 from kinfmu.mechanism.quantities.placement import GROUND, BodyFrame, Placement, body_of, unit_vector
+from kinfmu.motion.breaks import ORDER, Break, distinct, law_breaks, split_at
 from kinfmu.motion.fitting import Circle, Line, deviation
 from kinfmu.motion.history import FEWEST, Extreme, History, first_pole
 from kinfmu.motion.quantities import QuantityNames, QuantityRead, path_of
@@ -33,7 +34,6 @@ from kinfmu.motion.samples import (
     window,
     within_period,
 )
-from kinfmu.motion.splitting import ORDER, Break, distinct, law_breaks, split_at
 from kinfmu.plan.equations.system import size_of
 from kinfmu.plan.equations.taylor import Taylor
 from kinfmu.run import Run
@@ -104,19 +104,13 @@ class Motion:
         if len(run) < FEWEST:
             raise RequestError(f"the run has {len(run)} samples; measures need {FEWEST} or more")
         x, per, order, driver, drive = driven_samples(run)
-        tables = tuple(table[order] for table in (run.values, run.rates, run.accelerations))
-        motion = cls(
-            mechanism,
-            x,
-            per,
-            tables,  # type: ignore[arg-type]  # three of them
-            run.outputs,
-            run.fixed,
-            drive,
-            mechanism.body_points,
-            driver,
-            sampled=lambda name: (run.margin if name == MARGIN else force_of(run, name))[order],
-        )
+        tables = run.values[order], run.rates[order], run.accelerations[order]
+
+        def sampled(name: str) -> FloatArray:
+            return (run.margin if name == MARGIN else np.asarray(run[name], dtype=float))[order]
+
+        points: Any = mechanism.body_points
+        motion = cls(mechanism, x, per, tables, run.outputs, run.fixed, drive, points, driver, sampled=sampled)
         motion = motion._spread()
         outputs = [(motion.quantity_history(name), name.is_angle) for name in run.outputs]
         is_closed = bool(outputs) and bool(goes_round(outputs))
@@ -230,9 +224,7 @@ class Motion:
     def part(self, begin: float | None, end: float | None) -> Motion:
         """Return the part of the motion between two values of the driver; None: its first or last.
 
-        Raises:
-            RequestError: The driver turns back or does not reach the values.
-
+        Raise a RequestError if the driver turns back or does not reach them.
         """
         if begin is None and end is None:
             return self
@@ -452,17 +444,10 @@ class Motion:
 def break_places(run: Run) -> list[float]:
     """Return the arguments of a run, time or driver values, at which derivatives of laws jump.
 
-    Raises:
-        RequestError: As `Motion.of_run`.
-
+    Raise a RequestError as `Motion.of_run` does.
     """
     motion = Motion.of_run(run)
     return [one.x for one in motion.breaks(over_time=run.axis == TIME)]
-
-
-def force_of(run: Run, name: str) -> FloatArray:
-    """Return a force of a run, (n,)."""
-    return np.asarray(run[name], dtype=float)
 
 
 def _name(of: str | PoseQuantity) -> str:

@@ -14,8 +14,15 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.joints import CamRoller
 from kinfmu.mechanism.laws.law import TURN
 from kinfmu.motion.breaks import AT_SAMPLE, FollowedLaw, OneSided, bracket, breaks_of, followed_laws
-from kinfmu.motion.jerk import motion_of, quantity_table, targets_at
-from kinfmu.motion.motion_equations import LEAST_MARGIN, MotionEquations, derivative, with_derivative
+from kinfmu.motion.jerk import (
+    LEAST_MARGIN,
+    MotionEquations,
+    derivative,
+    motion_of,
+    quantity_table,
+    targets_at,
+    with_derivative,
+)
 from kinfmu.plan.equations.system import placement
 from kinfmu.plan.equations.taylor import Taylor
 from kinfmu.run import Column, Run

@@ -37,7 +37,7 @@ class QuantityNames:
     @cached_property
     def orders(self) -> dict[str, tuple[CoordinateName, int]]:
         """Each coordinate and its rates, with the coordinate and the order."""
-        return coordinate_orders(self._mechanism)
+        return coordinate_orders(self._mechanism.coordinate_names, self._mechanism.points)
 
     @cached_property
     def forces(self) -> dict[str, tuple[ForceName, ...]]:
@@ -79,10 +79,7 @@ def quantity_model(model: Model, quantities: Sequence[QuantityRead]) -> Model:
 
     It solves the same blocks, so that a design which the model cannot assemble has no numbers here either.
 
-    Args:
-        model: The model, of whose outputs and fixed coordinates the quantities are made.
-        quantities: The quantities.
-
+    model: The model, of whose outputs and fixed coordinates the quantities are made.
     """
     kept = _kept.setdefault(model, {})
     key = tuple(quantities)

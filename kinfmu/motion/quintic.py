@@ -28,9 +28,7 @@ _compiled: list[ctypes.CDLL] = []  # the library, once it is wanted
 def use_compiled() -> None:
     """Compile `quintic.c`, or find it in the cache; many designs are measured by it from then on.
 
-    Raises:
-        CompilerError: There is no compiler, or it fails.
-
+    Raise a CompilerError if there is no compiler, or it fails.
     """
     from kinfmu.codegen.c import compiler
 

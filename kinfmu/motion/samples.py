@@ -48,9 +48,7 @@ class DrivenSamples(NamedTuple):
 def driven_samples(run: HasAxis) -> DrivenSamples:
     """Return the samples of a run in order.
 
-    Raises:
-        RequestError: The samples are not in the order of time, or of one driver that has a constant speed.
-
+    Raise a RequestError if they are not in the order of time, or of one driver that has a constant speed.
     """
     x, per = _argument_of(run)
     order = np.s_[:] if x[-1] > x[0] else np.s_[::-1]
@@ -108,9 +106,7 @@ def within_period(drive: History, values: FloatArray) -> FloatArray:
 def window(drive: History, begin: float | None, end: float | None) -> tuple[float, float]:
     """Return the first and last argument between two values of the driver; None: its first or last.
 
-    Raises:
-        RequestError: The driver turns back or does not reach the values.
-
+    Raise a RequestError if the driver turns back or does not reach them.
     """
     ends = sorted((float(drive.value[0]), float(drive.value[-1])))
     if not (np.all(drive.rate > 0.0) or np.all(drive.rate < 0.0)):
@@ -151,11 +147,8 @@ def is_crowded(x: FloatArray) -> bool:
 def spread(x: FloatArray, rates: FloatArray, accelerations: FloatArray) -> IntArray:
     """Return the numbers of the samples to keep: ends, both sides of breaks, of close and nearly equal ones the first.
 
-    Args:
-        x: (n,) ascending arguments; a break is there twice.
-        rates: (n, m) rates of the outputs.
-        accelerations: (n, m) their accelerations. Samples without numbers are kept.
-
+    x: (n,) ascending arguments; a break is there twice. rates: (n, m) rates of the outputs. accelerations: (n, m) their
+    accelerations. Samples without numbers are kept.
     """
     mean = _mean(x)
     with np.errstate(invalid="ignore"):

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from kinfmu.errors import RequestError
 from kinfmu.mechanism.laws import Law
 from kinfmu.mechanism.laws.law import TURN, Jumps
-from kinfmu.mechanism.loads.following import Following
+from kinfmu.mechanism.loads.load import Following
 from kinfmu.mechanism.quantities.arithmetic import Value
 from kinfmu.mechanism.quantities.placement import Placement
 from kinfmu.plan.equations.graph import Node, symbols

@@ -22,8 +22,7 @@ from kinfmu import (
     RunSettings,
     Translational,
 )
-from kinfmu.analysis.driver_path import follow
-from kinfmu.analysis.values import value_text
+from kinfmu.analysis.driver_path import follow, value_text
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.plan import compile_plan
 from kinfmu.solver.python import Pose

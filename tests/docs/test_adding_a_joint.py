@@ -37,7 +37,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (copy / "kinfmu" / "mechanism" / "joints" / named).write_text(joint, encoding="utf-8")
     package = copy / "kinfmu" / "mechanism" / "joints" / "__init__.py"
     text = package.read_text(encoding="utf-8")
-    text = text.replace("from kinfmu.mechanism.joints.rack_and", f"{export}from kinfmu.mechanism.joints.rack_and", 1)
+    text = text.replace("from kinfmu.mechanism.joints.revolute", f"{export}from kinfmu.mechanism.joints.revolute", 1)
     text = text.replace("\n)\n\n__all__", "\n    Opposed,\n)\n\n__all__", 1)
     text = text.replace('    "PointOnLine",\n', '    "Opposed",\n    "PointOnLine",\n', 1)
     assert text.count("Opposed") == 3

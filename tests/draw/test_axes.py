@@ -25,9 +25,8 @@ from kinfmu.draw.chart import unit_in
 from kinfmu.draw.drawing import sheet_of
 from kinfmu.draw.fitted import Curve, Fitted, figure_of
 from kinfmu.draw.instant import instant
-from kinfmu.draw.plots import _sheet
+from kinfmu.draw.plots import _sheet, stacks_of
 from kinfmu.draw.sheet import INCH, Sheet, title_lines
-from kinfmu.draw.stacks import stacks_of
 from kinfmu.draw.writing import figure_style
 from kinfmu.errors import FigureError, KinfmuError, RequestError
 from kinfmu.mechanism import gallery

@@ -223,12 +223,12 @@ def test_drivers_are_cylinders_and_arrows_with_the_value_of_the_start() -> None:
     length = 1.7  # where the law starts, not where the start pose is: 1.685
     assert cylinder.text == "cylinder = 1.7 mm"
     (barrel,), (shaft,) = drawn(shown, "barrel"), drawn(shown, "shaft")
-    np.testing.assert_allclose(cylinder.ends, [barrel.points[0], shaft.points[1]], atol=1e-12)
+    np.testing.assert_allclose(cylinder.at, [barrel.points[0], shaft.points[1]], atol=1e-12)
     assert 0.3 * length <= np.hypot(*(barrel.points[1] - barrel.points[0])) <= 0.62 * length + 1e-12
 
     (turn,) = motion(instant(fourbar(4.0, 1.0, 3.5, 3.0)))
     assert isinstance(turn, Turn)
-    assert (turn.text, turn.sense, tuple(turn.centre)) == ("crank = 57.3°", 1.0, (0.0, 0.0))
+    assert (turn.text, turn.sense, tuple(turn.at)) == ("crank = 57.3°", 1.0, (0.0, 0.0))
     assert turn.heading == pytest.approx(1.0)
 
     ram = SlideDriver("ram", ("ground.slot", "block.S"), law=ConstantSpeed(3.5, -0.1))

@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 import kinfmu
 from kinfmu.draw import plot
 from kinfmu.draw.overlay import overlay, overlay_sheet
-from kinfmu.draw.plots import _sheet
-from kinfmu.draw.stacks import stacks_of
+from kinfmu.draw.plots import _sheet, stacks_of
 from kinfmu.errors import FigureError, KinfmuError, RequestError
 from kinfmu.run import Run
 from kinfmu.units import CoordinateName

@@ -17,11 +17,9 @@ from matplotlib.figure import Figure
 import kinfmu
 from kinfmu.arrays import FloatArray
 from kinfmu.draw import plot
-from kinfmu.draw.chart import axis_label, degree_ticks, label_size, numbers
-from kinfmu.draw.curves import gaps, rows_of
+from kinfmu.draw.chart import axis_label, degree_ticks, gaps, label_size, numbers, rows_of
 from kinfmu.draw.overlay import overlay, overlay_sheet
-from kinfmu.draw.plots import _sheet, _shown
-from kinfmu.draw.stacks import _title_of, stacks_of, usual_coordinates
+from kinfmu.draw.plots import _sheet, _shown, _title_of, stacks_of, usual_coordinates
 from kinfmu.draw.svaj_figure import _sheet as _svaj_sheet
 from kinfmu.draw.svaj_figure import driver_axis
 from kinfmu.errors import FigureError, RequestError

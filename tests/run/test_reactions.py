@@ -14,7 +14,7 @@ import pytest
 import kinfmu
 from kinfmu import Mechanism, Run
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.stacks import stacks_of
+from kinfmu.draw.plots import stacks_of
 from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.log import read, write_mcap
 from kinfmu.log.record import description

@@ -14,8 +14,7 @@ import pytest
 import kinfmu
 from kinfmu import KinfmuError, Run
 from kinfmu.draw import animate
-from kinfmu.draw.plots import _sheet
-from kinfmu.draw.stacks import stacks_of
+from kinfmu.draw.plots import _sheet, stacks_of
 from kinfmu.errors import LogError, RequestError
 from kinfmu.log import read, write_mcap
 from kinfmu.log.viewer.card import card

@@ -57,9 +57,7 @@ class Argument:
 def argument_of(mechanism: Mechanism, choice: str | None) -> Argument:
     """Return what the samples of a mechanism go by; choice: 'driver', 'time' or None: the driver, if there is one only.
 
-    Raises:
-        MechanismError: The mechanism has no driver, or several where one is needed.
-
+    Raise a MechanismError if there is no driver, or several where one is needed.
     """
     drivers, run = mechanism.drivers, mechanism.run
     if not drivers:
@@ -193,14 +191,10 @@ def crossings(u: FloatArray, curve: Curve, levels: FloatArray) -> FloatArray:
 
     Where it has a value several times, the one nearest to the argument before counts; for the first value the first.
 
-    Args:
-        u: (n,) arguments of samples of the whole motion.
-        curve: Values, rates and accelerations (m, 1) at arguments (m,).
-        levels: (m,).
+    Raise a NotReachedError if the output never has one of the values.
 
-    Raises:
-        NotReachedError: The output never has one of the values.
-
+    u: (n,) arguments of samples of the whole motion. curve: Values, rates and accelerations (m, 1) at arguments (m,).
+    levels: (m,).
     """
     x = curve(u)[0][:, 0]
     spacing = abs(float(u[1] - u[0]))

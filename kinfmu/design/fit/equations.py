@@ -13,9 +13,9 @@ import numpy as np
 from kinfmu.arrays import FloatArray
 from kinfmu.design.fit.argument import NotReachedError, crossings, modulo, nearest
 from kinfmu.design.fit.measuring import Aim
-from kinfmu.design.fit.numbers import Bounds
 from kinfmu.design.fit.problem import FitProblem
 from kinfmu.design.fit.sampled import Sampled
+from kinfmu.design.fit.targets import Bounds
 from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.plan import compile_plan
 from kinfmu.run.model import Model
@@ -86,10 +86,7 @@ class Equations:
 
         r = y(u) - y_k,   dr/dp = y_p - (y'/x') x_p
 
-    Args:
-        problem: The problem.
-        engine: 'python' or 'native'.
-
+    engine: 'python' or 'native'.
     """
 
     def __init__(self, problem: FitProblem, engine: str = "python") -> None:
@@ -98,9 +95,7 @@ class Equations:
         outputs = dict.fromkeys(name for one in problem.sampled for name in (*one.outputs, one.over) if name)
         self.outputs = tuple(outputs)
         self.names = tuple(problem.bounds)
-        self.scale = (
-            1.0  # root of the sum of squares of the targets of a typical design, to which penalties are relative
-        )
+        self.scale = 1.0  # to which penalties are relative: root of the sum of squares of a typical design's targets
         self.shifts = np.zeros_like(self._relative_roots)  # of the limits, while a search makes violations vanish
         self.stiffness = np.ones_like(self.shifts)  # factors of the penalties, of violations that vanish slowly
         self._ranges = np.array([bounds.high - bounds.low for bounds in problem.bounds.values()])
@@ -119,9 +114,7 @@ class Equations:
     def at(self, z: FloatArray) -> tuple[Evaluation, FloatArray]:
         """Return the evaluation and the Jacobian (r, n) by z, without the rows of measures, which are 0.
 
-        Raises:
-            NotAssembledError: The design cannot be assembled, or does not reach a sample.
-
+        Raise a NotAssembledError if the design cannot be assembled or does not reach a sample.
         """
         values = self.problem.vector(z)
         parameters = {name: values[name] for name in self.problem.parameters}

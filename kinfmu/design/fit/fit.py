@@ -297,15 +297,10 @@ _equations: Equations  # of a process of the team
 class Team:
     """Processes that search from many starts, with one worker this process; the results do not depend on their number.
 
-    Args:
-        problem: The problem.
-        engine: 'auto', 'python' or 'native'; 'auto' is native where a compiler is found.
-        designs: How many are solved, roughly.
-        workers: Number of processes; None: one for each core.
+    Raises a RequestError if `workers` is not a positive whole number.
 
-    Raises:
-        RequestError: `workers` is not a positive whole number.
-
+    engine: 'auto', 'python' or 'native'; 'auto' is native where a compiler is found. designs: How many are solved,
+    roughly. workers: Number of processes; None: one for each core.
     """
 
     def __init__(self, problem: FitProblem, engine: str, designs: int, workers: int | None) -> None:
@@ -318,12 +313,7 @@ class Team:
 
     @contextmanager
     def working(self) -> Iterator[Team]:
-        """Start the processes, and end them with the block.
-
-        Raises:
-            WorkerLostError: A process ended unexpectedly.
-
-        """
+        """Start the processes, and end them with the block; raise a WorkerLostError if one ends unexpectedly."""
         if self.workers == 1:
             yield self
             return

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.design.fit.numbers import read_weights
-from kinfmu.design.fit.targets import GrashofConstraint
+from kinfmu.design.fit.targets import GrashofConstraint, read_weights
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.expression import Expression
@@ -52,9 +51,7 @@ class Lengths:
     def of(cls, constraint: GrashofConstraint, where: str, mechanism: Mechanism) -> Lengths:
         """Return the conditions of a constraint.
 
-        Raises:
-            MechanismError: A length is not an expression of parameters, or there are not four.
-
+        Raise a MechanismError if a length is not an expression of parameters, or there are not four.
         """
         links, unit = constraint.links, mechanism.length_unit
         if isinstance(links, str) or not isinstance(links, Sequence) or len(links) != 4:

@@ -11,8 +11,14 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.design.fit.argument import Argument
-from kinfmu.design.fit.numbers import read_weights
-from kinfmu.design.fit.targets import Constraint, MarginConstraint, MeasureConstraint, MeasureTarget, Target
+from kinfmu.design.fit.targets import (
+    Constraint,
+    MarginConstraint,
+    MeasureConstraint,
+    MeasureTarget,
+    Target,
+    read_weights,
+)
 from kinfmu.errors import KinfmuError, MechanismError, valid_names
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.laws import ConstantSpeed
@@ -69,11 +75,8 @@ class Aim:
 class Measuring:
     """The measures of a problem.
 
-    Args:
-        model: The mechanism with the outputs that the measures need.
-        inputs: What moves it, as arguments of `Model.solve`.
-        aims: Measures with values or limits.
-
+    model: The mechanism with the outputs that the measures need. inputs: What moves it, as arguments of `Model.solve`.
+    aims: Measures with values or limits.
     """
 
     def __init__(self, model: Model, inputs: Mapping[str, Any], aims: Sequence[Aim]) -> None:
@@ -86,9 +89,7 @@ class Measuring:
     def values(self, parameters: Mapping[str, float]) -> FloatArray:
         """Return the measured values (aims,).
 
-        Raises:
-            KinfmuError: The design cannot be assembled, or a measure has no value.
-
+        Raise a KinfmuError if the design cannot be assembled, or a measure has no value.
         """
         reasons: dict[int, str] = {}
         found = self._measured({name: np.array([value]) for name, value in parameters.items()}, self.aims, reasons)
@@ -145,13 +146,11 @@ def measuring_of(
 ) -> Measuring | None:
     """Return the measures of targets and constraints; None if there are none.
 
-    Raises:
-        MechanismError: A name or a value is invalid.
-        KinfmuError: The mechanism as written cannot be measured.
-
+    Raise a MechanismError if a name or a value is invalid, another KinfmuError if the mechanism cannot be measured.
     """
     tables = [(f"[targets.{one.name}]", one) for one in targets if isinstance(one, MeasureTarget)]
-    more = [(f"[constraints.{one.name}]", one) for one in constraints if _is_measured(one)]
+    measured = (MarginConstraint, MeasureConstraint)
+    more = [(f"[constraints.{one.name}]", one) for one in constraints if isinstance(one, measured)]
     both: list[tuple[str, Any]] = [*tables, *more]
     if not both:
         return None
@@ -164,9 +163,10 @@ def measuring_of(
     for (where, one), reading in zip(both, readings, strict=True):
         unit = units[one.name]
         quantity = Quantity("number") if unit == "1" else quantity_in(unit, mechanism.length_unit)
+        given = {key: getattr(one, key, None) for key in ("value", "minimum", "maximum")}
         limits = {
-            key: None if (value := getattr(one, key, None)) is None else _number(where, key, value, quantity, mechanism)
-            for key in ("value", "minimum", "maximum")
+            key: None if value is None else read_constant(f"{where} {key}", value, quantity, mechanism.length_unit)
+            for key, value in given.items()
         }
         if all(value is None for value in limits.values()):
             raise MechanismError(f"{where} needs 'minimum' or 'maximum', or both")
@@ -200,14 +200,6 @@ def _parts(reading: Reading, value: float | None, minimum: float | None) -> Iter
 
 def _renamed(reading: Reading, name: str) -> Reading:
     return replace(reading, name=name)  # type: ignore[type-var]  # leaves are dataclasses
-
-
-def _is_measured(one: Constraint) -> bool:
-    return isinstance(one, MarginConstraint | MeasureConstraint)
-
-
-def _number(where: str, key: str, value: object, quantity: Quantity, mechanism: Mechanism) -> float:
-    return read_constant(f"{where} {key}", value, quantity, mechanism.length_unit)
 
 
 def _reading(where: str, one: Any, mechanism: Mechanism) -> Reading:

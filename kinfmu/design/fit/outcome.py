@@ -12,9 +12,9 @@ import numpy as np
 from kinfmu.arrays import FloatArray
 from kinfmu.design.fit.equations import Evaluation
 from kinfmu.design.fit.measuring import Aim
-from kinfmu.design.fit.numbers import flat
 from kinfmu.design.fit.problem import FitProblem
 from kinfmu.design.fit.sampled import Sampled
+from kinfmu.design.fit.targets import flat
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.measures import counted_from
 from kinfmu.mechanism.number import DisplayUnit, display_unit, written_unit

@@ -14,17 +14,18 @@ from kinfmu.arrays import FloatArray
 from kinfmu.design.fit.argument import Argument, argument_of
 from kinfmu.design.fit.lengths import Lengths
 from kinfmu.design.fit.measuring import Measuring, measuring_of
-from kinfmu.design.fit.numbers import Bounds, read_bounds
 from kinfmu.design.fit.sampled import Sampled, TracedPoints, sampled
 from kinfmu.design.fit.targets import (
     CONSTRAINTS,
     TARGETS,
+    Bounds,
     Constraint,
     FunctionTarget,
     GrashofConstraint,
     MeasureTarget,
     PathTarget,
     Target,
+    read_bounds,
 )
 from kinfmu.errors import MechanismError, RequestError, listed
 from kinfmu.files import suffix_of

@@ -120,7 +120,11 @@ def result_of(equations: Equations, optima: Sequence[Optimum], tried: int, refus
         if designs[-1].is_fitted:
             break
     best = next((one for one in designs if one.is_fitted), min(designs, key=lambda one: one.total))
-    refuted = [one for one in designs if one is not best and best.is_fitted]
+    notes = []
+    for one in designs if best.is_fitted else ():
+        if one is not best:
+            at = listed(f"{name} = {value:.6g}" for name, value in one.optimum.parameters.items())
+            notes.append(f"the optimum at {at} is not chosen: {one.note}")
     found = best.own or best.fitted
     own_sums = {id(one.optimum): one.own for one in designs if one.own is not None}
     others = [one for one in optima if one is not best.optimum]
@@ -141,7 +145,7 @@ def result_of(equations: Equations, optima: Sequence[Optimum], tried: int, refus
         refused=dict(refused),
         idle=_idle(problem, best.jacobian),
         undetermined=_undetermined(equations, best.z, best.fitted, best.jacobian, (best.optimum, *others)),
-        note="; ".join(filter(None, [*map(_not_chosen, refuted), best.note])),
+        note="; ".join(filter(None, [*notes, best.note])),
     )
 
 
@@ -167,12 +171,6 @@ def _as_file(equations: Equations, optimum: Optimum) -> _Design:
         note=f"the mechanism file assembles in another way, as at a change point: its sum of squares is "
         f"{own.squares:.6g}, that of the search {fitted.squares:.6g}"
     )
-
-
-def _not_chosen(design: _Design) -> str:
-    """Return why an optimum is not the result."""
-    at = listed(f"{name} = {value:.6g}" for name, value in design.optimum.parameters.items())
-    return f"the optimum at {at} is not chosen: {design.note}"
 
 
 def _idle(problem: FitProblem, jacobian: FloatArray) -> tuple[str, ...]:

@@ -11,8 +11,7 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.design.fit.argument import Argument
-from kinfmu.design.fit.numbers import Bounds, read_free, read_rows, read_weights
-from kinfmu.design.fit.targets import FunctionTarget, PathTarget, PoseTarget
+from kinfmu.design.fit.targets import Bounds, FunctionTarget, PathTarget, PoseTarget, read_free, read_rows, read_weights
 from kinfmu.errors import MechanismError, valid_names
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.number import read_constant
@@ -86,12 +85,7 @@ class TracedPoints:
         self.points = dict(mechanism.points)
 
     def outputs(self, where: str, of: str) -> tuple[CoordinateName, ...]:
-        """Return the names of a point's coordinates.
-
-        Raises:
-            MechanismError: There is no such point.
-
-        """
+        """Return the names of a point's coordinates; raise a MechanismError if there is no such point."""
         known = self._written.body_points
         if of in self.points:
             return tuple(CoordinateName(of, axis) for axis in "xy")
@@ -114,19 +108,10 @@ def sampled(
     argument: Argument,
     unit: str,
 ) -> Sampled:
-    """Return a target in the common form.
+    """Return a target, as declared, in the common form; raise a MechanismError if a value is invalid.
 
-    Args:
-        target: As declared.
-        where: Its table in messages, such as '[targets.foot]'.
-        traced: Names of the outputs of points.
-        coordinates: Known outputs, by their names.
-        argument: What the samples go by.
-        unit: Unit of length.
-
-    Raises:
-        MechanismError: A value is invalid.
-
+    where: Its table in messages, such as '[targets.foot]'. traced: Names of the outputs of points. coordinates: Known
+    outputs, by their names. argument: What the samples go by. unit: Unit of length.
     """
     common: dict[str, Any] = {
         "name": target.name,

@@ -12,14 +12,20 @@ its limit and whether it holds.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.design.fit.numbers import Numeral
+from kinfmu.errors import MechanismError
 from kinfmu.mechanism.measures import Reading
+from kinfmu.mechanism.number import read_constant
+from kinfmu.mechanism.valid import is_number, quoted
+from kinfmu.units import Quantity
 
+Numeral = float | str  # bare or with a unit
 Free = Numeral | Sequence[Numeral]
 Row = Sequence[Numeral] | FloatArray
 Rows = Sequence[Sequence[Numeral]] | FloatArray
@@ -220,3 +226,69 @@ class MeasureConstraint:
 
 Constraint = GrashofConstraint | MarginConstraint | MeasureConstraint
 CONSTRAINTS = (GrashofConstraint, MarginConstraint, MeasureConstraint)
+
+
+class Bounds(NamedTuple):
+    """Bounds of an unknown."""
+
+    low: float
+    high: float
+
+
+def read_bounds(where: str, value: object, quantity: Quantity, unit: str) -> Bounds:
+    """Return bounds [low, high], low below high.
+
+    Raise a MechanismError if the value is not two numbers in ascending order.
+    """
+    if isinstance(value, str) or not isinstance(value, Sequence) or len(value) != 2:
+        raise MechanismError(f"{where} = {quoted(value)} must be bounds [low, high]")
+    low, high = (read_constant(where, one, quantity, unit) for one in value)
+    if not low < high:
+        raise MechanismError(f"{where} = {quoted(value)}: the low bound must be below the high one")
+    return Bounds(low, high)
+
+
+def read_free(where: str, value: Any, quantity: Quantity, unit: str) -> float | Bounds:
+    """Return a number, or the bounds of an unknown; None is 0."""
+    if value is None:
+        return 0.0
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        return read_constant(where, value, quantity, unit)
+    return read_bounds(where, value, quantity, unit)
+
+
+def flat(value: Any) -> Iterable[object]:
+    """Return the numbers of a number, of bounds or of a list."""
+    return value if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else (value,)
+
+
+def read_rows(where: str, rows: Any, quantities: Sequence[Quantity], unit: str, example: str) -> FloatArray:
+    """Return rows of numbers (m, d), one of each quantity.
+
+    Raise a MechanismError if there are no rows, or a row has other than d numbers.
+    """
+    valid = f"{where} must be a list {example}"
+    if isinstance(rows, str) or not isinstance(rows, Sequence | np.ndarray) or not len(rows):
+        raise MechanismError(f"{where} = {quoted(rows)} must be a list {example}")
+    found = []
+    for k, row in enumerate(rows, start=1):
+        if isinstance(row, str) or not isinstance(row, Sequence | np.ndarray) or len(row) != len(quantities):
+            raise MechanismError(f"{valid}; number {k} is {quoted(row)}")
+        found.append([read_constant(f"{where}, number {k},", n, q, unit) for n, q in zip(row, quantities, strict=True)])
+    return np.array(found)
+
+
+def read_weights(where: str, value: Any, count: int) -> FloatArray:
+    """Return weights (count,), each at least 0 and not all 0.
+
+    Raise a MechanismError if a weight is no such number, or there are other than `count`.
+    """
+    weights = [value] * count if is_number(value) else value
+    if isinstance(weights, str) or not isinstance(weights, Sequence | np.ndarray) or not all(map(is_number, weights)):
+        raise MechanismError(f"{where} = {quoted(value)} must be a number, or a list of one for each point")
+    if len(weights) != count:
+        raise MechanismError(f"{where} has {len(weights)} numbers for {count} points")
+    found = np.array(weights, dtype=float)
+    if not (np.isfinite(found).all() and (found >= 0.0).all() and found.any()):
+        raise MechanismError(f"{where} = {quoted(value)}: weights must be 0 or more, and one of them above 0")
+    return found

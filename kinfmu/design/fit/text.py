@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from kinfmu.design.fit.numbers import Bounds, flat
 from kinfmu.design.fit.outcome import FitOutcome, TargetErrors, argument_unit, unit_of_unknown
 from kinfmu.design.fit.problem import FitProblem
 from kinfmu.design.fit.sampled import Sampled
+from kinfmu.design.fit.targets import Bounds, flat
 from kinfmu.display import aligned
 from kinfmu.errors import listed
 from kinfmu.mechanism.measures import counted_from

@@ -168,23 +168,9 @@ def define(
 ) -> Study:
     """Return a study; arguments as `kinfmu.study` has them.
 
-    Args:
-        mechanism: The mechanism, or what `kinfmu.load` takes.
-        parameters: For each parameter a table, as `read_variation` reads it.
-        measures: Names of measures of the mechanism, and measures. Default: those of the mechanism.
-        sampling: 'sobol' or 'latin_hypercube'.
-        designs: Number of samples of the parameters that are not on a grid.
-        seed: Seed of the random numbers, a whole number from 0.
-        t: (n,) times [s]. Default: `inputs`, or without these one cycle of the driver or the run of the file.
-        over: Description of the motion. Default: made from it.
-        engine: 'auto', 'python' or 'native'.
-        file_text: Text of the study file.
-        inputs: Driver values and rates by input, such as 'crank_angle': numbers or (n,) [rad or length].
+    Raise a RequestError if an argument is invalid, a MechanismError if the mechanism or a table of a parameter is.
 
-    Raises:
-        RequestError: An argument is invalid.
-        MechanismError: The mechanism, or a table of a parameter, is invalid.
-
+    over: Description of the motion. Default: made from it. file_text: Text of the study file.
     """
     if isinstance(mechanism, str | Path):
         mechanism = gallery.load(mechanism)
@@ -267,7 +253,8 @@ def _motion(
         longest = max(arrays, key=lambda name: np.size(arrays[name]))
         values = np.atleast_1d(arrays[longest])
         return StudyMotion(None, arrays, over or f"{longest} = {values[0]:.6g} to {values[-1]:.6g}")
-    if len(mechanism.drivers) == 1 and (can_cycle(mechanism) or not changes_law):
+    can_cycle = not changes_law or isinstance(mechanism.drivers[0].law, ConstantSpeed)  # at the speed of each design
+    if len(mechanism.drivers) == 1 and can_cycle:
         try:
             found, over = driver_cycle(compile_plan(mechanism))
         except KinfmuError as error:
@@ -310,13 +297,7 @@ def _identified(value: FloatArray | float) -> Any:
 
 
 def law_changing(mechanism: Mechanism, names: Collection[str]) -> list[str]:
-    """Return those of some parameters and law constants that change the law of a driver.
-
-    Args:
-        mechanism: The mechanism.
-        names: Names of parameters and law constants.
-
-    """
+    """Return those of some parameters and law constants that change the law of a driver."""
     constants = {constant.name for constant in mechanism.law_constants}
 
     def is_behind_law(name: str) -> bool:
@@ -329,16 +310,11 @@ def law_changing(mechanism: Mechanism, names: Collection[str]) -> list[str]:
 def own_cycles(
     mechanism: Mechanism, cycle: Mapping[str, FloatArray | float], designs: Mapping[str, FloatArray]
 ) -> dict[str, Any]:
-    """Return the driver values (m, n) of one cycle at the start and the speed of each design, as `solve` takes them.
+    """Return the driver values of one cycle at the start and the speed of each design, as `solve` takes them.
 
-    Args:
-        mechanism: The mechanism, with a single driver whose law is `constant_speed`.
-        cycle: The cycle of the design as written: angles (n,) and speed, by input.
-        designs: Arrays (m,) of the parameters and law constants that vary, by name.
-
-    Returns:
-        Angles and speeds; of a single design (n,) and a number.
-
+    They are (m, n) angles and speeds; of a single design (n,) and a number. cycle: That of the design as written,
+    angles (n,) and speed by input; its single driver has a law `constant_speed`. designs: Arrays (m,) of what varies,
+    by name.
     """
     (driver,) = mechanism.drivers
     law: Any = driver.law
@@ -356,8 +332,3 @@ def own_cycles(
     if count == 1:
         return {angle: begin[0] + turned, speed: float(own["speed"][0])}
     return {angle: begin[:, None] + turned, speed: np.repeat(own["speed"][:, None], len(turned), axis=1)}
-
-
-def can_cycle(mechanism: Mechanism) -> bool:
-    """Return whether the law of the only driver has a speed, at which each design can make its cycle."""
-    return len(mechanism.drivers) == 1 and isinstance(mechanism.drivers[0].law, ConstantSpeed)

@@ -51,10 +51,7 @@ def draw(result: StudyRows, path: str | Path | None, ax: Axes | None, measures: 
 def figure_of(result: StudyRows, measures: tuple[str, ...] = ()) -> Any:
     """Return the Figure of matplotlib that shows the results of a study.
 
-    Raises:
-        StudyError: A measure is unknown.
-        FigureError: There are too many columns for a scatter matrix.
-
+    Raise a StudyError if a measure is unknown, a FigureError if there are too many columns for a scatter matrix.
     """
     measures = _known(result, measures)
     kind = picture_of(result)

@@ -26,12 +26,7 @@ Columns = dict[str, Any]  # arrays (m,) by column; texts of `reason` by the desi
 class Job:
     """What a worker needs to measure designs of a study; it is sent as bytes and unpacked once.
 
-    Attributes:
-        model: The compiled mechanism, with its measures.
-        t: (n,) times, or None.
-        inputs: Driver values.
-        at_own_speed: As in `StudyMotion`.
-
+    model: the compiled mechanism, with its measures; t: (n,) times, or None; inputs, at_own_speed: as in `StudyMotion`.
     """
 
     model: Model
@@ -61,14 +56,9 @@ class Job:
 def run_chunk(packed: bytes, version: str, parameters: Mapping[str, FloatArray]) -> Columns:
     """Return the columns of some designs: what workers run.
 
-    Args:
-        packed: The job.
-        version: Of the kinfmu that sent it.
-        parameters: (m,) by name.
+    Raise a StudyError if the worker has another version of kinfmu.
 
-    Raises:
-        StudyError: The worker has another version of kinfmu.
-
+    packed: The job. version: Of the kinfmu that sent it. parameters: (m,) by name.
     """
     if version != VERSION:
         raise StudyError(f"a worker has kinfmu {VERSION}, and this is kinfmu {version}: install the same there")
@@ -126,11 +116,8 @@ class NominalMeasure:
 class Nominal:
     """The design as written.
 
-    Attributes:
-        measures: Its measures by name.
-        deviations: Standard deviations of the tolerances by name; none if the study has no tolerances, or others too.
-        reason: Why it has no numbers; '' if it has.
-
+    measures: by name; deviations: standard deviations of the tolerances by name, none if the study has no tolerances,
+    or others too; reason: why it has no numbers, '' if it has.
     """
 
     measures: Mapping[str, NominalMeasure]

@@ -22,14 +22,9 @@ _END, _END_SIZE = b"PK\5\6", 22  # record at the end of a .npz file
 class PartsFolder:
     """The folder FILE.parts next to the results FILE while a study runs.
 
-    Args:
-        target: The file of the results.
-        study: The study.
-        restart: Remove the parts of another study, or of an earlier run.
+    Raises a StudyError if the folder belongs to another study, or a run in progress uses it.
 
-    Raises:
-        StudyError: The folder belongs to another study, or a run in progress uses it.
-
+    target: The file of the results. restart: Remove the parts of another study, or of an earlier run.
     """
 
     def __init__(self, target: Path, study: Study, *, restart: bool = False) -> None:
@@ -51,7 +46,7 @@ class PartsFolder:
                 f"{self.folder}: a study in progress writes there; wait for it, or choose another file with -o"
             ) from None
         own = {"fingerprint": self._study.fingerprint, **self._study.definition}
-        found = self._written_manifest()
+        found = _manifest_of(self.folder)
         if restart or found is None:
             for path in self.folder.glob("part-*"):
                 path.unlink()
@@ -66,16 +61,6 @@ class PartsFolder:
                 path.unlink()
         self._lock = os.open(self._manifest, os.O_RDWR)
         lock_for_writing(self._lock)
-
-    def _written_manifest(self) -> dict[str, Any] | None:
-        """Return the manifest of the folder; None without one."""
-        try:
-            manifest = json.loads(self._manifest.read_bytes())
-        except (OSError, ValueError):
-            if any(self.folder.glob("part-*")):
-                return {}
-            return None
-        return manifest if isinstance(manifest, dict) else {}
 
     def __enter__(self) -> PartsFolder:
         return self
@@ -104,6 +89,15 @@ class PartsFolder:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
+def _manifest_of(folder: Path) -> dict[str, Any] | None:
+    """Return the manifest of a folder of parts, empty if it cannot be read; None without manifest and parts."""
+    try:
+        manifest = json.loads((folder / _MANIFEST).read_bytes())
+    except (OSError, ValueError):
+        return {} if any(folder.glob("part-*")) else None
+    return manifest if isinstance(manifest, dict) else {}
+
+
 def _is_whole(path: Path) -> bool:
     """Return True for a part that is there, up to the record at its end."""
     try:
@@ -119,11 +113,7 @@ def check_replaceable(target: Path, study: Study, there: Mapping[str, str]) -> N
 
     A study that has parts may replace it: it was begun with restart.
 
-    Args:
-        target: The file of the results.
-        study: The study.
-        there: Metadata of the study whose results the file holds; empty for other files.
-
+    target: The file of the results. there: Metadata of the study whose results the file holds; empty for other files.
     """
     if not target.is_file() or _has_parts_of(study, target):
         return
@@ -142,10 +132,7 @@ def remove_finished(target: Path, study: Study) -> None:
 
 def _has_parts_of(study: Study, target: Path) -> bool:
     """Return True if the folder next to the results is that of this study."""
-    with suppress(OSError, ValueError):
-        manifest = json.loads((folder_of(target) / _MANIFEST).read_bytes())
-        return isinstance(manifest, dict) and manifest.get("fingerprint") == study.fingerprint
-    return False
+    return (_manifest_of(folder_of(target)) or {}).get("fingerprint") == study.fingerprint
 
 
 def folder_of(target: Path) -> Path:

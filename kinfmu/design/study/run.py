@@ -98,18 +98,9 @@ def study(
         MissingPackageError: `distributed`, or for Parquet `pyarrow`, is not installed.
 
     """
+    how: dict[str, Any] = {"sampling": sampling, "designs": designs, "seed": seed, "engine": engine}
     try:
-        defined = define(
-            mechanism,
-            parameters,
-            measures=measures,
-            sampling=sampling,
-            designs=designs,
-            seed=seed,
-            t=t,
-            engine=engine,
-            inputs=inputs,
-        )
+        defined = define(mechanism, parameters, measures=measures, t=t, inputs=inputs, **how)
     except MechanismError as error:
         if isinstance(mechanism, Mechanism):
             raise RequestError(str(error), **error.data) from None
@@ -130,7 +121,7 @@ def run_study(
     if workers is None:
         workers = cores()
     require_workers(workers)
-    show = progress or _quiet
+    show = progress or (lambda _done, _count: None)
     if output is None:
         with temporary_folder() as folder, PartsFolder(folder / "study", study) as parts:
             layout, rows = _measured(study, parts, workers, dask, show)
@@ -177,17 +168,15 @@ def _measured(
     done = sum(min(size, len(study) - first) for first in set(study.parts) - set(missing))
     progress(done, len(study))
     packed = job.packed()
-    for first, columns in results(
-        run_chunk, lambda first: (packed, VERSION, study.part(first)), missing, workers, dask
-    ):
+
+    def arguments(first: int) -> tuple[Any, ...]:
+        return packed, VERSION, study.part(first)
+
+    for first, columns in results(run_chunk, arguments, missing, workers, dask):
         parts.write(first, part_bytes(layout.rows(first, columns)))
         done += min(size, len(study) - first)
         progress(done, len(study))
     return layout, joined(layout, ((k, min(size, len(study) - k), parts.path(k)) for k in study.parts))
-
-
-def _quiet(_done: int, _count: int) -> None:
-    """Show no progress."""
 
 
 AHEAD = 3  # parts given to each core before they are due; more would only fill the memory

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain
 from typing import Any, Literal
 
 import numpy as np
@@ -20,7 +21,12 @@ from kinfmu.mechanism.toml_document import check_keys
 from kinfmu.mechanism.valid import is_number, quoted
 from kinfmu.units import unit_of
 
-KEYS = ("values", "from", "to", "count", "tolerance", "distribution", "deviations", "nominal")
+_TOGETHER = {  # keys that go with the one that makes the kind of variation
+    "values": ("values",),
+    "from": ("from", "to", "count"),
+    "tolerance": ("tolerance", "distribution", "deviations", "nominal"),
+}
+KEYS = tuple(chain(*_TOGETHER.values()))
 DISTRIBUTIONS = ("normal", "uniform")
 MOST_DESIGNS = 10**9
 MOST_OF_A_GRID = 10**6  # values, which are part of the definition of the study
@@ -28,44 +34,30 @@ _EXAMPLE = '{ from = 1, to = 2, count = 5 }, { from = 1, to = 2 } or { tolerance
 
 
 @dataclass(frozen=True)
-class Grid:
-    """A parameter that takes given values.
-
-    Attributes:
-        name: The parameter or law constant.
-        unit: Its unit.
-        values: The values, in this order.
-        display_unit: The unit in which people wrote them.
-
-    """
+class _Varied:
+    """A parameter or law constant, its unit, and the one in which people wrote its numbers."""
 
     name: str
     unit: str
+    display_unit: str = field(default="", compare=False, kw_only=True)
+
+
+@dataclass(frozen=True)
+class Grid(_Varied):
+    """A parameter that takes given values, in this order."""
+
     values: tuple[float, ...]
-    display_unit: str = field(default="", compare=False)
 
     def as_json(self) -> dict[str, Any]:
         return {"unit": self.unit, "values": list(self.values)}
 
 
 @dataclass(frozen=True)
-class UniformRange:
-    """A parameter that is sampled evenly between two values.
+class UniformRange(_Varied):
+    """A parameter that is sampled evenly between two values."""
 
-    Attributes:
-        name: The parameter or law constant.
-        unit: Its unit.
-        low: Lower end.
-        high: Upper end.
-        display_unit: The unit in which people wrote them.
-
-    """
-
-    name: str
-    unit: str
     low: float
     high: float
-    display_unit: str = field(default="", compare=False)
 
     def at(self, points: FloatArray) -> FloatArray:
         """Return the values at points of the unit interval."""
@@ -76,27 +68,17 @@ class UniformRange:
 
 
 @dataclass(frozen=True)
-class Tolerance:
-    """A parameter that scatters about its nominal value.
+class Tolerance(_Varied):
+    """A parameter that scatters about its nominal value, within nominal - tolerance to nominal + tolerance.
 
-    Attributes:
-        name: The parameter or law constant.
-        unit: Its unit.
-        nominal: Its value without deviation.
-        tolerance: Half of the tolerance zone: nominal - tolerance to nominal + tolerance.
-        distribution: 'normal', or 'uniform' over the zone.
-        deviations: Of a normal distribution: how many standard deviations the tolerance is.
-        display_unit: The unit in which people wrote it.
-
+    distribution: 'normal', or 'uniform' over this zone; deviations: of a normal one, how many standard deviations the
+    tolerance is.
     """
 
-    name: str
-    unit: str
     nominal: float
     tolerance: float
     distribution: Literal["normal", "uniform"]
     deviations: float
-    display_unit: str = field(default="", compare=False)
 
     @property
     def deviation(self) -> float:
@@ -112,14 +94,8 @@ class Tolerance:
         return np.asarray(self.nominal + self.deviation * ndtri(points))
 
     def as_json(self) -> dict[str, Any]:
-        own = {"deviations": self.deviations} if self.distribution == "normal" else {}
-        return {
-            "unit": self.unit,
-            "nominal": self.nominal,
-            "tolerance": self.tolerance,
-            "distribution": self.distribution,
-            **own,
-        }
+        own = {key: getattr(self, key) for key in ("unit", "nominal", "tolerance", "distribution")}
+        return own | ({"deviations": self.deviations} if self.distribution == "normal" else {})
 
 
 Variation = Grid | UniformRange | Tolerance
@@ -164,30 +140,31 @@ def read_variation(where: str, name: str, table: Mapping[str, Any], mechanism: M
     values = table.get("values", ())
     given = [table.get(key) for key in ("from", "to", "tolerance", "nominal")]
     shown = settable.display_unit(name, [*(values if isinstance(values, list | tuple) else ()), *given]).unit
-    kinds = [key for key in ("values", "from", "tolerance") if key in table]
+    kinds = [key for key in _TOGETHER if key in table]
     if len(kinds) != 1:
-        what = (
-            f"has {' and '.join(kinds)}, which exclude each other" if kinds else "needs 'values', 'from' or 'tolerance'"
-        )
+        several = f"has {' and '.join(kinds)}, which exclude each other"
+        what = several if kinds else "needs 'values', 'from' or 'tolerance'"
         raise MechanismError(f"{where} {what}; give one of {_EXAMPLE}")
     (kind,) = kinds
-    _refuse_others(where, table, kind)
+    for key in table:
+        if key not in _TOGETHER[kind]:
+            keys = listed(sorted(_TOGETHER[kind]))
+            raise MechanismError(f"{where} {key}: does not go with '{kind}'; keys with it: {keys}")
     if kind == "values":
         if not isinstance(values, list | tuple | np.ndarray) or not len(values):
             raise MechanismError(f"{where} values = {quoted(values)} must be a list of numbers")
-        return Grid(name, unit, tuple(number("values", value) for value in values), shown)
+        return Grid(name, unit, tuple(number("values", value) for value in values), display_unit=shown)
     if kind == "from":
         if "to" not in table:
             raise MechanismError(f"{where} needs the key 'to'")
         low, high = number("from", table["from"]), number("to", table["to"])
         if "count" in table:
             count = whole_number(f"{where} count", table["count"], 2, MOST_OF_A_GRID)
-            return Grid(name, unit, tuple(np.linspace(low, high, count).tolist()), shown)
+            return Grid(name, unit, tuple(np.linspace(low, high, count).tolist()), display_unit=shown)
         if low == high:
             raise MechanismError(f"{where}: 'from' and 'to' are equal: {low:.9g}")
-        return UniformRange(name, unit, min(low, high), max(low, high), shown)
-    written = setting.value
-    nominal = number("nominal", table.get("nominal", float(written)))
+        return UniformRange(name, unit, min(low, high), max(low, high), display_unit=shown)
+    nominal = number("nominal", table.get("nominal", float(setting.value)))
     tolerance = number("tolerance", table["tolerance"], above=0.0)
     distribution = table.get("distribution", "normal")
     if distribution not in DISTRIBUTIONS:
@@ -199,7 +176,7 @@ def read_variation(where: str, name: str, table: Mapping[str, Any], mechanism: M
         raise MechanismError(f"{where} deviations = {quoted(deviations)} must be a positive number")
     if "deviations" in table and distribution != "normal":
         raise MechanismError(f"{where} deviations: only a normal distribution has them")
-    return Tolerance(name, unit, nominal, tolerance, distribution, float(deviations), shown)
+    return Tolerance(name, unit, nominal, tolerance, distribution, float(deviations), display_unit=shown)
 
 
 def whole_number(where: str, value: object, least: int, most: int = MOST_DESIGNS) -> int:
@@ -207,18 +184,6 @@ def whole_number(where: str, value: object, least: int, most: int = MOST_DESIGNS
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
         raise MechanismError(f"{where} = {quoted(value)} must be a whole number from {least} to {most}")
     return int(value)
-
-
-def _refuse_others(where: str, table: Mapping[str, Any], kind: str) -> None:
-    """Raise a MechanismError for a key that belongs to another kind of variation."""
-    own = {
-        "values": {"values"},
-        "from": {"from", "to", "count"},
-        "tolerance": {"tolerance", "distribution", "deviations", "nominal"},
-    }[kind]
-    for key in table:
-        if key not in own:
-            raise MechanismError(f"{where} {key}: does not go with '{kind}'; keys with it: {listed(sorted(own))}")
 
 
 METHODS = ("sobol", "latin_hypercube")

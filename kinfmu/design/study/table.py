@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,24 +117,6 @@ class TableLayout:
         return cls(tuple(fields), {k.removeprefix(_PREFIX): text for k, text in texts.items() if k.startswith(_PREFIX)})
 
 
-class Table(Protocol):
-    """The rows of a study, read column by column."""
-
-    layout: TableLayout
-
-    def __len__(self) -> int:
-        """Return the number of designs."""
-
-    def column(self, name: str) -> NDArray[Any]:
-        """Return a column (m,)."""
-
-    def batches(self, names: list[str]) -> Iterator[Rows]:
-        """Yield columns by some rows at a time."""
-
-    def to_arrow(self) -> Any:
-        """Return all as a pyarrow.Table."""
-
-
 class MemoryTable:
     """The rows of a study in memory, made when they are first asked for."""
 
@@ -199,6 +181,9 @@ class ParquetTable:
         return self._file().read()
 
 
+Table = MemoryTable | ParquetTable  # the rows of a study, read column by column
+
+
 def require_parquet(what: str) -> None:
     """Raise MissingPackageError where pyarrow is not installed; `what` needs it."""
     try:
@@ -210,10 +195,7 @@ def require_parquet(what: str) -> None:
 def table_in(path: Path) -> Table:
     """Return the table of a study in a file, a .csv file with its FILE.json or a .parquet file.
 
-    Raises:
-        StudyError: The file cannot be read, or is not one of a study.
-        MissingPackageError: Parquet without pyarrow.
-
+    Raise a StudyError if it cannot be read or is not one of a study, a MissingPackageError for Parquet without pyarrow.
     """
     if path.suffix != CSV:
         return ParquetTable(path)
@@ -256,15 +238,9 @@ def part_bytes(rows: Rows) -> bytes:
 
 
 def joined(layout: TableLayout, parts: Iterable[tuple[int, int, Path]]) -> Iterator[Rows]:
-    """Yield the rows of parts, one after another.
+    """Yield the rows of parts, one after another; raise a StudyError if a part cannot be read, or holds other designs.
 
-    Args:
-        layout: Of the table.
-        parts: First design, number of designs and file of each part.
-
-    Raises:
-        StudyError: A part cannot be read, or holds other designs.
-
+    layout: Of the table. parts: First design, number of designs and file of each part.
     """
     for first, count, path in parts:
         try:

@@ -30,7 +30,7 @@ from kinfmu.mechanism.quantities.placement import GROUND, BodyFrame, Placement, 
 from kinfmu.motion.cams import CAM_JOINTS, CamJoint, placed_cam, turn_of
 from kinfmu.motion.cams.placed import members_of
 from kinfmu.motion.cams.profile import envelope
-from kinfmu.motion.cams.traced import ComplexArray, traced
+from kinfmu.motion.cams.traced import pairs, traced
 from kinfmu.plan.equations.taylor import Taylor
 from kinfmu.run import Run
 from kinfmu.run.axis import TIME
@@ -149,11 +149,7 @@ def contact_force(
         else:
             size = run[f"{joint.name}.force"] / (out * in_holder * placed.direction.conjugate()).real
     turn, origin = np.exp(1j * frame[:, 2]), frame[:, 0] + 1j * frame[:, 1]
-    return _pairs(size * out * turn), _pairs(origin + (contact + placed.axle) * turn)
-
-
-def _pairs(points: ComplexArray) -> FloatArray:
-    return np.column_stack([points.real, points.imag])
+    return pairs(size * out * turn), pairs(origin + (contact + placed.axle) * turn)
 
 
 def load_forces(run: Run, mechanism: Mechanism, scene: Scene) -> Iterator[tuple[str, FloatArray, FloatArray]]:

@@ -20,7 +20,7 @@ from kinfmu.mechanism.quantities.placement import body_of, unit_vector
 from kinfmu.motion.cams import CAM_JOINTS, CamJoint, PlacedCam, placed_cam
 from kinfmu.motion.cams.critical import cut_depths
 from kinfmu.motion.cams.placed import members_of
-from kinfmu.motion.cams.traced import ComplexArray, given_curve, traced
+from kinfmu.motion.cams.traced import ComplexArray, given_curve, pairs, traced
 
 _BELT = 0.3  # of the distance of the axles: radius of a belt's larger pulley, since files state only the ratio
 _BEYOND = 0.35  # of the pinion's radius, additional length at both ends of a rack
@@ -246,7 +246,10 @@ def _shape(shown: Instant, joint: CamJoint) -> CamShape | None:
         is_real = bool((around.radius > 0.0).all() and ((around.curve * around.normal.conj()).real > 0.0).all())
     elif radius is not None:
         bends_less = (around.radius > radius) | (around.radius <= 0.0)
-        is_real = bool(bends_less.all() and np.abs(around.curve).min() > radius) and not _cuts(around, radius)
+        is_real = bool(bends_less.all() and np.abs(around.curve).min() > radius)
+        if is_real:  # unless the roller, at some place, cuts into the profile that it makes at another
+            depths = cut_depths(around.curve, around.curve - radius * around.normal, radius)
+            is_real = not depths.max() > _TOUCH * radius
     size = float(radius or 0.0) if is_real else 0.0
     profile, contact = around.curve - size * around.normal, now.curve - size * now.normal
     reach = face = None
@@ -256,7 +259,7 @@ def _shape(shown: Instant, joint: CamJoint) -> CamShape | None:
 
     def drawn(points: ComplexArray) -> FloatArray:
         """Return the place in the world of points from the origin in the cam's frame."""
-        return shown.placed(cam, np.column_stack([(points + origin).real, (points + origin).imag]))
+        return shown.placed(cam, pairs(points + origin))
 
     return CamShape(
         joint=joint.name,
@@ -271,12 +274,6 @@ def _shape(shown: Instant, joint: CamJoint) -> CamShape | None:
         contact=drawn(contact)[0] if is_real else None,
         reach=reach,
     )
-
-
-def _cuts(around: _Curve, radius: float) -> bool:
-    """Return True if the roller, at some place, cuts into the profile that it makes at another."""
-    depths = cut_depths(around.curve, around.curve - radius * around.normal, radius)
-    return bool(depths.max() > _TOUCH * radius)
 
 
 def _led(placed: PlacedCam, s: FloatArray) -> _Curve:

@@ -101,21 +101,13 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
     points: dict[str, list[tuple[str, FloatArray]]] = {}
     for name, point in mechanism.points.items():
         points.setdefault(body_of(point), []).append((name, shown.at(point)))
-    return Scene(
-        bodies,
-        frames(known, mechanism),
-        found,
-        pins,
-        points,
-        {
-            name: world(known[body_of(point)], mechanism.body_points[point])
-            for name, point in mechanism.points.items()
-            if body_of(point) in known
-        },
-        left_out,
-        *_bounds(found, known),
-        gravity_direction(mechanism),
-    )
+    paths = {
+        name: world(known[body_of(point)], mechanism.body_points[point])
+        for name, point in mechanism.points.items()
+        if body_of(point) in known
+    }
+    moved, corners, gravity = frames(known, mechanism), _bounds(found, known), gravity_direction(mechanism)
+    return Scene(bodies, moved, found, pins, points, paths, left_out, *corners, gravity)
 
 
 def _some(count: int) -> slice:

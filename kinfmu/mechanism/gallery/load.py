@@ -65,14 +65,9 @@ def load(mechanism: str | Path) -> Mechanism:
 def load_named_in(document: Mapping[str, Any], folder: Path) -> Mechanism:
     """Return the mechanism that the key 'mechanism' of a study or fit file names.
 
-    Args:
-        document: The content of the file.
-        folder: Its folder, where a relative path starts.
+    Raise a RequestError if the name is unknown, a MechanismError if there is none or the mechanism is invalid.
 
-    Raises:
-        RequestError: The name is unknown.
-        MechanismError: There is no such key, or the mechanism cannot be read or is invalid.
-
+    document: The content of the file. folder: Its folder, where a relative path starts.
     """
     if "mechanism" not in document:
         raise MechanismError(

@@ -5,15 +5,12 @@ To add a joint, write a file and add a line here.
 
 from __future__ import annotations
 
-from kinfmu.mechanism.joints.cam import CamOscillating, CamTranslating
-from kinfmu.mechanism.joints.cam_flat_face import CamFlatFace
-from kinfmu.mechanism.joints.cam_roller import CamRoller
+from kinfmu.mechanism.joints.cam import CamFlatFace, CamOscillating, CamRoller, CamTranslating
 from kinfmu.mechanism.joints.coupling import Coupling
 from kinfmu.mechanism.joints.fixed import Fixed
-from kinfmu.mechanism.joints.gear import Gear
+from kinfmu.mechanism.joints.gear import Gear, RackAndPinion
 from kinfmu.mechanism.joints.held import Angle, Coordinate, Distance, Held, PointOnLine, RelativeAngle
 from kinfmu.mechanism.joints.joint import Joint
-from kinfmu.mechanism.joints.rack_and_pinion import RackAndPinion
 from kinfmu.mechanism.joints.revolute import Revolute
 from kinfmu.mechanism.joints.translational import Translational
 

@@ -1,4 +1,4 @@
-"""Cams with a lift law: the position of a follower depends on the angle of a cam. What touches the cam."""
+"""Cams: a law gives the lift of a follower over the cam's angle, or a curve of the cam on which the follower stays."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from kinfmu.mechanism.joints.joint import Condition, Joint
 from kinfmu.mechanism.laws import Law, MotionSequence
 from kinfmu.mechanism.laws.law import NEARLY, TURN, values_by_degree
 from kinfmu.mechanism.quantities import AngleBetween, PoseQuantity, PositionAlong
-from kinfmu.mechanism.quantities.arithmetic import Value
+from kinfmu.mechanism.quantities.arithmetic import Value, atan2, sqrt
 from kinfmu.mechanism.quantities.placement import BodyName, BodyPair, Placement, PointPair, Reference, body_of
 from kinfmu.units import Length, Quantity, Radians
 
@@ -263,3 +263,82 @@ class CamOscillating(Cam):
 
     def follower(self) -> AngleBetween:
         return AngleBetween(self.between[1], self.between[0])
+
+
+@dataclass(frozen=True)
+class CamRoller(CamCurve):
+    """A roller on a cam: the roller's centre stays on the pitch curve.
+
+        Phi = |d| - f(angle of d in the cam's frame),   d = r_j + A_j s_b - r_i - A_i s_a        (1 row, scale 1)
+
+    The pitch curve is the cam's profile moved outwards by the roller's radius. After Haug (1989), cam-followers.
+    """
+
+    type: ClassVar[str] = "cam_roller"
+    labels: ClassVar[tuple[str, ...]] = ("radius",)
+    distance: ClassVar[str] = "radius of the pitch curve"
+    curve: ClassVar[str] = "pitch curve"
+
+    name: str
+    between: Annotated[
+        PointPair,
+        "the pole of the pitch curve on the cam i, then the roller's centre on the follower j",
+    ]
+    law: Annotated[
+        Law,
+        "radius of the pitch curve as a function of the polar angle in the cam's frame [length over rad]; positive, "
+        "with a period of a turn",
+    ]
+    roller_radius: RollerRadius = None
+
+    def residual(self, at: Placement) -> tuple[Value, ...]:
+        law, angle = self.led_by(at)
+        d_x, d_y = at.vector(self.between)
+        return (sqrt(d_x * d_x + d_y * d_y) - law.at(angle),)
+
+    def led_by(self, at: Placement) -> tuple[Law, Value]:
+        d_x, d_y = at.vector(self.between)
+        (e_x, e_y), (n_x, n_y) = (at.direction(body_of(self.between[0]), angle) for angle in (0.0, 0.5 * math.pi))
+        return self.law, atan2(n_x * d_x + n_y * d_y, e_x * d_x + e_y * d_y)
+
+    def conditions(self) -> tuple[Condition, ...]:
+        return (*super().conditions(), *roller_conditions(self.roller_radius))
+
+    def check(self) -> None:
+        check_element(self.name, self.roller_radius)
+        super().check()
+
+
+@dataclass(frozen=True)
+class CamFlatFace(CamCurve):
+    """A flat face on a cam: the face stays tangent to the cam's profile.
+
+        Phi = m.d - f(angle of m in the cam's frame),   d = r_j + A_j s_b - r_i - A_i s_a        (1 row, scale 1)
+
+    m: normal of the face; f: support function of the profile, the distance of its tangent from the pole over the
+    direction of the tangent's normal. A circle of radius R about a point at a distance e from the pole has
+    f = R + e cos(angle). The profile has the radius of curvature f + f'', which must be positive.
+    """
+
+    type: ClassVar[str] = "cam_flat_face"
+    labels: ClassVar[tuple[str, ...]] = ("distance",)
+    distance: ClassVar[str] = "tangent's distance from the pole"
+    curve: ClassVar[str] = "profile"
+
+    name: str
+    between: Annotated[PointPair, "the pole of the law on the cam i, then a point of the face on the follower j"]
+    law: Annotated[
+        Law,
+        "distance f > 0 of the profile's tangent from the pole over the direction of its normal in the cam's frame "
+        "[length over rad], period: a turn",
+    ]
+    normal: Annotated[Radians, "direction of the normal m of the face, away from the cam, in j's frame [rad]"] = 0.0
+
+    def residual(self, at: Placement) -> tuple[Value, ...]:
+        law, angle = self.led_by(at)
+        (d_x, d_y), (m_x, m_y) = at.vector(self.between), at.direction(body_of(self.between[1]), self.normal)
+        return (m_x * d_x + m_y * d_y - law.at(angle),)
+
+    def led_by(self, at: Placement) -> tuple[Law, Value]:
+        cam, follower = self.bodies()
+        return self.law, at.angle(follower) + self.normal - at.angle(cam)

@@ -13,11 +13,7 @@ from kinfmu.mechanism.quantities.placement import Placement
 class Condition(NamedTuple):
     """A condition on a number of a joint, which may depend on parameters and so be of any arithmetic.
 
-    Attributes:
-        key: Its name in messages.
-        value: The number.
-        required: 'positive', '0 or more', 'other than 0' or '0' (within `NEARLY`).
-
+    key: its name in messages; required: 'positive', '0 or more', 'other than 0' or '0' (within `NEARLY`).
     """
 
     key: str

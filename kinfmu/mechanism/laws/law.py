@@ -20,13 +20,7 @@ SAME = 1e-9  # of the largest value at the breaks and midway between them; small
 
 
 class Jumps(NamedTuple):
-    """Arguments at which a law jumps.
-
-    Attributes:
-        at: Those of one period, in any order.
-        period: The distance at which they repeat, 0 if they do not.
-
-    """
+    """Arguments at which a law jumps: those of one period, in any order, and the period; 0 if they do not repeat."""
 
     at: tuple[Value, ...] = ()
     period: Value = 0.0

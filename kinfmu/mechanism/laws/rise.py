@@ -57,9 +57,7 @@ def normalized(half: Sequence[tuple[float, Piece]]) -> CurveData:
     The second half is the mirror image of the first about (1/2, 1/2), with origins mirrored too, so that both ends are
     met to the last bit.
 
-    Args:
-        half: The pieces of the first half, each with the x where it begins.
-
+    half: The pieces of the first half, each with the x where it begins.
     """
     begins = [begin for begin, _ in half]
     ends = [*begins[1:], 0.5]

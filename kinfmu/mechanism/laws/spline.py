@@ -173,7 +173,10 @@ def spline_data(points: Sequence[tuple[float, float]], ends: str) -> CurveData:
         u[-1] = u[0]
     h = [b - a for a, b in pairwise(x)]
     slope = [(b - a) / width for (a, b), width in zip(pairwise(u), h, strict=True)]
-    m = {NOT_A_KNOT: _not_a_knot, NATURAL: _natural, PERIODIC: _periodic}[ends](h, slope)
+    if ends == NATURAL:
+        m = [0.0, *tridiagonal(*_rows(h, slope)), 0.0]
+    else:
+        m = _periodic(h, slope) if ends == PERIODIC else _not_a_knot(h, slope)
     pieces: list[Piece] = []
     for k, width in enumerate(h):
         b = slope[k] - width * (2.0 * m[k] + m[k + 1]) / 6.0
@@ -191,10 +194,6 @@ def _rows(h: Sequence[float], slope: Sequence[float]) -> tuple[list[float], list
     main = [2.0 * (h[k - 1] + h[k]) for k in inner]
     right = [6.0 * (slope[k] - slope[k - 1]) for k in inner]
     return [h[k - 1] for k in inner], main, [h[k] for k in inner], right
-
-
-def _natural(h: Sequence[float], slope: Sequence[float]) -> list[float]:
-    return [0.0, *tridiagonal(*_rows(h, slope)), 0.0]
 
 
 def _not_a_knot(h: Sequence[float], slope: Sequence[float]) -> list[float]:

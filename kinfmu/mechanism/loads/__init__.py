@@ -5,11 +5,9 @@ To add a load, write its class and add a line here.
 
 from __future__ import annotations
 
-from kinfmu.mechanism.loads.between import Damper, ForceBetween, GasSpring, Spring
-from kinfmu.mechanism.loads.following import Following
+from kinfmu.mechanism.loads.between import Damper, ForceBetween, GasSpring, Spring, TorsionDamper, TorsionSpring
 from kinfmu.mechanism.loads.forces import ForceAlong, ForceAt, TorqueOn
-from kinfmu.mechanism.loads.load import Load
-from kinfmu.mechanism.loads.torsion import TorsionDamper, TorsionSpring
+from kinfmu.mechanism.loads.load import Following, Load
 
 LOADS: tuple[type[Load], ...] = (
     ForceAt,

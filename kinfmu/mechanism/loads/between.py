@@ -1,4 +1,4 @@
-"""Loads along the line between two points: springs, dampers, gas springs and forces."""
+"""Loads along the line between two points, or the angle between two bodies: springs, dampers, gas springs, forces."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ from typing import Annotated, ClassVar
 
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism.laws import Law
-from kinfmu.mechanism.loads.following import Following, Over
-from kinfmu.mechanism.loads.load import Load
-from kinfmu.mechanism.quantities import DistanceBetween
+from kinfmu.mechanism.loads.load import Following, Load, Over
+from kinfmu.mechanism.quantities import AngleBetween, DistanceBetween
 from kinfmu.mechanism.quantities.arithmetic import Value
-from kinfmu.mechanism.quantities.placement import Placement, PointPair, body_of
-from kinfmu.units import METRES, Damping, Force, Length, Stiffness
+from kinfmu.mechanism.quantities.placement import BodyPair, Placement, PointPair, body_of
+from kinfmu.units import METRES, Damping, Force, Length, Radians, Stiffness, TorsionalDamping, TorsionalStiffness
 
 Points = Annotated[PointPair, "the two points 'body.point'"]
 MEET = 1e-9  # of the distance of the points from their bodies' origins; nearer points have no line between them
@@ -204,3 +203,76 @@ class ForceBetween(AlongLine, Following):
     between: Points
     law: Annotated[Law, "the force f [N]"]
     over: Over = None
+
+
+Bodies = Annotated[BodyPair, "bodies i and j"]
+
+
+class BetweenBodies(Load):
+    """A load along the angle between two bodies.
+
+        s = phi_j - phi_i
+
+    Leaves are torsion springs and dampers.
+    """
+
+    columns: ClassVar[tuple[str, ...]] = ("torque", "angle")
+    between: tuple[str, str]
+
+    def bodies(self) -> tuple[str, ...]:
+        return self.between
+
+    def acts_on(self) -> tuple[str, ...]:
+        return self.between
+
+    def measured(self, at: Placement) -> tuple[Value, ...]:
+        return (AngleBetween(self.between[1], self.between[0]).value(at),)
+
+    def kinds(self) -> tuple[str, ...]:
+        return ("angle",)
+
+
+@dataclass(frozen=True)
+class TorsionSpring(BetweenBodies):
+    """A linear torsion spring between two bodies.
+
+        e = -stiffness (s - free_angle)   along   s = phi_j - phi_i
+
+    Whole turns count.
+    """
+
+    type: ClassVar[str] = "torsion_spring"
+    is_conservative: ClassVar[bool] = True
+    required: ClassVar[Mapping[str, str]] = {"stiffness": "0 or more"}
+
+    name: str
+    between: Bodies
+    stiffness: Annotated[TorsionalStiffness, "[N m/rad]"]
+    free_angle: Annotated[Radians, "angle without torque [rad]"] = 0.0
+
+    def efforts(self, at: Placement, s: Sequence[Value], sd: Sequence[Value], x: Value) -> tuple[Value, ...]:  # noqa: ARG002
+        return (-(self.stiffness * (s[0] - self.free_angle)),)
+
+    def energy(self, s: Sequence[Value]) -> Value:
+        turn = s[0] - self.free_angle
+        return 0.5 * self.stiffness * turn * turn
+
+
+@dataclass(frozen=True)
+class TorsionDamper(BetweenBodies):
+    """A linear torsion damper between two bodies.
+
+        e = -damping ds/dt   along   s = phi_j - phi_i
+
+    It resists the relative speed.
+    """
+
+    type: ClassVar[str] = "torsion_damper"
+    required: ClassVar[Mapping[str, str]] = {"damping": "0 or more"}
+
+    name: str
+    between: Bodies
+    damping: Annotated[TorsionalDamping, "[N m s/rad]"]
+
+    def efforts(self, at: Placement, s: Sequence[Value], sd: Sequence[Value], x: Value) -> tuple[Value, ...]:  # noqa: ARG002
+        return (-(self.damping * sd[0]),)

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from kinfmu.mechanism.laws import Law
-from kinfmu.mechanism.loads.following import Following, Over
-from kinfmu.mechanism.loads.load import Load
+from kinfmu.mechanism.loads.load import Following, Load, Over
 from kinfmu.mechanism.quantities import AngleBetween
 from kinfmu.mechanism.quantities.arithmetic import Value
 from kinfmu.mechanism.quantities.placement import BodyName, Placement, PointName, body_of

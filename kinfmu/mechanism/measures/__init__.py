@@ -7,13 +7,15 @@ from kinfmu.mechanism.measures.extremes import (
     LowestMargin,
     Maximum,
     Minimum,
+    PathDistance,
     Peak,
     PeakAcceleration,
     PeakSpeed,
     Range,
+    Roundness,
+    Straightness,
     TimeRatio,
 )
-from kinfmu.mechanism.measures.paths import PathDistance, Roundness, Straightness
 from kinfmu.mechanism.measures.reading import Finding, Measured, Reading
 from kinfmu.mechanism.measures.transfer import MechanicalAdvantage, PressureAngle, TransmissionAngle, VelocityRatio
 

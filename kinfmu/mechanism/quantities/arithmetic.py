@@ -67,11 +67,7 @@ def split_periods(x: Value, begin: Value, *period: Value) -> tuple[Value, Value]
     Sum and product are each formed as two numbers, the rounded one and its rounding error (Knuth's sum, Dekker's
     product); n p, rounded, would lose as many digits as n has. The rest has the derivative of x.
 
-    Args:
-        x: The argument to reduce.
-        begin: Where a period begins.
-        period: Parts of the period; their sum may be rounded.
-
+    x: The argument to reduce. begin: Where a period begins. period: Parts of the period; their sum may be rounded.
     """
     whole: Value = 0.0
     small: Value = 0.0
@@ -88,11 +84,7 @@ def sine_of_line(slope: Value, x: Value, intercept: Value) -> Value:
 
         sin(p + e) = sin p + e cos p,   p: the rounded phase, e: its rounding error, |e| <= eps |p|
 
-    Args:
-        slope: Angle per unit of x.
-        x: Argument.
-        intercept: Angle at x = 0 [rad].
-
+    slope: Angle per unit of x. x: Argument. intercept: Angle at x = 0 [rad].
     """
     product, left = _exact_product(slope, x)
     phase, left_too = _exact_sum(product, intercept)

@@ -43,10 +43,7 @@ GROUND = BodyFrame(0.0, 0.0, 0.0, 1.0, 0.0)
 class Placement:
     """The bodies in one pose of the mechanism, in any arithmetic.
 
-    Args:
-        poses: BodyFrame by body name.
-        points: Body-fixed coordinates (s_x, s_y) by 'body.point'.
-
+    poses: BodyFrame by body name. points: Body-fixed coordinates (s_x, s_y) by 'body.point'.
     """
 
     def __init__(self, poses: Mapping[str, BodyFrame], points: Mapping[str, tuple[float, float]]) -> None:

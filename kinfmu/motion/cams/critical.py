@@ -68,9 +68,7 @@ class Critical:
 def critical_values(placed: PlacedCam) -> Critical:
     """Return the critical values of a cam, to round-off in the angles where they are smooth.
 
-    Raises:
-        MechanismError: The follower cannot touch the cam everywhere.
-
+    Raise a MechanismError if the follower cannot touch the cam everywhere.
     """
     parts = _intervals(placed)
     s = np.concatenate([np.linspace(a, b, max(int(_SAMPLES * (b - a) / TURN), 5)) for a, b in parts])

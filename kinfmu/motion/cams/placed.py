@@ -54,17 +54,11 @@ class PlacedCam:
 
 
 def placed_cam(mechanism: Mechanism, joint: CamJoint, poses: Mapping[str, tuple[float, float, float]]) -> PlacedCam:
-    """Return a cam in one pose of its mechanism.
+    """Return the cam of a joint in one pose of its mechanism.
 
-    Args:
-        mechanism: The mechanism.
-        joint: The joint that leads the follower.
-        poses: x, y [length] and phi [rad] by body, ground included; at least of cam, follower and holder.
-
-    Raises:
-        MechanismError: The law does not repeat after a turn, the cam has no axle, the follower no guide, or both turn
-            about one axle; the message states which.
-
+    poses: x, y [length] and phi [rad] by body, ground included; at least of cam, follower and holder. Raise a
+    MechanismError if the law does not repeat after a turn, the cam has no axle, the follower no guide, or both turn
+    about one axle; the message states which.
     """
     at = Placement({name: BodyFrame.of(*pose) for name, pose in poses.items()}, mechanism.body_points)
     where = f"cam '{joint.name}'"

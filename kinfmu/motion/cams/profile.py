@@ -15,7 +15,7 @@ from kinfmu.errors import KinfmuError, MechanismError, RequestError
 from kinfmu.files import write_whole
 from kinfmu.mechanism.joints import CamFlatFace, CamRoller
 from kinfmu.motion.cams.placed import PlacedCam
-from kinfmu.motion.cams.traced import ComplexArray, Traced, traced
+from kinfmu.motion.cams.traced import ComplexArray, Traced, pairs, traced
 from kinfmu.run import Column
 from kinfmu.run.tables import csv_lines
 from kinfmu.units import degrees_of
@@ -101,7 +101,11 @@ class CamProfile:
         ]
         if self.pitch is None:
             found.append(("face_offset", unit, self.offset))
-        return [_in_degrees(*column) for column in found] if degrees else found
+        for k, (name, own, values) in enumerate(found) if degrees else ():
+            shown, factor = degrees_of(own)
+            if shown != own:
+                found[k] = name, shown, np.round(values * factor, _DIGITS)  # 45, not 45.00000000000001
+        return found
 
     def csv_lines(self, *, degrees: bool = False, **form: Any) -> Iterator[str]:
         """Yield the lines of a CSV table, each with its end; arguments as in `write_csv`."""
@@ -109,18 +113,10 @@ class CamProfile:
         return csv_lines([*columns], **form)
 
 
-def _in_degrees(name: str, unit: str, values: FloatArray) -> tuple[str, str, FloatArray]:
-    """Return a column with angles in degrees: 45, not 45.00000000000001."""
-    shown, factor = degrees_of(unit)
-    return (name, unit, values) if shown == unit else (name, shown, np.round(values * factor, _DIGITS))
-
-
 def turn_of(placed: PlacedCam, angles: FloatArray) -> FloatArray:
     """Return the values of a cam's parameter at angles of the cam (n,) [rad], by Newton.
 
-    Raises:
-        MechanismError: The follower does not allow the cam to turn all the way round.
-
+    Raise a MechanismError if the follower does not allow the cam to turn all the way round.
     """
     if not isinstance(placed.joint, CamRoller | CamFlatFace):
         return angles
@@ -144,16 +140,14 @@ def turn_of(placed: PlacedCam, angles: FloatArray) -> FloatArray:
 def profile_at(placed: PlacedCam, angles: FloatArray, length_unit: str) -> CamProfile:
     """Return the profile of a cam at angles of the cam (n,) [rad].
 
-    Raises:
-        MechanismError: The roller or the face is not known, or has no place at an angle.
-
+    Raise a MechanismError if the roller or the face is not known, or has no place at an angle.
     """
     if not placed.is_known:
         name = placed.joint.name
         face = "" if isinstance(placed.joint, CamRoller) else ", or 'normal' for a flat face"
         raise MechanismError(f"cam '{name}' has no profile: [joints.{name}] needs the key 'roller_radius'{face}")
     found = traced(placed, turn_of(placed, angles))
-    pitch = None if placed.radius is None else _pairs(found.curve + placed.axle)
+    pitch = None if placed.radius is None else pairs(found.curve + placed.axle)
     return CamProfile(
         cam=placed.cam,
         joint=placed.joint.name,
@@ -161,13 +155,13 @@ def profile_at(placed: PlacedCam, angles: FloatArray, length_unit: str) -> CamPr
         angle=angles,
         position=found.follower,
         pitch=pitch,
-        profile=_pairs(envelope(placed, found) + placed.axle),
+        profile=pairs(envelope(placed, found) + placed.axle),
         pressure_angle=found.pressure_angle,
         radius=found.curve_radius - (placed.radius or 0.0),
         offset=found.offset,
-        face=_pairs(1j * found.normal),
+        face=pairs(1j * found.normal),
         roller_radius=placed.radius,
-        axle=_pairs(np.array([placed.axle]))[0],
+        axle=pairs(np.array([placed.axle]))[0],
         length_unit=length_unit,
         is_swinging=placed.pivot is not None,
     )
@@ -176,9 +170,7 @@ def profile_at(placed: PlacedCam, angles: FloatArray, length_unit: str) -> CamPr
 def angles_within(placed: PlacedCam, tolerance: float, length_unit: str) -> FloatArray:
     """Return angles of the cam over a turn, of which the last is not repeated, for polygons within a tolerance.
 
-    Raises:
-        RequestError: The tolerance is not positive, or needs more than 100 000 points.
-
+    Raise a RequestError if the tolerance is not positive, or needs more than 100 000 points.
     """
     if not tolerance > 0.0:
         raise RequestError(f"tolerance = {tolerance!r} must be a positive length")
@@ -204,7 +196,3 @@ def _off_chords(curve: FloatArray) -> float:
 def envelope(placed: PlacedCam, found: Traced) -> ComplexArray:
     """Return the profile from the axle: the pitch curve moved inwards by the roller's radius."""
     return np.asarray(found.curve - (placed.radius or 0.0) * found.normal)
-
-
-def _pairs(points: ComplexArray) -> FloatArray:
-    return np.column_stack([points.real, points.imag])

@@ -58,9 +58,7 @@ def law_values(law: Law, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatAr
 def traced(placed: PlacedCam, s: FloatArray) -> Traced:
     """Return a cam at values s (n,) of its parameter [rad].
 
-    Raises:
-        MechanismError: The follower cannot reach the curve everywhere, or its face turns with the cam.
-
+    Raise a MechanismError if the follower cannot reach the curve everywhere, or its face turns with the cam.
     """
     values = law_values(placed.joint.law, s)
     if isinstance(placed.joint, CamRoller):
@@ -93,10 +91,7 @@ def _led_roller(placed: PlacedCam, s: FloatArray, f: FloatArray, f1: FloatArray,
 def given_curve(joint: CamRoller | CamFlatFace, s: FloatArray) -> tuple[ComplexArray, ComplexArray, FloatArray]:
     """Return a given pitch curve or profile, from its pole: points, outward normals and radii of curvature (n,).
 
-    Args:
-        joint: The joint with the curve.
-        s: Angles in the cam's frame, of the points or of the normals (n,) [rad].
-
+    s: Angles in the cam's frame, of the points or of the normals (n,) [rad].
     """
     f, f1, f2 = law_values(joint.law, s)
     out = np.exp(1j * s)
@@ -255,6 +250,11 @@ def _motion(placed: PlacedCam, touching: ComplexArray) -> ComplexArray:
 def _turned_from(placed: PlacedCam, turns: ComplexArray) -> FloatArray:
     """Return the follower's angles, turned from its pose by unit vectors."""
     return np.asarray(placed.swing + np.angle(turns))
+
+
+def pairs(points: ComplexArray) -> FloatArray:
+    """Return points as pairs of real numbers (n, 2)."""
+    return np.column_stack([points.real, points.imag])
 
 
 def _angle(turns: ComplexArray) -> FloatArray:

@@ -31,12 +31,7 @@ class Efforts(NamedTuple):
     jumps: tuple[float, ...]
 
     def at(self, t: float, state: State) -> tuple[float, ...]:
-        """Return all efforts [N, N m].
-
-        Raises:
-            RequestError: One is not a finite number.
-
-        """
+        """Return all efforts [N, N m]; raise a RequestError if one is not a finite number."""
         efforts = tuple([effort(t, state) for effort in self.by_name.values()])
         for name, value in zip(self.by_name, efforts, strict=True):
             if not isfinite(value):
@@ -47,9 +42,7 @@ class Efforts(NamedTuple):
 def read_efforts(known: Sequence[str], given: Mapping[str, Any], span: tuple[float, float]) -> Efforts:
     """Return the efforts of inputs, 0 where none is given, for a span of time.
 
-    Raises:
-        RequestError: A name is unknown or a value is invalid.
-
+    Raise a RequestError if a name is unknown or a value is invalid.
     """
     for name in given:
         if name != TIME and name not in known:

@@ -1,24 +1,34 @@
-"""The motion of a mechanism under efforts as samples over time, or up to the limit that ends it."""
+"""The motion of a mechanism under efforts as samples over time, or up to the limit that ends it; scipy's Radau."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import inf, nan
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from kinfmu.arrays import FloatArray
 from kinfmu.codegen.forces import load_forces
 from kinfmu.codegen.python import load_model
 from kinfmu.errors import RequestError, listed
 from kinfmu.motion.torque.efforts import Efforts
-from kinfmu.motion.torque.radau import Radau
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.efforts import inertia_steps, led_laws, units_in_si
 from kinfmu.solver.python import Pose, Solver, Status
 from kinfmu.solver.python.pose import Vector
-from kinfmu.solver.python.torque import Course, DormandPrince, Ended, EquationOfMotion, Given, Laws, TorqueSteps
-
-METHODS = {"DOP853": DormandPrince, "Radau": Radau}
+from kinfmu.solver.python.torque import (
+    Course,
+    DormandPrince,
+    Ended,
+    EquationOfMotion,
+    Given,
+    Laws,
+    StepEnd,
+    TorqueSteps,
+)
 
 
 class Sample(NamedTuple):
@@ -71,14 +81,10 @@ class IntegratedMotion:
     def samples(self, u: Vector, ud: Vector, times: Sequence[float]) -> Iterator[Sample]:
         """Yield the samples until the last one, or until the motion ends early.
 
-        Args:
-            u: Initial values of the drivers.
-            ud: Their initial speeds.
-            times: Of the samples [s]; the first is the start.
+        Raise a RequestError if the initial pose is not reached, a driver moves no mass, or the motion cannot be
+        integrated.
 
-        Raises:
-            RequestError: The initial pose is not reached, a driver moves no mass, or the motion cannot be integrated.
-
+        u: Initial values of the drivers. ud: Their initial speeds. times: Of the samples [s]; the first is the start.
         """
         course, steps, d = self._course, self._steps, len(u)
         pose = course.solver.solve(course.here, u)
@@ -133,3 +139,51 @@ class IntegratedMotion:
                 f"driver {listed(self._plan.drivers[k].name for k in massless)}: its reduced inertia is 0, so that "
                 "efforts do not determine its motion; give a body that it moves a mass or an inertia"
             )
+
+
+class Radau:
+    """The integrator; scipy's object begins anew wherever a step does not start at the end of the one before.
+
+    tolerance: Error of a step in rad and sizes; that of angles is relative where they exceed 1 rad.
+
+    size: That the integrator would take next [s]; 0: chosen by scipy.
+    """
+
+    def __init__(self, tolerance: float) -> None:
+        self.tolerance, self.size = tolerance, 0.0
+        self._end: StepEnd | None = None
+
+    def begin(self, course: Course, at: StepEnd) -> None:
+        """Begin a span."""
+
+    def step(self, course: Course, at: StepEnd, last: float, longest: float) -> StepEnd | None:
+        """Return the end of a step, at `last` at the latest; None where no step succeeds."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # numbers that are not finite are reported as an end
+            if at is not self._end:
+                self._start(course, at, last, longest)
+            scipys = self._integrator
+            scipys.t_bound, scipys.status, scipys.max_step = last, "running", longest
+            scipys.step()
+        if scipys.status == "failed":
+            course.here = at.pose
+            return None
+        self.size = scipys.h_abs
+        self._end = course.complete(scipys.t, tuple(scipys.y.tolist()))
+        return self._end
+
+    def _start(self, course: Course, at: StepEnd, last: float, longest: float) -> None:
+        from scipy.integrate import Radau as ScipysRadau  # slow to import
+
+        def derive(t: float, y: FloatArray) -> FloatArray:
+            f = course.derive(t, tuple(y.tolist()))
+            return np.full(len(y), np.nan) if f is None else np.array(f)  # the integrator takes a shorter step
+
+        scales = self.tolerance * np.array(course.reach * 2)
+        first = min(self.size, last - at.t) or None
+        self._integrator: Any = ScipysRadau(
+            derive, at.t, np.array(at.y), last, rtol=self.tolerance, atol=scales, max_step=longest, first_step=first
+        )
+
+
+METHODS = {"DOP853": DormandPrince, "Radau": Radau}

@@ -26,7 +26,6 @@ from kinfmu.run.model import Model
 from kinfmu.run.verdict import coarse_samples
 from kinfmu.solver.python.pose import Status, Vector
 from kinfmu.solver.python.solver import LEAST_TOLERANCE, MOST_TOLERANCE, STEP_TOLERANCE
-from kinfmu.units import InputName
 
 
 def torque_driven(
@@ -84,7 +83,8 @@ def torque_driven(
         if progress is not None:
             progress(len(samples), len(times))
     events = [Event(ends[0], "info", changed.message)] if changed.message else []
-    coarse = coarse_samples(*_motion(plan, samples))
+    t, values, speeds = (np.array([sample[k] for sample in samples]) for k in range(3))
+    coarse = coarse_samples(t, [driver.inputs[0] for driver in plan.drivers], values, speeds)
     if coarse:
         events.append(Event(ends[0], "info", coarse))
     limit = motion.limit
@@ -94,12 +94,6 @@ def torque_driven(
     run = _run(Model(plan), samples, efforts, tuple(events), ended=limit is not None)
     about = {"drive": "torque", "method": method, "tolerance": repr(float(tolerance)), "steps": str(motion.step_count)}
     return run.replaced(info={**run.info, **about})
-
-
-def _motion(plan: SolvePlan, samples: list[Sample]) -> tuple[FloatArray, list[InputName], FloatArray, FloatArray]:
-    """Return the times (n,), the names (d,) of the drivers' values, their values and their speeds (n, d)."""
-    t, u, ud = (np.array([sample[k] for sample in samples]) for k in range(3))
-    return t, [driver.inputs[0] for driver in plan.drivers], u, ud
 
 
 def _initial_state(plan: SolvePlan, start: float, given: Mapping[str, float]) -> tuple[Vector, Vector]:
@@ -112,10 +106,8 @@ def _initial_state(plan: SolvePlan, start: float, given: Mapping[str, float]) ->
             raise RequestError(f"{name} = {quoted(value)} must be a finite number")
     u, ud, _ = load_model(plan).drive(start, tuple(constant.value for constant in plan.law_constants))
     values, speeds = (
-        tuple(
-            float(given.get(driver.inputs[order], by_law)) for driver, by_law in zip(plan.drivers, by_laws, strict=True)
-        )
-        for order, by_laws in enumerate((u, ud))
+        tuple(float(given.get(driver.inputs[order], one)) for driver, one in zip(plan.drivers, by_law, strict=True))
+        for order, by_law in enumerate((u, ud))
     )
     return values, speeds
 
@@ -135,14 +127,8 @@ def _run(model: Model, samples: list[Sample], efforts: Efforts, events: tuple[Ev
     forces = ForceModel(poses)
 
     def loaded() -> LoadedRun:
-        return LoadedRun(
-            run if poses is model else poses.solve(**inputs),
-            (u, ud, udd),
-            True,
-            model.arguments.setting({}),
-            applied_efforts(loads, applied, len(t)),
-            t,
-        )
+        solved, setting = run if poses is model else poses.solve(**inputs), model.arguments.setting({})
+        return LoadedRun(solved, (u, ud, udd), True, setting, applied_efforts(loads, applied, len(t)), t)
 
     run = model.solve(**inputs)
     if ended:  # the limit, however near the last sample is to it
