@@ -148,7 +148,10 @@ class _Designs(ctypes.Structure):
         ("table_step", ctypes.c_ssize_t * 3),
         ("status", _Place),
         ("reached", _Place),
+        ("status_step", ctypes.c_ssize_t),
         ("messages", _Place),
+        ("read", _Place),
+        ("context", _Place),
     )
 
 
@@ -179,6 +182,13 @@ class LibraryResult(NamedTuple):
     watch: FloatArray
     failures: tuple[tuple[int, str], ...]
     side_by_side: int
+
+
+class DesignReader(NamedTuple):
+    """A C function that reads each design as soon as it is solved, and what it needs: addresses. See designs.h."""
+
+    function: int
+    context: int
 
 
 class LawDriven(NamedTuple):
@@ -310,6 +320,7 @@ class Library:
         tables: Sequence[FloatArray | None],
         status: NDArray[np.int32],
         tolerance: float = TOLERANCE,
+        reader: DesignReader | None = None,
     ) -> tuple[NDArray[np.int32], dict[int, str]]:
         """Fill tables of many designs.
 
@@ -318,8 +329,9 @@ class Library:
             driven: (n, d) or (m, n, d) driver values, speeds and accelerations; None: by the laws.
             law: Times and constants of the laws; None: by driver values.
             tables: Three arrays (m, n, outputs) of values, rates and accelerations; None: not wanted.
-            status: (m, n) of 32 bits without gaps, filled with values of Status.
+            status: (m, n) of 32 bits, filled with values of Status; n without gaps.
             tolerance: Residual relative to the size above which a sample is not ok.
+            reader: Reads each design as soon as it is solved, so that all may share the memory of tables and status.
 
         Returns:
             (m,) how each design was reached, as in designs.h, and reasons by design for those that are not reached, or
@@ -350,6 +362,9 @@ class Library:
                 job.table_step[k] = step
         job.samples.outcomes, job.samples.residual, job.samples.watches = map(_start, (of_one, of_one[1:], of_one[2:]))
         job.status, job.reached, job.messages = _start(status), _start(reached), _start(messages)
+        job.status_step = status.strides[0] // status.itemsize
+        if reader is not None:
+            job.read, job.context = reader
         with self._memory(samples, tolerance, ()) as memory:
             if not self._library.kf_designs_run(memory.sweep, ctypes.byref(job)):
                 raise KinfmuError(self._refusal(designs * samples))

@@ -49,7 +49,7 @@ bool kf_designs_run(kf_sweep *sweep, const kf_designs *designs)
     for (k = 0; k < designs->count; ++k) {
         const double *const constants = designs->constants + k * designs->constant_step;
         char *const message = designs->messages + k * KF_MESSAGE;
-        int32_t *const status = designs->status + k * designs->samples.count;
+        int32_t *const status = designs->status + k * designs->status_step;
         int64_t failure, sample;
         kf_job job = designs->samples;
         if (designs->times == NULL) {
@@ -83,6 +83,9 @@ bool kf_designs_run(kf_sweep *sweep, const kf_designs *designs)
         }
         for (sample = 0; sample < job.count; ++sample) {
             status[sample] = job.outcomes[sample].status;
+        }
+        if (designs->read != NULL) {
+            designs->read(designs->context, k, status);
         }
     }
     return true;
