@@ -45,6 +45,7 @@ from kinfmu.solver.python.pose import Status
 from kinfmu.units import CoordinateName, InputName, Quantity, unit_of
 
 SAMPLES_AT_ONCE = 150_000  # of designs that are solved and measured together
+SAMPLES_READ_AT_ONCE = 5_000_000  # of designs whose extremes are read in one call, which cannot be stopped
 
 sin.register(np.ndarray, np.sin)
 cos.register(np.ndarray, np.cos)
@@ -69,8 +70,9 @@ class SampledAxis(NamedTuple):
 class _Solved(NamedTuple):
     """The designs of a part after they are solved.
 
-    left: those to be assembled anew; reasons: why others are not reached, by number; worst: (m,) status; missing: (m, 2)
-    how many samples of a design have no numbers, and the first of them; motion: of all of them; memory: to be used again.
+    left: those to be assembled anew; reasons: why others are not reached, by number; worst: (m,) status; missing:
+    (m, 2) how many samples of a design have no numbers, and the first of them; motion: of all; memory: to be used
+    again.
     """
 
     left: Sequence[int]
@@ -153,8 +155,8 @@ class BatchReading:
         self._is_native = self._model.is_native(self._count * samples)
         if self._in_tables:
             self._compute_quantities()
-        most = max(1, SAMPLES_AT_ONCE // samples) if self._channels is None else self._count
-        parts = parts_of(self._count, most, workers)
+        most = SAMPLES_AT_ONCE if self._channels is None else SAMPLES_READ_AT_ONCE
+        parts = parts_of(self._count, max(1, most // samples), workers)
         measure = self._measure if self._in_tables else self._measure_by_design
         if self._is_native and workers > 1:
             with ThreadPoolExecutor(workers) as pool:

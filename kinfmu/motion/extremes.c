@@ -37,9 +37,13 @@ typedef struct {
 
 /* columns: (columns, count) values, rates and accelerations of a design. weights: of third and fourth derivatives, if the
  * motion does not go round, and if it does. members: (groups, columns) columns that go round together, goes_round: (designs,
- * groups) whether they do. worst: status; missing: samples without numbers, and the first of them (designs, 2). memory:
- * (2 columns + 9, count).
+ * groups) whether they do. worst: status; missing: samples without numbers, and the first of them (designs, 2). ranges:
+ * (columns, 3) of the rows; memory: (2 columns + 9, count).
  */
+typedef struct {
+    double low, high; /* NaN where a number is not finite */
+} kf_range;
+
 typedef struct {
     int64_t count, columns, channels, groups;
     const double *x, *h, *rows[3], *weights[2][2];
@@ -47,11 +51,15 @@ typedef struct {
     const kf_channel *channel;
     uint8_t *goes_round;
     int32_t *worst, *missing;
+    kf_range (*ranges)[3];
     double *memory;
 } kf_extremes;
 
+/* is_known: all numbers are finite. range: of the values. */
 typedef struct {
     const double *f, *v, *a;
+    bool is_known;
+    kf_range range;
 } kf_rows;
 
 /* Smallest and largest number, their places, and the same between the samples; NaN if a number is not finite. */
@@ -60,10 +68,9 @@ static void both_extremes(const kf_rows *rows, int64_t count, const double *x, c
     enum { MOST = 64, AT_ONCE = 32 };
     const double *const f = rows->f, *const v = rows->v, *const a = rows->a;
     int64_t marked[2][MOST], number[2] = {0, 0}, k, i;
-    double ends[2];
+    const double ends[2] = {rows->range.low, rows->range.high};
     int side, half;
-    range(f, count, &ends[0], &ends[1]);
-    if (!(ends[0] <= ends[1]) || !is_finite(v, count) || !is_finite(a, count)) {
+    if (!rows->is_known) {
         found[0] = found[1] = found[2] = found[3] = NAN;
         return;
     }
@@ -120,12 +127,12 @@ static bool goes_round(const kf_extremes *of, const uint8_t *members)
         double scales[2] = {1e-300, 1e-300}, apart[2] = {0.0, 0.0};
         for (k = 0; k < of->columns && is_same; ++k) {
             const double *const row = of->rows[order] + k * of->count;
-            double low, high, difference, size;
+            const double low = of->ranges[k][order].low, high = of->ranges[k][order].high;
+            double difference, size;
             if (!members[k]) {
                 continue;
             }
             angle = of->is_angle[k];
-            range(row, of->count, &low, &high);
             is_same = low <= high; /* both are NaN where a sample has no numbers */
             difference = row[of->count - 1] - row[0];
             if (order == 0) {
@@ -143,11 +150,27 @@ static bool goes_round(const kf_extremes *of, const uint8_t *members)
     return is_same && moves;
 }
 
+static bool is_known(const kf_range *range)
+{
+    return range->low <= range->high;
+}
+
+/* Rows and what is known of them. */
+static kf_rows looked_at(const double *f, const double *v, const double *a, int64_t count)
+{
+    kf_rows rows = {f, v, a, false, {NAN, NAN}};
+    range(f, count, &rows.range.low, &rows.range.high);
+    rows.is_known = is_known(&rows.range) && is_finite(v, count) && is_finite(a, count);
+    return rows;
+}
+
 /* Values, rates and accelerations of a column, or of its first or second derivative, whose own are estimated. */
 static kf_rows rows_of(const kf_extremes *of, int64_t column, int64_t order, bool is_closed)
 {
     const int64_t n = of->count;
+    const kf_range *const ranges = of->ranges[column];
     const double *rows[5];
+    kf_rows found;
     int k;
     for (k = 0; k < 3; ++k) {
         rows[k] = of->rows[k] + column * n;
@@ -159,7 +182,11 @@ static kf_rows rows_of(const kf_extremes *of, int64_t column, int64_t order, boo
         kf_higher(1, n, is_closed, of->weights[is_closed][0], of->weights[is_closed][1], rows[0], 0, rows[1], 0, rows[2], 0,
                   (double *)rows[3], (double *)rows[4]);
     }
-    return (kf_rows){rows[order], rows[order + 1], rows[order + 2]};
+    found = (kf_rows){rows[order], rows[order + 1], rows[order + 2], is_known(&ranges[order]), ranges[order]};
+    for (k = (int)order + 1; k < order + 3; ++k) {
+        found.is_known = found.is_known && (k < 3 ? is_known(&ranges[k]) : is_finite(rows[k], n));
+    }
+    return found;
 }
 
 /* The size of a vector and its derivatives, in the memory after that of the columns. */
@@ -175,7 +202,7 @@ static kf_rows size_of(const kf_extremes *of, const kf_rows *x, const kf_rows *y
         v[k] = slope * rate;
         a[k] = slope * bend - 2.0 * slope * slope * slope * (rate * rate);
     }
-    return (kf_rows){f, v, a};
+    return looked_at(f, v, a, of->count);
 }
 
 /* A number of a sample, counted on into the next period, which is a turn further. */
@@ -221,20 +248,19 @@ static kf_rows part_of(const kf_extremes *of, const kf_part *part, const kf_rows
         to[order][0] = ends[0][order];
         to[order][last] = ends[1][order];
     }
-    return (kf_rows){to[0], to[1], to[2]};
+    return looked_at(to[0], to[1], to[2], part->count);
 }
 
 /* How many times a quantity that goes round repeats on the way. See History.repeats. */
 static int64_t repeats(const kf_extremes *of, const kf_rows *rows, double low, double high)
 {
     const int64_t n = of->count;
+    const double *const f = rows->f, least = rows->range.low, most = rows->range.high;
     const double level = low + LEVEL * (high - low), span = of->x[n - 1] - of->x[0];
-    double least, most;
-    int64_t rises = 0, count, k, place;
-    for (k = 0; k + 1 < n; ++k) {
-        rises += rows->f[k] >= level && !(rows->f[k == 0 ? n - 2 : k - 1] >= level);
+    int64_t rises = (f[0] >= level) & !(f[n - 2] >= level), count, k, place;
+    for (k = 1; k + 1 < n; ++k) {
+        rises += (f[k] >= level) & (f[k - 1] < level);
     }
-    range(rows->f, n, &least, &most);
     for (count = rises; count > 1; --count) {
         bool is_same = rises % count == 0;
         for (k = 0, place = 0; k < n && is_same; ++k) {
@@ -245,7 +271,7 @@ static int64_t repeats(const kf_extremes *of, const kf_rows *rows, double low, d
                 ++place;
             }
             read_at(rows, n, place, 0.0, of->h[place], (x - of->x[place]) / of->h[place], found);
-            is_same = fabs(found[0] - rows->f[k]) <= REPEATED * (most - least);
+            is_same = fabs(found[0] - f[k]) <= REPEATED * (most - least);
         }
         if (is_same) {
             return count;
@@ -260,15 +286,23 @@ void kf_read_extremes(const kf_extremes *of, int64_t design, const int32_t *stat
     const int64_t n = of->count;
     uint8_t *const is_closed = of->goes_round + design * of->groups;
     int32_t *const missing = of->missing + 2 * design;
+    int32_t worst = 0;
     int64_t k;
-    of->worst[design] = missing[0] = missing[1] = 0;
+    int order;
     for (k = 0; k < n; ++k) {
-        of->worst[design] = status[k] > of->worst[design] ? status[k] : of->worst[design];
+        worst = status[k] > worst ? status[k] : worst;
     }
-    for (k = of->worst[design] > LAST_GOOD ? n - 1 : -1; k >= 0; --k) {
+    of->worst[design] = worst;
+    missing[0] = missing[1] = 0;
+    for (k = worst > LAST_GOOD ? n - 1 : -1; k >= 0; --k) {
         if (status[k] > LAST_GOOD) {
             ++missing[0];
             missing[1] = (int32_t)k;
+        }
+    }
+    for (k = 0; k < of->columns; ++k) {
+        for (order = 0; order < 3; ++order) {
+            range(of->rows[order] + k * n, n, &of->ranges[k][order].low, &of->ranges[k][order].high);
         }
     }
     for (k = 0; k < of->groups; ++k) {

@@ -158,7 +158,9 @@ class Extremes:
     found: FloatArray | None = None
     rounds: NDArray[np.bool_] | None = None
 
-    def of(self, columns: tuple[int, ...], order: int, window: Window, x: FloatArray, *, is_closed: bool) -> HistoryExtremes:
+    def of(
+        self, columns: tuple[int, ...], order: int, window: Window, x: FloatArray, *, is_closed: bool
+    ) -> HistoryExtremes:
         """Return the extremes of columns in a part of the motion."""
         part = next(k for k, windows in enumerate(self.channels.windows) if windows[is_closed] == window)
         channel = Channel(columns, order, part)
@@ -170,13 +172,13 @@ class Extremes:
 
     def goes_round(self, quantities: Sequence[QuantityRead]) -> NDArray[np.bool_]:
         """Return (m,) whether quantities go round together."""
-        assert self.rounds is not None  # noqa: S101  while measures are asked, nobody asks this
+        assert self.rounds is not None  # noqa: S101  it is known once designs are read
         columns = tuple(map(self.channels.outputs.index, quantities))
         return self.rounds[:, self.channels.groups.index(columns)]
 
     def of_designs(self, chosen: IntArray) -> Extremes:
         """Return those of some designs."""
-        assert self.found is not None and self.rounds is not None  # noqa: S101, PT018  the same
+        assert self.found is not None and self.rounds is not None  # noqa: S101, PT018
         return replace(self, found=self.found[:, chosen], rounds=self.rounds[chosen])
 
 
@@ -224,6 +226,7 @@ class _Extremes(ctypes.Structure):
         ("goes_round", _Place),
         ("worst", _Place),
         ("missing", _Place),
+        ("ranges", _Place),
         ("memory", _Place),
     )
 
@@ -270,6 +273,7 @@ class ExtremesReader:
         of.members = self._address(np.array([[k in group for k in range(columns)] for group in groups], np.uint8))
         of.channel = ctypes.addressof(listed)
         of.goes_round, of.worst, of.missing = map(self._address, (self._rounds, self.worst, self.missing))
+        of.ranges = self._address(np.empty((columns, 3, 2)))
         of.memory = self._address(np.empty((2 * columns + 9, n)))
         self._kept += [one, parts, listed]
         function = ctypes.cast(compiled().kf_read_extremes, _Place).value or 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from kinfmu.mechanism.members import kind_of_measured
 from kinfmu.mechanism.quantities import PoseQuantity, cosine_between
 from kinfmu.mechanism.quantities.arithmetic import Value, sqrt
 from kinfmu.mechanism.quantities.placement import GROUND, BodyFrame, Placement, body_of, unit_vector
-from kinfmu.motion.extremes import Extremes, HistoryExtremes, SamplesNeededError
+from kinfmu.motion.extremes import Extremes, SamplesNeededError
 from kinfmu.motion.fitting import Circle, Line, deviation
 from kinfmu.motion.history import FEWEST, Extreme, History, first_pole
 from kinfmu.motion.quantities import QuantityNames, QuantityRead, path_of
@@ -294,13 +294,13 @@ class Motion:
         over, under = kinds[::-1] if inverse else kinds
         return Quantity("number") if over == under else Quantity(over, 1, under)
 
-    def history(self, of: str | PoseQuantity) -> History | HistoryExtremes:
+    def history(self, of: str | PoseQuantity) -> History:
         """Return a quantity over the motion: a coordinate, a rate of one, or a measured quantity."""
         if self.extremes is not None:
             return self._extremes_of(of, 0)
         return self._cut(self._whole(of))
 
-    def derivative(self, of: str | PoseQuantity, order: Literal[1, 2]) -> History | HistoryExtremes:
+    def derivative(self, of: str | PoseQuantity, order: Literal[1, 2]) -> History:
         """Return the speed (order 1) or acceleration (2) of a quantity; of a point 'body.point' its magnitude."""
         if self.extremes is not None:
             return self._extremes_of(of, order)
@@ -309,8 +309,8 @@ class Motion:
             return self._cut(self._as_history(sqrt(x * x + y * y)))
         return self._cut(_derived(self._whole(of), order))
 
-    def _extremes_of(self, of: str | PoseQuantity, order: int) -> HistoryExtremes:
-        """Return the extremes of a quantity, or of its derivative of an order."""
+    def _extremes_of(self, of: str | PoseQuantity, order: int) -> Any:
+        """Return the extremes of a quantity, or of its derivative of an order, as much of a history as measures read."""
         assert self.extremes is not None  # noqa: S101  the callers look
         columns, order = self.extremes.channels.find(self.names, self.mechanism.body_points, of, order)
         return self.extremes.of(columns, order, self.window, self.x, is_closed=self.is_closed)

@@ -94,7 +94,7 @@ static void range(const double *numbers, int64_t count, double *low, double *hig
 {
     double lows[VECTOR], highs[VECTOR], zeros[VECTOR] = {0.0}, all = 0.0; /* 0 times a number, NaN if it is not finite */
     const int64_t width = count < VECTOR ? count : VECTOR;
-    int64_t k, i;
+    int64_t k, i, half;
     for (i = 0; i < VECTOR; ++i) {
         lows[i] = highs[i] = numbers[0];
     }
@@ -112,7 +112,14 @@ static void range(const double *numbers, int64_t count, double *low, double *hig
     }
     *low = lows[0];
     *high = highs[0];
-    for (i = 0; i < width; ++i) {
+    for (half = count < VECTOR ? 0 : VECTOR / 2; half >= 8; half /= 2) { /* shorter chains of numbers that wait for each other */
+        for (i = 0; i < half; ++i) {
+            lows[i] = lows[half + i] < lows[i] ? lows[half + i] : lows[i];
+            highs[i] = highs[half + i] > highs[i] ? highs[half + i] : highs[i];
+            zeros[i] += zeros[half + i];
+        }
+    }
+    for (i = 0; i < (width == VECTOR ? 8 : width); ++i) {
         *low = lows[i] < *low ? lows[i] : *low;
         *high = highs[i] > *high ? highs[i] : *high;
         all += zeros[i];
