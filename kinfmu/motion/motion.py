@@ -309,11 +309,12 @@ class Motion:
             return self._cut(self._as_history(sqrt(x * x + y * y)))
         return self._cut(_derived(self._whole(of), order))
 
-    def _extremes_of(self, of: str | PoseQuantity, order: int) -> Any:
-        """Return the extremes of a quantity, or of its derivative of an order, as much of a history as measures read."""
+    def _extremes_of(self, of: str | PoseQuantity, order: int) -> History:
+        """Return the extremes of a quantity, or of its derivative of an order, in place of its history."""
         assert self.extremes is not None  # noqa: S101  the callers look
         columns, order = self.extremes.channels.find(self.names, self.mechanism.body_points, of, order)
-        return self.extremes.of(columns, order, self.window, self.x, is_closed=self.is_closed)
+        found: Any = self.extremes.of(columns, order, self.window, self.x, is_closed=self.is_closed)
+        return found  # type: ignore[no-any-return]  # as much of a history as most measures read
 
     def speed_ratio(self, of: str | PoseQuantity, to: str | None) -> History:
         """Return the speed of a quantity over that of another; to: a coordinate, None: the driver."""
