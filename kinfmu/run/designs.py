@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinfmu.arrays import FloatArray
+from kinfmu.arrays import FloatArray, new_numbers
 from kinfmu.display import Displayed
 from kinfmu.errors import KinfmuError, RequestError, listed, suggestion
 from kinfmu.mechanism import LawConstant
@@ -254,7 +254,7 @@ def solve_batch(batch: Batch, driving: Driving, *, highest: int, tolerance: floa
     """
     shape = (batch.count, len(driving.times), len(batch.plan.outputs))
     tables: list[Any] = [
-        np.empty((shape[0], shape[2], shape[1])).transpose(0, 2, 1) if order <= highest else None for order in range(3)
+        new_numbers(shape[0], shape[2], shape[1]).transpose(0, 2, 1) if order <= highest else None for order in range(3)
     ]
     status = np.empty(shape[:2], dtype=np.int32)
     reasons: dict[int, str] = {}

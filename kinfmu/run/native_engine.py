@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.arrays import FloatArray
+from kinfmu.arrays import FloatArray, new_numbers
 from kinfmu.codegen.c import compiler
 from kinfmu.codegen.c.model import emit
 from kinfmu.codegen.lanes import sources
@@ -256,7 +256,7 @@ class Library:
         """
         count, watches = len(driven[0]), len(self.plan.watches)
         if reuse is None:
-            whole = np.empty((2 + watches, count))  # one allocation: the system provides large ones faster
+            whole = new_numbers(2 + watches, count)  # one allocation: the system provides large ones faster
             outcomes = whole[0].view(np.int32).reshape(count, 2)
             result = LibraryResult(outcomes, whole[1], whole[2:].reshape(count, watches), (), 0)
         elif reuse.watch.shape == (count, watches):
