@@ -12,6 +12,7 @@
 #define SURE 0.05         /* determinant from which nodes count as regular */
 #define MOST_MEMORY 1e8   /* [bytes] for segments on either side of the anchor */
 #define AT_ONCE 4096     /* driver values that are looked at together */
+#define ROUNDED 1e-12    /* of a segment */
 #define STEEP 0.78        /* [rad]; up to here sines and cosines are turned by polynomials */
 
 #if KF_HAS_LANES
@@ -543,17 +544,19 @@ void kf_predict(const kf_segments *segments, const double *u, kf_lanes *lanes, i
     const double per_width = 1.0 / segments->width, farthest = KF_FARTHEST * kf_reach[0];
     const double last = segments->repeats ? INFINITY : (double)segments->count;
     const double least = segments->repeats ? -INFINITY : 0.0;
+    const double end = segments->has_end ? last + ROUNDED : -INFINITY;
     double own[KF_LANES + KF_VECTOR], number[KF_LANES + 1];
     uint64_t bits[KF_LANES], ends = 0; /* bits of the last lanes of pieces: lanes in one segment, one after another */
     int from = 0, i;
     KF_SIDE_BY_SIDE
     for (i = 0; i < KF_LANES; ++i) {
-        const double place = __builtin_floor((u[i] - begin) * per_width);
-        const bool is_within = (place >= least) & (place < last) & (fabs(u[i]) < farthest);
+        const double exact = (u[i] - begin) * per_width, place = __builtin_floor(exact);
+        const bool is_before = place < last, is_end = exact <= end;
+        const bool is_within = (place >= least) & (is_before | is_end) & (fabs(u[i]) < farthest);
         own[i] = u[i];
         alone[i] = !is_within;
         bits[i] = (uint64_t)1 << i;
-        number[i] = is_within ? place : 0.0;
+        number[i] = !is_within ? 0.0 : is_before ? place : last - 1.0;
     }
     for (i = KF_LANES; i < KF_LANES + KF_VECTOR; ++i) {
         own[i] = 0.0;

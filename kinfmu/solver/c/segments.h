@@ -54,7 +54,7 @@ typedef struct {
     kf_segment *segments;
     int64_t first, count;
     double width;
-    bool repeats;
+    bool repeats, has_end; /* has_end: the last segment includes its end, where the last sample of a turn may be */
     double raised[KF_ROOM(KF_UNKNOWNS)];
     kf_window windows[KF_WINDOWS];
     int window_count;
