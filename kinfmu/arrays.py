@@ -16,11 +16,11 @@ _PAGE = 2**21 // 8  # numbers in a large page of the system
 def new_numbers(*shape: int) -> FloatArray:
     """Return an array without values.
 
-    One of several pages begins at a page and has all of its last one: small pages at its ends would take the system as
-    long as all the large ones.
+    A large one begins at a large page of the system and has all of its last one: the small pages that it would have at
+    its ends take as long as all the others.
     """
     count = math.prod(shape)
-    if count < 4 * _PAGE:
+    if count < _PAGE:
         return np.empty(shape)
     whole = np.empty(count + 2 * _PAGE)
     first = -(whole.__array_interface__["data"][0] // whole.itemsize) % _PAGE

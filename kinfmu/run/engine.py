@@ -65,7 +65,7 @@ def tables_for(out: Tables | None, shape: tuple[int, int], order: Literal["C", "
     if out is None:
         rows, columns = shape
         whole = new_numbers(3, *shape) if order == "C" else new_numbers(3, columns, rows).transpose(0, 2, 1)
-        return tuple(whole)  # type: ignore[return-value]  # three; the system provides one large array faster
+        return tuple(whole)  # three; the system provides one large array faster
     names = ("values", "rates", "accelerations")
     if not isinstance(out, tuple | list) or len(out) != len(names):
         given = f"{len(out)}" if isinstance(out, tuple | list) else type(out).__name__
