@@ -19,6 +19,7 @@ from kinfmu.errors import MissingPackageError
 from kinfmu.mechanism.gallery import load
 from kinfmu.mechanism.gallery.chains import fourbar_chain
 from kinfmu.plan import compile_plan
+from kinfmu.run.engine import Driven
 from kinfmu.run.model import compile as compiled_model
 from kinfmu.run.native_engine import FLAGS, Library
 
@@ -26,6 +27,7 @@ ROUNDS = 9
 SAMPLES = 360_000  # a thousand turns by one degree
 CHAIN_SAMPLES = 2000
 LENGTHS = (40.0, 20.0, 50.0, 50.0)  # ground, crank, coupler, rocker of the gallery's crank_rocker
+STEPS = (5, 15)  # [deg]
 CLOSED = "closed form by hand, vectorized"
 WHOLE = "crank-rocker, q, qd, qdd"
 ALONE = "the same, q alone"
@@ -53,6 +55,8 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES, loops: int = 1000) -> str:
         ),
         "the same, by Model.solve": lambda: model.solve(crank_angle=u),
         "four-bar past two change points a turn": lambda: fourbar.sweep(driven, tables, reuse=fourbar_result),
+        **{f"crank-rocker, samples {step} degrees apart": _coarse(crank_rocker, driven, step) for step in STEPS},
+        "Jansen's leg, q, qd, qdd": _whole(Library(compile_plan(load("jansen_leg"))), driven),
     }
     absent = []
     try:
@@ -71,6 +75,20 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES, loops: int = 1000) -> str:
     if PYLINKAGE in medians:
         lines.append(f"{PYLINKAGE}: {medians[PYLINKAGE] / medians[WHOLE]:.1f} times that time")
     return "\n".join([*lines, *_chain(rounds, loops), *absent])
+
+
+def _coarse(library: Library, driven: Driven, step: int) -> Callable[[], object]:
+    """Return a sweep of as many samples that are further apart."""
+    u, ud, udd = driven
+    return _whole(library, (u * step, ud, udd))
+
+
+def _whole(library: Library, driven: Driven) -> Callable[[], object]:
+    """Return a sweep into given arrays."""
+    shape = 3, len(library.plan.outputs), len(driven[0])
+    tables = [table.T for table in np.empty(shape)]
+    result = library.sweep(driven, tables)
+    return lambda: library.sweep(driven, tables, reuse=result)
 
 
 def _allocated(samples: int) -> list[FloatArray]:

@@ -20,6 +20,7 @@ from kinfmu.mechanism.parameters import in_order, parameter_values
 from kinfmu.mechanism.quantities.arithmetic import Value, atan2_like, cos, sin, sqrt
 from kinfmu.mechanism.settings import LawConstant
 from kinfmu.motion.breaks import has_breaks
+from kinfmu.motion.extremes import Channels, Extremes, ExtremesReader, SamplesNeededError
 from kinfmu.motion.history import FEWEST
 from kinfmu.motion.measure import (
     listed_measures,
@@ -44,6 +45,7 @@ from kinfmu.solver.python.pose import Status
 from kinfmu.units import CoordinateName, InputName, Quantity, unit_of
 
 SAMPLES_AT_ONCE = 150_000  # of designs that are solved and measured together
+SAMPLES_READ_AT_ONCE = 5_000_000  # of designs whose extremes are read in one call, which cannot be stopped
 
 sin.register(np.ndarray, np.sin)
 cos.register(np.ndarray, np.cos)
@@ -63,6 +65,22 @@ class SampledAxis(NamedTuple):
     input_names: tuple[InputName, ...]
     inputs: FloatArray
     length_unit: str
+
+
+class _Solved(NamedTuple):
+    """The designs of a part after they are solved.
+
+    left: those to be assembled anew; reasons: why others are not reached, by number; worst: (m,) status; missing:
+    (m, 2) how many samples of a design have no numbers, and the first of them; motion: of all; memory: to be used
+    again.
+    """
+
+    left: Sequence[int]
+    reasons: Mapping[int, str]
+    worst: NDArray[np.int32]
+    missing: NDArray[np.integer[Any]]
+    motion: Motion
+    memory: tuple[FloatArray, NDArray[np.int32]] | None = None
 
 
 class BatchReading:
@@ -108,6 +126,7 @@ class BatchReading:
         if (count := len(self._driving.times)) < FEWEST:
             raise RequestError(f"there are {count} samples; measures need {FEWEST} or more")
         self._tolerance, self._anew = tolerance, anew
+        self._channels: Channels | None = None
         self._idle: list[tuple[FloatArray, NDArray[np.int32]]] = []  # memory of earlier parts
         self._names = QuantityNames(mechanism)
         self.motion, self._order = self._empty_motion()
@@ -133,10 +152,11 @@ class BatchReading:
     def run(self, workers: int) -> None:
         """Solve and measure all designs."""
         samples = len(self._driving.times)
-        parts = parts_of(self._count, max(1, SAMPLES_AT_ONCE // samples), workers)
         self._is_native = self._model.is_native(self._count * samples)
         if self._in_tables:
             self._compute_quantities()
+        most = SAMPLES_AT_ONCE if self._channels is None else SAMPLES_READ_AT_ONCE
+        parts = parts_of(self._count, max(1, most // samples), workers)
         measure = self._measure if self._in_tables else self._measure_by_design
         if self._is_native and workers > 1:
             with ThreadPoolExecutor(workers) as pool:
@@ -157,9 +177,54 @@ class BatchReading:
             model.load_library()
         self._quantities = self._batch.of_model(model)
         self.motion = replace(self.motion, outputs=quantities, _histories={})
+        self._channels = self._wanted() if self._is_native else None
+
+    def _wanted(self) -> Channels | None:
+        """Return the extremes that the measures need; None if one needs more than extremes."""
+        channels = Channels(self.motion.outputs)
+        asked = replace(self.motion, extremes=Extremes(channels))
+        try:
+            for reading in self._in_tables:
+                if (reading.begin, reading.end) != (None, None):
+                    channels.windows.append((_window(asked.going_round(False), reading), _window(asked, reading)))
+                read_values(asked, reading)
+        except (SamplesNeededError, RequestError):  # an error is found again where samples are read
+            return None
+        return channels
 
     def _measure(self, part: slice) -> dict[int, str]:
         """Solve the designs of a part and measure them; return why one has no values, by its number in the part."""
+        with np.errstate(all="ignore"):  # samples without numbers are NaN
+            solved = (self._samples_of if self._channels is None else self._extremes_of)(part)
+            missing, reasons = solved.missing[:, 0], solved.reasons
+            is_solved = missing < len(self._driving.times)
+            is_solved[list(solved.left)] = False
+            self.status[part] = solved.worst
+            reasons = {k: reasons[k] for k in np.flatnonzero(~is_solved).tolist() if k in reasons}
+            for k in np.flatnonzero(is_solved).tolist() if self._by_design else ():
+                if reason := self._measure_design(self._by_design, part.start + k):
+                    reasons[k] = reason
+            self._read(part, solved, is_solved, reasons)
+            for k in solved.left:
+                if reason := self._measure_design(self._readings, part.start + k):
+                    reasons[k] = reason
+        if solved.memory is not None:
+            self._idle.append(solved.memory)
+        return reasons
+
+    def _extremes_of(self, part: slice) -> _Solved:
+        """Solve the designs of a part and read the extremes of each, in compiled code."""
+        assert self._channels is not None  # noqa: S101  the caller looks
+        batch, driving = self._quantities.part(part), self._driving.part(part)
+        reader = ExtremesReader(self._channels, self.motion.x, self._order, batch.count)
+        left, reasons = solve_by_library(
+            batch, driving, reader.tables, reader.status, self._tolerance, 1, anew=self._anew, reader=reader.function
+        )
+        motion = replace(self._motion_of(batch), extremes=reader.extremes())
+        return _Solved(left, reasons, reader.worst, reader.missing, motion)
+
+    def _samples_of(self, part: slice) -> _Solved:
+        """Solve the designs of a part into tables."""
         batch, driving = self._quantities.part(part), self._driving.part(part)
         memory = self._idle.pop() if self._idle else None
         if memory is None or len(memory[1]) < batch.count:
@@ -167,24 +232,12 @@ class BatchReading:
             whole = np.empty((3, batch.count, len(self.motion.outputs), samples))
             memory = whole, np.empty((batch.count, samples), np.int32)
         tables, status = [table[: batch.count].transpose(0, 2, 1) for table in memory[0]], memory[1][: batch.count]
-        with np.errstate(all="ignore"):  # samples without numbers are NaN
-            left, reasons = self._solve(batch, driving, tables, status)
-            good = np.asarray(status <= Status.BRIDGED)
-            is_solved = np.asarray(good.any(axis=1))
-            is_solved[list(left)] = False
-            self.status[part] = status.max(axis=1, initial=0)
-            reasons = {k: reasons[k] for k in np.flatnonzero(~is_solved).tolist() if k in reasons}
-            for k in np.flatnonzero(is_solved).tolist() if self._by_design else ():
-                if reason := self._measure_design(self._by_design, part.start + k):
-                    reasons[k] = reason
-            self._read(
-                part, self._motion_of(batch, [table[:, self._order] for table in tables]), good, is_solved, reasons
-            )
-            for k in left:
-                if reason := self._measure_design(self._readings, part.start + k):
-                    reasons[k] = reason
-        self._idle.append(memory)
-        return reasons
+        left, reasons = self._solve(batch, driving, tables, status)
+        good = status <= Status.BRIDGED
+        missing = np.stack([np.count_nonzero(~good, axis=1), np.argmin(good, axis=1)], axis=1)
+        value, rate, acceleration = (table[:, self._order] for table in tables)
+        motion = replace(self._motion_of(batch), tables=(value, rate, acceleration))
+        return _Solved(left, reasons, status.max(axis=1, initial=0), missing, motion, memory)
 
     def _solve(
         self, batch: Batch, driving: Driving, tables: Sequence[FloatArray], status: NDArray[np.int32]
@@ -204,14 +257,13 @@ class BatchReading:
     def _read(
         self,
         part: slice,
-        motion: Motion,
-        good: NDArray[np.bool_],
+        solved: _Solved,
         is_solved: NDArray[np.bool_],
         reasons: dict[int, str],
     ) -> None:
         """Read the measures of the designs of a part that are solved; add the reasons of those without values."""
         closed_ones: dict[tuple[QuantityRead, ...], NDArray[np.bool_]] = {}
-        is_whole = np.asarray(good.all(axis=1))
+        motion, is_whole = solved.motion, solved.missing[:, 0] == 0
         whole: dict[bool, Motion] = {}  # of all designs: measures of one quantity share its extremes
         for reading in self._in_tables:
             value, at = self.values[reading.name][part], self.at[reading.name][part]
@@ -222,7 +274,7 @@ class BatchReading:
                 chosen = np.flatnonzero(is_solved & (closed_ones[quantities] == is_closed))
                 if not len(chosen):
                     continue
-                if len(chosen) < len(good):
+                if len(chosen) < len(is_whole):
                     some = motion.of_designs(chosen).going_round(is_closed)
                 else:
                     some = whole.setdefault(is_closed, motion.going_round(is_closed))
@@ -232,15 +284,14 @@ class BatchReading:
                     reasons |= {k: str(error) for k in chosen.tolist() if k not in reasons}
                     continue
                 value[chosen] = values.value
-                texts = np.broadcast_to(values.reason, len(chosen)).tolist()
-                for k, text in zip(chosen.tolist(), texts, strict=True):
-                    if text and good[k].all():
-                        reasons.setdefault(k, text)
+                texts = np.broadcast_to(values.reason, len(chosen))
+                for k in np.flatnonzero((texts != "") & is_whole[chosen]).tolist():
+                    reasons.setdefault(int(chosen[k]), str(texts[k]))
                 for column, places in enumerate(values.at):
                     at[chosen, column] = places
             for k in np.flatnonzero(is_solved & ~np.isfinite(value)).tolist():
                 if k not in reasons:
-                    reasons[k] = reason_without_value(self._samples(part.start + k), good[k])
+                    reasons[k] = reason_without_value(self._samples(part.start + k), *solved.missing[k].tolist())
 
     def _measure_by_design(self, part: slice) -> dict[int, str]:
         """Measure the designs of a part one by one; return why one has no values, by its number in the part."""
@@ -280,8 +331,8 @@ class BatchReading:
             reasons += [result.reason] if result.reason else []
         return reasons[0] if reasons else ""
 
-    def _motion_of(self, batch: Batch, tables: Sequence[FloatArray]) -> Motion:
-        """Return the motion of the designs of a part."""
+    def _motion_of(self, batch: Batch) -> Motion:
+        """Return the motion of the designs of a part, without its tables."""
         motion = self.motion
         has_pressure = any(isinstance(reading, PressureAngle) for reading in self._in_tables)
         if self._open_parameters and (has_pressure or not self._is_native):
@@ -289,7 +340,6 @@ class BatchReading:
             motion = replace(motion, points=points_of_designs(self._model.mechanism, arrays))
         return replace(
             motion,
-            tables=(tables[0], tables[1], tables[2]),
             fixed={**motion.fixed, **self._fixed_of(batch)},
             is_closed=False,
             drive=motion.drive and replace(motion.drive, is_closed=False),
@@ -387,6 +437,14 @@ class BatchReading:
         quantities = {argument.name: argument.quantity for argument in arguments}
         unit = plan.mechanism.length_unit
         return {name: unit_of(quantities[name] or Quantity("number"), unit) for name in self.parameters}
+
+
+def _window(motion: Motion, reading: Reading) -> tuple[float, float] | None:
+    """Return the part of a motion that a reading sees; None if the motion does not reach its ends."""
+    try:
+        return motion.part(reading.begin, reading.end).window
+    except RequestError:
+        return None
 
 
 def points_of_designs(mechanism: Mechanism, given: Mapping[str, FloatArray]) -> dict[str, tuple[Value, Value]]:

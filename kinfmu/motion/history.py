@@ -142,9 +142,7 @@ class History:
         """
         wraps = self.is_closed and not self.is_seamed
         near = neighbours_within(self.x, is_closed=wraps)
-        found = higher_derivatives(
-            self._flat, _weights(self.x.tobytes(), is_closed=wraps), is_closed=wraps, neighbours=near
-        )
+        found = higher_derivatives(self._flat, weights_at(self.x, is_closed=wraps), is_closed=wraps, neighbours=near)
         shape = self.value.shape
         return found[0].reshape(shape), found[1].reshape(shape), found[2].reshape(shape)
 
@@ -181,9 +179,7 @@ class History:
             turns = (turn, 0.0 * turn, 0.0 * turn)
             rows = [np.concatenate([row, row[..., 1:] + more], -1) for row, more in zip(self.rows, turns, strict=True)]
             whole = History(np.concatenate([self.x, self.x[1:] + self.span]), rows[0], rows[1], rows[2])
-        steps = np.diff(self.x)
-        least = _NEAR * float(np.min(steps[steps > 0.0]))
-        first, last = np.searchsorted(whole.x, begin + least, "right"), np.searchsorted(whole.x, end - least, "left")
+        _, first, last = cut_places(self.x, begin, end, is_closed=self.is_closed)
         x = np.concatenate([[begin], whole.x[first:last], [end]])
         rows = []
         for at, row in zip(whole.at(np.array([begin, end])), whole.rows, strict=True):
@@ -208,9 +204,7 @@ class History:
 
     def largest_size(self) -> Extreme:
         """Return the largest absolute value of each design and where it occurs."""
-        low, high = self.extremes()
-        is_low = -low.value > high.value
-        return Extreme(np.where(is_low, -low.value, high.value), np.where(is_low, low.x, high.x))
+        return larger(*self.extremes())
 
     def _largest(self, *signs: float) -> list[Extreme]:
         """Return the extremes of these signs: 1 for the maximum, -1 for the minimum."""
@@ -317,6 +311,33 @@ class History:
         return tuple(np.where(known, one, np.nan).reshape(shape) for one in (start, stop))  # type: ignore[return-value]
 
 
+def larger(low: Extreme, high: Extreme) -> Extreme:
+    """Return the largest absolute value of each design, of minimum and maximum, and where it occurs."""
+    is_low = -low.value > high.value
+    return Extreme(np.where(is_low, -low.value, high.value), np.where(is_low, low.x, high.x))
+
+
+def cut_places(x: FloatArray, begin: float, end: float, *, is_closed: bool) -> tuple[FloatArray, int, int]:
+    """Return where a part of a motion is cut out of its samples.
+
+    Args:
+        x: (n,) arguments of the motion.
+        begin: First argument of the part.
+        end: Last argument of the part; of a motion that goes round also in the next period.
+        is_closed: The motion goes round.
+
+    Returns:
+        Arguments of the motion, with those of the next period if the part reaches into it; the first sample after
+        the begin, and the first one that is not before the end.
+
+    """
+    whole = np.concatenate([x, x[1:] + (x[-1] - x[0])]) if is_closed and end > x[-1] else x
+    steps = np.diff(x)
+    least = _NEAR * float(np.min(steps[steps > 0.0]))
+    first, last = np.searchsorted(whole, begin + least, "right"), np.searchsorted(whole, end - least, "left")
+    return whole, int(first), int(last)
+
+
 def _crossings_and_back(
     x: FloatArray, rows: list[FloatArray], is_known: NDArray[np.bool_]
 ) -> tuple[IntArray, FloatArray]:
@@ -343,6 +364,11 @@ def neighbours_within(x: FloatArray, *, is_closed: bool) -> tuple[IntArray, IntA
     near[before], far[before] = before - 1, before - 2
     near[before + 1], far[before + 1] = before + 2, before + 3
     return near, far
+
+
+def weights_at(x: FloatArray, *, is_closed: bool) -> tuple[FloatArray, FloatArray]:
+    """Return the weights (8, n) of the third and of the fourth derivative at arguments (n,), as `_weights` does."""
+    return _weights(x.tobytes(), is_closed=is_closed)
 
 
 @lru_cache(maxsize=8)

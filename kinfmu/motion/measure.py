@@ -191,16 +191,15 @@ def _reason(run: Run, reading: Reading) -> str:
             f"'{of}' is not determined: redundant rows share the load, the contact of a cam is unknown, or laws of "
             "loads have no times"
         )
-    return reason_without_value(run, run.good)
+    return reason_without_value(run, int(np.count_nonzero(~run.good)), int(np.argmin(run.good)))
 
 
-def reason_without_value(samples: HasAxis, good: NDArray[np.bool_]) -> str:
-    """Return why a measure has no value; good: (n,) True for samples with numbers."""
-    missing = np.flatnonzero(~good)
-    if not len(missing):
+def reason_without_value(samples: HasAxis, missing: int, first: int) -> str:
+    """Return why a measure has no value; missing: how many samples have no numbers, and the first of them."""
+    if not missing:
         return "the quantity has no finite value at some samples"
-    first = axis_of(samples).place(float(samples.t[missing[0]]))
-    return f"{len(missing)} of {len(good)} samples have no numbers, the first at {first}"
+    place = axis_of(samples).place(float(samples.t[first]))
+    return f"{missing} of {len(samples.t)} samples have no numbers, the first at {place}"
 
 
 def moves_evenly(drive: History) -> bool:

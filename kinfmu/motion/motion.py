@@ -20,6 +20,7 @@ from kinfmu.mechanism.quantities import PoseQuantity, cosine_between
 from kinfmu.mechanism.quantities.arithmetic import Value, sqrt
 from kinfmu.mechanism.quantities.placement import GROUND, BodyFrame, Placement, body_of, unit_vector
 from kinfmu.motion.breaks import ORDER, Break, distinct, law_breaks, split_at
+from kinfmu.motion.extremes import Extremes, SamplesNeededError
 from kinfmu.motion.fitting import Circle, Line, deviation
 from kinfmu.motion.history import FEWEST, Extreme, History, first_pole
 from kinfmu.motion.quantities import QuantityNames, QuantityRead, path_of
@@ -67,6 +68,7 @@ class Motion:
             None: they are unknown too.
         is_seamed: True if a law's derivatives jump at the ends of a motion that goes round. Inside x is twice where
             they jump, once for each side.
+        extremes: Extremes of many designs, which are known in place of the tables; None: the tables hold samples.
 
     """
 
@@ -83,6 +85,7 @@ class Motion:
     window: tuple[float, float] | None = None
     sampled: Callable[[str], FloatArray] | None = None
     is_seamed: bool = False
+    extremes: Extremes | None = None
     _histories: dict[QuantityRead, History] = field(default_factory=dict, repr=False)
     _names: QuantityNames | None = field(default=None, repr=False)  # the same object in all parts and all designs
     _windows: dict[tuple[float | None, float | None, bool], tuple[float, float]] = field(
@@ -165,6 +168,8 @@ class Motion:
         self, quantities: Sequence[QuantityRead], is_known: NDArray[np.bool_] | None = None
     ) -> NDArray[np.bool_]:
         """Return (...) whether quantities go round, whatever else moves; is_known: designs without gaps, if known."""
+        if self.extremes is not None:
+            return self.extremes.goes_round(quantities)
         moving = [(self.quantity_history(one), one.is_angle) for one in quantities if one not in self.fixed]
         return goes_round(moving, is_known) if moving else np.full(self.tables[0].shape[:-2], self.is_closed)
 
@@ -177,6 +182,8 @@ class Motion:
 
     def of_designs(self, chosen: IntArray) -> Motion:
         """Return the motion of some of the designs, of one leading axis."""
+        if self.extremes is not None:
+            return replace(self, extremes=self.extremes.of_designs(chosen))
 
         def rows(value: Value) -> Value:
             return value[chosen] if isinstance(value, np.ndarray) else value
@@ -281,14 +288,25 @@ class Motion:
 
     def history(self, of: str | PoseQuantity) -> History:
         """Return a quantity over the motion: a coordinate, a rate of one, or a measured quantity."""
+        if self.extremes is not None:
+            return self._extremes_of(of, 0)
         return self._cut(self._whole(of))
 
     def derivative(self, of: str | PoseQuantity, order: Literal[1, 2]) -> History:
         """Return the speed (order 1) or acceleration (2) of a quantity; of a point 'body.point' its magnitude."""
+        if self.extremes is not None:
+            return self._extremes_of(of, order)
         if isinstance(of, str) and of in self.mechanism.body_points:
             x, y = (_derived(history, order).taylor for history in self._path(of))
             return self._cut(self._as_history(sqrt(x * x + y * y)))
         return self._cut(_derived(self._whole(of), order))
+
+    def _extremes_of(self, of: str | PoseQuantity, order: int) -> History:
+        """Return the extremes of a quantity, or of its derivative of an order, in place of its history."""
+        assert self.extremes is not None  # noqa: S101  the callers look
+        columns, order = self.extremes.channels.find(self.names, self.mechanism.body_points, of, order)
+        found: Any = self.extremes.of(columns, order, self.window, self.x, is_closed=self.is_closed)
+        return found  # type: ignore[no-any-return]  # as much of a history as most measures read
 
     def speed_ratio(self, of: str | PoseQuantity, to: str | None) -> History:
         """Return the speed of a quantity over that of another; to: a coordinate, None: the driver."""
@@ -366,6 +384,8 @@ class Motion:
 
     def quantity_history(self, quantity: QuantityRead) -> History:
         """Return a quantity that measures read, without regard to the window."""
+        if self.extremes is not None:
+            raise SamplesNeededError
         if quantity not in self._histories:
             self._histories[quantity] = self._new_history(quantity)
         return self._histories[quantity]
@@ -380,6 +400,8 @@ class Motion:
 
     def _whole(self, of: str | PoseQuantity) -> History:
         """Return a quantity as `history` does, without regard to the window."""
+        if self.extremes is not None:
+            raise SamplesNeededError
         if of in self.names.forces:
             return self._force_history(str(of))
         if isinstance(of, str):

@@ -7,7 +7,7 @@
 
 #define STEPS 60    /* of a root in its interval */
 #define SAME 1e-15  /* of an interval; roots closer than this are equal */
-#define VECTOR 8    /* numbers side by side */
+#define VECTOR 32   /* numbers side by side; loops over fewer are unrolled, not laid side by side */
 
 static double polynomial(const double *c, int terms, double s)
 {
@@ -83,62 +83,22 @@ static double cut_of(const double slope[5])
     return polynomial(curve, 4, 0.0) * polynomial(curve, 4, 1.0) < 0.0 ? root(curve, 4, 0.0, 1.0) : 0.5;
 }
 
-static bool is_finite(const double *numbers, int64_t count)
+/* Where a loop over VECTOR numbers at a time begins, after one at k: the last time it ends with the last number. */
+static int64_t following(int64_t k, int64_t count)
 {
-    double zeros[VECTOR] = {0.0}; /* 0 times a number, NaN for one that is not finite */
-    double all = 0.0;
-    int64_t k;
-    int i;
-    for (k = 0; k + VECTOR <= count; k += VECTOR) {
-        for (i = 0; i < VECTOR; ++i) {
-            zeros[i] += 0.0 * numbers[k + i];
-        }
-    }
-    for (; k < count; ++k) {
-        all += 0.0 * numbers[k];
-    }
-    for (i = 0; i < VECTOR; ++i) {
-        all += zeros[i];
-    }
-    return all == 0.0;
-}
-
-/* The largest sample: its number. */
-static int64_t largest(const kf_quantity *of, int64_t count)
-{
-    double tops[VECTOR], best = of->sign * of->f[0];
-    int64_t k;
-    int i;
-    for (i = 0; i < VECTOR; ++i) {
-        tops[i] = best;
-    }
-    for (k = 0; k + VECTOR <= count; k += VECTOR) {
-        for (i = 0; i < VECTOR; ++i) {
-            const double f = of->sign * of->f[k + i];
-            tops[i] = f > tops[i] ? f : tops[i];
-        }
-    }
-    for (; k < count; ++k) {
-        best = of->sign * of->f[k] > best ? of->sign * of->f[k] : best;
-    }
-    for (i = 0; i < VECTOR; ++i) {
-        best = tops[i] > best ? tops[i] : best;
-    }
-    for (k = 0; of->sign * of->f[k] != best; ++k) {
-    }
-    return k;
+    return k + 2 * VECTOR <= count || k + VECTOR == count ? k + VECTOR : count - VECTOR;
 }
 
 /* The smallest and the largest of some numbers; both NaN if one of them is not finite. */
 static void range(const double *numbers, int64_t count, double *low, double *high)
 {
-    double lows[VECTOR], highs[VECTOR], zeros[VECTOR] = {0.0}, least, most, all = 0.0;
-    int64_t k;
-    int i;
+    double lows[VECTOR], highs[VECTOR], zeros[VECTOR] = {0.0}, all = 0.0; /* 0 times a number, NaN if it is not finite */
+    const int64_t width = count < VECTOR ? count : VECTOR;
+    int64_t k, i, half;
     for (i = 0; i < VECTOR; ++i) {
         lows[i] = highs[i] = numbers[0];
     }
-    for (k = 0; k + VECTOR <= count; k += VECTOR) {
+    for (k = 0; k + VECTOR <= count; k = following(k, count)) {
         for (i = 0; i < VECTOR; ++i) {
             const double one = numbers[k + i];
             lows[i] = one < lows[i] ? one : lows[i];
@@ -146,20 +106,45 @@ static void range(const double *numbers, int64_t count, double *low, double *hig
             zeros[i] += 0.0 * one;
         }
     }
-    least = lows[0];
-    most = highs[0];
-    for (; k < count; ++k) {
-        least = numbers[k] < least ? numbers[k] : least;
-        most = numbers[k] > most ? numbers[k] : most;
-        all += 0.0 * numbers[k];
+    for (i = 0; i < width && count < VECTOR; ++i) {
+        lows[i] = highs[i] = numbers[i];
+        zeros[i] = 0.0 * numbers[i];
     }
-    for (i = 0; i < VECTOR; ++i) {
-        least = lows[i] < least ? lows[i] : least;
-        most = highs[i] > most ? highs[i] : most;
+    *low = lows[0];
+    *high = highs[0];
+    for (half = count < VECTOR ? 0 : VECTOR / 2; half >= 8; half /= 2) { /* shorter chains of numbers that wait for each other */
+        for (i = 0; i < half; ++i) {
+            lows[i] = lows[half + i] < lows[i] ? lows[half + i] : lows[i];
+            highs[i] = highs[half + i] > highs[i] ? highs[half + i] : highs[i];
+            zeros[i] += zeros[half + i];
+        }
+    }
+    for (i = 0; i < (width == VECTOR ? 8 : width); ++i) {
+        *low = lows[i] < *low ? lows[i] : *low;
+        *high = highs[i] > *high ? highs[i] : *high;
         all += zeros[i];
     }
-    *low = all == 0.0 ? least : NAN;
-    *high = all == 0.0 ? most : NAN;
+    if (all != 0.0) {
+        *low = *high = NAN;
+    }
+}
+
+static bool is_finite(const double *numbers, int64_t count)
+{
+    double low, high;
+    range(numbers, count, &low, &high);
+    return low <= high;
+}
+
+/* The largest sample, with its sign: its number. */
+static int64_t largest(const kf_quantity *of, int64_t count)
+{
+    double low, high;
+    int64_t k;
+    range(of->f, count, &low, &high);
+    for (k = 0; of->f[k] != (of->sign < 0.0 ? low : high); ++k) {
+    }
+    return k;
 }
 
 /* Mark the intervals whose control points exceed a value; the number of marks. */
@@ -194,6 +179,26 @@ static int64_t mark(const kf_quantity *of, int64_t count, const double *h, doubl
     return found;
 }
 
+/* Keep the largest value in one half of interval i, if it exceeds that before; the slope changes its sign once there. */
+static void visit(const kf_quantity *of, int64_t i, int half, const double *x, const double *h, double before, double *value,
+                  double *at)
+{
+    double c[6], slope[5], cut, begin, end, s, here;
+    take(of, i, h[i], c, slope);
+    cut = cut_of(slope);
+    begin = half == 0 ? 0.0 : cut;
+    end = half == 0 ? cut : 1.0;
+    if (!(polynomial(slope, 5, begin) > 0.0 && polynomial(slope, 5, end) < 0.0)) {
+        return;
+    }
+    s = root(slope, 5, begin, end);
+    here = polynomial(c, 6, s);
+    if (here > before && here >= *value) {
+        *value = here;
+        *at = x[i] + s * h[i];
+    }
+}
+
 /* The largest value of one design and its place. */
 static void maximum(const kf_quantity *of, int64_t count, const double *x, const double *h, double *value, double *at)
 {
@@ -203,27 +208,13 @@ static void maximum(const kf_quantity *of, int64_t count, const double *x, const
     const double grid = of->sign * of->f[top];
     const int64_t found = mark(of, count, h, grid, MOST, marked);
     const int64_t visits = found <= MOST ? found : count - 1; /* too many to list: all intervals are visited */
-    int side;
+    int half;
     *value = grid;
     *at = x[top];
-    for (side = 0; side < 2; ++side) {
+    for (half = 0; half < 2; ++half) {
         const double before = *value;
         for (k = 0; k < visits; ++k) {
-            const int64_t i = found <= MOST ? marked[k] : k;
-            double c[6], slope[5], cut, begin, end, s, here;
-            take(of, i, h[i], c, slope);
-            cut = cut_of(slope);
-            begin = side == 0 ? 0.0 : cut;
-            end = side == 0 ? cut : 1.0;
-            if (!(polynomial(slope, 5, begin) > 0.0 && polynomial(slope, 5, end) < 0.0)) {
-                continue;
-            }
-            s = root(slope, 5, begin, end);
-            here = polynomial(c, 6, s);
-            if (here > before && here >= *value) {
-                *value = here;
-                *at = x[i] + s * h[i];
-            }
+            visit(of, found <= MOST ? marked[k] : k, half, x, h, before, value, at);
         }
     }
 }
@@ -262,7 +253,7 @@ void kf_ranges(int64_t designs, int64_t count, const double *table, ptrdiff_t st
 }
 
 /* A weighted sum of the numbers of three samples: k, and those before and after it in `near` and `far`. */
-static double weighted(const double *w, int64_t n, int64_t k, const double *v, const double *a, double near_change,
+static inline double weighted(const double *w, int64_t n, int64_t k, const double *v, const double *a, double near_change,
                        int64_t near, double far_change, int64_t far)
 {
     return w[k] * v[k] + w[n + k] * a[k] + w[2 * n + k] * near_change + w[3 * n + k] * v[near] + w[4 * n + k] * a[near]
@@ -271,8 +262,8 @@ static double weighted(const double *w, int64_t n, int64_t k, const double *v, c
 
 /* Third and fourth derivatives, (designs, count) without gaps, with weights (8, count). */
 void kf_higher(int64_t designs, int64_t count, bool is_closed, const double *w3, const double *w4, const double *f,
-               ptrdiff_t f_step, const double *v, ptrdiff_t v_step, const double *a, ptrdiff_t a_step, double *third,
-               double *fourth)
+               ptrdiff_t f_step, const double *v, ptrdiff_t v_step, const double *a, ptrdiff_t a_step, double *restrict third,
+               double *restrict fourth)
 {
     const int64_t last = count - 1;
     int64_t design, k;

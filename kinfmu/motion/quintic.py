@@ -26,14 +26,15 @@ _compiled: list[ctypes.CDLL] = []  # the library, once it is wanted
 
 @cache
 def use_compiled() -> None:
-    """Compile `quintic.c`, or find it in the cache; many designs are measured by it from then on.
+    """Compile `quintic.c` and `extremes.c`, or find them in the cache; many designs are measured by these from then on.
 
     Raise a CompilerError if there is no compiler, or it fails.
     """
     from kinfmu.codegen.c import compiler
 
-    text = (Path(__file__).parent / "quintic.c").read_text("utf-8")
-    library = compiler.load({"quintic.c": text}, compiler.VECTORIZED)
+    folder = Path(__file__).parent
+    files = {name: (folder / name).read_text("utf-8") for name in ("quintic.c", "extremes.c")}
+    library = compiler.load(files, compiler.VECTORIZED)
     place, count, step = ctypes.c_void_p, ctypes.c_int64, ctypes.c_ssize_t
     table = (place, step)
     library.kf_maxima.argtypes = (count, count, place, place, count, place, *table * 3, place, place)
@@ -41,6 +42,11 @@ def use_compiled() -> None:
     library.kf_ranges.argtypes = (count, count, *table, place, place)
     library.kf_maxima.restype = library.kf_higher.restype = library.kf_ranges.restype = None
     _compiled.append(library)
+
+
+def compiled() -> ctypes.CDLL:
+    """Return the library that `use_compiled` loaded."""
+    return _compiled[0]
 
 
 def ranges(table: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinfmu.arrays import FloatArray
+from kinfmu.arrays import FloatArray, new_numbers
 from kinfmu.display import Displayed
 from kinfmu.errors import KinfmuError, RequestError, listed, suggestion
 from kinfmu.mechanism import LawConstant
@@ -26,7 +26,7 @@ from kinfmu.solver.python.pose import Status
 from kinfmu.units import CoordinateName
 
 if TYPE_CHECKING:
-    from kinfmu.run.native_engine import Library
+    from kinfmu.run.native_engine import DesignReader, Library
 
 SAMPLES_AT_ONCE = 500_000  # of a piece of work: its diagnostics stay in some 30 MB
 
@@ -254,7 +254,7 @@ def solve_batch(batch: Batch, driving: Driving, *, highest: int, tolerance: floa
     """
     shape = (batch.count, len(driving.times), len(batch.plan.outputs))
     tables: list[Any] = [
-        np.empty((shape[0], shape[2], shape[1])).transpose(0, 2, 1) if order <= highest else None for order in range(3)
+        new_numbers(shape[0], shape[2], shape[1]).transpose(0, 2, 1) if order <= highest else None for order in range(3)
     ]
     status = np.empty(shape[:2], dtype=np.int32)
     reasons: dict[int, str] = {}
@@ -290,8 +290,12 @@ def solve_by_library(
     threads: int,
     *,
     anew: bool,
+    reader: DesignReader | None = None,
 ) -> tuple[Sequence[int], dict[int, str]]:
-    """Fill the tables by the compiled plan; return the designs still to be solved alone, and reasons of the others."""
+    """Fill the tables by the compiled plan; return the designs still to be solved alone, and reasons of the others.
+
+    reader: Reads each design as soon as it is solved, by one thread.
+    """
     from kinfmu.run.native_engine import LawDriven
 
     library, start = batch.model.load_library(), batch.plan.mechanism.run.start
@@ -302,9 +306,11 @@ def solve_by_library(
     def piece(part: slice) -> tuple[NDArray[np.int32], dict[int, str]]:
         law = LawDriven(driving.times, batch.constants[part], start) if driving.driven is None else None
         into = [None if table is None else table[part] for table in tables]
-        return library.solve_designs(values[part], driving.part(part).driven, law, into, status[part], tolerance)
+        moved = driving.part(part).driven
+        return library.solve_designs(values[part], moved, law, into, status[part], tolerance, reader)
 
-    parts = parts_of(batch.count, max(1, SAMPLES_AT_ONCE // max(1, len(driving.times))), threads)
+    most = batch.count if reader is not None else max(1, SAMPLES_AT_ONCE // max(1, len(driving.times)))
+    parts = parts_of(batch.count, most, threads)
     with ThreadPoolExecutor(threads) as pool:
         found = list(pool.map(piece, parts)) if threads > 1 else [piece(part) for part in parts]
     alone: set[int] = set(np.flatnonzero(invalid).tolist())

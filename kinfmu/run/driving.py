@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinfmu.arrays import FloatArray
+from kinfmu.arrays import FloatArray, new_numbers
 from kinfmu.errors import KinfmuError, RequestError, listed, valid_names
 from kinfmu.mechanism import RunSettings
 from kinfmu.plan import DriverInfo
@@ -90,7 +90,8 @@ def driven_by_inputs(
     if len(drivers) == len(inputs) == rows == 1 and not wrap and drivers[0].inputs[0] in inputs:
         (name,) = inputs  # the values of a single driver: a short call is done here
         column = column_of(name, inputs[name])
-        table = column.reshape(-1, 1).copy()
+        table = new_numbers(len(column), 1)
+        table[:, 0] = column
         return table, _filled(table.shape, _DEFAULTS[1]), _filled(table.shape, _DEFAULTS[2])
     names = [name for driver in drivers for name in driver.inputs]
     for name in inputs:
@@ -200,6 +201,10 @@ def _is_within(values: FloatArray, largest: float) -> bool:
     """Return True if all values are numbers of at most this size; no temporary arrays are made."""
     if values.size <= _FEW and math.hypot(*values.ravel().tolist()) <= largest:  # NaN stays
         return True
+    if largest == sys.float_info.max:
+        with np.errstate(over="ignore", invalid="ignore"):
+            if math.isfinite(values.sum()):  # one pass in place of two: infinity and NaN stay
+                return True
     return bool(values.min(initial=0.0) >= -largest and values.max(initial=0.0) <= largest)
 
 

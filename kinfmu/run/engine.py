@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 
-from kinfmu.arrays import FloatArray, IntArray
+from kinfmu.arrays import FloatArray, IntArray, new_numbers
 from kinfmu.errors import KinfmuError, RequestError, valid_names
 from kinfmu.solver.python import Pose, Solver
 from kinfmu.solver.python.pose import Vector, evaluated
@@ -64,8 +64,8 @@ def tables_for(out: Tables | None, shape: tuple[int, int], order: Literal["C", "
     """Return the tables that are given, checked, or new ones."""
     if out is None:
         rows, columns = shape
-        whole = np.empty((3, *shape)) if order == "C" else np.empty((3, columns, rows)).transpose(0, 2, 1)
-        return tuple(whole)  # type: ignore[return-value]  # three; the system provides one large array faster
+        whole = new_numbers(3, *shape) if order == "C" else new_numbers(3, columns, rows).transpose(0, 2, 1)
+        return tuple(whole)  # three; the system provides one large array faster
     names = ("values", "rates", "accelerations")
     if not isinstance(out, tuple | list) or len(out) != len(names):
         given = f"{len(out)}" if isinstance(out, tuple | list) else type(out).__name__

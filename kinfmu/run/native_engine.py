@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.arrays import FloatArray
+from kinfmu.arrays import FloatArray, new_numbers
 from kinfmu.codegen.c import compiler
 from kinfmu.codegen.c.model import emit
 from kinfmu.codegen.lanes import sources
@@ -148,7 +148,10 @@ class _Designs(ctypes.Structure):
         ("table_step", ctypes.c_ssize_t * 3),
         ("status", _Place),
         ("reached", _Place),
+        ("status_step", ctypes.c_ssize_t),
         ("messages", _Place),
+        ("read", _Place),
+        ("context", _Place),
     )
 
 
@@ -179,6 +182,13 @@ class LibraryResult(NamedTuple):
     watch: FloatArray
     failures: tuple[tuple[int, str], ...]
     side_by_side: int
+
+
+class DesignReader(NamedTuple):
+    """A C function that reads each design as soon as it is solved, and what it needs: addresses. See designs.h."""
+
+    function: int
+    context: int
 
 
 class LawDriven(NamedTuple):
@@ -255,7 +265,7 @@ class Library:
         """
         count, watches = len(driven[0]), len(self.plan.watches)
         if reuse is None:
-            whole = np.empty((2 + watches, count))  # one allocation: the system provides large ones faster
+            whole = new_numbers(2 + watches, count)  # one allocation: the system provides large ones faster
             outcomes = whole[0].view(np.int32).reshape(count, 2)
             result = LibraryResult(outcomes, whole[1], whole[2:].reshape(count, watches), (), 0)
         elif reuse.watch.shape == (count, watches):
@@ -319,6 +329,7 @@ class Library:
         tables: Sequence[FloatArray | None],
         status: NDArray[np.int32],
         tolerance: float = TOLERANCE,
+        reader: DesignReader | None = None,
     ) -> tuple[NDArray[np.int32], dict[int, str]]:
         """Fill tables of many designs.
 
@@ -327,8 +338,9 @@ class Library:
             driven: (n, d) or (m, n, d) driver values, speeds and accelerations; None: by the laws.
             law: Times and constants of the laws; None: by driver values.
             tables: Three arrays (m, n, outputs) of values, rates and accelerations; None: not wanted.
-            status: (m, n) of 32 bits without gaps, filled with values of Status.
+            status: (m, n) of 32 bits, filled with values of Status; n without gaps.
             tolerance: Residual relative to the size above which a sample is not ok.
+            reader: Reads each design as soon as it is solved, so that all may share the memory of tables and status.
 
         Returns:
             (m,) how each design was reached, as in designs.h, and reasons by design for those that are not reached, or
@@ -359,6 +371,9 @@ class Library:
                 job.table_step[k] = step
         job.samples.outcomes, job.samples.residual, job.samples.watches = map(_start, (of_one, of_one[1:], of_one[2:]))
         job.status, job.reached, job.messages = _start(status), _start(reached), _start(messages)
+        job.status_step = status.strides[0] // status.itemsize
+        if reader is not None:
+            job.read, job.context = reader
         with self._memory(samples, tolerance, ()) as memory:
             if not self._library.kf_designs_run(memory.sweep, ctypes.byref(job)):
                 raise KinfmuError(self._refusal(designs * samples))

@@ -157,6 +157,43 @@ def test_every_kind_of_measure_equals_measure_of_each_design(engine: str) -> Non
     assert_as_measured(found, model, READ, crank_angle=TURN)
 
 
+OF_EXTREMES: tuple[Reading, ...] = (
+    Minimum("lowest", "coupler.y"),
+    Maximum("fastest", "rocker.omega"),
+    Range("across_the_end", "coupler.y", 5.5, 1.0),
+    Range("relative", AngleBetween("coupler", to="rocker"), BEGIN, END),
+    Peak("largest", "rocker.alpha"),
+    PeakSpeed("speed", "coupler.tracer", BEGIN, END),
+    PeakAcceleration("shock", "coupler.tracer"),
+    PeakAcceleration("jerk", "rocker.phi", 5.5, 1.0),
+    TimeRatio("quick_return", "rocker.phi"),
+    TransmissionAngle("transmission", ("coupler.P", "coupler.Q"), ("rocker.C", "rocker.Q")),
+)
+
+
+@pytest.mark.parametrize(
+    "angles",
+    [TURN, TURN[::-1], np.linspace(0.0, 4.0 * math.pi, 241), np.linspace(0.5, 5.8, 100), TURN[:-1] + 0.01],
+    ids=["turn", "backwards", "two turns", "open", "nearly a turn"],
+)
+@pytest.mark.parametrize("workers", [1, 2])
+def test_measures_of_extremes_are_read_without_tables(
+    angles: np.ndarray, workers: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def never(*_: object) -> None:
+        raise AssertionError("all samples are kept")
+
+    monkeypatch.setattr("kinfmu.motion.batch_reading.BatchReading._samples_of", never)
+    model = kinfmu.compile(crank_rocker(), engine="native")
+    values = drawn(5)
+    values["crank_link"] = np.array([15.0, np.nan, 38.0, 15.2, 14.9])  # one is invalid, one does not turn round
+    twice = [one for one in OF_EXTREMES if isinstance(one, TimeRatio)]  # other extremes are at one of two equal places
+    measures = OF_EXTREMES if np.ptp(angles) < 7.0 else twice
+    found = kinfmu.measure_designs(model, values, measures, crank_angle=angles, workers=workers)  # type: ignore[arg-type]
+    assert np.isfinite(next(iter(found.values.values()))[[0, 3, 4]]).all()
+    assert_as_measured(found, model, measures, crank_angle=angles)
+
+
 def test_measures_of_the_file_may_have_numbers_that_depend_on_the_design() -> None:
     model = kinfmu.compile(crank_rocker())
     found = kinfmu.measure_designs(model, drawn(4), crank_angle=TURN)  # type: ignore[arg-type]

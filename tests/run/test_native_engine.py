@@ -68,6 +68,29 @@ def test_the_gallery_moves_as_in_python(name: str) -> None:
     assert [(event.t, event.text) for event in native.events] == [(event.t, event.text) for event in python.events]
 
 
+@every_member
+@pytest.mark.few(1)
+def test_loops_over_lanes_read_no_parameters_which_stores_might_change(name: str) -> None:
+    text = emit_lanes(compile_plan(kinfmu.load(name))).get("lanes.c", "")
+    assert not [line for line in text.splitlines() if line.startswith("        ") and "= model->" in line]
+
+
+def _coarse_turns(rng: np.random.Generator) -> Iterator[np.ndarray]:
+    yield np.arange(600) * np.radians(7.0) - 3.0
+    yield rng.uniform(-200.0, 200.0, 600)
+    yield np.linspace(0.0, 2.0 * np.pi, 130)
+
+
+@pytest.mark.parametrize("name", ["crank_rocker", "fourbar", "jansen_leg"])
+@pytest.mark.few(1)
+def test_samples_in_many_segments_are_those_of_python(name: str) -> None:
+    plan = compile_plan(kinfmu.load(name))
+    driver = plan.drivers[0].inputs[0]
+    for u in _coarse_turns(np.random.default_rng(8)):
+        native, python = (kinfmu.solve(plan, engine=engine, **{driver: u}) for engine in ("native", "python"))
+        assert_same_motion(native, python)
+
+
 @pytest.mark.usefixtures("optimized")
 @pytest.mark.long
 def test_change_points_are_crossed_at_full_accuracy_in_any_order() -> None:

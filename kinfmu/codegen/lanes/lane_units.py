@@ -207,11 +207,17 @@ def is_turned(node: Node, angles: Collection[str]) -> bool:
 
 
 def through(lines: Sequence[str]) -> list[str]:
-    """Return the statements in a loop over the lanes."""
+    """Return the statements in a loop over the lanes; what is the same in all lanes is read before it.
+
+    Stores might change it as far as compilers know, and some of them (GCC 12) then leave the loop without vectors.
+    """
     if not lines:
         return ["    (void)i;"]
     lines = ended(lines)
+    equal = [line for line in lines if re.fullmatch(r"\w+ = model->[\w\[\]]+;", line)]
+    lines = [line for line in lines if line not in equal]
     return [
+        *(f"    const double {line}" for line in equal),
         "    KF_SIDE_BY_SIDE",
         "    for (i = 0; i < KF_LANES; ++i) {",
         *(f"        {line}" for line in [*declared(assigned(lines)), *lines]),

@@ -5,13 +5,14 @@
 
 #include "internal.h"
 
-#define SEGMENTS 16       /* in a turn */
 #define TURN 6.283185307179586
 #define HIGH 6.2831853069365025     /* [rad]; 2 pi to 32 bits, as in bridge.c */
 #define LOW 2.430840202602477e-10   /* [rad]; the rest */
 #define SAME 1e-9         /* difference of poses that are a turn apart */
 #define SURE 0.05         /* determinant from which nodes count as regular */
 #define MOST_MEMORY 1e8   /* [bytes] for segments on either side of the anchor */
+#define AT_ONCE 4096     /* driver values that are looked at together */
+#define ROUNDED 1e-12    /* of a segment */
 #define STEEP 0.78        /* [rad]; up to here sines and cosines are turned by polynomials */
 
 #if KF_HAS_LANES
@@ -259,14 +260,15 @@ static bool is_repeated(kf_segments *segments, const kf_node *a, const kf_node *
     return true;
 }
 
-/* Find the smallest and the largest of the anchor and of the driver values; NaN is left out. */
-static void range(int64_t count, const double *u, double *low, double *high)
+/* Extend a range by driver values; NaN is left out. */
+static void extend(int64_t count, const double *u, double *low, double *high)
 {
     double lows[KF_VECTOR], highs[KF_VECTOR];
     int64_t k;
     int i;
     for (i = 0; i < KF_VECTOR; ++i) {
-        lows[i] = highs[i] = kf_anchor_u[0];
+        lows[i] = *low;
+        highs[i] = *high;
     }
     for (k = 0; k + KF_VECTOR <= count; k += KF_VECTOR) {
         for (i = 0; i < KF_VECTOR; ++i) {
@@ -286,21 +288,58 @@ static void range(int64_t count, const double *u, double *low, double *high)
     }
 }
 
+#if KF_LOOKS_UP
+
+/* Store the segments of a turn number by number; not if an angle is steep in one of them. */
+static void list_segments(kf_segments *segments)
+{
+    int i, j, k;
+    segments->is_listed = segments->repeats;
+    for (i = 0; i < KF_SEGMENTS && segments->is_listed; ++i) {
+        const kf_segment *const segment = &segments->segments[i];
+        segments->listed_driver[0][i] = segment->centre;
+        segments->listed_driver[1][i] = segment->sine[KF_UNKNOWNS];
+        segments->listed_driver[2][i] = segment->cosine[KF_UNKNOWNS];
+        segments->is_plain = (i == 0 || segments->is_plain) && segment->is_plain;
+        for (k = 0; k < KF_UNKNOWNS; ++k) {
+            double(*const to)[KF_SEGMENTS] = segments->listed[k];
+            for (j = 0; j < KF_TERMS - 1; ++j) {
+                to[j][i] = segment->c[j][k];
+            }
+            to[KF_TERMS - 1][i] = segment->base[k];
+            to[KF_TERMS][i] = segment->sine[k];
+            to[KF_TERMS + 1][i] = segment->cosine[k];
+            segments->is_listed = segments->is_listed && !segment->is_steep[k];
+        }
+    }
+}
+
+#endif
+
 bool kf_segments_lay(kf_segments *segments, kf_follower *follower, int64_t count, const double *u)
 {
-    const double width = TURN / SEGMENTS * kf_reach[0];
+    const double width = TURN / KF_SEGMENTS * kf_reach[0];
     const double most = fmin(floor(MOST_MEMORY / sizeof *segments->segments), KF_FARTHEST * kf_reach[0] / width);
     kf_node *const nodes = malloc(4 * sizeof *nodes);
-    double low, high;
-    bool done = nodes != NULL;
+    const double begin = kf_anchor_u[0];
+    double low = begin, high = begin;
+    int64_t seen = 0;
+    bool done = nodes != NULL, is_long = false;
     segments->width = width;
-    range(count, u, &low, &high);
-    low = (low - kf_anchor_u[0]) / width;
-    high = (high - kf_anchor_u[0]) / width;
-    segments->repeats = KF_REPEATS && kf_driver_is_angle[0] && high - low > SEGMENTS && done
-        && allocate(segments, 0, SEGMENTS) && lay(segments, follower, SEGMENTS, nodes)
-        && is_repeated(segments, &nodes[0], &nodes[3]);
+    segments->repeats = false;
+    while (seen < count && done && !segments->repeats) { /* as a rule the first values show that there is more than a turn */
+        const int64_t more = KF_REPEATS && kf_driver_is_angle[0] && !is_long && count - seen > AT_ONCE ? AT_ONCE : count - seen;
+        extend(more, u + seen, &low, &high);
+        seen += more;
+        if (!is_long && (high - begin) / width - (low - begin) / width > KF_SEGMENTS) {
+            is_long = true;
+            segments->repeats = KF_REPEATS && kf_driver_is_angle[0] && allocate(segments, 0, KF_SEGMENTS)
+                && lay(segments, follower, KF_SEGMENTS, nodes) && is_repeated(segments, &nodes[0], &nodes[3]);
+        }
+    }
     if (done && !segments->repeats) {
+        low = (low - begin) / width;
+        high = (high - begin) / width;
         low = floor(fmax(low, -most));
         high = ceil(fmin(high, most));
         done = allocate(segments, (int64_t)low, (int64_t)(high > low ? high : low + 1.0));
@@ -309,6 +348,9 @@ bool kf_segments_lay(kf_segments *segments, kf_follower *follower, int64_t count
             lay(segments, follower, (int64_t)low, nodes);
         }
     }
+#if KF_LOOKS_UP
+    list_segments(segments);
+#endif
     kf_restart(follower);
     free(nodes);
     return done;
@@ -322,6 +364,53 @@ void kf_segments_free(kf_segments *segments)
 double kf_turns_after(const kf_segments *segments, double u)
 {
     return segments->repeats && fabs(u) < KF_FARTHEST * kf_reach[0] ? floor((u - kf_anchor_u[0]) / TURN) : 0.0;
+}
+
+/* Where in their segments lanes at..at + KF_VECTOR are, from -1 to 1, and sine and cosine of the driver's angle there.
+ *
+ * of: centre of the segment, sine and cosine there, whole turns before it.
+ */
+static inline void place_driver(const kf_segments *segments, const double *u, double of[4][KF_VECTOR], double *x, double *sine,
+                                double *cosine)
+{
+    const double per_half = 2.0 / segments->width;
+    double step[KF_VECTOR];
+    int i;
+    KF_SIDE_BY_SIDE
+    for (i = 0; i < KF_VECTOR; ++i) {
+        step[i] = u[i] - of[3][i] * HIGH - of[0][i] - of[3][i] * LOW;
+        x[i] = step[i] * per_half;
+        if (kf_driver_is_angle[0]) {
+            kf_turn(step[i], of[1][i], of[2][i], &sine[i], &cosine[i]);
+        }
+    }
+}
+
+/* Predict an unknown in lanes at..at + KF_VECTOR. of: the terms of its polynomials, its base, sine and cosine there. */
+static inline void predict_unknown(int k, bool is_steep, double of[KF_TERMS + 2][KF_VECTOR], const double *x, kf_lanes *lanes,
+                                   int at)
+{
+    double *const z = lanes->z[k] + at, *const sine = lanes->angles[0][k] + at, *const cosine = lanes->angles[1][k] + at;
+    double step[KF_VECTOR];
+    int i;
+    KF_SIDE_BY_SIDE
+    for (i = 0; i < KF_VECTOR; ++i) {
+        const double p = x[i];
+        step[i] = p * KF_FMA(p, KF_FMA(p, KF_FMA(p, KF_FMA(p, KF_FMA(p, KF_FMA(p, KF_FMA(p, of[7][i], of[6][i]), of[5][i]),
+            of[4][i]), of[3][i]), of[2][i]), of[1][i]), of[0][i]);
+        z[i] = of[KF_TERMS - 1][i] + step[i];
+    }
+    if (kf_unknown_is_angle[k] && !is_steep) {
+        KF_SIDE_BY_SIDE
+        for (i = 0; i < KF_VECTOR; ++i) {
+            kf_turn(step[i], of[KF_TERMS][i], of[KF_TERMS + 1][i], &sine[i], &cosine[i]);
+        }
+    } else if (kf_unknown_is_angle[k]) {
+        KF_SIDE_BY_SIDE
+        for (i = 0; i < KF_VECTOR; ++i) {
+            kf_sincos_lane(z[i], &sine[i], &cosine[i]);
+        }
+    }
 }
 
 /* Predict lanes from..to (excluded), all in one segment, KF_VECTOR at a time; lanes past the last one are overwritten. */
@@ -373,37 +462,124 @@ static void predict_within(const kf_segments *segments, const kf_segment *segmen
     }
 }
 
+#if KF_LOOKS_UP
+
+#define MOST_PIECES 5 /* of lanes in one segment; with more, looking up is faster */
+
+typedef double kf_numbers __attribute__((vector_size(64)));
+typedef int64_t kf_places __attribute__((vector_size(64)));
+
+/* Look up the numbers of KF_VECTOR segments. */
+static inline void look_up(const double *table, kf_places segment, double *numbers)
+{
+    kf_numbers low, high;
+    memcpy(&low, table, sizeof low);
+    memcpy(&high, table + KF_VECTOR, sizeof high);
+    low = __builtin_shuffle(low, high, segment);
+    memcpy(numbers, &low, sizeof low);
+}
+
+/* Predict all lanes, each in its segment; number: of the segment, counted over all turns. As predict_within does it. */
+static void predict_listed(const kf_segments *segments, const double *u, const double *number, kf_lanes *lanes, int32_t *alone)
+{
+    const double per_half = 2.0 / segments->width;
+    double of[KF_TERMS + 2][KF_VECTOR], turns[KF_LANES], x[KF_VECTOR], step[KF_VECTOR];
+    int64_t segment[KF_LANES];
+    int at, i, j, k;
+    KF_SIDE_BY_SIDE
+    for (i = 0; i < KF_LANES; ++i) {
+        turns[i] = __builtin_floor(number[i] / KF_SEGMENTS);
+        segment[i] = (int64_t)(number[i] - KF_SEGMENTS * turns[i]);
+    }
+    for (i = 0; i < KF_LANES && !segments->is_plain; ++i) {
+        alone[i] |= !segments->segments[segment[i]].is_plain;
+    }
+    for (at = 0; at < KF_LANES; at += KF_VECTOR) {
+        double *sine = lanes->angles[0][KF_UNKNOWNS] + at, *cosine = lanes->angles[1][KF_UNKNOWNS] + at;
+        kf_numbers whole;
+        kf_places places;
+        memcpy(&places, segment + at, sizeof places);
+        memcpy(&whole, turns + at, sizeof whole);
+        for (j = 0; j < 3; ++j) {
+            look_up(segments->listed_driver[j], places, of[j]);
+        }
+        KF_SIDE_BY_SIDE
+        for (i = 0; i < KF_VECTOR; ++i) {
+            step[i] = u[at + i] - turns[at + i] * HIGH - of[0][i] - turns[at + i] * LOW;
+            x[i] = step[i] * per_half;
+            kf_turn(step[i], of[1][i], of[2][i], &sine[i], &cosine[i]);
+        }
+        for (k = 0; k < KF_UNKNOWNS; ++k) {
+            const kf_numbers raised = whole * segments->raised[k];
+            double *const z = lanes->z[k] + at;
+            kf_numbers base;
+            kf_places chosen = whole == 0.0;
+            for (j = 0; j < KF_TERMS + 2; ++j) {
+                look_up(segments->listed[k][j], places, of[j]);
+            }
+            memcpy(&base, of[KF_TERMS - 1], sizeof base);
+            chosen = ((kf_places)base & chosen) | ((kf_places)(base + raised * HIGH + raised * LOW) & ~chosen);
+            memcpy(of[KF_TERMS - 1], &chosen, sizeof chosen);
+            sine = lanes->angles[0][k] + at;
+            cosine = lanes->angles[1][k] + at;
+            KF_SIDE_BY_SIDE
+            for (i = 0; i < KF_VECTOR; ++i) {
+                const double p = x[i];
+                step[i] = p * KF_FMA(p, KF_FMA(p, KF_FMA(p, KF_FMA(p, KF_FMA(p, KF_FMA(p, KF_FMA(p, of[7][i], of[6][i]),
+                    of[5][i]), of[4][i]), of[3][i]), of[2][i]), of[1][i]), of[0][i]);
+                z[i] = of[KF_TERMS - 1][i] + step[i];
+                if (kf_unknown_is_angle[k]) {
+                    kf_turn(step[i], of[KF_TERMS][i], of[KF_TERMS + 1][i], &sine[i], &cosine[i]);
+                }
+            }
+        }
+    }
+}
+
+#endif
+
 void kf_predict(const kf_segments *segments, const double *u, kf_lanes *lanes, int32_t *alone)
 {
     const double begin = kf_anchor_u[0] + (double)segments->first * segments->width;
     const double per_width = 1.0 / segments->width, farthest = KF_FARTHEST * kf_reach[0];
     const double last = segments->repeats ? INFINITY : (double)segments->count;
     const double least = segments->repeats ? -INFINITY : 0.0;
+    const double end = segments->has_end ? last + ROUNDED : -INFINITY;
     double own[KF_LANES + KF_VECTOR], number[KF_LANES + 1];
-    int ends[KF_LANES + 1], pieces = 0, from = 0, i, k; /* lanes in one segment, one after another, are a piece */
+    uint64_t bits[KF_LANES], ends = 0; /* bits of the last lanes of pieces: lanes in one segment, one after another */
+    int from = 0, i;
     KF_SIDE_BY_SIDE
     for (i = 0; i < KF_LANES; ++i) {
-        const double place = __builtin_floor((u[i] - begin) * per_width);
-        const bool is_within = (place >= least) & (place < last) & (fabs(u[i]) < farthest);
+        const double exact = (u[i] - begin) * per_width, place = __builtin_floor(exact);
+        const bool is_before = place < last, is_end = exact <= end;
+        const bool is_within = (place >= least) & (is_before | is_end) & (fabs(u[i]) < farthest);
         own[i] = u[i];
         alone[i] = !is_within;
-        number[i] = is_within ? place : 0.0;
+        bits[i] = (uint64_t)1 << i;
+        number[i] = !is_within ? 0.0 : is_before ? place : last - 1.0;
     }
     for (i = KF_LANES; i < KF_LANES + KF_VECTOR; ++i) {
         own[i] = 0.0;
     }
     number[KF_LANES] = NAN;
-    for (i = 0; i < KF_LANES; ++i) { /* without a branch, which would often be mispredicted */
-        ends[pieces] = i + 1;
-        pieces += number[i] != number[i + 1];
+    for (i = 0; i < KF_LANES; ++i) {
+        ends |= number[i] == number[i + 1] ? 0 : bits[i];
     }
-    for (k = 0; k < pieces; from = ends[k++]) {
-        const double turns = segments->repeats ? floor(number[from] / SEGMENTS) : 0.0;
-        const kf_segment *const segment = &segments->segments[(int64_t)(number[from] - SEGMENTS * turns)];
-        for (i = from; i < ends[k] && !segment->is_plain; ++i) {
+#if KF_LOOKS_UP
+    if (segments->is_listed && __builtin_popcountll(ends) > MOST_PIECES) {
+        predict_listed(segments, u, number, lanes, alone);
+        return;
+    }
+#endif
+    for (; ends != 0; ends &= ends - 1) {
+        const int end = __builtin_ctzll(ends) + 1;
+        const double turns = segments->repeats ? floor(number[from] / KF_SEGMENTS) : 0.0;
+        const kf_segment *const segment = &segments->segments[(int64_t)(number[from] - KF_SEGMENTS * turns)];
+        for (i = from; i < end && !segment->is_plain; ++i) {
             alone[i] = 1;
         }
-        predict_within(segments, segment, turns, own, from, ends[k], lanes);
+        predict_within(segments, segment, turns, own, from, end, lanes);
+        from = end;
     }
 }
 

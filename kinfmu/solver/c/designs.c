@@ -46,10 +46,14 @@ bool kf_designs_run(kf_sweep *sweep, const kf_designs *designs)
 {
     int64_t k;
     int order;
-    for (k = 0; k < designs->count; ++k) {
+    bool is_done = true;
+#if KF_HAS_LANES
+    sweep->segments.has_end = designs->read != NULL; /* else samples are those of kf_sweep_run, to the bit */
+#endif
+    for (k = 0; k < designs->count && is_done; ++k) {
         const double *const constants = designs->constants + k * designs->constant_step;
         char *const message = designs->messages + k * KF_MESSAGE;
-        int32_t *const status = designs->status + k * designs->samples.count;
+        int32_t *const status = designs->status + k * designs->status_step;
         int64_t failure, sample;
         kf_job job = designs->samples;
         if (designs->times == NULL) {
@@ -77,13 +81,17 @@ bool kf_designs_run(kf_sweep *sweep, const kf_designs *designs)
             if (designs->times != NULL) {
                 drive(&sweep->follower.solver.model, designs->times, constants, &job);
             }
-            if (!kf_sweep_run(sweep, &job)) {
-                return false;
-            }
+            is_done = kf_sweep_run(sweep, &job);
         }
         for (sample = 0; sample < job.count; ++sample) {
             status[sample] = job.outcomes[sample].status;
         }
+        if (designs->read != NULL) {
+            designs->read(designs->context, k, status);
+        }
     }
-    return true;
+#if KF_HAS_LANES
+    sweep->segments.has_end = false;
+#endif
+    return is_done;
 }

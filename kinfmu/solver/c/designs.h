@@ -11,6 +11,9 @@ typedef enum {
     KF_NO_START = 2     /* the laws start at a pose that is not reached */
 } kf_reached;
 
+/* What reads a design as soon as it is solved. context: its own; status: (samples.count) values of kf_status. */
+typedef void kf_design_reader(const void *context, int64_t design, const int32_t *status);
+
 /* Designs to be solved at `samples.count` samples each, and the tables to be filled.
  *
  * count: of the designs. parameters: (count, KF_PARAMETERS).
@@ -24,8 +27,9 @@ typedef enum {
  * samples: its tables are those of the first design; those of the next one begin table_step[order] numbers later. Each
  * design overwrites its outcomes, residual and watches. Failures of samples are not collected.
  *
- * status: (count, samples.count) values of kf_status. reached: (count) values of kf_reached. messages: (count, KF_MESSAGE), why a design, or else its first sample without
- * numbers, is not reached; empty if all are.
+ * status: (samples.count) values of kf_status of the first design; those of the next one begin status_step numbers later.
+ * reached: (count) values of kf_reached. messages: (count, KF_MESSAGE), why a design, or else its first sample without
+ * numbers, is not reached; empty if all are. read: NULL for none; with it steps may be 0, and all designs share tables.
  */
 typedef struct {
     int64_t count;
@@ -37,7 +41,10 @@ typedef struct {
     kf_job samples;
     ptrdiff_t table_step[3];
     int32_t *status, *reached;
+    ptrdiff_t status_step;
     char *messages;
+    kf_design_reader *read;
+    const void *context;
 } kf_designs;
 
 /* Return whether the laws start at a pose that can be reached with the parameters set. */

@@ -16,6 +16,12 @@
 #include "follower.h"
 #include "lanes.h"
 
+#if defined(__AVX512DQ__) && !defined(__clang__)
+#define KF_LOOKS_UP 1 /* two registers hold a number of each segment of a turn */
+#else
+#define KF_LOOKS_UP 0
+#endif
+#define KF_SEGMENTS 16     /* in a turn */
 #define KF_TERMS 9         /* of a segment's polynomials: three nodes with three conditions */
 #define KF_WINDOW_TERMS 12 /* of a window's: four nodes */
 #define KF_WINDOWS 64      /* the first ones; samples in others are solved alone */
@@ -48,10 +54,14 @@ typedef struct {
     kf_segment *segments;
     int64_t first, count;
     double width;
-    bool repeats;
+    bool repeats, has_end; /* has_end: the last segment includes its end, where the last sample of a turn may be */
     double raised[KF_ROOM(KF_UNKNOWNS)];
     kf_window windows[KF_WINDOWS];
     int window_count;
+#if KF_LOOKS_UP
+    bool is_listed, is_plain; /* the segments of a turn, number by number; plain: all of them */
+    double listed[KF_ROOM(KF_UNKNOWNS)][KF_TERMS + 2][KF_SEGMENTS], listed_driver[3][KF_SEGMENTS];
+#endif
 } kf_segments;
 
 /* Compute segments for driver values (count) from the anchor of the follower's solver; false if there is no memory. */

@@ -6,22 +6,50 @@
 #include <stdint.h>
 #include <string.h>
 
-#if defined(__SSE2__)
-#include <emmintrin.h> /* small: that of AVX takes longer to compile than the file that needs it */
-#endif
-
 #define KF_LINE 8 /* numbers in a line of the caches */
+
+typedef double kf_line __attribute__((vector_size(64))); /* of plain GCC and Clang: their headers take long to compile */
 
 /* Write a line of numbers to an aligned place. */
 static inline void kf_stream_line(double *to, const double *from)
 {
-#if defined(__SSE2__)
+#if defined(__clang__)
+    kf_line line;
+    memcpy(&line, from, sizeof line);
+    __builtin_nontemporal_store(line, (kf_line *)(void *)to);
+#elif defined(__AVX512F__)
+    kf_line line;
+    memcpy(&line, from, sizeof line);
+    __builtin_ia32_movntpd512(to, line);
+#elif defined(__SSE2__)
     int k;
     for (k = 0; k < KF_LINE; k += 2) {
-        _mm_stream_pd(to + k, _mm_loadu_pd(from + k));
+        double pair __attribute__((vector_size(16)));
+        memcpy(&pair, from + k, sizeof pair);
+        __builtin_ia32_movntpd(to + k, pair);
     }
 #else
     memcpy(to, from, KF_LINE * sizeof(double));
+#endif
+}
+
+/* Write a line of which the first numbers, `odd`, are the end of one line and the others the begin of another. */
+static inline void kf_stream_joined(double *to, const double *end, const double *begin, int odd)
+{
+    double both[2 * KF_LINE];
+#if defined(__AVX512F__) && !defined(__clang__) /* in registers: a load of numbers that were just stored waits for them */
+    typedef int64_t kf_places __attribute__((vector_size(64)));
+    const kf_places places = {8, 9, 10, 11, 12, 13, 14, 15};
+    kf_line a, b;
+    memcpy(&a, end, sizeof a);
+    memcpy(&b, begin, sizeof b);
+    a = __builtin_shuffle(a, b, places - odd);
+    __builtin_ia32_movntpd512(to, a);
+    (void)both;
+#else
+    memcpy(both, end, KF_LINE * sizeof(double));
+    memcpy(both + KF_LINE, begin, KF_LINE * sizeof(double));
+    kf_stream_line(to, both + KF_LINE - odd);
 #endif
 }
 
@@ -44,10 +72,7 @@ static inline void kf_stream(kf_column *column, double *to, const double *from, 
     if (odd > 0 && is_first) {
         memcpy(to, from, (size_t)lead * sizeof(double));
     } else if (odd > 0) {
-        double both[2 * KF_LINE];
-        memcpy(both, column->last, sizeof column->last);
-        memcpy(both + KF_LINE, from, sizeof column->last);
-        kf_stream_line(to - odd, both + KF_LINE - odd);
+        kf_stream_joined(to - odd, column->last, from, odd);
     }
     for (i = lead; i + KF_LINE <= count; i += KF_LINE) {
         kf_stream_line(to + i, from + i);
@@ -66,7 +91,7 @@ static inline void kf_stream_rest(const kf_column *column, void *to)
 static inline void kf_stream_end(void)
 {
 #if defined(__SSE2__)
-    _mm_sfence();
+    __builtin_ia32_sfence();
 #endif
 }
 
