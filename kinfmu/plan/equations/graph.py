@@ -23,18 +23,15 @@ Content = float | str | tuple[CurveData, int] | None
 class Node:
     """A number in the graph: a constant, a symbol, or an operation on earlier nodes."""
 
-    __slots__ = ("args", "graph", "id", "op", "value")
+    __slots__ = ("args", "constant", "graph", "id", "op", "value")
 
     def __init__(self, graph: Graph, op: str, args: tuple[Node, ...], value: Content, number: int) -> None:
         self.graph = graph
         self.op = op  # "constant", "symbol", "+", "-", "*", "/", "neg", or a key of FUNCTIONS
         self.args = args
         self.value = value  # of a constant its float, of a symbol its name, of a curve its data and order
+        self.constant: float | None = value if op == "constant" else None  # type: ignore[assignment]  # a float
         self.id = number
-
-    @property
-    def constant(self) -> float | None:
-        return self.value if self.op == "constant" else None  # type: ignore[return-value]  # constants hold floats
 
     @property
     def name(self) -> str:
@@ -71,7 +68,7 @@ class Node:
             return a - b.args[0]
         if a.op == "neg":
             return b - a.args[0]
-        return self.graph.node("+", *sorted((a, b), key=_number))
+        return self.graph.node("+", *_numbered(a, b))
 
     def __sub__(self, other: Any) -> Node:
         a, b = self, self.graph.lift(other)
@@ -102,8 +99,10 @@ class Node:
         return self.graph.node("neg", self)
 
     def __mul__(self, other: Any) -> Node:
-        a, b = sorted((self, self.graph.lift(other)), key=_number)
+        a, b = _numbered(self, self.graph.lift(other))
         for x, y in ((a, b), (b, a)):
+            if x.constant is None and x.op != "neg":
+                continue
             if x.constant == 0.0:
                 return x
             if x.constant == 1.0:
@@ -135,8 +134,9 @@ class Node:
     __rmul__ = __mul__
 
 
-def _number(node: Node) -> int:
-    return node.id
+def _numbered(a: Node, b: Node) -> tuple[Node, Node]:
+    """Return two nodes in the order of their numbers."""
+    return (a, b) if a.id <= b.id else (b, a)
 
 
 class Graph:
@@ -163,10 +163,11 @@ class Graph:
         return self._intern(node.op, args, node.value)
 
     def _intern(self, op: str, args: tuple[Node, ...], value: Content) -> Node:
-        key = (op, value, *(arg.id for arg in args))
-        if key not in self._nodes:
-            self._nodes[key] = Node(self, op, args, value, len(self._nodes))
-        return self._nodes[key]
+        key = (op, value, args)
+        node = self._nodes.get(key)
+        if node is None:
+            node = self._nodes[key] = Node(self, op, args, value, len(self._nodes))
+        return node
 
     def function(self, name: str, *args: Node, value: Content = None) -> Node:
         """Return one of FUNCTIONS of nodes; `value`: data and order of a curve."""
@@ -185,10 +186,12 @@ class Graph:
         zero, one = self.constant(0.0), self.constant(1.0)
         d: dict[Node, Node] = {}
         for node in reachable(targets):
-            a = node.args[0] if node.args else node
-            b = node.args[-1] if node.args else node
-            if node.op in ("constant", "symbol"):
+            if not node.args:
                 d[node] = zero if node in still else rates.get(node, zero)
+                continue
+            a, b = node.args[0], node.args[-1]
+            if node.op in _OPERATORS and d[a] is zero and d[b] is zero:  # most nodes depend on few symbols
+                d[node] = zero
             elif node.op == "+":
                 d[node] = d[a] + d[b]
             elif node.op == "-":
@@ -249,6 +252,7 @@ def _applied(op: str, value: Content, args: Sequence[float]) -> float:
     return _OPERATIONS[op](*args)
 
 
+_OPERATORS = frozenset(("+", "-", "*", "/", "neg"))
 FUNCTIONS = ("sin", "cos", "sqrt", "floor", "atan2", "curve")
 _OPERATIONS: dict[str, Callable[..., float]] = {
     "+": operator.add,

@@ -96,7 +96,7 @@ class System:
         at = np.asarray(q, dtype=float)
         matrix = np.zeros((len(self.rows), len(self.coordinates)))
         for member in self.members:
-            matrix[np.ix_(member.rows, member.columns)] = self.gradients(member, at)
+            matrix[np.ix_(member.rows, member.columns)] = self.gradients(member, at[list(member.columns)].tolist())
         return matrix
 
     @cached_property
@@ -119,16 +119,14 @@ class System:
         """Number of the joint or driver to which each row belongs, by index into `members`."""
         return tuple(number for number, member in enumerate(self.members) for _ in member.rows)
 
-    def values(self, member: Member, q: FloatArray, u: FloatArray) -> Sequence[float]:
-        """Return Phi of one joint or driver, a value per row; q: (n,) all coordinates."""
+    def values(self, member: Member, coordinates: Sequence[float], u: FloatArray) -> Sequence[float]:
+        """Return Phi of one joint or driver, a value per row; coordinates: of its columns."""
         target = 0.0 if member.driver is None else float(u[member.driver])
-        coordinates = q[list(member.columns)].tolist()
         code = self._codes.get(member.rows)
         return code.values(coordinates, target) if code else list(map(float, self._alone(member, coordinates, target)))
 
-    def gradients(self, member: Member, q: FloatArray) -> FloatArray:
-        """Return Phi_q of one joint or driver, (its rows, its columns); q: (n,) all coordinates."""
-        coordinates = q[list(member.columns)].tolist()
+    def gradients(self, member: Member, coordinates: Sequence[float]) -> FloatArray:
+        """Return Phi_q of one joint or driver, (its rows, its columns); coordinates: of its columns."""
         shape = len(member.rows), len(coordinates)
         code = self._code(member)
         if code is not None:
