@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from kinfmu.mechanism.quantities.arithmetic import atan2_like, cos, curve, floor, sin, sqrt
@@ -173,7 +174,7 @@ class Graph:
         """Return one of FUNCTIONS of nodes; `value`: data and order of a curve."""
         numbers = [arg.constant for arg in args if arg.constant is not None]
         if len(numbers) == len(args):
-            return self.constant(_applied(name, value, numbers))
+            return self.constant(_operation(name, value)(*numbers))
         return self._intern(name, args, value)
 
     def derivative(
@@ -232,24 +233,27 @@ def reachable(targets: Iterable[Node]) -> list[Node]:
 
 def evaluate(targets: Sequence[Node], values: Mapping[str, float]) -> list[float]:
     """Return numbers for the targets, given a number for each symbol by name; used by plans, not at run time."""
-    at: dict[Node, float] = {}
+    return [value for (value,) in evaluate_all(targets, {name: (value,) for name, value in values.items()}, 1)]
+
+
+def evaluate_all(
+    targets: Sequence[Node], values: Mapping[str, Sequence[float]], count: int
+) -> list[Sequence[float]]:
+    """Return `count` numbers for each target, given as many for each symbol by name."""
+    at: dict[Node, Sequence[float]] = {}
     for node in reachable(targets):
-        args = [at[arg] for arg in node.args]
         if node.op == "constant":
-            at[node] = float(node.constant or 0.0)
+            at[node] = (float(node.constant or 0.0),) * count
         elif node.op == "symbol":
             at[node] = values[node.name]
         else:
-            at[node] = _applied(node.op, node.value, args)
+            at[node] = list(map(_operation(node.op, node.value), *(at[arg] for arg in node.args)))
     return [at[target] for target in targets]
 
 
-def _applied(op: str, value: Content, args: Sequence[float]) -> float:
-    """Return an operation on numbers."""
-    if isinstance(value, tuple):
-        data, order = value
-        return curve_value(data, order, args[0])
-    return _OPERATIONS[op](*args)
+def _operation(op: str, value: Content) -> Callable[..., float]:
+    """Return an operation on numbers; `value`: data and order of a curve."""
+    return partial(curve_value, *value) if isinstance(value, tuple) else _OPERATIONS[op]
 
 
 _OPERATORS = frozenset(("+", "-", "*", "/", "neg"))
