@@ -141,11 +141,10 @@ _ALONE = (((0, ""),), ((1, "v"),), ((2, "(v * v)"), (1, "a")))  # sums of deriva
 def readers(parts: Parts) -> list[str]:
     """Return all of them."""
     watches = "inline void kf_watches(const kf_model *model, const kf_found *found, double *watches)"
-    fixed = "void kf_fixed(const kf_model *model, double *fixed)"
     return [
         *(line for order in range(3) for line in _outputs(parts, order)),
         *_filled(parts, watches, [node for _, node in parts.plan.watches]),
-        *_filled(parts, fixed, list(parts.plan.fixed_nodes.values())),
+        *_fixed(parts),
         *(_laws(parts) if parts.plan.path_laws.units else ()),
     ]
 
@@ -220,6 +219,19 @@ def _filled(parts: Parts, signature: str, nodes: Sequence[Node]) -> list[str]:
     return function(signature, [*lines, *filled(signature.split("*")[-1].rstrip(")"), texts)])
 
 
+def _fixed(parts: Parts) -> list[str]:
+    """Return the function of the fixed coordinates; many numbers are a table: for n stores compilers take O(n^2)."""
+    signature, nodes = "void kf_fixed(const kf_model *model, double *fixed)", list(parts.plan.fixed_nodes.values())
+    if len(nodes) <= MOST_STORES:
+        return _filled(parts, signature, nodes)
+    lines, texts = _formulas(parts, nodes)
+    numbers = [0.0 if node.constant is None else node.constant for node in nodes]
+    copied = ["for (k = 0; k < KF_FIXED; ++k) {", "    fixed[k] = fixed_numbers[k];", "}"]
+    stored = [one for one, node in zip(filled("fixed", texts), nodes, strict=True) if node.constant is None]
+    table = array("static double fixed_numbers", numbers)
+    return [*table, "", *function(signature, [*lines, *copied, *stored], ("int k;",))]
+
+
 def _formulas(parts: Parts, targets: Sequence[Node]) -> tuple[list[str], list[str]]:
     """Return statements, those that read first, and after them each target as an expression."""
     writer = Writer(parts.names, [*parts.derived, *parts.stage_cache.nodes])
@@ -229,6 +241,7 @@ def _formulas(parts: Parts, targets: Sequence[Node]) -> tuple[list[str], list[st
     return [*read, *statements], texts
 
 
+MOST_STORES = 500
 _BIND = "bool kf_bind(kf_model *model, const double *parameters, char *why, size_t size)"
 _HOLDS = {"positive": "{} > 0.0", "0 or more": "{} >= 0.0", "other than 0": "{} != 0.0", "0": "fabs({}) <= 1e-9"}
 

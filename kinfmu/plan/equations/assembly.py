@@ -216,9 +216,7 @@ def in_order(system: System, rows: Sequence[int] | None = None) -> Ordered:
     poses = rng.uniform(-3.0, 3.0, (_LOOKS, len(system.coordinates))) * system.column_scales
     meets: list[list[int]] = []
     for member in system.members:
-        own = poses[:, member.columns].tolist()
-        slopes = np.any([system.gradients(member, one) != 0.0 for one in own], axis=0)  # (rows, columns)
-        meets += [[column for column, meet in zip(member.columns, row, strict=True) if meet] for row in slopes]
+        meets += [[member.columns[k] for k in met] for met in system.met(member, poses[:, member.columns])]
     chosen = range(len(meets)) if rows is None else rows
     order = ordered_blocks([meets[row] for row in chosen], len(system.coordinates))
     return Ordered(

@@ -76,7 +76,7 @@ class _PartMember:
         self.member = member
         self.rows = [(k, row_place[row]) for k, row in enumerate(member.rows) if row in row_place]
         self.columns = [(k, column_place[column]) for k, column in enumerate(member.columns) if column in column_place]
-        self._at = at[list(member.columns)].tolist()
+        self._at = member.own(at)
 
     def coordinates(self, pose: Sequence[float]) -> list[float]:
         """Return its coordinates from those of the part."""

@@ -47,6 +47,11 @@ class Member(NamedTuple):
     columns: tuple[int, ...]  # three a body
     driver: int | None = None  # number of the driver, if it is one
 
+    def own(self, q: FloatArray) -> list[float]:
+        """Return the coordinates of its columns from all coordinates, (n,)."""
+        own: list[float] = q[list(self.columns)].tolist()
+        return own
+
 
 class System:
     """Phi(q, u) = [Phi_K(q); Phi_D(q, u)]: joint rows in file order, then one row for each driver.
@@ -96,7 +101,7 @@ class System:
         at = np.asarray(q, dtype=float)
         matrix = np.zeros((len(self.rows), len(self.coordinates)))
         for member in self.members:
-            matrix[np.ix_(member.rows, member.columns)] = self.gradients(member, at[list(member.columns)].tolist())
+            matrix[np.ix_(member.rows, member.columns)] = self.gradients(member, member.own(at))
         return matrix
 
     @cached_property
@@ -135,8 +140,19 @@ class System:
         along = [Taylor(pair) for pair in zip(coordinates, np.eye(len(coordinates)), strict=True)]
         gradients = np.zeros(shape)
         for row, phi in enumerate(self._alone(member, along, 0.0)):
-            gradients[row] = phi.c[1] if isinstance(phi, Taylor) else 0.0
+            gradients[row] = _derivative(phi, 1)
         return gradients
+
+    def met(self, member: Member, poses: FloatArray) -> list[list[int]]:
+        """Return for each row of one joint or driver those of its columns along which it moves in any of some poses.
+
+        poses: (n, its columns).
+        """
+        self._evaluations[member.rows] += len(poses)
+        units = np.eye(poses.shape[1])[:, :, None]
+        along = [Taylor(pair) for pair in zip(poses.T, units, strict=True)]
+        slopes = [np.asarray(_derivative(phi, 1)) for phi in self._alone(member, along, 0.0)]
+        return [np.flatnonzero((slope != 0.0).any(axis=-1)).tolist() if slope.ndim else [] for slope in slopes]
 
     def _code(self, member: Member) -> RowCode | None:
         """Return the code of a joint or driver; None as long as its formulas are evaluated rarely."""
