@@ -91,6 +91,11 @@ class TimeDerivatives:
         still = {self.first[symbol] for symbol in unaccelerated}
         return self.graph.derivative(self.of(nodes), self.both, still)
 
+    def first_and_second(self, nodes: Sequence[Node]) -> tuple[list[Node], list[Node]]:
+        """Return first and second derivatives."""
+        first = self.of(nodes)
+        return first, self.graph.derivative(first, self.both)
+
 
 def build_block(
     system: System,
@@ -114,7 +119,7 @@ def build_block(
         if value is None:  # `find_structure` found it linear, so this cannot happen
             raise AssertionError(f"{system.rows[index].name} does not give {name}")
         known[name] = value
-        (rate,), (acceleration,) = rates.of([value]), rates.second([value])
+        (rate,), (acceleration,) = rates.first_and_second([value])
         assigned.append((name, (value, rate, acceleration)))
     solved = (*structure.rows, *structure.companions)
     unknowns = [tracer.symbols[name] for name in structure.unknowns]

@@ -166,7 +166,7 @@ def _outputs(
             else:
                 nodes.append((coordinate, value))
     positions = [node for _, node in nodes]
-    motions = zip((name for name, _ in nodes), positions, rates.of(positions), rates.second(positions), strict=True)
+    motions = zip((name for name, _ in nodes), positions, *rates.first_and_second(positions), strict=True)
     return [MotionNodes(*motion) for motion in motions], coordinate_count, fixed
 
 

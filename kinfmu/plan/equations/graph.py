@@ -236,9 +236,7 @@ def evaluate(targets: Sequence[Node], values: Mapping[str, float]) -> list[float
     return [value for (value,) in evaluate_all(targets, {name: (value,) for name, value in values.items()}, 1)]
 
 
-def evaluate_all(
-    targets: Sequence[Node], values: Mapping[str, Sequence[float]], count: int
-) -> list[Sequence[float]]:
+def evaluate_all(targets: Sequence[Node], values: Mapping[str, Sequence[float]], count: int) -> list[Sequence[float]]:
     """Return `count` numbers for each target, given as many for each symbol by name."""
     at: dict[Node, Sequence[float]] = {}
     for node in reachable(targets):

@@ -51,7 +51,9 @@ def test_code_of_its_row_gives_the_numbers_of_its_formula(cls: type[Driver], dat
     values, gradients = list(system.values(member, member.own(q), target)), system.gradients(member, member.own(q))
     system.use_code()
     assert list(system.values(member, member.own(q), target)) == values
-    np.testing.assert_allclose(system.gradients(member, member.own(q)), gradients, rtol=1e-14, atol=1e-15 * size(system, q))
+    np.testing.assert_allclose(
+        system.gradients(member, member.own(q)), gradients, rtol=1e-14, atol=1e-15 * size(system, q)
+    )
 
 
 @every_driver

@@ -187,4 +187,6 @@ def test_code_of_its_rows_gives_the_numbers_of_its_formulas(cls: type[Joint], da
     values, gradients = list(system.values(member, member.own(q), NO_DRIVERS)), system.gradients(member, member.own(q))
     system.use_code()
     assert list(system.values(member, member.own(q), NO_DRIVERS)) == values
-    np.testing.assert_allclose(system.gradients(member, member.own(q)), gradients, rtol=1e-14, atol=1e-15 * size(system, q))
+    np.testing.assert_allclose(
+        system.gradients(member, member.own(q)), gradients, rtol=1e-14, atol=1e-15 * size(system, q)
+    )

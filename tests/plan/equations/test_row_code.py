@@ -46,7 +46,9 @@ def test_a_mechanism_has_the_same_rows(name: str) -> None:
         own = member.own(q)
         assert list(plain.values(member, own, u)) == list(coded.values(same, own, u))
         scale = max(1.0, float(np.abs(q).max()))
-        np.testing.assert_allclose(coded.gradients(same, own), plain.gradients(member, own), rtol=1e-14, atol=1e-15 * scale)
+        np.testing.assert_allclose(
+            coded.gradients(same, own), plain.gradients(member, own), rtol=1e-14, atol=1e-15 * scale
+        )
 
 
 def test_where_a_root_is_zero_the_gradient_is_that_of_a_point_at_rest() -> None:
