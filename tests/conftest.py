@@ -9,6 +9,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
@@ -17,6 +18,9 @@ from kinfmu.codegen.c import compiler
 from kinfmu.fmu.native import archive
 from kinfmu.run import native_engine as library
 from tests import compiled_once
+
+if TYPE_CHECKING:
+    from tests.page.engines import Browser
 
 GOLDEN = Path(__file__).parent / "golden"
 
@@ -144,6 +148,15 @@ def _few(items: list[pytest.Item]) -> Iterable[pytest.Item]:
         chosen.append(best)
         seen |= best.callspec.indices.items()
     return chosen
+
+
+@pytest.fixture(scope="module")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """A browser for pages, of one file: as long as it runs, nothing else can run an event loop."""
+    from tests.page.engines import browser  # here, since few tests need it
+
+    with browser(tmp_path_factory.mktemp("pages")) as opened:
+        yield opened
 
 
 @pytest.fixture

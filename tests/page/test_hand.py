@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 import kinfmu.page
-from tests.page.engines import PHONE, Browser, Opened, browser, needs_browser, text_of
+from tests.page.engines import PHONE, Browser, Opened, needs_browser, text_of
 
 pytestmark = needs_browser
 WATCH_TEXTS = """(() => {
@@ -20,12 +19,6 @@ WATCH_TEXTS = """(() => {
         return own.call(this, text, x, y);
     };
 })()"""
-
-
-@pytest.fixture(scope="module")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with browser(tmp_path_factory.mktemp("pages")) as opened:
-        yield opened
 
 
 def on_screen(page: Opened, expression: str) -> tuple[float, float]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,7 @@ from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text as toml_text
 from kinfmu.run.axis import shown_range
 from tests.gallery_members import every_member
-from tests.page.engines import DESKTOP, PHONE, Browser, browser, needs_browser, text_of
+from tests.page.engines import DESKTOP, PHONE, Browser, needs_browser, text_of
 
 pytestmark = needs_browser
 LARGEST = 300_000  # [bytes] of a page
@@ -24,12 +23,6 @@ LABELS = Path(__file__).with_name("labels.js").read_text("utf-8")
 CONTRASTS = Path(__file__).with_name("contrasts.js").read_text("utf-8")
 JUMPS = Path(__file__).with_name("jumps.js").read_text("utf-8")
 COVERED = Path(__file__).with_name("covered.js").read_text("utf-8")
-
-
-@pytest.fixture(scope="module")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with browser(tmp_path_factory.mktemp("pages")) as opened:
-        yield opened
 
 
 @pytest.mark.parametrize("name", ["crank_rocker", "jansen_leg", "excavator"])
