@@ -238,6 +238,7 @@ def test_roller_of_a_given_curve_can_be_changed(chromium: Browser) -> None:
         ({"swing": -1.2}, "pad", "the profile of joint pad, which would not be convex"),
     ],
 )
+@pytest.mark.few(1)
 def test_profile_that_cannot_be_is_left_out_and_the_page_states_why(
     cams: Opened, values: dict[str, float], joint: str, note: str
 ) -> None:

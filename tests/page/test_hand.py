@@ -29,6 +29,7 @@ def on_screen(page: Opened, expression: str) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("mode", ["move", "lengths"])
+@pytest.mark.few(1)
 def test_handle_of_a_driver_drags_it_in_both_modes_and_the_view_stays(chromium: Browser, mode: str) -> None:
     with chromium.open(text_of("crank_rocker")) as page:
         if mode == "lengths":

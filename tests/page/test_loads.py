@@ -139,6 +139,7 @@ def test_loads_can_be_switched_off_and_a_page_without_them_has_no_switch(chromiu
         assert drawn(page).lines == []
 
 
+@pytest.mark.long
 def test_gravity_is_not_drawn_over_other_things(chromium: Browser) -> None:
     with chromium.open(text()) as page:
         assert "g" in drawn(page).texts
