@@ -216,6 +216,7 @@ def test_every_command_reports_the_same_line(
 
 
 @pytest.mark.parametrize("case", ["binary rubbish", "deep nesting"])
+@pytest.mark.few(1)
 def test_a_separate_process_reports_the_same_line(case: str, tmp_path: Path) -> None:
     path = tmp_path / "wrong.toml"
     written, expected = content(case)
