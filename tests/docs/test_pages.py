@@ -104,6 +104,7 @@ def test_fitting(tmp_path: Path) -> None:
     assert float(timed) < 10.0
 
 
+@pytest.mark.long
 def test_the_target_with_an_offset_finds_a_straight_line_at_any_height(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
