@@ -20,6 +20,8 @@ from kinfmu.plan.path_laws import argument_symbol
 from kinfmu.solver.python.continuation import NO_NUMBER
 from kinfmu.solver.python.curve import CurveData
 
+MOST_STORES = 500  # of numbers in one function; the time of a compiler grows with their square
+
 
 class Parts(Lists):
     """The parts of a plan's model in C, from which its functions are written.
@@ -220,7 +222,7 @@ def _filled(parts: Parts, signature: str, nodes: Sequence[Node]) -> list[str]:
 
 
 def _fixed(parts: Parts) -> list[str]:
-    """Return the function of the fixed coordinates; many numbers are a table: for n stores compilers take O(n^2)."""
+    """Return the function of the fixed coordinates; beyond MOST_STORES their numbers are a table."""
     signature, nodes = "void kf_fixed(const kf_model *model, double *fixed)", list(parts.plan.fixed_nodes.values())
     if len(nodes) <= MOST_STORES:
         return _filled(parts, signature, nodes)
@@ -241,7 +243,6 @@ def _formulas(parts: Parts, targets: Sequence[Node]) -> tuple[list[str], list[st
     return [*read, *statements], texts
 
 
-MOST_STORES = 500
 _BIND = "bool kf_bind(kf_model *model, const double *parameters, char *why, size_t size)"
 _HOLDS = {"positive": "{} > 0.0", "0 or more": "{} >= 0.0", "other than 0": "{} != 0.0", "0": "fabs({}) <= 1e-9"}
 

@@ -216,7 +216,7 @@ def in_order(system: System, rows: Sequence[int] | None = None) -> Ordered:
     poses = rng.uniform(-3.0, 3.0, (_LOOKS, len(system.coordinates))) * system.column_scales
     meets: list[list[int]] = []
     for member in system.members:
-        meets += [[member.columns[k] for k in met] for met in system.met(member, poses[:, member.columns])]
+        meets += [[member.columns[k] for k in met] for met in system.columns_met(member, poses[:, member.columns])]
     chosen = range(len(meets)) if rows is None else rows
     order = ordered_blocks([meets[row] for row in chosen], len(system.coordinates))
     return Ordered(

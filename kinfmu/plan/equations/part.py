@@ -47,19 +47,19 @@ class Part:
     def residual(self, q: FloatArray, u: FloatArray) -> FloatArray:
         """Return Phi of the rows relative to the size, (len(rows),)."""
         pose, phi = q.tolist(), np.empty(len(self.rows))
-        for one in self._members:
-            values = self.system.values(one.member, one.coordinates(pose), u)
-            for k, place in one.rows:
+        for part in self._members:
+            values = self.system.values(part.member, part.coordinates(pose), u)
+            for k, place in part.rows:
                 phi[place] = values[k]
         return np.asarray(phi / self.row_scales)
 
     def jacobian(self, q: FloatArray) -> FloatArray:
         """Return Phi_q, rows relative to the size and columns in sizes and radians: pure numbers of order one."""
         pose, matrix = q.tolist(), np.zeros((len(self.rows), len(self.columns)))
-        for one in self._members:
-            gradients = self.system.gradients(one.member, one.coordinates(pose))
-            for k, row in one.rows:
-                for j, column in one.columns:
+        for part in self._members:
+            gradients = self.system.gradients(part.member, part.coordinates(pose))
+            for k, row in part.rows:
+                for j, column in part.columns:
                     matrix[row, column] = gradients[k, j]
         return matrix / self.row_scales[:, None] * self.column_scales
 
@@ -76,7 +76,7 @@ class _PartMember:
         self.member = member
         self.rows = [(k, row_place[row]) for k, row in enumerate(member.rows) if row in row_place]
         self.columns = [(k, column_place[column]) for k, column in enumerate(member.columns) if column in column_place]
-        self._at = member.own(at)
+        self._at = member.coordinates(at)
 
     def coordinates(self, pose: Sequence[float]) -> list[float]:
         """Return its coordinates from those of the part."""

@@ -47,10 +47,10 @@ class Member(NamedTuple):
     columns: tuple[int, ...]  # three a body
     driver: int | None = None  # number of the driver, if it is one
 
-    def own(self, q: FloatArray) -> list[float]:
+    def coordinates(self, q: FloatArray) -> list[float]:
         """Return the coordinates of its columns from all coordinates, (n,)."""
-        own: list[float] = q[list(self.columns)].tolist()
-        return own
+        coordinates: list[float] = q[list(self.columns)].tolist()
+        return coordinates
 
 
 class System:
@@ -101,7 +101,7 @@ class System:
         at = np.asarray(q, dtype=float)
         matrix = np.zeros((len(self.rows), len(self.coordinates)))
         for member in self.members:
-            matrix[np.ix_(member.rows, member.columns)] = self.gradients(member, member.own(at))
+            matrix[np.ix_(member.rows, member.columns)] = self.gradients(member, member.coordinates(at))
         return matrix
 
     @cached_property
@@ -143,7 +143,7 @@ class System:
             gradients[row] = _derivative(phi, 1)
         return gradients
 
-    def met(self, member: Member, poses: FloatArray) -> list[list[int]]:
+    def columns_met(self, member: Member, poses: FloatArray) -> list[list[int]]:
         """Return for each row of one joint or driver those of its columns along which it moves in any of some poses.
 
         poses: (n, its columns).

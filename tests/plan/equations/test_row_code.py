@@ -21,7 +21,7 @@ def test_rows_get_code_when_they_are_evaluated_often(monkeypatch: pytest.MonkeyP
     real = system_module.row_code
     monkeypatch.setattr(system_module, "row_code", lambda *given: made.append(given) or real(*given))
     system = System(kinfmu.load("crank_rocker"))
-    own = system.members[0].own(np.linspace(0.0, 1.0, len(system.coordinates)))
+    own = system.members[0].coordinates(np.linspace(0.0, 1.0, len(system.coordinates)))
     for _ in range(RARELY):
         system.gradients(system.members[0], own)
     assert not made
@@ -43,7 +43,7 @@ def test_a_mechanism_has_the_same_rows(name: str) -> None:
     q = rng.normal(size=len(plain.coordinates)) * plain.column_scales
     u = rng.normal(size=len(plain.mechanism.drivers))
     for member, same in zip(plain.members, coded.members, strict=True):
-        own = member.own(q)
+        own = member.coordinates(q)
         assert list(plain.values(member, own, u)) == list(coded.values(same, own, u))
         scale = max(1.0, float(np.abs(q).max()))
         np.testing.assert_allclose(
