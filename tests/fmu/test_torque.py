@@ -368,7 +368,9 @@ def test_settings_of_a_torque_driven_fmu_are_for_these_alone(torque_driven: Call
 
 @of_each_flavour
 @pytest.mark.few(1)
-def test_a_mass_on_a_crank_turns_in_closed_form(flavour: str, fmi: int, tmp_path: Path) -> None:
+def test_a_mass_on_a_crank_turns_in_closed_form(
+    flavour: str, fmi: int, opened: Callable[..., Host], tmp_path: Path
+) -> None:
     """theta = T t^2 / (2 m r^2), with a parameter as mass, without forces among the outputs."""
     mechanism = replace(
         pendulum(gravity=(0.0, 0.0)),
@@ -377,7 +379,7 @@ def test_a_mass_on_a_crank_turns_in_closed_form(flavour: str, fmi: int, tmp_path
         bodies=tuple(body if body.is_ground else replace(body, mass="rim") for body in pendulum().bodies),
     )
     path = kinfmu.build(mechanism, tmp_path / "a.fmu", flavour=flavour, fmi=fmi, drive="torque", outputs=["rod.phi"])
-    host = Host(path, tmp_path / "a")
+    host = opened(path)
     assert not {"crank.torque", "kinetic_energy"} & set(host.references)
     host.set({"rim": 8.0, "crank_torque": 3.0})
     host.initialize(0.0)
@@ -385,7 +387,6 @@ def test_a_mass_on_a_crank_turns_in_closed_form(flavour: str, fmi: int, tmp_path
     for k in range(5):
         assert host.step(0.4 * k, 0.4) == OK
     found = host.get("crank_angle", "crank_speed", "crank_acceleration", "rod.phi")
-    host.free()
     assert found == pytest.approx([3.0 * 2.0 / inertia, 3.0 * 2.0 / inertia, 3.0 / inertia, 3.0], rel=1e-12)
 
 
