@@ -9,14 +9,22 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import settings
 
+import kinfmu
 from kinfmu.codegen.c import compiler
 from kinfmu.fmu.native import archive
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.toml_text import text
 from kinfmu.run import native_engine as library
 from tests import compiled_once
+
+if TYPE_CHECKING:
+    from tests.fmu.host import Host
+    from tests.page.engines import Browser
 
 GOLDEN = Path(__file__).parent / "golden"
 
@@ -144,6 +152,48 @@ def _few(items: list[pytest.Item]) -> Iterable[pytest.Item]:
         chosen.append(best)
         seen |= best.callspec.indices.items()
     return chosen
+
+
+@pytest.fixture(scope="session")
+def fmu_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """`fmu_of(mechanism, flavour, fmi, drive)`: path of an FMU, built once; of the gallery a name is enough."""
+    folder = tmp_path_factory.mktemp("fmus")
+    paths: dict[tuple[str, str, int, str], Path] = {}
+
+    def get(model: str | Mechanism, flavour: str = "python", fmi: int = 2, drive: str = "time") -> Path:
+        mechanism = kinfmu.load(model) if isinstance(model, str) else model
+        key = (text(mechanism), flavour, fmi, drive)
+        if key not in paths:
+            path = folder / f"{len(paths)}" / f"{mechanism.name}.fmu"
+            paths[key] = kinfmu.build(mechanism, path, flavour=flavour, fmi=fmi, drive=drive)  # type: ignore[arg-type]
+        return paths[key]
+
+    return get
+
+
+@pytest.fixture
+def opened(tmp_path: Path) -> Iterator[Callable[..., Host]]:
+    """`opened(path, **options)`: an instance of an FMU; freed at the end."""
+    from tests.fmu.host import Host  # here: fmpy takes long to import
+
+    hosts: list[Host] = []
+
+    def get(path: Path, **options: Any) -> Host:
+        hosts.append(Host(path, tmp_path / f"instance_{len(hosts)}", **options))
+        return hosts[-1]
+
+    yield get
+    for host in hosts:
+        host.free()
+
+
+@pytest.fixture(scope="module")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """A browser for pages, of one file: as long as it runs, nothing else can run an event loop."""
+    from tests.page.engines import browser  # here, since few tests need it
+
+    with browser(tmp_path_factory.mktemp("pages")) as opened:
+        yield opened
 
 
 @pytest.fixture

@@ -15,6 +15,24 @@ from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text
 from kinfmu.units import Quantity
 
+PINS = (
+    Revolute("O", ("ground.O", "crank.O")),
+    Revolute("P", ("crank.P", "coupler.P")),
+    Revolute("Q", ("coupler.Q", "rocker.Q")),
+    Revolute("C", ("ground.C", "rocker.C")),
+)
+FOURBAR_PINS = """[joints]
+O = { type = "revolute", between = ["ground.O", "crank.O"] }
+P = { type = "revolute", between = ["crank.P", "coupler.P"] }
+Q = { type = "revolute", between = ["coupler.Q", "rocker.Q"] }
+C = { type = "revolute", between = ["ground.C", "rocker.C"] }
+"""
+FOURBAR_DRIVER = """[drivers.crank]
+type = "angle"
+of = "crank"
+law = "constant_speed"
+"""
+
 
 def reference_fourbar(bar: float = 1.0, start_degrees: float = 60.0) -> Mechanism:
     """The gallery's four-bar, with another length of its redundant bar AB or another start pose."""
@@ -89,12 +107,7 @@ def fourbar(
             Body("coupler", {"P": (0, 0), "Q": (coupler, 0)}, (x0 + px, y0 + py, math.atan2(qy - py, qx - px))),
             Body("rocker", {"C": (0, 0), "Q": (rocker, 0)}, (x0 + ground, y0, math.atan2(qy, qx - ground))),
         ],
-        [
-            Revolute("O", ("ground.O", "crank.O")),
-            Revolute("P", ("crank.P", "coupler.P")),
-            Revolute("Q", ("coupler.Q", "rocker.Q")),
-            Revolute("C", ("ground.C", "rocker.C")),
-        ],
+        [*PINS],
         [AngleDriver("crank", "crank", ConstantSpeed(start, 1.0))],
     )
 

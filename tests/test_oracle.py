@@ -211,11 +211,13 @@ def test_following_changes_the_sign_of_the_closed_form_at_a_change_point() -> No
     assert abs(motion.qd[1, 1] - motion.qd[1, 2]) > 0.1  # of two branches one was taken, not their mean
 
 
+@pytest.mark.long
 def test_following_a_regular_stretch_is_solving() -> None:
     closed = oracle.slider_crank("1", "3", "0.4", [0.1, 0.6, -0.2])
     assert_same(follow(slider_crank("1", "3", "0.4"), [0, 0.1, 3.9], 0.0, [0.1, 0.6, -0.2]), closed)
 
 
+@pytest.mark.long
 def test_following_says_when_a_limit_stops_it() -> None:
     with pytest.raises(ValueError, match=r"singular|lost|converge"):
         follow(double_pendulum, [0.5, -0.87, 5.24, 1.5, -1, 6.14], 5.24, [6.5])

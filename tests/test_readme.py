@@ -88,16 +88,3 @@ def test_the_version_is_typed_once() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     assert project["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "kinfmu.version.VERSION"}
     assert kinfmu.__version__ == kinfmu.VERSION
-
-
-def test_the_readme_is_read_on_a_screen_and_a_half() -> None:
-    headings = re.findall(r"^## (.*)$", README, re.MULTILINE)
-    assert headings == [
-        "Two commands to install and try it",
-        "Ten lines of Python",
-        "Ten lines of TOML",
-        "Compared with other solvers",
-        "Guarantees and limitations",
-        "Documentation",
-    ]
-    assert len(README.splitlines()) <= 115

@@ -34,7 +34,7 @@ from kinfmu.solver.python.trusted_step import trusted_step
 from tests import oracle
 from tests.analysis.linkages import pushed_crank
 from tests.gallery_members import every_member
-from tests.mechanisms import fourbar, scaled
+from tests.mechanisms import PINS, fourbar, scaled
 from tests.oracle import Motion, Residual, largest_error, mp
 
 SCALES = [1e-6, 1e-3, 1.0, 1e3, 1e6]
@@ -205,12 +205,7 @@ def third_crank(ratio: float, wrong: float, *, is_body: bool, at: tuple[float, f
         Body("coupler", {"P": (0, 0), "Q": (ground, 0), "A": (x, y)}, (at[0] + 0.594, at[1] + 0.926, 0)),
         Body("rocker", {"C": (0, 0), "Q": (crank, 0)}, (at[0] + ground, at[1], 1.0)),
     ]
-    joints: list[Revolute | Distance] = [
-        Revolute("O", ("ground.O", "crank.O")),
-        Revolute("P", ("crank.P", "coupler.P")),
-        Revolute("Q", ("coupler.Q", "rocker.Q")),
-        Revolute("C", ("ground.C", "rocker.C")),
-    ]
+    joints: list[Revolute | Distance] = [*PINS]
     if is_body:
         bodies.append(Body("bar", {"B": (0, 0), "A": (wrong_crank, 0)}, (*there, 1.0)))
         joints += [Revolute("B", ("ground.B", "bar.B")), Revolute("A", ("coupler.A", "bar.A"))]

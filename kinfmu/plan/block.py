@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections import ChainMap
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from kinfmu.arrays import FloatArray
 from kinfmu.plan.companions import BlockStructure
-from kinfmu.plan.equations.graph import Node, evaluate, symbols
+from kinfmu.plan.equations.graph import Node, evaluate_all, symbols
 from kinfmu.plan.equations.system import Row, System
 from kinfmu.plan.origin import FarRows
 from kinfmu.plan.structure import RowTracer, given_value
@@ -90,6 +91,11 @@ class TimeDerivatives:
         still = {self.first[symbol] for symbol in unaccelerated}
         return self.graph.derivative(self.of(nodes), self.both, still)
 
+    def first_and_second(self, nodes: Sequence[Node]) -> tuple[list[Node], list[Node]]:
+        """Return first and second derivatives."""
+        first = self.of(nodes)
+        return first, self.graph.derivative(first, self.both)
+
 
 def build_block(
     system: System,
@@ -113,7 +119,7 @@ def build_block(
         if value is None:  # `find_structure` found it linear, so this cannot happen
             raise AssertionError(f"{system.rows[index].name} does not give {name}")
         known[name] = value
-        (rate,), (acceleration,) = rates.of([value]), rates.second([value])
+        (rate,), (acceleration,) = rates.first_and_second([value])
         assigned.append((name, (value, rate, acceleration)))
     solved = (*structure.rows, *structure.companions)
     unknowns = [tracer.symbols[name] for name in structure.unknowns]
@@ -142,23 +148,22 @@ def build_block(
     )
 
 
-def block_determinant(jacobian: NDArray[np.float64], usual: Sequence[float]) -> float:
-    """Return the determinant of a block that the run time monitors.
+def _determinants(jacobians: FloatArray, usual: Sequence[float]) -> FloatArray:
+    """Return the determinants of a block that the run time monitors, one for each of its Jacobians (n, m, k).
 
     For one and two unknowns det J itself; from three on that of the rows scaled to unit length; for tall J the product
     of R's diagonal over the column lengths. Scaling hides a row (a column) that vanishes, as where all links of a loop
     are in line, so both are multiplied by its length over the usual one.
     """
-    m, k = jacobian.shape
+    _, m, k = jacobians.shape
+    if m == k <= 2:
+        return np.asarray(np.linalg.det(jacobians))
+    lengths = np.linalg.norm(jacobians, axis=1 if m > k else 2)
+    part = (lengths / usual).min(axis=1, initial=1.0)
     if m > k:
-        lengths = np.linalg.norm(jacobian, axis=0)
-        part = min(1.0, *(lengths / usual))
-        diagonal = np.abs(np.diag(np.linalg.qr(jacobian, mode="r")))
-        return float(part * np.prod(diagonal / np.where(lengths > 0.0, lengths, 1.0)))
-    if k > 2:
-        lengths = np.linalg.norm(jacobian, axis=1)
-        return float(min(1.0, *(lengths / usual)) * np.linalg.det(jacobian / lengths[:, None]))
-    return float(np.linalg.det(jacobian))
+        diagonal = np.abs(np.diagonal(np.linalg.qr(jacobians, mode="r"), axis1=1, axis2=2))
+        return np.asarray(part * np.prod(diagonal / np.where(lengths > 0.0, lengths, 1.0), axis=1))
+    return np.asarray(part * np.linalg.det(jacobians / lengths[:, :, None]))
 
 
 def _determinant_scale(
@@ -167,25 +172,22 @@ def _determinant_scale(
     """Return the largest |determinant| over random poses, and the usual lengths of rows or columns."""
     if not jacobian:
         return 1.0, ()
-    rng = np.random.default_rng(1989)
     flat = [entry for row in jacobian for entry in row]
     met = symbols(flat)
-    matrices = []
-    for sample in range(_DETERMINANT_SAMPLES):
-        turned = {}
-        for symbol in met:
-            value = anchor[symbol.name]
-            if sample > 0 and not is_parameter(symbol):
-                is_angle = symbol.coordinate is not None and symbol.coordinate.is_angle
-                value = rng.uniform(-np.pi, np.pi) if is_angle else value + size * rng.uniform(-0.5, 0.5)
-            turned[symbol.name] = value
-        matrices.append(np.reshape(evaluate(flat, turned), (len(jacobian), -1)))
-    m, k = matrices[0].shape
+    moving = [symbol for symbol in met if not is_parameter(symbol)]
+    random = np.random.default_rng(1989).random((_DETERMINANT_SAMPLES - 1, len(moving)))
+    values = {symbol.name: [anchor[symbol.name]] * _DETERMINANT_SAMPLES for symbol in met}
+    for symbol, part in zip(moving, random.T.tolist(), strict=True):
+        at = anchor[symbol.name]
+        is_angle = symbol.coordinate is not None and symbol.coordinate.is_angle
+        values[symbol.name] = [at, *(-np.pi + math.tau * x if is_angle else at + size * (-0.5 + x) for x in part)]
+    m, k = len(jacobian), len(jacobian[0])
+    matrices = np.transpose(evaluate_all(flat, values, _DETERMINANT_SAMPLES)).reshape(-1, m, k)
     usual: tuple[float, ...] = ()
     if m > k or k > 2:
         lengths = np.linalg.norm(matrices, axis=1 if m > k else 2).max(axis=0)
         usual = tuple(_rounded(length) for length in lengths)
-    return _rounded(max(abs(block_determinant(matrix, usual)) for matrix in matrices)), usual
+    return _rounded(max(map(abs, _determinants(matrices, usual)))), usual
 
 
 def _rounded(scale: float) -> float:

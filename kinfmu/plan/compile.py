@@ -94,9 +94,10 @@ def plan_from(
     refuse_undefined_loads(system, redundancy.assembly.start, anchor)
     settable = _parameters(mechanism, parameters)
     tracer = Tracer(local, [parameter.name for parameter in settable])
-    structure = find_structure(system, tracer, redundancy, anchor.q)
+    row = RowTracer(system, tracer)
+    structure = find_structure(system, tracer, row, redundancy, anchor.q)
     known = structure.fixed
-    rates, row = TimeDerivatives(tracer, known), RowTracer(system, tracer)
+    rates = TimeDerivatives(tracer, known)
     motions, coordinate_count, fixed = _outputs(mechanism, origin, tracer, rates, known)
     if outputs is not None:
         motions, coordinate_count = _chosen(motions, coordinate_count, outputs, fixed)
@@ -165,7 +166,7 @@ def _outputs(
             else:
                 nodes.append((coordinate, value))
     positions = [node for _, node in nodes]
-    motions = zip((name for name, _ in nodes), positions, rates.of(positions), rates.second(positions), strict=True)
+    motions = zip((name for name, _ in nodes), positions, *rates.first_and_second(positions), strict=True)
     return [MotionNodes(*motion) for motion in motions], coordinate_count, fixed
 
 

@@ -85,7 +85,7 @@ def find_path_laws(
     given = _given(blocks, curved)
     nodes = [*arguments, *lengths, *(tracer.symbols[name] for name in given)]
     units += [*([size] * len(lengths)), *(1.0 if name.is_angle else size for name in given)]
-    motions = tuple(map(tuple, (nodes, rates.of(nodes), rates.second(nodes))))
+    motions = tuple(map(tuple, (nodes, *rates.first_and_second(nodes))))
     return PathLaws(motions, tuple(turns), tuple(steps), tuple(slopes), tuple(added), len(lengths), tuple(units))
 
 

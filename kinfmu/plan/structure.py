@@ -42,24 +42,35 @@ class RowTracer:
 
     def __init__(self, system: System, tracer: Tracer) -> None:
         self.tracer = tracer
-        self._owners: list[tuple[str, int, int]] = []  # (kind, number of the joint or driver, row within it)
-        for number, joint in enumerate(system.mechanism.joints):
-            self._owners += [("joint", number, k) for k in range(len(joint.labels))]
-        self._owners += [("driver", number, 0) for number in range(len(system.mechanism.drivers))]
+        self._system = system
+        self._traced: dict[tuple[int, tuple[Node | None, ...]], tuple[Node, ...]] = {}  # by member and what is known
 
     def __call__(self, index: int, known: Mapping[str, Node]) -> Node:
-        kind, number, k = self._owners[index]
-        if kind == "joint":
-            return self.tracer.joint(self.tracer.joints[number], known)[k]
-        return self.tracer.driver(self.tracer.drivers[number], known)
+        number = self._system.member_of[index]
+        member = self._system.members[number]
+        coordinates = self._system.coordinates
+        key = number, tuple([known.get(coordinates[column]) for column in member.columns])
+        rows = self._traced.get(key)
+        if rows is None:
+            rows = self._traced[key] = self._rows(number, known)
+        return rows[index - member.rows[0]]
+
+    def _rows(self, number: int, known: Mapping[str, Node]) -> tuple[Node, ...]:
+        """Return the rows of a joint or driver, by its number among the members."""
+        joints = self.tracer.joints
+        if number < len(joints):
+            return self.tracer.joint(joints[number], known)
+        return (self.tracer.driver(self.tracer.drivers[number - len(joints)], known),)
 
 
-def find_structure(system: System, tracer: Tracer, redundancy: Redundancy, pose: FloatArray) -> Structure:
+def find_structure(
+    system: System, tracer: Tracer, row: RowTracer, redundancy: Redundancy, pose: FloatArray
+) -> Structure:
     """Return the order of solving the kept joint rows and the driver rows; redundant rows may become companions.
 
     pose: closed, (n,).
     """
-    row, kept = RowTracer(system, tracer), redundancy.kept
+    kept = redundancy.kept
     known, fixed_by = _constants(system, tracer, row, kept)
     used = set(fixed_by.values())
     driving = range(system.joint_row_count, len(system.rows))

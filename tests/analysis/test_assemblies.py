@@ -155,6 +155,7 @@ def test_assemblies_are_plain_data_too() -> None:
     assert found["found"][1]["start"]["rocker"]["phi"] == pytest.approx(math.radians(-129.9))
 
 
+@pytest.mark.long
 def test_a_search_that_finds_very_many_reports_it() -> None:
     assemblies = found_for(chain(7))
     assert len(assemblies.found) == 64

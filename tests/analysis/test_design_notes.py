@@ -10,8 +10,10 @@ import kinfmu
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import parse
 from tests.gallery_members import every_member
+from tests.mechanisms import FOURBAR_DRIVER, FOURBAR_PINS
 
-FOURBAR = """
+FOURBAR = (
+    """
 name = "fourbar"
 [units]
 length = "mm"
@@ -27,17 +29,12 @@ start = { x = 20, phi = "78 deg" }
 [bodies.rocker]
 points = { C = [0, 0], Q = [50, 0] }
 start = { x = 40, phi = "102 deg" }
-[joints]
-O = { type = "revolute", between = ["ground.O", "crank.O"] }
-P = { type = "revolute", between = ["crank.P", "coupler.P"] }
-Q = { type = "revolute", between = ["coupler.Q", "rocker.Q"] }
-C = { type = "revolute", between = ["ground.C", "rocker.C"] }
-[drivers.crank]
-type = "angle"
-of = "crank"
-law = "constant_speed"
-speed = "60 rpm"
 """
+    + FOURBAR_PINS
+    + FOURBAR_DRIVER
+    + """speed = "60 rpm"
+"""
+)
 BACK_AND_FORTH = """
 law = "harmonic"
 amplitude = "60 deg"

@@ -83,6 +83,7 @@ def test_numbers_off_the_scale_and_samples_without_numbers_are_drawn_as_far_as_t
     assert "nan" not in svg.lower()
 
 
+@pytest.mark.long
 def test_equal_numbers_give_equal_bytes_in_both_formats(tmp_path: Path) -> None:
     for name in "ab":
         (tmp_path / name).mkdir()

@@ -215,6 +215,7 @@ def test_the_oracle_of_the_change_point_is_the_closed_form_near_it(u: float) -> 
         assert largest_error(ours[k, columns], table, modulo_turns=k == 0) <= 1e-14
 
 
+@pytest.mark.long
 def test_the_oracle_of_the_change_point_goes_on_smoothly_exactly_at_it() -> None:
     def closure(q: object, u: object) -> list[Series]:
         coupler, rocker = q  # type: ignore[misc]
@@ -263,6 +264,7 @@ def test_kinfmu_keeps_its_digits_through_the_point_and_stays_on_the_branch(
     assert qdd <= 1e-9
 
 
+@pytest.mark.long
 def test_plain_newton_loses_them_and_the_table_shows_it() -> None:
     near, _ = singular.measure(1, engines=[SHIPPED, GENERATED])
     change_point = [one for one in near if one.point == POINTS[0].title]

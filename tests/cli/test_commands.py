@@ -217,6 +217,7 @@ def test_the_package_is_a_program_too(tmp_path: Path) -> None:
     assert done.stdout.endswith(f", version {kinfmu.VERSION}\n")
 
 
+@pytest.mark.long
 def test_the_program_reports_a_wrong_bar_on_stderr(tmp_path: Path, fourbar_file: Callable[..., Path]) -> None:
     path = fourbar_file("length = 1\n", "length = 1.01\n")
     done = program("solve", path.name, "-o", "run.csv", cwd=tmp_path)

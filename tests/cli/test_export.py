@@ -124,6 +124,7 @@ def test_a_coordinate_that_joints_hold_is_no_column(command: Command, refuses: C
     assert "outputs: 'piston.y' is not one: the joints hold it constant; outputs: crank.phi" in message
 
 
+@pytest.mark.long
 def test_animations_have_the_width_that_is_asked_for(
     record: Path,
     command: Command,

@@ -18,7 +18,7 @@ import pytest
 
 import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Gear, Mechanism, Revolute, load
-from kinfmu.codegen.c import compiler
+from kinfmu.codegen.c import compiler, functions
 from kinfmu.codegen.c import emit as emit_c
 from kinfmu.codegen.python import emit, load_model, load_module
 from kinfmu.errors import CompilerError
@@ -223,6 +223,18 @@ def test_c_and_python_agree_to_the_bit(name: str) -> None:
         entries = c.array("LARGEST_BLOCK")()
         c.library.kf_jacobian(c.model, ctypes.byref(found), block, entries)
         assert entries[: np.size(jacobian)] == list(np.ravel(jacobian))
+
+
+@pytest.mark.parametrize("most_stores", [500, 0])
+def test_c_gives_the_fixed_coordinates_from_stores_or_from_a_table(
+    monkeypatch: pytest.MonkeyPatch, most_stores: int
+) -> None:
+    monkeypatch.setattr(functions, "MOST_STORES", most_stores)
+    plan = compile_plan(kinfmu.load("jansen_leg"))  # some are formulas of parameters
+    c, fixed = Compiled(plan), numbers([math.nan] * len(plan.fixed))
+    assert c.bind([parameter.value for parameter in plan.parameters]) == ""
+    c.library.kf_fixed(c.model, fixed)
+    assert list(fixed) == list(plan.fixed.values())
 
 
 def test_laws_of_c_and_python_agree() -> None:

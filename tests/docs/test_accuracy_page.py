@@ -106,7 +106,3 @@ def test_the_charts_are_in_the_folder_of_the_page_with_text_as_text() -> None:
         drawn = (DOCS / f"{chart}.svg").read_text(encoding="utf-8")
         for engine in (name for name in LOOKS if name not in PEERS):
             assert f">{engine}<" in drawn, ANEW
-
-
-def test_the_readme_leads_here() -> None:
-    assert "(docs/accuracy.md)" in (ROOT / "README.md").read_text(encoding="utf-8")

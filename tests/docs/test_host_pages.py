@@ -73,6 +73,7 @@ def test_the_page_of_libcosim_runs(tmp_path: Path) -> None:
     follow("host-osp.md", tmp_path)
 
 
+@pytest.mark.long
 def test_libcosim_steps_a_system_of_the_parts_that_its_page_shows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

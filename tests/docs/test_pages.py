@@ -104,6 +104,7 @@ def test_fitting(tmp_path: Path) -> None:
     assert float(timed) < 10.0
 
 
+@pytest.mark.long
 def test_the_target_with_an_offset_finds_a_straight_line_at_any_height(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -262,12 +263,6 @@ def test_every_block_of_a_page_is_executed_or_listed(name: str) -> None:
     assert problems(name, BY_NAME[name]) == []
 
 
-def test_a_block_that_no_test_executes_is_found() -> None:
-    page = "Text:\n\n```console\n$ kinfmu list\n```\n\n    motor -e 5\n    kinfmu list\n\n```text\nfourbar\n```\n"
-    wrong = problems("page.md", blocks(page))
-    assert [line.split("'")[1] for line in wrong] == ["$ kinfmu list", "motor -e 5", "fourbar"]
-
-
 def test_every_exception_of_the_lists_is_on_a_page() -> None:
     for page, begin in CHECKED_ELSEWHERE:
         assert any(block.head.startswith(begin) for block in BY_NAME[page]), begin
@@ -288,11 +283,6 @@ def test_commands_within_sentences_exist_with_their_options(name: str) -> None:
         command, *words = line.split()
         known = {name for option in main.commands[command].params for name in option.opts}
         assert {word.partition("=")[0] for word in words if re.match("--?[a-z]", word)} <= known, line
-
-
-def test_pages_with_a_test_of_their_own_have_it() -> None:
-    for name, test in OWN_TESTS.items():
-        assert name in (Path(__file__).parent / test).read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

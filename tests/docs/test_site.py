@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import re
-import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -78,92 +77,6 @@ def test_links_to_folders_of_the_gallery_lead_to_its_pages(site: Any) -> None:
     site("_site.gallery").linked(None, "gallery", source)
     assert source[0].startswith("[`engine`](gallery/engine.md) and [page](fmu.md)")
     assert re.findall(r"^gallery/(\w+)$", source[0], re.MULTILINE) == gallery.names()
-
-
-@pytest.mark.parametrize(
-    ("html", "fault"),
-    [
-        ('<a href="other.html">x</a>', "other.html does not exist"),
-        ('<a href="#there">x</a>', "#there: no such place in the page"),
-        ('<a href="index.html#here">x</a><p id="here">', ""),
-        ('<a href="https://example.org/">x</a>', ""),
-        ('<script src="https://example.org/a.js"></script>', "loads https://example.org/a.js from the network"),
-        ('<img src="a%20b.png">', "a%20b.png does not exist"),
-    ],
-)
-def test_the_check_of_links_finds_what_is_wrong(
-    html: str, fault: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "index.html").write_text(html, encoding="utf-8")
-    check = runpy.run_path(str(DOCS / "_site" / "links.py"))["main"]
-    assert check(tmp_path) == (1 if fault else 0)
-    assert (f"index.html: {fault}\n" in capsys.readouterr().err) == bool(fault)
-
-
-def test_the_check_of_links_finds_fonts_from_the_net(tmp_path: Path) -> None:
-    (tmp_path / "index.html").write_text("", encoding="utf-8")
-    (tmp_path / "a.css").write_text('@import "https://example.org/font.css";', encoding="utf-8")
-    check = runpy.run_path(str(DOCS / "_site" / "links.py"))["problems"]
-    assert check(tmp_path) == ["a.css: loads a file from the network"]
-
-
-GALLERY_PAGE = """<iframe src="live/fourbar.html"></iframe><a href="live/fourbar.html">live</a>
-<a href="live/fourbar.fmu">FMU</a> <a href="../_downloads/1/mechanism.toml">file</a>
-<a href="../_downloads/2/reference.csv">data</a> <a href="../_downloads/3/figure.svg">figure</a>"""
-
-
-@pytest.fixture
-def built(tmp_path: Path) -> Path:
-    """A site with one page of the gallery."""
-    (tmp_path / "gallery" / "live").mkdir(parents=True)
-    (tmp_path / "gallery" / "fourbar.html").write_text(GALLERY_PAGE, encoding="utf-8")
-    (tmp_path / "gallery" / "live" / "fourbar.html").write_text("<title>fourbar</title>", encoding="utf-8")
-    kinfmu.build(kinfmu.load("fourbar"), tmp_path / "gallery" / "live" / "fourbar.fmu")
-    for number, file in enumerate(("mechanism.toml", "reference.csv", "figure.svg"), start=1):
-        target = tmp_path / "_downloads" / str(number) / file
-        target.parent.mkdir(parents=True)
-        target.write_bytes((gallery.folder() / "fourbar" / file).read_bytes())
-    return tmp_path
-
-
-def test_the_check_of_the_gallery_accepts_pages_with_all_their_files(site: Any, built: Path) -> None:
-    problems = site("_site.contents").problems
-    assert problems(built, ["fourbar"]) == []
-    assert problems(built, ["fourbar", "engine"]) == ["gallery/engine.html: there is no such page"]
-
-
-@pytest.mark.parametrize(
-    ("link", "fault"),
-    [
-        ('<iframe src="live/fourbar.html">', "no link to live/fourbar.html"),
-        ('<a href="live/fourbar.html">', "no link to live/fourbar.html"),
-        ('<a href="live/fourbar.fmu">', "no link to live/fourbar.fmu"),
-        ('<a href="../_downloads/1/mechanism.toml">', "no link to mechanism.toml"),
-    ],
-)
-@pytest.mark.few(2)
-def test_the_check_of_the_gallery_finds_a_missing_link(site: Any, built: Path, link: str, fault: str) -> None:
-    page = built / "gallery" / "fourbar.html"
-    assert link in GALLERY_PAGE
-    page.write_text(GALLERY_PAGE.replace(link, ""), encoding="utf-8")
-    assert site("_site.contents").problems(built, ["fourbar"]) == [f"gallery/fourbar.html: {fault}"]
-
-
-def test_the_check_of_the_gallery_finds_files_of_another_mechanism(site: Any, built: Path) -> None:
-    kinfmu.build(kinfmu.load("engine"), built / "gallery" / "live" / "fourbar.fmu")
-    (built / "gallery" / "live" / "fourbar.html").write_text("<title>engine</title>", encoding="utf-8")
-    (built / "_downloads" / "1" / "mechanism.toml").write_text('name = "engine"', encoding="utf-8")
-    assert site("_site.contents").problems(built, ["fourbar"]) == [
-        "gallery/fourbar.html: live/fourbar.html is not the page of fourbar",
-        "gallery/fourbar.html: live/fourbar.fmu is an FMU of engine",
-        "gallery/fourbar.html: ../_downloads/1/mechanism.toml is not mechanism.toml of fourbar",
-    ]
-
-
-def test_the_site_is_checked_when_it_is_built() -> None:
-    script = (DOCS.parent / "scripts" / "docs").read_text(encoding="utf-8")
-    assert "docs/_site/links.py docs/_build" in script
-    assert "-m _site.contents docs/_build" in script
 
 
 @pytest.mark.long

@@ -303,6 +303,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 
 @every_member
+@pytest.mark.few(2)
 def test_the_figure_in_the_gallery_is_current(name: str, gallery_figure: Callable[[str], Path]) -> None:
     there, now = picture(gallery.folder() / name / "figure.svg"), picture(gallery_figure(name))
     assert not differences(there, now), "scripts/pictures draws it anew"

@@ -56,6 +56,7 @@ def test_a_mechanism_of_the_gallery_is_drawn_with_all_its_names(
 
 
 @every_member
+@pytest.mark.few(2)
 def test_names_are_above_all_lines_and_off_the_links_bars_and_cylinders(name: str) -> None:
     shown = instant(gallery.load(name))
     sheet = sheet_of(shown)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-import kinfmu
-from kinfmu.fmu import build
 from kinfmu.fmu.interface import Drive
 from kinfmu.mechanism import Mechanism, toml_file
 from tests.fmu.host import Host
@@ -23,34 +21,15 @@ def mechanism(name: str) -> Mechanism:
 
 
 @pytest.fixture(scope="session")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Drive], Path]:
-    """`built(name, drive)`: path of the FMU of a gallery mechanism."""
-    folder = tmp_path_factory.mktemp("fmus")
-    paths: dict[tuple[str, str], Path] = {}
-
-    def get(name: str, drive: Drive = "time") -> Path:
-        if (name, drive) not in paths:
-            paths[name, drive] = build(mechanism(name), folder / f"{name}_{drive}.fmu", drive=drive)
-        return paths[name, drive]
-
-    return get
+def built(fmu_of: Build) -> Build:
+    """`built(name, drive)`: path of the python FMU of a gallery mechanism."""
+    return lambda name, drive="time": fmu_of(name, drive=drive)
 
 
 @pytest.fixture(scope="session")
-def built_native(tmp_path_factory: pytest.TempPathFactory) -> Build:
+def built_native(fmu_of: Build) -> Build:
     """`built_native(mechanism, fmi, drive)`: path of a native FMU of a mechanism or a gallery name."""
-    folder = tmp_path_factory.mktemp("native")
-    paths: dict[tuple[str, int, str], Path] = {}
-
-    def get(model: str | Mechanism, fmi: int, drive: str = "inputs") -> Path:
-        mechanism = kinfmu.load(model) if isinstance(model, str) else model
-        key = (mechanism.name, fmi, drive)
-        if key not in paths:
-            path = folder / f"{mechanism.name}_{fmi}_{drive}.fmu"
-            paths[key] = kinfmu.build(mechanism, path, flavour="native", fmi=fmi, drive=drive)  # type: ignore[arg-type]
-        return paths[key]
-
-    return get
+    return lambda model, fmi, drive="inputs": fmu_of(model, "native", fmi, drive)
 
 
 @pytest.fixture
@@ -64,17 +43,13 @@ def pendulum(built: Callable[..., Path]) -> Path:
 
 
 @pytest.fixture
-def start(built: Callable[..., Path], tmp_path: Path) -> Iterator[Callable[..., Host]]:
+def start(built: Build, opened: Start) -> Start:
     """`start(name, drive)`: a slave, by default initialized at time 0; freed at the end."""
-    hosts: list[Host] = []
 
     def get(name: str = "fourbar", drive: Drive = "inputs", *, initialize: bool = True) -> Host:
-        host = Host(built(name, drive), tmp_path / f"slave_{len(hosts)}")
-        hosts.append(host)
+        host = opened(built(name, drive))
         if initialize:
             host.initialize(0.0)
         return host
 
-    yield get
-    for host in hosts:
-        host.free()
+    return get

@@ -58,6 +58,7 @@ def refusal(content: bytes, folder: Path) -> str:
     return line.removeprefix(f"{path}: ")
 
 
+@pytest.mark.long
 def test_an_fmu_with_a_flipped_bit_is_whole_or_one_line(whole: bytes, tmp_path: Path) -> None:
     """Half of the bits in the directory of the archive, which has no checksum."""
     drawn = random.Random(0)  # noqa: S311  # no secret

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -95,37 +95,17 @@ def press() -> Mechanism:
     return toml_file.parse(PRESS, "press")
 
 
-@pytest.fixture(scope="module")
-def fmu_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
-    """`fmu_of(mechanism, flavour, fmi, drive)`: path of the FMU, built once."""
-    folder = tmp_path_factory.mktemp("forces")
-    paths: dict[tuple[str, str, int, str], Path] = {}
-
-    def get(mechanism: Mechanism, flavour: str, fmi: int, drive: str = "time") -> Path:
-        key = (mechanism.name, flavour, fmi, drive)
-        if key not in paths:
-            path = folder / ("_".join(map(str, key)) + ".fmu")
-            paths[key] = kinfmu.build(mechanism, path, flavour=flavour, fmi=fmi, drive=drive)  # type: ignore[arg-type]
-        return paths[key]
-
-    return get
-
-
 @pytest.fixture
-def start(fmu_of: Callable[..., Path], tmp_path: Path) -> Iterator[Callable[..., Host]]:
+def start(fmu_of: Callable[..., Path], opened: Callable[..., Host]) -> Callable[..., Host]:
     """`start(flavour, fmi)`: a slave of the press that inputs drive, initialized at 0."""
-    hosts: list[Host] = []
 
     def get(flavour: str, fmi: int, angle: float = 0.7) -> Host:
-        host = Host(fmu_of(press(), flavour, fmi, "inputs"), tmp_path / f"slave_{len(hosts)}")
-        hosts.append(host)
+        host = opened(fmu_of(press(), flavour, fmi, "inputs"))
         host.set({"rates": 2, "crank_angle": angle})
         host.initialize(0.0)
         return host
 
-    yield get
-    for host in hosts:
-        host.free()
+    return get
 
 
 def force_outputs(host: Host) -> tuple[Variable, ...]:
@@ -242,10 +222,9 @@ def test_a_load_that_is_no_number_is_refused(start: Callable[..., Host], flavour
 
 
 def test_an_unreachable_sample_keeps_the_forces_of_the_last_good_one(
-    fmu_of: Callable[..., Path], tmp_path: Path
+    fmu_of: Callable[..., Path], opened: Callable[..., Host]
 ) -> None:
-    mechanism = loaded("triple_rocker")
-    host = Host(fmu_of(mechanism, "python", 2, "inputs"), tmp_path / "slave")
+    host = opened(fmu_of(loaded("triple_rocker"), "python", 2, "inputs"))
     name = host.about.interface.part("inputs")[0].name
     host.set({"rates": 2})
     host.initialize(0.0)
@@ -255,18 +234,18 @@ def test_an_unreachable_sample_keeps_the_forces_of_the_last_good_one(
     assert host.status() > 2
     assert host.get(*(variable.name for variable in host.about.interface.part("forces"))) == before
     assert host.step(0.1, 0.1) == DISCARD
-    host.free()
 
 
-def test_a_native_fmu_discards_forces_of_an_unreachable_sample(fmu_of: Callable[..., Path], tmp_path: Path) -> None:
-    host = Host(fmu_of(loaded("triple_rocker"), "native", 2, "inputs"), tmp_path / "slave")
+def test_a_native_fmu_discards_forces_of_an_unreachable_sample(
+    fmu_of: Callable[..., Path], opened: Callable[..., Host]
+) -> None:
+    host = opened(fmu_of(loaded("triple_rocker"), "native", 2, "inputs"))
     name = host.about.interface.part("inputs")[0].name
     host.set({"rates": 2})
     host.initialize(0.0)
     host.set({name: host.get(name)[0] + math.pi})
     assert host.status() > 2
     assert answer(host.get, "potential_energy") == DISCARD
-    host.free()
 
 
 @pytest.mark.parametrize(
@@ -308,10 +287,12 @@ def test_outputs_that_an_fmu_cannot_have(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("flavour", "fmi"), FLAVOURS[:2])
 @pytest.mark.few(1)
-def test_determined_reactions_of_redundant_rows_and_nan_on_a_bridge(flavour: str, fmi: int, tmp_path: Path) -> None:
+def test_determined_reactions_of_redundant_rows_and_nan_on_a_bridge(
+    flavour: str, fmi: int, fmu_of: Callable[..., Path], opened: Callable[..., Host]
+) -> None:
     """Wheels whose rods are solved by least squares, and a parallelogram at its change point."""
     wheels = coupled(LOCOMOTIVE)
-    path = kinfmu.build(wheels, tmp_path / "wheels.fmu", flavour=flavour, fmi=fmi, drive="inputs")
+    path = fmu_of(wheels, flavour, fmi, "inputs")
     t = np.linspace(0.0, 1.0, 9)
     given = {"crank_angle": 5.0 * t, "crank_speed": 5.0 + 0.0 * t, "crank_acceleration": 0.0 * t}
     run = kinfmu.simulate(path, inputs={"time": t, **given}, step=t[1], parameters={"rates": 2})
@@ -320,7 +301,7 @@ def test_determined_reactions_of_redundant_rows_and_nan_on_a_bridge(flavour: str
 
     parallelogram = loaded("fourbar")
     bare = replace(parallelogram, joints=tuple(joint for joint in parallelogram.joints if joint.name != "AB"))
-    host = Host(kinfmu.build(bare, tmp_path / "bare.fmu", flavour=flavour, fmi=fmi, drive="inputs"), tmp_path / "bare")
+    host = opened(fmu_of(bare, flavour, fmi, "inputs"))
     host.set({"rates": 2, "crank_angle": 3.0, "crank_speed": 1.0})
     host.initialize(0.0)
     host.set({"crank_angle": math.pi})
@@ -331,7 +312,6 @@ def test_determined_reactions_of_redundant_rows_and_nan_on_a_bridge(flavour: str
     assert [torque, shaking] == pytest.approx([reference[name][1] for name in names[:2]], rel=1e-9)
     assert math.isnan(reaction)
     assert np.isnan(reference["O.force_x"][1])
-    host.free()
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
@@ -368,8 +348,10 @@ def test_adjoint_derivatives_of_forces(start: Callable[..., Host]) -> None:
 
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.few(1)
-def test_model_exchange_has_the_forces_of_a_run(fmu_of: Callable[..., Path], fmi: int, tmp_path: Path) -> None:
-    host = Host(fmu_of(press(), "native", fmi), tmp_path / "model", model_exchange=True)
+def test_model_exchange_has_the_forces_of_a_run(
+    fmu_of: Callable[..., Path], fmi: int, opened: Callable[..., Host]
+) -> None:
+    host = opened(fmu_of(press(), "native", fmi), model_exchange=True)
     host.set({"work_force": -150.0})
     host.initialize(0.0)
     host.fmu.enterContinuousTimeMode()
@@ -379,7 +361,6 @@ def test_model_exchange_has_the_forces_of_a_run(fmu_of: Callable[..., Path], fmi
     for k, time in enumerate(t):
         host.fmu.setTime(time)
         np.testing.assert_allclose(host.get(*names), [reference[name][k] for name in names], rtol=1e-12, atol=1e-11)
-    host.free()
 
 
 RESTING = {"crank_angle": 0.7, "crank_speed": 3.0, "crank_acceleration": 0.0, "work_force": -150.0}
@@ -425,8 +406,10 @@ def sixth_order(value_at: Callable[[float], float], h: float) -> float:
     return sum(weight / (60.0 * h) * (value_at(j * h) - value_at(-j * h)) for j, weight in weights)
 
 
-def test_derivatives_of_forces_with_respect_to_time_and_masses(fmu_of: Callable[..., Path], tmp_path: Path) -> None:
-    host = Host(fmu_of(press(), "native", 3), tmp_path / "timed")
+def test_derivatives_of_forces_with_respect_to_time_and_masses(
+    fmu_of: Callable[..., Path], opened: Callable[..., Host]
+) -> None:
+    host = opened(fmu_of(press(), "native", 3))
     host.enter(0.0)
     model = kinfmu.compile(press())
 
@@ -438,7 +421,6 @@ def test_derivatives_of_forces_with_respect_to_time_and_masses(fmu_of: Callable[
     assert of_mass == pytest.approx(sixth_order(lambda d: torque(0.0, 3.0 + d), 0.1), rel=1e-9)
     assert of_time == pytest.approx(sixth_order(lambda d: torque(d, 3.0), 1e-3), rel=1e-8)
     host.fmu.exitInitializationMode()
-    host.free()
 
 
 def test_the_example_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -65,8 +66,10 @@ def test_an_fmu_driven_by_a_law_moves_as_solve_does(name: str, tmp_path: Path) -
     np.testing.assert_allclose(solved["arm0.phi"], [LAWS[name].at(t) for t in solved.t], rtol=0.0, atol=1e-15)
 
 
-def test_constants_of_laws_are_parameters_with_units_and_a_duration_stays_positive(tmp_path: Path) -> None:
-    host = Host(kinfmu.build(arms(SEQUENCE, LAWS["polynomial"]), tmp_path / "arms.fmu"), tmp_path / "slave")
+def test_constants_of_laws_are_parameters_with_units_and_a_duration_stays_positive(
+    fmu_of: Callable[..., Path], opened: Callable[..., Host]
+) -> None:
+    host = opened(fmu_of(arms(SEQUENCE, LAWS["polynomial"])))
     variables = {variable.name: variable for variable in host.about.interface}
     units = {"start": "rad", "begin": "s", "rise_1": "rad", "duration_1": "s", "duration_2": "s"}
     units_of_polynomial = {"c0": "rad", "c1": "rad/s", "c2": "rad/s2", "c3": "rad/s3"}
@@ -81,7 +84,6 @@ def test_constants_of_laws_are_parameters_with_units_and_a_duration_stays_positi
     host.set({"arm0.duration_1": 0.0})
     assert host.get("arm0.duration_1") == [4.0]
     assert host.step(2.0, 0.5) == DISCARD
-    host.free()
 
 
 def test_constants_are_checked_where_they_are_given_to_solve() -> None:
@@ -92,16 +94,15 @@ def test_constants_are_checked_where_they_are_given_to_solve() -> None:
         kinfmu.solve(mechanism, parameters={"arm0.duration_1": -1.0})
 
 
-def test_an_external_law_waits_for_the_inputs(tmp_path: Path) -> None:
+def test_an_external_law_waits_for_the_inputs(opened: Callable[..., Host], tmp_path: Path) -> None:
     mechanism = arms(External(0.75), ConstantSpeed())
     assert default_drive(mechanism) == "inputs"
     assert default_drive(arms(ConstantSpeed())) == "time"
-    host = Host(kinfmu.build(mechanism, tmp_path / "arms.fmu"), tmp_path / "slave")
+    host = opened(kinfmu.build(mechanism, tmp_path / "arms.fmu"))
     host.initialize(0.0)
     assert host.get("arm0.phi") == pytest.approx([0.75])
     host.set({"arm0_angle": math.pi})
     assert host.get("arm0.phi") == pytest.approx([math.pi])
-    host.free()
     by_time = kinfmu.simulate(kinfmu.build(mechanism, tmp_path / "timed.fmu", drive="time"), stop=1.0)
     assert by_time["arm0.phi"] == pytest.approx(0.75)
     assert by_time["arm1.phi"][-1] == pytest.approx(1.0)

@@ -21,6 +21,7 @@ from kinfmu.mechanism import Point
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.plan import compile_plan
 from kinfmu.solver.python import UnsolvableModel, with_parameters
+from tests.mechanisms import PINS
 from tests.oracle import fourbar as exact_fourbar
 
 LENGTHS = {"ground": 4.0, "crank": 1.0, "coupler": 3.5, "rocker": 3.0}
@@ -37,12 +38,7 @@ def linkage(lengths: Mapping[str, float | str] = LENGTHS) -> Mechanism:
             Body("coupler", {"P": (0, 0), "Q": ("coupler", 0), "M": ("coupler/2", "rocker/6")}, (0.5, 0.8, 0.6)),
             Body("rocker", {"C": (0, 0), "Q": ("rocker", 0)}, (4, 0, 1.8)),
         ],
-        [
-            Revolute("O", ("ground.O", "crank.O")),
-            Revolute("P", ("crank.P", "coupler.P")),
-            Revolute("Q", ("coupler.Q", "rocker.Q")),
-            Revolute("C", ("ground.C", "rocker.C")),
-        ],
+        [*PINS],
         [AngleDriver("crank", "crank", ConstantSpeed(1.0, "1 rad/s"))],
         points={"M": "coupler.M"},
         parameters=dict(lengths),

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -25,21 +23,17 @@ NO_STEPS = [
 
 
 @pytest.fixture(params=FLAVOURS)
-def start(request: pytest.FixtureRequest, built: Build, built_native: Build, tmp_path: Path) -> Iterator[Start]:
+def start(request: pytest.FixtureRequest, built: Build, built_native: Build, opened: Start) -> Start:
     """`start(name, drive)`: an instance of each flavour, by default initialized at time 0; freed at the end."""
-    hosts: list[Host] = []
 
     def get(name: str = "fourbar", drive: Drive = "inputs", *, initialize: bool = True) -> Host:
         is_python = request.param == "python"
-        path = built(name, drive) if is_python else built_native(name, int(request.param[-1]), drive)
-        hosts.append(Host(path, tmp_path / f"instance_{len(hosts)}"))
+        host = opened(built(name, drive) if is_python else built_native(name, int(request.param[-1]), drive))
         if initialize:
-            hosts[-1].initialize(0.0)
-        return hosts[-1]
+            host.initialize(0.0)
+        return host
 
-    yield get
-    for host in hosts:
-        host.free()
+    return get
 
 
 @pytest.mark.few(1)

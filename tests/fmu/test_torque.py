@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -58,35 +57,23 @@ FLAVOURS = [("native", 2), ("native", 3), ("python", 2)]
 of_each_flavour = pytest.mark.parametrize(("flavour", "fmi"), FLAVOURS)
 
 
-@pytest.fixture(scope="module")
-def fmu_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
-    """`fmu_of(name, flavour, fmi)`: path of the FMU, built once."""
-    folder = tmp_path_factory.mktemp("torque")
-
-    @cache
-    def get(name: str, flavour: str, fmi: int) -> Path:
-        path = folder / f"{name}_{flavour}_{fmi}.fmu"
-        return kinfmu.build(MECHANISMS[name](), path, flavour=flavour, fmi=fmi, drive="torque")
-
-    return get
+@pytest.fixture
+def torque_driven(fmu_of: Callable[..., Path]) -> Callable[..., Path]:
+    """`torque_driven(name, flavour, fmi)`: path of an FMU."""
+    return lambda name, flavour, fmi: fmu_of(MECHANISMS[name](), flavour, fmi, "torque")
 
 
 @pytest.fixture
-def start(fmu_of: Callable[..., Path], tmp_path: Path) -> Iterator[Callable[..., Host]]:
+def start(torque_driven: Callable[..., Path], opened: Callable[..., Host]) -> Callable[..., Host]:
     """`start(name, flavour, fmi, **values)`: an initialized instance."""
-    hosts: list[Host] = []
 
     def get(name: str, flavour: str, fmi: int, *, model_exchange: bool = False, **values: float) -> Host:
-        path = fmu_of(name, flavour, fmi)
-        host = Host(path, tmp_path / f"{len(hosts)}", model_exchange=model_exchange)
-        hosts.append(host)
+        host = opened(torque_driven(name, flavour, fmi), model_exchange=model_exchange)
         host.set({name.replace("__", "."): value for name, value in values.items()})
         host.initialize(0.0)
         return host
 
-    yield get
-    for host in hosts:
-        host.free()
+    return get
 
 
 def steps(host: Host, count: int, h: float = WINDOW, first: int = 0) -> None:
@@ -101,11 +88,11 @@ def same_motion(mechanism: Mechanism, stop: float, h: float, **arguments: Any) -
 @of_each_flavour
 @pytest.mark.few(1)
 def test_co_simulation_is_the_motion_that_python_integrates(
-    flavour: str, fmi: int, fmu_of: Callable[..., Path]
+    flavour: str, fmi: int, torque_driven: Callable[..., Path]
 ) -> None:
     """With loads that jump between two samples, held inputs, and every output."""
     inputs = {"time": [0.0, 1.2], "crank_torque": [11.0, 11.0], "wind_force": [-7.0, -7.0]}
-    path, state = fmu_of("motor", flavour, fmi), {"crank_angle": 0.4, "crank_speed": 3.0}
+    path, state = torque_driven("motor", flavour, fmi), {"crank_angle": 0.4, "crank_speed": 3.0}
     run = kinfmu.simulate(path, start=0.0, stop=1.2, step=0.1, inputs=inputs, state=state, tolerance=1e-12)
     exact = same_motion(motor(), 1.2, 0.1, inputs={"crank_torque": 11.0, "wind_force": -7.0}, state=state)
     assert [event.text for event in run.events] == [event.text for event in exact.events]
@@ -196,19 +183,21 @@ def test_a_motion_ends_at_its_limit_and_stays_before_it(
     assert host.step(0.693, 0.01) == DISCARD
 
 
-def test_the_run_of_a_limit_ends_with_one_event(fmu_of: Callable[..., Path]) -> None:
+def test_the_run_of_a_limit_ends_with_one_event(torque_driven: Callable[..., Path]) -> None:
     state = {"crank_angle": 0.5, "crank_speed": 0.1}
-    run = kinfmu.simulate(fmu_of("rocker", "native", 2), start=0.0, stop=3.0, step=0.01, state=state)
+    run = kinfmu.simulate(torque_driven("rocker", "native", 2), start=0.0, stop=3.0, step=0.01, state=state)
     (event,) = run.events
     assert event.level == "error"
     assert "the motion ends at a limit" in event.text
     assert run.status.tolist()[-2:] == [Status.OK, Status.OUTSIDE]
 
 
-def test_model_exchange_ends_at_the_limit_too(fmu_of: Callable[..., Path], capfd: pytest.CaptureFixture[str]) -> None:
+def test_model_exchange_ends_at_the_limit_too(
+    torque_driven: Callable[..., Path], capfd: pytest.CaptureFixture[str]
+) -> None:
     """fmpy would keep a logger of its caller for every later FMU of the process, after it is gone; so it prints."""
     found = simulate_fmu(
-        str(fmu_of("rocker", "native", 2)),
+        str(torque_driven("rocker", "native", 2)),
         fmi_type="ModelExchange",
         stop_time=3.0,
         relative_tolerance=1e-9,
@@ -222,10 +211,10 @@ def test_model_exchange_ends_at_the_limit_too(fmu_of: Callable[..., Path], capfd
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_hosts_integrate_the_states_in_model_exchange(fmi: int, fmu_of: Callable[..., Path]) -> None:
+def test_hosts_integrate_the_states_in_model_exchange(fmi: int, torque_driven: Callable[..., Path]) -> None:
     """CVode of fmpy; the events of the load are its time events."""
     found = simulate_fmu(
-        str(fmu_of("motor", "native", fmi)),
+        str(torque_driven("motor", "native", fmi)),
         fmi_type="ModelExchange",
         stop_time=1.0,
         relative_tolerance=1e-10,
@@ -301,8 +290,10 @@ def test_directional_derivatives_are_those_of_the_outputs(fmi: int, start: Calla
 
 
 @of_each_flavour
-def test_the_description_is_valid_and_declares_the_states(flavour: str, fmi: int, fmu_of: Callable[..., Path]) -> None:
-    path = fmu_of("motor", flavour, fmi)
+def test_the_description_is_valid_and_declares_the_states(
+    flavour: str, fmi: int, torque_driven: Callable[..., Path]
+) -> None:
+    path = torque_driven("motor", flavour, fmi)
     assert validate_fmu(str(path)) == []
     from fmpy import read_model_description
 
@@ -365,8 +356,8 @@ def test_a_four_bar_keeps_its_energy_over_a_thousand_turns(tmp_path: Path) -> No
     assert np.abs(run["kinetic_energy"] / run["kinetic_energy"][0] - 1).max() < 2e-10
 
 
-def test_settings_of_a_torque_driven_fmu_are_for_these_alone(fmu_of: Callable[..., Path]) -> None:
-    path = fmu_of("rocker", "native", 2)
+def test_settings_of_a_torque_driven_fmu_are_for_these_alone(torque_driven: Callable[..., Path]) -> None:
+    path = torque_driven("rocker", "native", 2)
     with pytest.raises(RequestError, match=r"crank_speed = '3 mm': unit 'mm' must be one of rad/s"):
         kinfmu.simulate(path, state={"crank_speed": "3 mm"})  # type: ignore[dict-item]
     with pytest.raises(RequestError, match=r"integrator.tolerance = 0.1 must be at least 1e-13, at most 0.0001"):
@@ -377,7 +368,9 @@ def test_settings_of_a_torque_driven_fmu_are_for_these_alone(fmu_of: Callable[..
 
 @of_each_flavour
 @pytest.mark.few(1)
-def test_a_mass_on_a_crank_turns_in_closed_form(flavour: str, fmi: int, tmp_path: Path) -> None:
+def test_a_mass_on_a_crank_turns_in_closed_form(
+    flavour: str, fmi: int, opened: Callable[..., Host], tmp_path: Path
+) -> None:
     """theta = T t^2 / (2 m r^2), with a parameter as mass, without forces among the outputs."""
     mechanism = replace(
         pendulum(gravity=(0.0, 0.0)),
@@ -386,7 +379,7 @@ def test_a_mass_on_a_crank_turns_in_closed_form(flavour: str, fmi: int, tmp_path
         bodies=tuple(body if body.is_ground else replace(body, mass="rim") for body in pendulum().bodies),
     )
     path = kinfmu.build(mechanism, tmp_path / "a.fmu", flavour=flavour, fmi=fmi, drive="torque", outputs=["rod.phi"])
-    host = Host(path, tmp_path / "a")
+    host = opened(path)
     assert not {"crank.torque", "kinetic_energy"} & set(host.references)
     host.set({"rim": 8.0, "crank_torque": 3.0})
     host.initialize(0.0)
@@ -394,18 +387,16 @@ def test_a_mass_on_a_crank_turns_in_closed_form(flavour: str, fmi: int, tmp_path
     for k in range(5):
         assert host.step(0.4 * k, 0.4) == OK
     found = host.get("crank_angle", "crank_speed", "crank_acceleration", "rod.phi")
-    host.free()
     assert found == pytest.approx([3.0 * 2.0 / inertia, 3.0 * 2.0 / inertia, 3.0 / inertia, 3.0], rel=1e-12)
 
 
 @pytest.mark.parametrize("flavour", ["native", "python"])
 def test_the_tolerance_of_the_host_is_that_of_the_integrator(
-    flavour: str, fmu_of: Callable[..., Path], tmp_path: Path
+    flavour: str, torque_driven: Callable[..., Path], opened: Callable[..., Host]
 ) -> None:
-    host = Host(fmu_of("motor", flavour, 2), tmp_path / "host")
+    host = opened(torque_driven("motor", flavour, 2))
     taken = []
     for tolerance in (1e-6, 1e-20, 1.0):
         host.fmu.setupExperiment(startTime=0.0, tolerance=tolerance)
         taken += host.get("integrator.tolerance")
-    host.free()
     assert taken == [1e-6, 1e-13, 1e-4]

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import random
 import sys
-import time
 from pathlib import Path
 
 import pytest
 
-from kinfmu.log import write_mcap
 from tests.fuzz import cache, files, fmu, logs, mechanisms
 from tests.fuzz.guarded import ZIG, Watch
 from tests.fuzz.hostile_text import CANARY
-from tests.fuzz.summary import PARTS, Summary, one_of_each, run
+from tests.fuzz.summary import PARTS, Summary, run
 
 SECONDS = 0.5  # of each part after one trial of each kind; scripts/fuzz goes on for longer
 KINDS = {  # of the programs of `fmu`, compiled under sanitizers, see below; `opens` has one kind
@@ -31,43 +28,6 @@ def test_hostile_input_of_each_part_has_no_findings(part: str) -> None:
     assert summary.tried.total() > 0
     assert KINDS.get(part, set()) <= summary.tried.keys()
     assert summary.findings == [], "\n".join(summary.lines())
-
-
-def test_one_seed_of_each_kind_is_found_from_any_seed_on() -> None:
-    for first in (0, 7, 123):
-        for part in (mechanisms, files):
-            found = [part.kind_of(seed) for seed in one_of_each(first, part.kind_of)]
-            assert len(found) == len(set(found)) == len(KINDS[part.__name__.rpartition(".")[2]])
-
-
-def _ended_with_pauses(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, first: float, other: float | None, command: list[str]
-) -> list[str]:
-    """Return the findings of the kind 'ended' on one command; first, other: pauses [s] before its signals."""
-    write_mcap(logs.motion(), folder / logs.MOTION)
-    place = folder / "trial"
-    place.mkdir()
-    pauses = iter([first])
-    sleep = time.sleep
-    monkeypatch.setattr(logs, "_commands", lambda _fmu: [command])
-    monkeypatch.setattr(logs.time, "sleep", lambda pause: sleep(next(pauses, other or pause)))
-    return list(logs._ended(random.Random(3), place, folder / "none.fmu"))  # noqa: S311
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="processes of these trials are ended as on Linux")
-def test_a_command_that_ends_before_its_signal_is_judged_and_started_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    solve = ["solve", "fourbar", "--engine", "python", "--times", "0:180:0.02", "-o", "run.mcap"]
-    assert _ended_with_pauses(tmp_path, monkeypatch, 6.0, None, solve) == []
-    assert (tmp_path / "trial" / "run.mcap").exists()  # that of the first time
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="processes of these trials are ended as on Linux")
-def test_a_command_that_is_never_interrupted_is_a_finding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(logs, "ATTEMPTS", 2)
-    (found,) = _ended_with_pauses(tmp_path, monkeypatch, 3.0, 3.0, ["list"])
-    assert found.startswith("list was not interrupted: it ended before SIG")
 
 
 # ------------------------------------------------------------------------------------------------------------------ fmu

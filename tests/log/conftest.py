@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import kinfmu
 from kinfmu.errors import LogError
 from kinfmu.log.viewer import headless
 from kinfmu.run import Run
@@ -34,14 +33,9 @@ def any_run(request: pytest.FixtureRequest) -> Run:
 
 
 @pytest.fixture(scope="session")
-def fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[[], Path]:
+def fmu(fmu_of: Callable[..., Path]) -> Callable[[], Path]:
     """`fmu()`: the four-bar as an FMU driven by time, built when first asked for."""
-    path = tmp_path_factory.mktemp("fmu") / "fourbar.fmu"
-
-    def built() -> Path:
-        return path if path.exists() else kinfmu.build(kinfmu.load("fourbar"), path)
-
-    return built
+    return lambda: fmu_of("fourbar")
 
 
 @pytest.fixture(scope="package")  # an open viewer draws all the time

@@ -20,10 +20,12 @@ from kinfmu.run.solve import solve
 from tests.analysis.test_design_notes import FOURBAR
 from tests.fuzz.mechanisms import SAMPLES, written
 from tests.gallery_members import mostly_long
+from tests.mechanisms import FOURBAR_PINS
 
 ROOT = Path(__file__).parents[2]
 
-CRANK_ROCKER = """\
+CRANK_ROCKER = (
+    """\
 name = "crank_rocker"
 [parameters]
 crank = 1.0
@@ -38,12 +40,9 @@ start = { x = 0.5, y = 0.9, phi = "40 deg" }
 [bodies.rocker]
 points = { C = [0, 0], Q = [3, 0] }
 start = { x = 4, phi = "100 deg" }
-[joints]
-O = { type = "revolute", between = ["ground.O", "crank.O"] }
-P = { type = "revolute", between = ["crank.P", "coupler.P"] }
-Q = { type = "revolute", between = ["coupler.Q", "rocker.Q"] }
-C = { type = "revolute", between = ["ground.C", "rocker.C"] }
-[drivers]
+"""
+    + FOURBAR_PINS
+    + """[drivers]
 crank = { type = "angle", of = "crank", law = "constant_speed", start = "60 deg", speed = "1 rad/s" }
 [points]
 tip = "coupler.tip"
@@ -51,6 +50,7 @@ tip = "coupler.tip"
 stop = 6.3
 step = 0.01
 """
+)
 PIN_Q = 'Q = { type = "revolute", between = ["coupler.Q", "rocker.Q"] }\n'
 DRIVER = 'crank = { type = "angle", of = "crank", law = "constant_speed", start = "60 deg", speed = "1 rad/s" }\n'
 POINT = '["crank", 0]'  # of the crank, by its parameter
@@ -216,6 +216,7 @@ def test_every_command_reports_the_same_line(
 
 
 @pytest.mark.parametrize("case", ["binary rubbish", "deep nesting"])
+@pytest.mark.few(1)
 def test_a_separate_process_reports_the_same_line(case: str, tmp_path: Path) -> None:
     path = tmp_path / "wrong.toml"
     written, expected = content(case)

@@ -34,9 +34,11 @@ from kinfmu.mechanism.quantities import AngleBetween, DistanceBetween
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.motion import History, quintic
 from kinfmu.motion.quintic import use_compiled
+from tests.mechanisms import FOURBAR_DRIVER, FOURBAR_PINS
 
 TURN = np.linspace(0.0, 2.0 * math.pi, 121)
-CRANK_ROCKER = """
+CRANK_ROCKER = (
+    """
 name = "crank_rocker"
 [units]
 length = "mm"
@@ -59,16 +61,10 @@ start = { phi = "40 deg" }
 [bodies.rocker]
 points = { C = [0, 0], Q = ["rocker_link", 0] }
 start = { phi = "100 deg" }
-[joints]
-O = { type = "revolute", between = ["ground.O", "crank.O"] }
-P = { type = "revolute", between = ["crank.P", "coupler.P"] }
-Q = { type = "revolute", between = ["coupler.Q", "rocker.Q"] }
-C = { type = "revolute", between = ["ground.C", "rocker.C"] }
-[drivers.crank]
-type = "angle"
-of = "crank"
-law = "constant_speed"
-speed = "2 rad/s"
+"""
+    + FOURBAR_PINS
+    + FOURBAR_DRIVER
+    + """speed = "2 rad/s"
 [measures.rest]
 type = "dwell"
 of = "rocker.phi"
@@ -79,6 +75,7 @@ of = "coupler.y"
 begin = "lean"
 end = "lean + 100 deg"
 """
+)
 BEGIN, END = 1.0, 4.0
 READ: tuple[Reading, ...] = (
     Minimum("minimum", "rocker.phi"),

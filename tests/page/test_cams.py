@@ -15,7 +15,7 @@ import kinfmu
 from kinfmu.errors import KinfmuError
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.page import page as page_of
-from tests.page.engines import PHONE, Browser, Opened, browser, needs_browser, text_of
+from tests.page.engines import PHONE, Browser, Opened, needs_browser, text_of
 from tests.run.test_reactions import HEAD, JOINTS, SLIDING
 
 pytestmark = needs_browser
@@ -125,12 +125,6 @@ STOP_AT_6 = """(() => {
     const own = probe.at;
     probe.at = (u, ...rest) => (u[0] > 6 ? 5 : own.call(probe, u, ...rest)); // 5: no pose
 })()"""
-
-
-@pytest.fixture(scope="module")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with browser(tmp_path_factory.mktemp("pages")) as opened:
-        yield opened
 
 
 @pytest.fixture(scope="module")
@@ -244,6 +238,7 @@ def test_roller_of_a_given_curve_can_be_changed(chromium: Browser) -> None:
         ({"swing": -1.2}, "pad", "the profile of joint pad, which would not be convex"),
     ],
 )
+@pytest.mark.few(1)
 def test_profile_that_cannot_be_is_left_out_and_the_page_states_why(
     cams: Opened, values: dict[str, float], joint: str, note: str
 ) -> None:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 import kinfmu.page
-from tests.page.engines import PHONE, Browser, Opened, browser, needs_browser, text_of
+from tests.page.engines import PHONE, Browser, Opened, needs_browser, text_of
 
 pytestmark = needs_browser
 WATCH_TEXTS = """(() => {
@@ -22,12 +21,6 @@ WATCH_TEXTS = """(() => {
 })()"""
 
 
-@pytest.fixture(scope="module")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with browser(tmp_path_factory.mktemp("pages")) as opened:
-        yield opened
-
-
 def on_screen(page: Opened, expression: str) -> tuple[float, float]:
     """Return the place on the screen of a place on the canvas."""
     x, y = page.get(expression)
@@ -36,6 +29,7 @@ def on_screen(page: Opened, expression: str) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("mode", ["move", "lengths"])
+@pytest.mark.few(1)
 def test_handle_of_a_driver_drags_it_in_both_modes_and_the_view_stays(chromium: Browser, mode: str) -> None:
     with chromium.open(text_of("crank_rocker")) as page:
         if mode == "lengths":

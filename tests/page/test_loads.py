@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -15,7 +14,7 @@ import pytest
 from kinfmu.arrays import FloatArray
 from kinfmu.page import page as page_of
 from tests.mechanism.loads.every_load import every_load, fourbar
-from tests.page.engines import Browser, Opened, browser, needs_browser, text_of
+from tests.page.engines import Browser, Opened, needs_browser, text_of
 
 pytestmark = needs_browser
 pytest.importorskip("ziglang", reason="pages are compiled by zig")
@@ -27,12 +26,6 @@ class Drawn(NamedTuple):
 
     lines: list[FloatArray]
     texts: dict[str, FloatArray]
-
-
-@pytest.fixture(scope="module")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with browser(tmp_path_factory.mktemp("pages")) as opened:
-        yield opened
 
 
 @cache
@@ -146,6 +139,7 @@ def test_loads_can_be_switched_off_and_a_page_without_them_has_no_switch(chromiu
         assert drawn(page).lines == []
 
 
+@pytest.mark.long
 def test_gravity_is_not_drawn_over_other_things(chromium: Browser) -> None:
     with chromium.open(text()) as page:
         assert "g" in drawn(page).texts

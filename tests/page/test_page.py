@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,7 @@ from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text as toml_text
 from kinfmu.run.axis import shown_range
 from tests.gallery_members import every_member
-from tests.page.engines import DESKTOP, PHONE, Browser, browser, needs_browser, text_of
+from tests.page.engines import DESKTOP, PHONE, Browser, needs_browser, text_of
 
 pytestmark = needs_browser
 LARGEST = 300_000  # [bytes] of a page
@@ -24,12 +23,6 @@ LABELS = Path(__file__).with_name("labels.js").read_text("utf-8")
 CONTRASTS = Path(__file__).with_name("contrasts.js").read_text("utf-8")
 JUMPS = Path(__file__).with_name("jumps.js").read_text("utf-8")
 COVERED = Path(__file__).with_name("covered.js").read_text("utf-8")
-
-
-@pytest.fixture(scope="module")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with browser(tmp_path_factory.mktemp("pages")) as opened:
-        yield opened
 
 
 @pytest.mark.parametrize("name", ["crank_rocker", "jansen_leg", "excavator"])
@@ -300,6 +293,7 @@ def test_value_changes_curve_and_can_be_undone_and_read_from_the_address(chromiu
     assert apart.max() < 1e-9
 
 
+@pytest.mark.long
 def test_every_key_press_and_value_within_one_frame_counts(chromium: Browser) -> None:
     with chromium.open(text_of("crank_rocker")) as page:
         press = "['ArrowRight', 'ArrowRight', 'ArrowRight'].forEach(key => k.canvas.dispatchEvent(new KeyboardEvent("
@@ -382,6 +376,7 @@ def test_dragged_pin_changes_lengths_and_the_saved_file_has_them(chromium: Brows
     assert np.abs(turn["tracer.vx"] - table["tracer.vx_[mm/s]"]).max() < 1e-9
 
 
+@pytest.mark.long
 def test_pin_dragged_too_far_stays_where_the_lengths_close(chromium: Browser) -> None:
     with chromium.open(text_of("crank_rocker")) as page:
         page.tab.click("#edit")
@@ -481,6 +476,7 @@ def test_masses_and_gravity_have_the_limits_and_the_effects_of_the_file(chromium
         assert run[name][0] == pytest.approx(force, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.long
 def test_change_points_are_found_again_with_new_lengths(chromium: Browser) -> None:
     with chromium.open(text_of("fourbar")) as page:  # its third bar moves along the coupler and stays parallel
         page.get("k.design.set({'bodies.coupler.points.A.x': 0.8, 'bodies.ground.points.B.x': 1.8}) && k.reshape()")
@@ -670,7 +666,7 @@ def test_keyboard_alone_moves_plays_and_changes_values(chromium: Browser) -> Non
 
 
 @pytest.mark.parametrize("name", ["crank_rocker", "jansen_leg", "slider_crank"])
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_a_pin_is_chosen_and_moved_by_keys(chromium: Browser, name: str) -> None:
     with chromium.open(text_of(name)) as page:
         keyboard, ring = page.tab.keyboard, "k.linkage.pose && k.hand.place"
@@ -751,7 +747,7 @@ def test_nothing_is_spoken_at_frame_rate_and_the_drawing_states_its_pose(chromiu
     "name", ["crank_rocker", "triple_rocker", "cam_roller", "slider_crank", "toggle_press", "five_bar"]
 )
 @pytest.mark.parametrize("size", [PHONE, DESKTOP], ids=["phone", "desktop"])
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_fit_shows_the_circles_of_the_drivers(chromium: Browser, name: str, size: dict[str, int]) -> None:
     with chromium.open(text_of(name)) as page:
         page.resize(size)
@@ -814,6 +810,7 @@ def test_notes_and_long_rows_leave_scale_and_check_boxes_alone(chromium: Browser
         assert page.errors == []
 
 
+@pytest.mark.long
 def test_a_length_that_closes_on_another_branch_only_names_no_gap(chromium: Browser) -> None:
     with chromium.open(text_of("crank_rocker")) as page:
         assert (

@@ -31,7 +31,7 @@ from kinfmu.plan import compile_plan
 from kinfmu.solver.python import Pose, Solver, Status, singularity_map
 from kinfmu.solver.python.trusted_step import trusted_step
 from tests import oracle
-from tests.mechanisms import slider_crank, tight_jaw, with_arm
+from tests.mechanisms import PINS, slider_crank, tight_jaw, with_arm
 from tests.solver.change_points import fourbar
 
 Errors = Callable[[Solver, Pose], list[float]]
@@ -479,12 +479,7 @@ def test_a_determinant_that_stays_low_is_not_searched_again_in_every_short_step(
             Body("coupler", {"P": (0, 0), "Q": (1, 0)}, (0, 0, 0.09)),
             Body("rocker", {"C": (0, 0), "Q": (1.006, 0)}, (2, 0, 3.05)),
         ],
-        [
-            Revolute("O", ("ground.O", "crank.O")),
-            Revolute("P", ("crank.P", "coupler.P")),
-            Revolute("Q", ("coupler.Q", "rocker.Q")),
-            Revolute("C", ("ground.C", "rocker.C")),
-        ],
+        [*PINS],
         [AngleDriver("crank", "crank", ConstantSpeed(1.0, 1.0))],
     )
     run = kinfmu.solve(flat, np.arange(100) * 1e-4, engine="python")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -53,25 +53,17 @@ def test_with_several_drivers_the_path_back_from_a_near_singular_pose_is_the_pat
 
 @pytest.mark.parametrize("flavour", ["python", pytest.param("native 2", marks=pytest.mark.long), "native 3"])
 @pytest.mark.few(1)
-def test_in_fmus_the_path_back_from_a_near_singular_pose_is_the_path_there(flavour: str, tmp_path: Path) -> None:
+def test_in_fmus_the_path_back_from_a_near_singular_pose_is_the_path_there(
+    flavour: str, fmu_of: Callable[..., Path], opened: Callable[..., Host]
+) -> None:
     name, _, fmi = flavour.partition(" ")
-    path = kinfmu.build(
-        kinfmu.load("five_bar"),
-        tmp_path / "five_bar.fmu",
-        flavour=name,  # type: ignore[arg-type]  # one of the two
-        fmi=int(fmi or 2),  # type: ignore[arg-type]
-        drive="inputs",
-    )
-    host = Host(path, tmp_path / "unpacked")
-    try:
-        host.initialize(0.0)
-        found = []
-        for k, left in enumerate(THERE_AND_BACK):
-            host.set({"left_angle": left, "right_angle": math.pi - left})
-            found.append([host.status(), *host.get("T.x", "T.y")])
-            assert host.step(0.1 * k, 0.1) == OK
-    finally:
-        host.free()
+    host = opened(fmu_of("five_bar", name, int(fmi or 2), "inputs"))
+    host.initialize(0.0)
+    found = []
+    for k, left in enumerate(THERE_AND_BACK):
+        host.set({"left_angle": left, "right_angle": math.pi - left})
+        found.append([host.status(), *host.get("T.x", "T.y")])
+        assert host.step(0.1 * k, 0.1) == OK
     assert [int(row[0]) for row in found] == [0, 0, 1, 1, 1, 0, 0]
     np.testing.assert_allclose(found, found[::-1], rtol=0, atol=1e-9)
 
@@ -279,74 +271,51 @@ def test_a_pose_of_two_bridges_comes_back_from_its_numbers_to_the_bit() -> None:
     assert far.z == solver.solve(ahead, (3.0, 3.3)).z
 
 
+def stepped_twice(host: Host, inputs: tuple[str, str], ways: list[tuple[float, float]], *outputs: str) -> np.ndarray:
+    """Return status and outputs in each step, the same after the state of the beginning is restored."""
+    host.initialize(0.0)
+    runs, taken = [], host.state()
+    for _ in range(2):
+        found = []
+        for k, values in enumerate(ways):
+            host.set(dict(zip(inputs, values, strict=True)))
+            found.append([host.status(), *host.get(*outputs)])
+            assert host.step(0.1 * k, 0.1) == OK
+        runs.append(found)
+        host.restore(taken)
+    assert runs[0] == runs[1]
+    return np.array(runs[0])
+
+
 @pytest.mark.parametrize("flavour", ["python", pytest.param("native 2", marks=pytest.mark.long), "native 3"])
 @pytest.mark.few(1)
 def test_fmus_follow_a_crossing_with_blocks_of_several_drivers_and_go_back_to_a_state(
-    flavour: str, tmp_path: Path
+    flavour: str, fmu_of: Callable[..., Path], opened: Callable[..., Host]
 ) -> None:
     name, _, fmi = flavour.partition(" ")
     case = fourbar("4", "1", "3", "2")
-    path = kinfmu.build(
-        with_robot(case.mechanism),
-        tmp_path / "robot.fmu",
-        flavour=name,  # type: ignore[arg-type]  # one of the two
-        fmi=int(fmi or 2),  # type: ignore[arg-type]
-        drive="inputs",
-    )
-    host = Host(path, tmp_path / "unpacked")
+    host = opened(fmu_of(with_robot(case.mechanism), name, int(fmi or 2), "inputs"))
     ways = [(1.0, 0.6), (3.1, 0.9), (3.16, 0.2), (5.0, 0.4), (2.0, 1.0)]
-    try:
-        host.initialize(0.0)
-        runs, taken = [], host.state()
-        for _ in range(2):
-            found = []
-            for k, (crank, arm) in enumerate(ways):
-                host.set({"crank_angle": crank, "arm_angle": arm})
-                found.append([host.status(), *host.get("rocker.phi", "link.phi")])
-                assert host.step(0.1 * k, 0.1) == OK
-            runs.append(found)
-            host.restore(taken)
-    finally:
-        host.free()
-    assert runs[0] == runs[1]
-    assert [int(row[0]) for row in runs[0]] == [0, 2, 2, 0, 0]
+    found = stepped_twice(host, ("crank_angle", "arm_angle"), ways, "rocker.phi", "link.phi")
+    assert found[:, 0].tolist() == [0, 2, 2, 0, 0]
     exact = robot_motion(case, np.array(ways), (0.0, 0.0), (0.0, 0.0))[0]
-    off = np.array(runs[0])[:, 2] - exact
+    off = found[:, 2] - exact
     assert np.abs(np.remainder(off + math.pi, 2.0 * math.pi) - math.pi).max() <= 1e-11
 
 
 @pytest.mark.parametrize("flavour", ["python", "native 3"])
 @pytest.mark.few(1)
-def test_fmus_pass_crossings_of_each_driver_and_go_back_to_a_state(flavour: str, tmp_path: Path) -> None:
+def test_fmus_pass_crossings_of_each_driver_and_go_back_to_a_state(
+    flavour: str, fmu_of: Callable[..., Path], opened: Callable[..., Host]
+) -> None:
     name, _, fmi = flavour.partition(" ")
     case = fourbar("4", "1", "3", "2")
-    path = kinfmu.build(
-        with_second(case.mechanism),
-        tmp_path / "two.fmu",
-        flavour=name,  # type: ignore[arg-type]  # one of the two
-        fmi=int(fmi or 2),  # type: ignore[arg-type]
-        drive="inputs",
-    )
-    host = Host(path, tmp_path / "unpacked")
+    host = opened(fmu_of(with_second(case.mechanism), name, int(fmi or 2), "inputs"))
     ways = [(1.0, 1.0), (3.1, 3.16), (3.18, 2.0), (5.0, -1.0)]
-    try:
-        host.initialize(0.0)
-        taken = host.state()
-        runs = []
-        for _ in range(2):
-            found = []
-            for k, (first, second) in enumerate(ways):
-                host.set({"crank_angle": first, "second_angle": second})
-                found.append([host.status(), *host.get("rocker.phi", "rocker2.phi")])
-                assert host.step(0.1 * k, 0.1) == OK
-            runs.append(found)
-            host.restore(taken)
-    finally:
-        host.free()
-    assert runs[0] == runs[1]
-    assert [int(row[0]) for row in runs[0]] == [0, 2, 2, 0]
+    found = stepped_twice(host, ("crank_angle", "second_angle"), ways, "rocker.phi", "rocker2.phi")
+    assert found[:, 0].tolist() == [0, 2, 2, 0]
     exact = case.motion(np.array(ways, dtype=np.longdouble).ravel())["rocker.phi"][0].astype(float).reshape(-1, 2)
-    assert np.abs(np.array(runs[0])[:, 1:] - exact).max() <= 1e-11
+    assert np.abs(found[:, 1:] - exact).max() <= 1e-11
 
 
 def test_a_track_has_every_constant_of_a_model_that_following_it_reads() -> None:

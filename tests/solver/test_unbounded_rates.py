@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
-from typing import Any
 
 import mpmath as mp
 import numpy as np
@@ -171,15 +169,12 @@ def test_estimates_of_rates_are_for_the_driver_values_and_do_not_count_their_rou
 FLAVOURS = [("python", 2), ("native", 2), ("native", 3)]
 
 
-@pytest.fixture(scope="module")
-def cylinder_fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], tuple[Path, float, float]]:
-    """`cylinder_fmu(flavour, fmi)`: path of the FMU, built once, and the declared shortest and longest length."""
-    folder = tmp_path_factory.mktemp("cylinders")
+@pytest.fixture
+def cylinder_fmu(fmu_of: Callable[..., Path]) -> Callable[[str, int], tuple[Path, float, float]]:
+    """`cylinder_fmu(flavour, fmi)`: path of the FMU, and the declared shortest and longest length."""
 
-    @cache
     def get(flavour: str, fmi: int) -> tuple[Path, float, float]:
-        name: Any = folder / f"{flavour}{fmi}.fmu"
-        path = kinfmu.build(cylinder(0.7), name, flavour=flavour, fmi=fmi, drive="inputs")
+        path = fmu_of(cylinder(0.7), flavour, fmi, "inputs")
         variables = read_model_description(str(path)).modelVariables
         (length,) = [one for one in variables if one.name == "cylinder_length"]
         return path, float(length.min), float(length.max)
@@ -190,26 +185,23 @@ def cylinder_fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int
 @pytest.mark.parametrize(("flavour", "fmi"), FLAVOURS)
 @pytest.mark.few(1)
 def test_in_fmus_estimates_hold_at_the_longest_reach_that_is_declared(
-    flavour: str, fmi: int, cylinder_fmu: Callable[[str, int], tuple[Path, float, float]], tmp_path: Path
+    flavour: str, fmi: int, cylinder_fmu: Callable[[str, int], tuple[Path, float, float]], opened: Callable[..., Host]
 ) -> None:
     """At the first sample as at a later one."""
     path, _, longest = cylinder_fmu(flavour, fmi)
     at_longest = {"cylinder_length": longest, "cylinder_speed": 1.0}
     exact = exact_arm(0.7, longest)
     for is_first in (True, False):
-        host = Host(path, tmp_path / f"{is_first}")
-        try:
-            host.set(at_longest if is_first else {"cylinder_length": 1.0, "cylinder_speed": 1.0})
-            host.initialize(0.0)
-            host.set(at_longest)
-            assert host.status() == 1
-            values, errors = host.get("arm.phi", "arm.omega"), host.get("solver.error_q", "solver.error_qd")
-            bounds = [
-                abs(value - wanted) <= error for value, wanted, error in zip(values, exact or (), errors, strict=False)
-            ]
-            assert bounds == [True, True]
-        finally:
-            host.free()
+        host = opened(path)
+        host.set(at_longest if is_first else {"cylinder_length": 1.0, "cylinder_speed": 1.0})
+        host.initialize(0.0)
+        host.set(at_longest)
+        assert host.status() == 1
+        values, errors = host.get("arm.phi", "arm.omega"), host.get("solver.error_q", "solver.error_qd")
+        bounds = [
+            abs(value - wanted) <= error for value, wanted, error in zip(values, exact or (), errors, strict=False)
+        ]
+        assert bounds == [True, True]
 
 
 @pytest.mark.parametrize(("flavour", "fmi"), FLAVOURS)
@@ -220,31 +212,28 @@ def test_in_fmus_a_cylinder_beyond_its_declared_range_is_outside(
     fmi: int,
     has_moved: bool,
     cylinder_fmu: Callable[[str, int], tuple[Path, float, float]],
-    tmp_path: Path,
+    opened: Callable[..., Host],
 ) -> None:
     """At the declared ends, and 1e-9 within, it is near_singular; beyond there is no pose, from far and from near."""
     path, shortest, longest = cylinder_fmu(flavour, fmi)
-    host = Host(path, tmp_path / "instance")
-    try:
-        host.initialize(0.0)
-        time = 0.0
-        for end, sign in ((shortest, -1.0), (longest, 1.0)):
-            if has_moved:
-                for inside in (1e-2, 1e-6):
-                    host.set({"cylinder_length": end - sign * inside})
-                    assert host.step(time, 0.1) == OK
-                    time += 0.1
-            for beyond in (-1e-9, 0.0):
-                host.set({"cylinder_length": end + sign * beyond})
-                assert host.status() == Status.NEAR_SINGULAR, beyond
-                assert host.get("arm.phi") == pytest.approx([0.0 if sign < 0.0 else math.pi], abs=2e-4)
-            for beyond in (3e-12, 1e-9, 1e-6, 1e-2, 10.0):
-                host.set({"cylinder_length": end + sign * beyond})
-                assert host.status() == Status.OUTSIDE, beyond
-                assert host.step(time, 0.1) == DISCARD
-            host.set({"cylinder_length": end - sign * 1e-2})
-            assert host.status() == Status.OK
-            assert host.step(time, 0.1) == OK
-            time += 0.1
-    finally:
-        host.free()
+    host = opened(path)
+    host.initialize(0.0)
+    time = 0.0
+    for end, sign in ((shortest, -1.0), (longest, 1.0)):
+        if has_moved:
+            for inside in (1e-2, 1e-6):
+                host.set({"cylinder_length": end - sign * inside})
+                assert host.step(time, 0.1) == OK
+                time += 0.1
+        for beyond in (-1e-9, 0.0):
+            host.set({"cylinder_length": end + sign * beyond})
+            assert host.status() == Status.NEAR_SINGULAR, beyond
+            assert host.get("arm.phi") == pytest.approx([0.0 if sign < 0.0 else math.pi], abs=2e-4)
+        for beyond in (3e-12, 1e-9, 1e-6, 1e-2, 10.0):
+            host.set({"cylinder_length": end + sign * beyond})
+            assert host.status() == Status.OUTSIDE, beyond
+            assert host.step(time, 0.1) == DISCARD
+        host.set({"cylinder_length": end - sign * 1e-2})
+        assert host.status() == Status.OK
+        assert host.step(time, 0.1) == OK
+        time += 0.1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -12,17 +11,11 @@ import kinfmu
 from kinfmu import Mechanism
 from kinfmu.mechanism.gallery.chains import fourbar_chain
 from kinfmu.page import page
-from tests.page.engines import PHONE, Browser, browser, needs_browser
+from tests.page.engines import PHONE, Browser, needs_browser
 
 pytestmark = needs_browser
 LARGEST = 300_000  # [bytes] of a page of the gallery
 AGREEMENT = 1e-9  # of the size; JavaScript computes sines of drawn poses, the engine those of the solution
-
-
-@pytest.fixture(scope="module")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with browser(tmp_path_factory.mktemp("pages")) as opened:
-        yield opened
 
 
 def opens_and_moves(chromium: Browser, mechanism: Mechanism, largest: int) -> None:

@@ -20,6 +20,8 @@ from kinfmu.plan.path_laws import argument_symbol
 from kinfmu.solver.python.continuation import NO_NUMBER
 from kinfmu.solver.python.curve import CurveData
 
+MOST_STORES = 500  # of numbers in one function; the time of a compiler grows with their square
+
 
 class Parts(Lists):
     """The parts of a plan's model in C, from which its functions are written.
@@ -141,11 +143,10 @@ _ALONE = (((0, ""),), ((1, "v"),), ((2, "(v * v)"), (1, "a")))  # sums of deriva
 def readers(parts: Parts) -> list[str]:
     """Return all of them."""
     watches = "inline void kf_watches(const kf_model *model, const kf_found *found, double *watches)"
-    fixed = "void kf_fixed(const kf_model *model, double *fixed)"
     return [
         *(line for order in range(3) for line in _outputs(parts, order)),
         *_filled(parts, watches, [node for _, node in parts.plan.watches]),
-        *_filled(parts, fixed, list(parts.plan.fixed_nodes.values())),
+        *_fixed(parts),
         *(_laws(parts) if parts.plan.path_laws.units else ()),
     ]
 
@@ -219,6 +220,19 @@ def _filled(parts: Parts, signature: str, nodes: Sequence[Node]) -> list[str]:
     """Return a function that writes numbers into its last argument."""
     lines, texts = _formulas(parts, nodes)
     return function(signature, [*lines, *filled(signature.split("*")[-1].rstrip(")"), texts)])
+
+
+def _fixed(parts: Parts) -> list[str]:
+    """Return the function of the fixed coordinates; beyond MOST_STORES their numbers are a table."""
+    signature, nodes = "void kf_fixed(const kf_model *model, double *fixed)", list(parts.plan.fixed_nodes.values())
+    if len(nodes) <= MOST_STORES:
+        return _filled(parts, signature, nodes)
+    lines, texts = _formulas(parts, nodes)
+    numbers = [0.0 if node.constant is None else node.constant for node in nodes]
+    copied = ["for (k = 0; k < KF_FIXED; ++k) {", "    fixed[k] = fixed_numbers[k];", "}"]
+    stored = [one for one, node in zip(filled("fixed", texts), nodes, strict=True) if node.constant is None]
+    table = array("static double fixed_numbers", numbers)
+    return [*table, "", *function(signature, [*lines, *copied, *stored], ("int k;",))]
 
 
 def _formulas(parts: Parts, targets: Sequence[Node]) -> tuple[list[str], list[str]]:

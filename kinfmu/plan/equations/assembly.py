@@ -17,8 +17,8 @@ from kinfmu.plan.equations.closing import (
     closed_up_to,
     dependent_rows,
     followed,
-    gap_of,
     margin,
+    offset_rounding,
     reaches,
 )
 from kinfmu.plan.equations.part import Part
@@ -216,8 +216,7 @@ def in_order(system: System, rows: Sequence[int] | None = None) -> Ordered:
     poses = rng.uniform(-3.0, 3.0, (_LOOKS, len(system.coordinates))) * system.column_scales
     meets: list[list[int]] = []
     for member in system.members:
-        slopes = np.any([system.gradients(member, q) != 0.0 for q in poses], axis=0)  # (rows, columns)
-        meets += [[column for column, meet in zip(member.columns, row, strict=True) if meet] for row in slopes]
+        meets += [[member.columns[k] for k in met] for met in system.columns_met(member, poses[:, member.columns])]
     chosen = range(len(meets)) if rows is None else rows
     order = ordered_blocks([meets[row] for row in chosen], len(system.coordinates))
     return Ordered(
@@ -284,8 +283,8 @@ def _assembled_in_order(
         if least <= comfortable(system):
             return None, f"the rows {listed(system.rows[k].name for k in rows[:5])} are singular there or nearly so"
     whole = Part(system)
-    open_rows = [k for k, left in enumerate(whole.residual(q, u)) if gap_of(whole, q, left) > CLOSED]
-    if open_rows:  # a cam that dwells at every random pose does not show what it moves
+    open_rows = np.flatnonzero(np.abs(whole.residual(q, u)) - offset_rounding(whole, q) > CLOSED)
+    if open_rows.size:  # a cam that dwells at every random pose does not show what it moves
         return None, f"the rows {listed(system.rows[k].name for k in open_rows[:5])} open when others close"
     return Assembled(q, u, least), ""
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kinfmu.arrays import FloatArray
 from kinfmu.plan.equations.part import Part
@@ -76,14 +75,14 @@ def close(part: System | Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray
             too_far = True
         else:
             damping *= 8.0
-    return best, gap_of(part, best, residual)
+    largest = float(np.abs(residual).max(initial=0.0))
+    return best, max(0.0, largest - offset_rounding(part, best)) if largest > 0.0 else 0.0
 
 
-def gap_of(part: Part, q: FloatArray, residual: ArrayLike) -> float:
-    """Return the largest residual of a pose, less what the rounding of its offset from the origin leaves of it."""
+def offset_rounding(part: Part, q: FloatArray) -> float:
+    """Return what the rounding of a pose's offset from the origin leaves of residuals."""
     away = float(np.abs(part.whole(q).reshape(-1, 3)[:, :2]).max(initial=0.0)) / part.system.size
-    rounding = min(OFFSET_ROUNDING * away, _TOLERANCE) if away > FAR else 0.0
-    return max(0.0, float(np.abs(residual).max(initial=0.0)) - rounding)
+    return min(OFFSET_ROUNDING * away, _TOLERANCE) if away > FAR else 0.0
 
 
 def closed_up_to(system: System) -> float:

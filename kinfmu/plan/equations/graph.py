@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from kinfmu.mechanism.quantities.arithmetic import atan2_like, cos, curve, floor, sin, sqrt
@@ -23,18 +24,15 @@ Content = float | str | tuple[CurveData, int] | None
 class Node:
     """A number in the graph: a constant, a symbol, or an operation on earlier nodes."""
 
-    __slots__ = ("args", "graph", "id", "op", "value")
+    __slots__ = ("args", "constant", "graph", "id", "op", "value")
 
     def __init__(self, graph: Graph, op: str, args: tuple[Node, ...], value: Content, number: int) -> None:
         self.graph = graph
         self.op = op  # "constant", "symbol", "+", "-", "*", "/", "neg", or a key of FUNCTIONS
         self.args = args
         self.value = value  # of a constant its float, of a symbol its name, of a curve its data and order
+        self.constant: float | None = value if op == "constant" else None  # type: ignore[assignment]  # a float
         self.id = number
-
-    @property
-    def constant(self) -> float | None:
-        return self.value if self.op == "constant" else None  # type: ignore[return-value]  # constants hold floats
 
     @property
     def name(self) -> str:
@@ -71,7 +69,7 @@ class Node:
             return a - b.args[0]
         if a.op == "neg":
             return b - a.args[0]
-        return self.graph.node("+", *sorted((a, b), key=_number))
+        return self.graph.node("+", *_numbered(a, b))
 
     def __sub__(self, other: Any) -> Node:
         a, b = self, self.graph.lift(other)
@@ -102,8 +100,10 @@ class Node:
         return self.graph.node("neg", self)
 
     def __mul__(self, other: Any) -> Node:
-        a, b = sorted((self, self.graph.lift(other)), key=_number)
+        a, b = _numbered(self, self.graph.lift(other))
         for x, y in ((a, b), (b, a)):
+            if x.constant is None and x.op != "neg":
+                continue
             if x.constant == 0.0:
                 return x
             if x.constant == 1.0:
@@ -135,8 +135,9 @@ class Node:
     __rmul__ = __mul__
 
 
-def _number(node: Node) -> int:
-    return node.id
+def _numbered(a: Node, b: Node) -> tuple[Node, Node]:
+    """Return two nodes in the order of their numbers."""
+    return (a, b) if a.id <= b.id else (b, a)
 
 
 class Graph:
@@ -163,16 +164,17 @@ class Graph:
         return self._intern(node.op, args, node.value)
 
     def _intern(self, op: str, args: tuple[Node, ...], value: Content) -> Node:
-        key = (op, value, *(arg.id for arg in args))
-        if key not in self._nodes:
-            self._nodes[key] = Node(self, op, args, value, len(self._nodes))
-        return self._nodes[key]
+        key = (op, value, args)
+        node = self._nodes.get(key)
+        if node is None:
+            node = self._nodes[key] = Node(self, op, args, value, len(self._nodes))
+        return node
 
     def function(self, name: str, *args: Node, value: Content = None) -> Node:
         """Return one of FUNCTIONS of nodes; `value`: data and order of a curve."""
         numbers = [arg.constant for arg in args if arg.constant is not None]
         if len(numbers) == len(args):
-            return self.constant(_applied(name, value, numbers))
+            return self.constant(_operation(name, value)(*numbers))
         return self._intern(name, args, value)
 
     def derivative(
@@ -185,10 +187,12 @@ class Graph:
         zero, one = self.constant(0.0), self.constant(1.0)
         d: dict[Node, Node] = {}
         for node in reachable(targets):
-            a = node.args[0] if node.args else node
-            b = node.args[-1] if node.args else node
-            if node.op in ("constant", "symbol"):
+            if not node.args:
                 d[node] = zero if node in still else rates.get(node, zero)
+                continue
+            a, b = node.args[0], node.args[-1]
+            if node.op in _OPERATORS and d[a] is zero and d[b] is zero:  # most nodes depend on few symbols
+                d[node] = zero
             elif node.op == "+":
                 d[node] = d[a] + d[b]
             elif node.op == "-":
@@ -229,26 +233,28 @@ def reachable(targets: Iterable[Node]) -> list[Node]:
 
 def evaluate(targets: Sequence[Node], values: Mapping[str, float]) -> list[float]:
     """Return numbers for the targets, given a number for each symbol by name; used by plans, not at run time."""
-    at: dict[Node, float] = {}
+    return [value for (value,) in evaluate_all(targets, {name: (value,) for name, value in values.items()}, 1)]
+
+
+def evaluate_all(targets: Sequence[Node], values: Mapping[str, Sequence[float]], count: int) -> list[Sequence[float]]:
+    """Return `count` numbers for each target, given as many for each symbol by name."""
+    at: dict[Node, Sequence[float]] = {}
     for node in reachable(targets):
-        args = [at[arg] for arg in node.args]
         if node.op == "constant":
-            at[node] = float(node.constant or 0.0)
+            at[node] = (float(node.constant or 0.0),) * count
         elif node.op == "symbol":
             at[node] = values[node.name]
         else:
-            at[node] = _applied(node.op, node.value, args)
+            at[node] = list(map(_operation(node.op, node.value), *(at[arg] for arg in node.args)))
     return [at[target] for target in targets]
 
 
-def _applied(op: str, value: Content, args: Sequence[float]) -> float:
-    """Return an operation on numbers."""
-    if isinstance(value, tuple):
-        data, order = value
-        return curve_value(data, order, args[0])
-    return _OPERATIONS[op](*args)
+def _operation(op: str, value: Content) -> Callable[..., float]:
+    """Return an operation on numbers; `value`: data and order of a curve."""
+    return partial(curve_value, *value) if isinstance(value, tuple) else _OPERATIONS[op]
 
 
+_OPERATORS = frozenset(("+", "-", "*", "/", "neg"))
 FUNCTIONS = ("sin", "cos", "sqrt", "floor", "atan2", "curve")
 _OPERATIONS: dict[str, Callable[..., float]] = {
     "+": operator.add,

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.plan.equations.system import System
+from kinfmu.plan.equations.system import Member, System
 
 
 class Part:
@@ -31,16 +31,12 @@ class Part:
         self.row_scales: FloatArray = system.scales[self.rows] * system.size  # residual per mechanism size
         self.column_scales: FloatArray = system.column_scales[self.columns]
         self._at = np.zeros(n) if at is None else at.copy()
-        row_place, column_place = _places(self.rows, len(system.rows)), _places(self.columns, n)
-        self._members = []  # (member, its rows wanted and their places, its entries of Phi_q wanted and their places)
-        for number in sorted({system.member_of[row] for row in self.rows}):
-            member = system.members[number]
-            wanted_rows = [k for k, row in enumerate(member.rows) if row_place[row] >= 0]
-            wanted_columns = [k for k, column in enumerate(member.columns) if column_place[column] >= 0]
-            row_places = row_place[[member.rows[k] for k in wanted_rows]]
-            column_places = column_place[[member.columns[k] for k in wanted_columns]]
-            entries = np.ix_(wanted_rows, wanted_columns), np.ix_(row_places, column_places)
-            self._members.append((member, (wanted_rows, row_places), entries))
+        row_place = {row: k for k, row in enumerate(self.rows)}
+        column_place = {column: k for k, column in enumerate(self.columns)}
+        self._members = [
+            _PartMember(system.members[number], row_place, column_place, self._at)
+            for number in sorted({system.member_of[row] for row in self.rows})
+        ]
 
     def whole(self, q: FloatArray) -> FloatArray:
         """Return all coordinates of the system, (n,)."""
@@ -50,22 +46,41 @@ class Part:
 
     def residual(self, q: FloatArray, u: FloatArray) -> FloatArray:
         """Return Phi of the rows relative to the size, (len(rows),)."""
-        at, phi = self.whole(q), np.empty(len(self.rows))
-        for member, (rows, places), _ in self._members:
-            values = self.system.values(member, at, u)
-            phi[places] = [values[k] for k in rows]
+        pose, phi = q.tolist(), np.empty(len(self.rows))
+        for part in self._members:
+            values = self.system.values(part.member, part.coordinates(pose), u)
+            for k, place in part.rows:
+                phi[place] = values[k]
         return np.asarray(phi / self.row_scales)
 
     def jacobian(self, q: FloatArray) -> FloatArray:
         """Return Phi_q, rows relative to the size and columns in sizes and radians: pure numbers of order one."""
-        at, matrix = self.whole(q), np.zeros((len(self.rows), len(self.columns)))
-        for member, _, (entries, places) in self._members:
-            matrix[places] = self.system.gradients(member, at)[entries]
+        pose, matrix = q.tolist(), np.zeros((len(self.rows), len(self.columns)))
+        for part in self._members:
+            gradients = self.system.gradients(part.member, part.coordinates(pose))
+            for k, row in part.rows:
+                for j, column in part.columns:
+                    matrix[row, column] = gradients[k, j]
         return matrix / self.row_scales[:, None] * self.column_scales
 
 
-def _places(chosen: Sequence[int], count: int) -> np.ndarray:
-    """Return the place of each of `count` indices among those chosen, -1 for the others."""
-    places = np.full(count, -1)
-    places[list(chosen)] = np.arange(len(chosen))
-    return places
+class _PartMember:
+    """A joint or driver of a part.
+
+    rows, columns: those of its own that are of the part, by index, each with its place there.
+    """
+
+    def __init__(
+        self, member: Member, row_place: Mapping[int, int], column_place: Mapping[int, int], at: FloatArray
+    ) -> None:
+        self.member = member
+        self.rows = [(k, row_place[row]) for k, row in enumerate(member.rows) if row in row_place]
+        self.columns = [(k, column_place[column]) for k, column in enumerate(member.columns) if column in column_place]
+        self._at = member.coordinates(at)
+
+    def coordinates(self, pose: Sequence[float]) -> list[float]:
+        """Return its coordinates from those of the part."""
+        at: list[float] = self._at.copy()
+        for k, place in self.columns:
+            at[k] = pose[place]
+        return at

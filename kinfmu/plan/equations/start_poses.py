@@ -49,7 +49,7 @@ def start_from_poses(system: System) -> StartValues:
     turns = np.zeros(len(law))
     for k, driver in enumerate(system.mechanism.drivers):
         member = system.members[len(system.mechanism.joints) + k]
-        (seen,) = system.gradients(member, q) != 0.0
+        (seen,) = system.gradients(member, member.coordinates(q)) != 0.0
         if all(given[column] for column, used in zip(member.columns, seen, strict=True) if used):
             if driver.quantity.kind == "angle":
                 turns[k] = math.tau * round((law[k] - measured[k]) / math.tau)
@@ -63,7 +63,7 @@ def with_angles(system: System, q: FloatArray, change: FloatArray) -> FloatArray
     for k, driver in enumerate(system.mechanism.drivers):
         if driver.quantity.kind == "angle" and change[k] != 0.0:
             member = system.members[len(system.mechanism.joints) + k]
-            (slopes,) = system.gradients(member, q)
+            (slopes,) = system.gradients(member, member.coordinates(q))
             turned = int(np.abs(slopes).argmax())
             q[member.columns[turned]] += change[k] / slopes[turned]
     return q

@@ -47,6 +47,11 @@ class Member(NamedTuple):
     columns: tuple[int, ...]  # three a body
     driver: int | None = None  # number of the driver, if it is one
 
+    def coordinates(self, q: FloatArray) -> list[float]:
+        """Return the coordinates of its columns from all coordinates, (n,)."""
+        coordinates: list[float] = q[list(self.columns)].tolist()
+        return coordinates
+
 
 class System:
     """Phi(q, u) = [Phi_K(q); Phi_D(q, u)]: joint rows in file order, then one row for each driver.
@@ -96,7 +101,7 @@ class System:
         at = np.asarray(q, dtype=float)
         matrix = np.zeros((len(self.rows), len(self.coordinates)))
         for member in self.members:
-            matrix[np.ix_(member.rows, member.columns)] = self.gradients(member, at)
+            matrix[np.ix_(member.rows, member.columns)] = self.gradients(member, member.coordinates(at))
         return matrix
 
     @cached_property
@@ -119,16 +124,14 @@ class System:
         """Number of the joint or driver to which each row belongs, by index into `members`."""
         return tuple(number for number, member in enumerate(self.members) for _ in member.rows)
 
-    def values(self, member: Member, q: FloatArray, u: FloatArray) -> Sequence[float]:
-        """Return Phi of one joint or driver, a value per row; q: (n,) all coordinates."""
+    def values(self, member: Member, coordinates: Sequence[float], u: FloatArray) -> Sequence[float]:
+        """Return Phi of one joint or driver, a value per row; coordinates: of its columns."""
         target = 0.0 if member.driver is None else float(u[member.driver])
-        coordinates = q[list(member.columns)].tolist()
         code = self._codes.get(member.rows)
         return code.values(coordinates, target) if code else list(map(float, self._alone(member, coordinates, target)))
 
-    def gradients(self, member: Member, q: FloatArray) -> FloatArray:
-        """Return Phi_q of one joint or driver, (its rows, its columns); q: (n,) all coordinates."""
-        coordinates = q[list(member.columns)].tolist()
+    def gradients(self, member: Member, coordinates: Sequence[float]) -> FloatArray:
+        """Return Phi_q of one joint or driver, (its rows, its columns); coordinates: of its columns."""
         shape = len(member.rows), len(coordinates)
         code = self._code(member)
         if code is not None:
@@ -137,8 +140,19 @@ class System:
         along = [Taylor(pair) for pair in zip(coordinates, np.eye(len(coordinates)), strict=True)]
         gradients = np.zeros(shape)
         for row, phi in enumerate(self._alone(member, along, 0.0)):
-            gradients[row] = phi.c[1] if isinstance(phi, Taylor) else 0.0
+            gradients[row] = _derivative(phi, 1)
         return gradients
+
+    def columns_met(self, member: Member, poses: FloatArray) -> list[list[int]]:
+        """Return for each row of one joint or driver those of its columns along which it moves in any of some poses.
+
+        poses: (n, its columns).
+        """
+        self._evaluations[member.rows] += len(poses)
+        units = np.eye(poses.shape[1])[:, :, None]
+        along = [Taylor(pair) for pair in zip(poses.T, units, strict=True)]
+        slopes = [np.asarray(_derivative(phi, 1)) for phi in self._alone(member, along, 0.0)]
+        return [np.flatnonzero((slope != 0.0).any(axis=-1)).tolist() if slope.ndim else [] for slope in slopes]
 
     def _code(self, member: Member) -> RowCode | None:
         """Return the code of a joint or driver; None as long as its formulas are evaluated rarely."""

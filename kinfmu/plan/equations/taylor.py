@@ -56,7 +56,10 @@ class Taylor:
         if not isinstance(other, Taylor):
             return Taylor([self.c[0] + other, *self.c[1:]], self.side)
         side = other.side if self.side is None else self.side
-        return Taylor([a + b for a, b in zip(self.c, other.c, strict=True)], side)
+        a, b = self.c, other.c
+        if len(a) == len(b) == 2:  # Jacobians, most of the work of an assembly: without a loop
+            return Taylor((a[0] + b[0], a[1] + b[1]), side)
+        return Taylor([x + y for x, y in zip(a, b, strict=True)], side)
 
     def __neg__(self) -> Taylor:
         return Taylor([-a for a in self.c], _turned(self.side, -1.0))
@@ -65,15 +68,20 @@ class Taylor:
         if not isinstance(other, Taylor):
             return Taylor([self.c[0] - other, *self.c[1:]], self.side)
         side = _turned(other.side, -1.0) if self.side is None else self.side
-        return Taylor([a - b for a, b in zip(self.c, other.c, strict=True)], side)
+        a, b = self.c, other.c
+        if len(a) == len(b) == 2:
+            return Taylor((a[0] - b[0], a[1] - b[1]), side)
+        return Taylor([x - y for x, y in zip(a, b, strict=True)], side)
 
     def __rsub__(self, other: Any) -> Taylor:
         return (-self).__add__(other)
 
     def __mul__(self, other: Any) -> Taylor:
+        a = self.c
         if not isinstance(other, Taylor):
-            return Taylor([a * other for a in self.c], _turned(self.side, other))
-        a, b = self.c, other.c
+            side = None if self.side is None else _turned(self.side, other)
+            return Taylor((a[0] * other, a[1] * other) if len(a) == 2 else [x * other for x in a], side)
+        b = other.c
         product = [a[0] * b[0], a[1] * b[0] + a[0] * b[1]]
         for k in range(2, len(a)):
             term = a[k] * b[0]

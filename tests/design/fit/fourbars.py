@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 
 from kinfmu.mechanism import Mechanism, toml_file
+from tests.mechanisms import FOURBAR_DRIVER, FOURBAR_PINS
 
 LENGTHS = {"ground": 4.0, "crank": 1.0, "coupler": 3.5, "rocker": 3.0, "px": 1.7, "py": 1.2}
-TEXT = """
+TEXT = (
+    """
 name = "NAME"
 [bodies.ground]
 points = { PIVOTS }
@@ -22,18 +24,13 @@ start = { phi = "40 deg" }
 [bodies.rocker]
 points = { C = [0, 0], Q = ["rocker", 0] }
 start = { phi = "100 deg" }
-[joints]
-O = { type = "revolute", between = ["ground.O", "crank.O"] }
-P = { type = "revolute", between = ["crank.P", "coupler.P"] }
-Q = { type = "revolute", between = ["coupler.Q", "rocker.Q"] }
-C = { type = "revolute", between = ["ground.C", "rocker.C"] }
-[drivers.crank]
-type = "angle"
-of = "crank"
-law = "constant_speed"
-start = "60 deg"
+"""
+    + FOURBAR_PINS
+    + FOURBAR_DRIVER
+    + """start = "60 deg"
 [parameters]
 """
+)
 
 
 def four_bar(more: str = "", **lengths: float) -> Mechanism:

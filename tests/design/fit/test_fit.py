@@ -201,6 +201,7 @@ def test_a_file_gives_what_python_gives(tmp_path: Path) -> None:
     assert "curve: wanted" in str(expected._repr_svg_())
 
 
+@pytest.mark.long
 def test_starts_and_offsets_are_listed_with_their_units() -> None:
     points = [("0 deg", 0.0), ("30 deg", 0.1), ("60 deg", 0.2)]
     angle = FunctionTarget(name="f", of="rocker.phi", points=points, start=(1, 2), offset=(1, 3))

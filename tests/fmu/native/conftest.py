@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import pytest
 
 from kinfmu.mechanism import Mechanism
@@ -18,9 +15,8 @@ def fmi(request: pytest.FixtureRequest) -> int:
 
 
 @pytest.fixture
-def start(built_native: Build, fmi: int, tmp_path: Path) -> Iterator[Start]:
+def start(built_native: Build, fmi: int, opened: Start) -> Start:
     """`start(name, drive)`: an instance, by default initialized at time 0; freed at the end."""
-    hosts: list[Host] = []
 
     def get(
         model: str | Mechanism = "fourbar",
@@ -29,15 +25,11 @@ def start(built_native: Build, fmi: int, tmp_path: Path) -> Iterator[Start]:
         initialize: bool = True,
         model_exchange: bool = False,
     ) -> Host:
-        path = built_native(model, fmi, drive)
-        host = Host(path, tmp_path / path.stem, model_exchange=model_exchange)
-        hosts.append(host)
+        host = opened(built_native(model, fmi, drive), model_exchange=model_exchange)
         if initialize:
             host.initialize(0.0)
             if model_exchange:
                 host.fmu.enterContinuousTimeMode()
         return host
 
-    yield get
-    for host in hosts:
-        host.free()
+    return get

@@ -48,19 +48,15 @@ CLOCKS: dict[str, Callable[[float], Iterator[float]]] = {  # equal times in diff
 
 
 @pytest.fixture
-def start(built_native: Build, tmp_path: Path) -> Iterator[Callable[..., Host]]:
+def start(built_native: Build, opened: Callable[..., Host]) -> Callable[..., Host]:
     """`start(name, t)`: a slave of FMI 2.0 that is driven by inputs, initialized at time t."""
-    hosts: list[Host] = []
 
     def get(name: str = "fourbar", t: float = 0.0) -> Host:
-        path = built_native(name, 2, "inputs")
-        hosts.append(Host(path, tmp_path / path.stem))
-        hosts[-1].initialize(t)
-        return hosts[-1]
+        host = opened(built_native(name, 2, "inputs"))
+        host.initialize(t)
+        return host
 
-    yield get
-    for host in hosts:
-        host.free()
+    return get
 
 
 def give(host: Host, name: str, derivatives: list[float]) -> None:

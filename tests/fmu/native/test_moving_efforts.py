@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -37,31 +37,15 @@ def taylor(t: float) -> tuple[float, ...]:
     return tuple(float(c) * math.factorial(k) for k, c in enumerate(mpmath.taylor(torque, t, 3)))
 
 
-@pytest.fixture(scope="module")
-def fmu_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Path]:
-    folder = tmp_path_factory.mktemp("moving")
-
-    @cache
-    def get(name: str, fmi: int) -> Path:
-        return kinfmu.build(MECHANISMS[name](), folder / f"{name}_{fmi}.fmu", flavour="native", fmi=fmi, drive="torque")
+@pytest.fixture
+def start(fmu_of: Callable[..., Path], opened: Callable[..., Host]) -> Callable[..., Host]:
+    def get(name: str, fmi: int, inputs_at: Callable[[float], Mapping[str, float]] | None = None, **at: float) -> Host:
+        host = opened(fmu_of(MECHANISMS[name](), "native", fmi, "torque"), inputs_at=inputs_at)
+        host.set({"integrator.tolerance": 1e-12, **at})
+        host.initialize(0.0)
+        return host
 
     return get
-
-
-@pytest.fixture
-def start(fmu_of: Callable[[str, int], Path], tmp_path: Path) -> Iterator[Callable[..., Host]]:
-    hosts: list[Host] = []
-
-    def get(name: str, fmi: int, inputs_at: Callable[[float], Mapping[str, float]] | None = None, **at: float) -> Host:
-        path = fmu_of(name, fmi)
-        hosts.append(Host(path, tmp_path / path.stem, inputs_at=inputs_at))
-        hosts[-1].set({"integrator.tolerance": 1e-12, **at})
-        hosts[-1].initialize(0.0)
-        return hosts[-1]
-
-    yield get
-    for host in hosts:
-        host.free()
 
 
 def error_of(host: Host, h: float, orders: int) -> float:

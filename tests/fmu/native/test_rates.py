@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from fmpy.fmi1 import FMICallException
 
-import kinfmu
 from kinfmu.errors import RequestError
 from kinfmu.fmu import simulate
 from kinfmu.fmu.slave.estimated_rates import Rates
@@ -24,38 +23,28 @@ Start = Callable[..., Host]
 
 
 @pytest.fixture(scope="module")
-def paths(built_native: Build, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], Path]:
+def paths(built: Build, built_native: Build) -> Callable[[str, str], Path]:
     """`paths(flavour, name)`: an FMU that inputs drive."""
-    folder = tmp_path_factory.mktemp("python")
-    made: dict[str, Path] = {}
 
     def get(flavour: str, name: str) -> Path:
-        if flavour != "python":
-            return built_native(name, int(flavour[-1]), "inputs")
-        if name not in made:
-            made[name] = kinfmu.build(kinfmu.load(name), folder / f"{name}.fmu", flavour="python", drive="inputs")
-        return made[name]
+        return built(name, "inputs") if flavour == "python" else built_native(name, int(flavour[-1]), "inputs")
 
     return get
 
 
 @pytest.fixture(params=FLAVOURS)
-def start(request: pytest.FixtureRequest, paths: Callable[[str, str], Path], tmp_path: Path) -> Iterator[Start]:
+def start(request: pytest.FixtureRequest, paths: Callable[[str, str], Path], opened: Start) -> Start:
     """`start(name, rates, before)`: a slave; before: inputs that are set before `rates` is."""
-    hosts: list[Host] = []
 
     def get(name: str = "fourbar", rates: Rates | None = None, before: dict[str, float] | None = None) -> Any:
-        hosts.append(Host(paths(request.param, name), tmp_path / f"slave_{len(hosts)}"))
-        host = hosts[-1]
+        host = opened(paths(request.param, name))
         host.set(before or {})
         if rates is not None:
             host.set({"rates": rates})
         host.initialize(0.0)
         return host
 
-    yield get
-    for host in hosts:
-        host.free()
+    return get
 
 
 def steps(host: Any, t: float, h: float) -> bool:
@@ -142,13 +131,12 @@ def test_the_choice_is_fixed_once_initialized(start: Start) -> None:
     assert mode(host) == Rates.AUTO
 
 
-def test_model_exchange_always_takes_the_inputs(paths: Callable[[str, str], Path], tmp_path: Path) -> None:
+def test_model_exchange_always_takes_the_inputs(paths: Callable[[str, str], Path], opened: Start) -> None:
     for fmi in (2, 3):
-        host = Host(paths(f"native {fmi}", "fourbar"), tmp_path / str(fmi), model_exchange=True)
+        host = opened(paths(f"native {fmi}", "fourbar"), model_exchange=True)
         host.set({"rates": Rates.ESTIMATED, "crank_speed": 3.0})
         host.initialize(0.0)
         assert host.get("crank.omega") == [3.0]
-        host.free()
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)

@@ -48,10 +48,15 @@ def test_code_of_its_row_gives_the_numbers_of_its_formula(cls: type[Driver], dat
     system = data.draw(systems(cls))
     q, target = data.draw(poses(system)), np.array([u])
     (member,) = system.members
-    values, gradients = list(system.values(member, q, target)), system.gradients(member, q)
+    values, gradients = (
+        list(system.values(member, member.coordinates(q), target)),
+        system.gradients(member, member.coordinates(q)),
+    )
     system.use_code()
-    assert list(system.values(member, q, target)) == values
-    np.testing.assert_allclose(system.gradients(member, q), gradients, rtol=1e-14, atol=1e-15 * size(system, q))
+    assert list(system.values(member, member.coordinates(q), target)) == values
+    np.testing.assert_allclose(
+        system.gradients(member, member.coordinates(q)), gradients, rtol=1e-14, atol=1e-15 * size(system, q)
+    )
 
 
 @every_driver

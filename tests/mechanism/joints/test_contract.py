@@ -184,7 +184,12 @@ def test_code_of_its_rows_gives_the_numbers_of_its_formulas(cls: type[Joint], da
     system = data.draw(systems(cls))
     q = data.draw(regular_poses(system))
     (member,) = system.members
-    values, gradients = list(system.values(member, q, NO_DRIVERS)), system.gradients(member, q)
+    values, gradients = (
+        list(system.values(member, member.coordinates(q), NO_DRIVERS)),
+        system.gradients(member, member.coordinates(q)),
+    )
     system.use_code()
-    assert list(system.values(member, q, NO_DRIVERS)) == values
-    np.testing.assert_allclose(system.gradients(member, q), gradients, rtol=1e-14, atol=1e-15 * size(system, q))
+    assert list(system.values(member, member.coordinates(q), NO_DRIVERS)) == values
+    np.testing.assert_allclose(
+        system.gradients(member, member.coordinates(q)), gradients, rtol=1e-14, atol=1e-15 * size(system, q)
+    )

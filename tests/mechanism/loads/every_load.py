@@ -18,8 +18,10 @@ from kinfmu.mechanism.toml_file import parse
 from kinfmu.plan.equations.system import placement
 from kinfmu.units import METRES
 from tests.mechanism.joints.drawn import POINTS, coordinates, members
+from tests.mechanisms import FOURBAR_DRIVER, FOURBAR_PINS
 
-FOURBAR = """
+FOURBAR = (
+    """
 name = "four_bar"
 title = "Four-bar with loads"
 [units]
@@ -38,18 +40,13 @@ mass = "2 kg"
 [bodies.rocker]
 points = { C = [0, 0], Q = [120, 0], T = [60, 0] }
 start = { x = 200, phi = "70 deg" }
-[joints]
-O = { type = "revolute", between = ["ground.O", "crank.O"] }
-P = { type = "revolute", between = ["crank.P", "coupler.P"] }
-Q = { type = "revolute", between = ["coupler.Q", "rocker.Q"] }
-C = { type = "revolute", between = ["ground.C", "rocker.C"] }
-[drivers.crank]
-type = "angle"
-of = "crank"
-law = "constant_speed"
-start = "60 deg"
+"""
+    + FOURBAR_PINS
+    + FOURBAR_DRIVER
+    + """start = "60 deg"
 speed = "60 rpm"
 """
+)
 GRAVITY = """
 [gravity]
 x = 0

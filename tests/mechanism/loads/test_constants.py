@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -76,19 +75,6 @@ def assert_torque(run: kinfmu.Run, constants: dict[str, float]) -> None:
     assert np.ptp(run["crank.torque"]) > 1.0  # the test can fail
 
 
-@pytest.fixture(scope="module")
-def fmu_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
-    """`fmu_of(flavour, fmi, drive)`: path of the FMU, built once."""
-    folder = tmp_path_factory.mktemp("constants")
-
-    @cache
-    def get(flavour: str, fmi: int, drive: str) -> Path:
-        path = folder / f"{flavour}_{fmi}_{drive}.fmu"
-        return kinfmu.build(pendulum(), path, flavour=flavour, fmi=fmi, drive=drive)  # type: ignore[arg-type]
-
-    return get
-
-
 @pytest.mark.parametrize("engine", ["python", "native"])
 def test_forces_follow_the_constants(engine: str) -> None:
     t = np.linspace(0.0, 1.0, 41)
@@ -123,14 +109,14 @@ def test_batches_take_arrays_of_them() -> None:
 @of_each_flavour
 @pytest.mark.few(1)
 def test_an_fmu_has_them_as_tunable_parameters(
-    fmu_of: Callable[..., Path], flavour: str, fmi: int, tmp_path: Path
+    fmu_of: Callable[..., Path], flavour: str, fmi: int, opened: Callable[..., Host]
 ) -> None:
-    path = fmu_of(flavour, fmi, "time")
+    path = fmu_of(pendulum(), flavour, fmi, "time")
     assert_torque(kinfmu.simulate(path), WRITTEN)
     run = kinfmu.simulate(path, parameters=CHANGED)
     assert_torque(run, CHANGED)
     assert "push.rise" not in run.force_names
-    host = Host(path, tmp_path / "host")
+    host = opened(path)
     variables = {variable.name: variable for variable in host.about.interface}
     assert [variables[name].variability for name in WRITTEN] == ["tunable"] * 6
     assert (variables["push.rise"].unit, variables["push.begin"].unit) == ("N m", "s")
@@ -149,7 +135,6 @@ def test_an_fmu_has_them_as_tunable_parameters(
             (slope,) = host.slopes(["crank.torque"], [name], [1.0])
             high, low = (torque(0.5, 1.3, CHANGED | {name: value + by}) for by in (h, -h))
             assert slope == pytest.approx((high - low) / (2.0 * h), abs=1e-6)
-    host.free()
 
 
 def driven_by_push(t: float, begin: float, duration: float, rise: float) -> tuple[float, float]:
@@ -166,7 +151,7 @@ def driven_by_push(t: float, begin: float, duration: float, rise: float) -> tupl
 @pytest.mark.few(1)
 def test_fmus_driven_by_torques_keep_them(fmu_of: Callable[..., Path], flavour: str, fmi: int) -> None:
     weightless = {"gas.start": MASS * G, "gas.speed": 0.0}  # the force carries the mass
-    path = fmu_of(flavour, fmi, "torque")
+    path = fmu_of(pendulum(), flavour, fmi, "torque")
     for push in ({}, {"push.rise": -2.0, "push.duration": 0.31, "push.begin": 0.123}):
         parameters = weightless | push | {"integrator.tolerance": 1e-12}
         run = kinfmu.simulate(path, start=0.0, stop=1.0, step=0.25, parameters=parameters, state={"crank_speed": 0.0})

@@ -15,6 +15,7 @@ from kinfmu.mechanism import gallery
 from kinfmu.plan import compile_plan
 from kinfmu.plan.equations.assembly import find_assembly, in_order, start_values
 from kinfmu.plan.equations.system import System
+from tests.mechanisms import PINS
 from tests.mechanisms import fourbar as fourbar_of_bars
 from tests.stress.families import STARTS_ANYWHERE
 from tests.stress.trial import trial
@@ -33,10 +34,7 @@ def near_its_limit() -> Mechanism:
             Body("output", {"D": (0, 0), "S": (1.951, 0)}, (0.51, -1.68, -2.73)),
         ],
         [
-            Revolute("O", ("ground.O", "crank.O")),
-            Revolute("P", ("crank.P", "coupler.P")),
-            Revolute("Q", ("coupler.Q", "rocker.Q")),
-            Revolute("C", ("ground.C", "rocker.C")),
+            *PINS,
             Revolute("R", ("coupler.R", "link.R")),
             Revolute("S", ("link.S", "output.S")),
             Revolute("D", ("ground.D", "output.D")),
@@ -144,12 +142,7 @@ def test_start_poses_on_another_branch_than_the_law_can_reach_give_way() -> None
         Body("coupler", {"P": (0, 0), "Q": (3, 0)}),
         Body("rocker", {"C": (0, 0), "Q": (1.2, 0)}),
     ]
-    joints = [
-        Revolute("O", ("ground.O", "crank.O")),
-        Revolute("P", ("crank.P", "coupler.P")),
-        Revolute("Q", ("coupler.Q", "rocker.Q")),
-        Revolute("C", ("ground.C", "rocker.C")),
-    ]
+    joints = [*PINS]
     low = math.acos((9 + 16 - 1.8**2) / 24)  # coupler folded over the rocker
     for start in (0.6, -0.6):
         assert low < abs(start)
