@@ -25,7 +25,9 @@ TEXTS: dict[str, tuple[str, tuple[str, ...]]] = {  # module of benchmarks, and t
     "log": ("log_files", ()),
     "import": ("import_time", ()),
     "chains": ("chains", ()),
+    "size": ("sizes", ()),
 }
+WITH_CHARTS = ("accuracy", "size")
 MEASUREMENTS = ("accuracy", *TEXTS)
 ALL = "all"
 
@@ -69,8 +71,8 @@ def _with_reference() -> list[str]:
     "-o",
     "folder",
     type=click.Path(file_okay=False, path_type=Path),
-    help="Where accuracy writes tables and charts. Default: docs/ of a checkout; the current folder without a checkout "
-    "or with --mechanism.",
+    help="Where accuracy and size write tables and charts. Default: docs/ of a checkout; the current folder without a "
+    "checkout or with --mechanism.",
 )
 def main(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None, folder: Path | None) -> None:
     """Measure kinfmu on this machine, compared with other solvers.
@@ -90,11 +92,13 @@ def main(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None,
     log       writing and reading records of a million samples, compared with mcap
     import    `import kinfmu`, compared with bare Python
     chains    chains of up to a thousand loops
+    size      cost against size: loops, designs, rows, each next to the floor; a chart; takes minutes
     all       all of these
     """  # noqa: D301  click leaves lines behind a backspace as they are
     wanted = MEASUREMENTS if ALL in what else what or MEASUREMENTS[:1]
-    if "accuracy" not in wanted and (mechanisms or folder is not None):
-        raise click.UsageError(f"{'--mechanism' if mechanisms else '-o'} is for accuracy, not for {listed(wanted)}")
+    for option, is_given, users in (("--mechanism", mechanisms, ("accuracy",)), ("-o", folder, WITH_CHARTS)):
+        if is_given and not set(users) & set(wanted):
+            raise click.UsageError(f"{option} is for {listed(users)}, not for {listed(wanted)}")
     given = {} if rounds is None else {"rounds": rounds}
     for k, name in enumerate(dict.fromkeys(wanted)):
         if k:
@@ -104,7 +108,8 @@ def main(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None,
         else:
             module, mechanism = TEXTS[name]
             measurement = import_module(f"benchmarks.{module}")  # each needs other packages
-            click.echo(measurement.run(*map(gallery.load, mechanism), **given))
+            chart = {"folder": folder or default_folder()} if name in WITH_CHARTS else {}
+            click.echo(measurement.run(*map(gallery.load, mechanism), **given, **chart))
 
 
 def default_folder() -> Path:

@@ -15,6 +15,7 @@ from benchmarks.charts import draw, near_singular, work_precision
 from benchmarks.engine import EngineSetting
 from benchmarks.rounds import spread
 from benchmarks.singular import DISTANCES, Near
+from benchmarks.sizes import Cost, chart, run
 from kinfmu.draw.writing import write
 from kinfmu.errors import FigureError, MissingPackageError
 
@@ -102,3 +103,25 @@ def test_what_cannot_be_written_is_reported(tmp_path: Path, monkeypatch: pytest.
     with pytest.raises(MissingPackageError, match="drawing needs matplotlib"):
         draw(tmp_path, MEASURED, NEAR)
     assert [path.name for path in tmp_path.iterdir()] == ["a_file"]
+
+
+def test_cost_against_size_has_a_panel_each_with_the_floor() -> None:
+    costs = [
+        Cost(f"{what}: {what}", (1, 10), {"ours": [2e-3, 3e-2], "floor": [1e-3, 1e-2]}) for what in ("rows", "loops")
+    ]
+    panels = chart(costs).axes
+    assert [panel.get_xlabel() for panel in panels] == ["rows", "loops"]
+    assert [line.get_label() for line in panels[0].get_lines()] == ["ours", "floor"]
+    assert panels[0].get_ylim() == pytest.approx((1e-3, 1.0))
+
+
+@pytest.mark.long
+def test_cost_against_size_is_measured_up_to_a_largest_size(tmp_path: Path) -> None:
+    text = run(1, tmp_path, most=10)
+    assert re.findall(r"^(a sample|measures) of .*: (\w+)", text, re.M) == [
+        ("a sample", "loops"),
+        ("measures", "designs"),
+    ]
+    assert len(re.findall(r"^10? ", text, re.M)) == 4
+    assert all(float(ratio) > 0.0 for ratio in re.findall(r"([\d.]+)$", text, re.M))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cost-against-size.png", "cost-against-size.svg"]

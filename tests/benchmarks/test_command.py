@@ -182,7 +182,7 @@ def test_the_charts_name_every_engine_and_quantity(written: Path) -> None:
         (
             ("accurcy",),
             "Invalid value for '[WHAT]...': 'accurcy' is not a measurement; did you mean 'accuracy'?; "
-            "known: accuracy, sample, sweep, designs, forces, step, native, jitter, log, import, chains, all",
+            "known: accuracy, sample, sweep, designs, forces, step, native, jitter, log, import, chains, size, all",
         ),
         (
             ("--mechanism", "slidercrank"),
@@ -191,7 +191,7 @@ def test_the_charts_name_every_engine_and_quantity(written: Path) -> None:
         ),
         (("--rounds", "0"), "Invalid value for '--rounds': 0 is not in the range x>=1."),
         (("sample", "--mechanism", "fourbar"), "--mechanism is for accuracy, not for sample"),
-        (("step", "import", "-o", "there"), "-o is for accuracy, not for step, import"),
+        (("step", "import", "-o", "there"), "-o is for accuracy, size, not for step, import"),
     ],
 )
 def test_wrong_words_are_refused_with_what_would_be_right(

@@ -13,6 +13,8 @@ import pytest
 import kinfmu
 from kinfmu import Mechanism, Run
 from kinfmu.errors import KinfmuError, RequestError
+from kinfmu.mechanism import gallery
+from kinfmu.mechanism.toml_file import parse
 from kinfmu.plan import compile_plan
 from kinfmu.run.designs import parts_of
 from tests.gallery_members import mostly_long
@@ -381,3 +383,20 @@ def test_parts_hold_all_designs_and_every_thread_gets_as_many(designs: int, most
 
 def test_no_designs_have_no_parts() -> None:
     assert parts_of(0, 10, 2) == []
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_what_follows_an_angle_among_the_parameters_turns_with_it(engine: str) -> None:
+    """A slide tilted by t: rod.phi = t - asin(a sin(u - t) / l), continuous in t over whole turns."""
+    text = (gallery.folder() / "slider_crank/mechanism.toml").read_text(encoding="utf-8")
+    text = text.replace('"ground.O", "piston.S"] }', '"ground.O", "piston.S"], axis = "tilt" }').replace(
+        "[run]", '[parameters]\ntilt = "10 deg"\n\n[run]'
+    )
+    tilts = np.radians([10.0, 100.0, 190.0, 191.0, 280.0, 350.0, 369.0, 370.0, 371.0, 1000.0, -170.0, -349.0, -351.0])
+    model = kinfmu.compile(parse(text), ["rod.phi", "piston.x"], engine=engine)
+    designs = model.solve_designs({"tilt": tilts}, crank_angle=[0.3], anew=False)
+    np.testing.assert_array_equal(designs.status, 0)
+    side = tilts - np.arcsin(45.0 / 144.0 * np.sin(0.3 - tilts))
+    np.testing.assert_allclose(
+        designs.values[:, 0, designs.outputs.index("rod.phi")], side, rtol=0, atol=1e-13 * np.abs(tilts).max()
+    )

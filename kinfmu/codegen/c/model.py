@@ -133,6 +133,7 @@ def tables(plan: SolvePlan, solved: Sequence[Block], labels: Mapping[str, str]) 
         *(array("double kf_law_turns", plan.path_laws.turns) if plan.path_laws.units else []),
         *(array("double kf_law_units", plan.path_laws.units) if plan.path_laws.units else []),
         *array("double kf_parameters_written", [parameter.value for parameter in plan.parameters]),
+        *array("bool kf_parameter_is_angle", booleans(one.quantity.kind == "angle" for one in plan.parameters)),
         *array("double kf_constants_written", [constant.value for constant in plan.law_constants]),
         "",
         f"const char kf_name[] = {string(plan.mechanism.name)};",

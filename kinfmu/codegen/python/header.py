@@ -76,6 +76,7 @@ def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str
     kinds = tuple(driver.quantity.kind for driver in plan.drivers)
     rows, scales = tuple(b.row_names for b in solved), tuple(b.row_scales for b in solved)
     distances = tuple(map(tuple, distance_rows(plan, solved)))
+    angles = tuple(one.quantity.kind == "angle" for one in plan.parameters)
     reach = tuple(1.0 if kind == "angle" else plan.size for kind in kinds)
     return [
         f'"""Kinematics of {plan.mechanism.name}: generated from its mechanism, not to be edited."""',
@@ -97,6 +98,7 @@ def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str
         f"LAW_CONSTANTS = {tuple((constant.name, constant.value) for constant in plan.law_constants)!r}",
         f"POSITIVE = {tuple(k for k, constant in enumerate(plan.law_constants) if constant.is_positive)!r}",
         f"PARAMETERS = {tuple((parameter.name, parameter.value) for parameter in plan.parameters)!r}",
+        *([f"PARAMETER_IS_ANGLE = {angles!r}"] if plan.parameters else []),
         f"WATCHES = {plan.watch_names!r}",
         f"UNKNOWNS = {plan.unknowns!r}",
         f"UNKNOWN_SCALES = {tuple(1.0 if n.is_angle else plan.size for n in plan.unknowns)!r}",

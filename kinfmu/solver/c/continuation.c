@@ -189,13 +189,16 @@ bool kf_continued(kf_solver *solver, const double *from, const double *to, const
     kf_model *const ahead = &solver->scratch.ahead;
     kf_pose *const trial = &solver->scratch.poses[0];
     double *const slope = solver->scratch.zd;
-    double p[KF_ROOM(KF_PARAMETERS)], s = 0.0, step = 1.0;
+    double p[KF_ROOM(KF_PARAMETERS)], s = 0.0, turn = 0.0, longest, step;
     bool is_there = true;
     int k;
     path->block = -1;
     for (k = 0; k < KF_PARAMETERS; ++k) {
         is_there = is_there && to[k] == from[k];
+        turn = kf_parameter_is_angle[k] ? fmax(turn, fabs(to[k] - from[k])) : turn;
     }
+    longest = turn > 0.0 ? fmin(1.0, KF_LONGEST_TURN / turn) : 1.0;
+    step = longest;
     memset(slope, 0, KF_UNKNOWNS * sizeof(double));
     for (path->steps = 0; path->steps < KF_MOST_CONTINUED && !is_there; ++path->steps) {
         const double there = fmin(s + step, 1.0);
@@ -214,7 +217,7 @@ bool kf_continued(kf_solver *solver, const double *from, const double *to, const
                 *pose = *trial;
                 solver->model = *ahead;
                 s = there;
-                step *= 2.0;
+                step = fmin(2.0 * step, longest);
                 is_there = s == 1.0;
                 continue;
             }

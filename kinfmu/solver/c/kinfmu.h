@@ -90,6 +90,7 @@ extern const double kf_law_turns[KF_ROOM(KF_LAW_ARGUMENTS)]; /* 0 if the argumen
 extern const double kf_law_units[KF_LAWS];
 #endif
 extern const double kf_parameters_written[KF_ROOM(KF_PARAMETERS)];
+extern const bool kf_parameter_is_angle[KF_ROOM(KF_PARAMETERS)];
 extern const double kf_constants_written[KF_ROOM(KF_CONSTANTS)]; /* of the laws */
 
 extern const char kf_name[];

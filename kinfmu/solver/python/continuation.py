@@ -3,7 +3,9 @@
     Phi(q, u, p0 + s (p1 - p0)) = 0,   s from 0 to 1
 
 The drivers rest; steps in s are predicted by the last step's slope, corrected by Newton and trusted as on a path
-of the drivers. The rank is not determined again: the watches show whether the redundant rows still hold.
+of the drivers. A step turns no parameter by more than a radian: nearly a whole turn leaves almost the same residuals,
+and what follows that angle would end one turn off. The rank is not determined again: the watches show whether the
+redundant rows still hold.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from .solver import TOLERANCE, Solver
 from .trusted_step import FALL, MOST_OFF, TRUST
 
 _SHORTEST = 1e-7  # step in s; where steps get shorter the path ends
+_LONGEST_TURN = 1.0  # [rad] of a parameter in one step
 _MOST_CONTINUED = 10_000
 _MOST_ITERATIONS = 60
 NO_NUMBER = "they lead to numbers that are not finite"
@@ -70,7 +73,10 @@ def reach(module: Any, values: Vector, tolerance: float = TOLERANCE) -> Reached:
     written, model, pose = _at_anchor(module)
     u = pose.u
     slope = at_rest = (0.0,) * len(pose.z)
-    s, step, block = 0.0, 1.0, -1
+    changes = zip(module.PARAMETER_IS_ANGLE, written, values, strict=True)
+    turn = max([abs(b - a) for is_angle, a, b in changes if is_angle], default=0.0)
+    longest = min(1.0, _LONGEST_TURN / turn) if turn else 1.0
+    s, step, block = 0.0, longest, -1
     for _ in range(_MOST_CONTINUED):
         if values == written:
             break
@@ -87,7 +93,7 @@ def reach(module: Any, values: Vector, tolerance: float = TOLERANCE) -> Reached:
                     pose, model = trial, ahead
                     break
                 slope = tuple([(b - a) / (there - s) for a, b in zip(pose.z, trial.z, strict=True)])
-                s, pose, model, step = there, trial, ahead, 2.0 * step
+                s, pose, model, step = there, trial, ahead, min(2.0 * step, longest)
                 continue
         step *= 0.5
         if step < _SHORTEST:

@@ -314,21 +314,24 @@ def on_track(track: TrackModel, pose: Pose) -> Pose:
     return Pose(u, evaluated(track, u, track.of(pose.z)), None if singularities is None else singularities.around(u[0]))
 
 
-def rates_in_time(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple[Vector, Vector]:
-    """Return first and second derivative of the unknowns in time; interpolated blocks by the chain rule."""
+def rates_in_time(model: Model, pose: Pose, ud: Vector, udd: Vector | None) -> tuple[Vector, Vector]:
+    """Return first and second derivative of the unknowns in time; interpolated blocks by the chain rule.
+
+    The second one is empty without accelerations udd.
+    """
     held = held_blocks(pose) if pose.is_bridged else 0
     if not held:
         zd = tuple(model.velocity(pose.values, ud))
-        return zd, tuple(model.acceleration(pose.values, ud, udd, zd))
+        return zd, () if udd is None else tuple(model.acceleration(pose.values, ud, udd, zd))
     first = second = (0.0,) * len(pose.z)
     for track, own in pose.tracks:
         if own.bridge is not None:
-            v, a = ud[track.driver], udd[track.driver]
+            v, a = ud[track.driver], 0.0 if udd is None else udd[track.driver]
             zd, zdd = tangent_of(track, own)
             first = track.put([v * d for d in zd], first)
             second = track.put([v * v * dd + a * d for d, dd in zip(zd, zdd, strict=True)], second)
     zd = tuple(model.velocity(pose.values, ud, first, held))
-    return zd, tuple(model.acceleration(pose.values, ud, udd, zd, second, held))
+    return zd, () if udd is None else tuple(model.acceleration(pose.values, ud, udd, zd, second, held))
 
 
 def sample_rates(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple[Vector, Vector, Vector]:
@@ -338,9 +341,8 @@ def sample_rates(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple[Vec
         v, a = ud[0], udd[0]
         zd = tuple([d * v for d in slopes])
         return zd, tuple([dd * (v * v) + d * a for d, dd in zip(slopes, second, strict=True)]), slopes
-    rest = (0.0,) * len(ud)
     unit = [tuple([float(k == number) for k in range(len(ud))]) for number in range(len(ud))]
-    slopes = tuple([d for speeds in unit for d in rates_in_time(model, pose, speeds, rest)[0]])
+    slopes = tuple([d for speeds in unit for d in rates_in_time(model, pose, speeds, None)[0]])
     return *rates_in_time(model, pose, ud, udd), slopes
 
 
@@ -415,6 +417,6 @@ def _mixed_step(tracks: Tracks, mixed: TrackModel, pose: Pose, u: Vector, target
 def _mixed_limit(tracks: Tracks, mixed: TrackModel, path: Path) -> Limit:
     """Return where the path of the blocks that depend on several drivers ends, just beyond its last pose."""
     pose, direction = path.pose, path.direction
-    slopes, _ = rates_in_time(tracks.model, pose, direction, (0.0,) * len(direction))
+    slopes, _ = rates_in_time(tracks.model, pose, direction, None)
     mixed = mixed.with_rest(pose.z, slopes)
     return limit_beyond(mixed, on_track(mixed, path.before), on_track(mixed, pose), direction)

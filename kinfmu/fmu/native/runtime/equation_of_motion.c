@@ -52,21 +52,32 @@ bool kf_accelerations(const kf_solver *solver, kf_pose *pose, double t, const do
     udd[0] = (efforts[0] - found[0]) / found[1] / kf_in_si[0];
     return found[1] > 0.0 && isfinite(udd[0]);
 #else
-    double matrix[KF_DRIVERS * KF_DRIVERS], right[KF_DRIVERS], factors[KF_LU_ROOM(KF_DRIVERS)], determinant;
-    int j, k, place = KF_DRIVERS;
+    double *rows[KF_DRIVERS];
+    int i, j, k;
     bool good = true;
     find_inertia(solver, pose, t, ud, loads, found);
     for (k = 0; k < KF_DRIVERS; ++k) {
-        right[k] = efforts[k] - found[k];
-        for (j = k; j < KF_DRIVERS; ++j) {
-            matrix[k * KF_DRIVERS + j] = matrix[j * KF_DRIVERS + k] = found[place++];
+        rows[k] = k == 0 ? found + KF_DRIVERS : rows[k - 1] + KF_DRIVERS - k + 1; /* from the diagonal on */
+        udd[k] = efforts[k] - found[k];
+    }
+    for (k = 0; k < KF_DRIVERS; ++k) { /* L D L^T */
+        if (!(rows[k][0] > 0.0)) {
+            return false;
         }
-        good = good && matrix[k * KF_DRIVERS + k] > 0.0;
+        for (j = 1; j < KF_DRIVERS - k; ++j) {
+            const double ratio = rows[k][j] / rows[k][0];
+            for (i = j; i < KF_DRIVERS - k; ++i) {
+                rows[k + j][i - j] -= ratio * rows[k][i];
+            }
+            udd[k + j] -= ratio * udd[k];
+        }
     }
-    if (!good || !kf_lu(KF_DRIVERS, matrix, factors, &determinant)) {
-        return false;
+    for (k = KF_DRIVERS - 1; k >= 0; --k) {
+        for (j = 1; j < KF_DRIVERS - k; ++j) {
+            udd[k] -= rows[k][j] * udd[k + j];
+        }
+        udd[k] /= rows[k][0];
     }
-    kf_lu_solve(KF_DRIVERS, factors, right, udd);
     for (k = 0; k < KF_DRIVERS; ++k) {
         udd[k] /= kf_in_si[k];
         good = good && isfinite(udd[k]);

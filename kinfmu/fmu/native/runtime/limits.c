@@ -88,11 +88,11 @@ void kf_within(const kf_end *before, const kf_end *after, double t, double *u, d
 
 #if KF_DRIVERS == 1
 /* When the speed of the only driver changes its sign within a step. */
-static double critical_time(kf_course *course, const kf_end *before, const kf_end *after)
+static double critical_time(kf_course *course, const kf_end *before, const kf_end *after, double low_enough)
 {
     double low = before->t, high = after->t, u, rate;
     int k;
-    (void)course;
+    (void)course, (void)low_enough;
     for (k = 0; k < HALVINGS; ++k) {
         const double middle = 0.5 * (low + high);
         kf_within(before, after, middle, &u, &rate);
@@ -113,18 +113,19 @@ static double margin_within(kf_course *course, const kf_end *before, const kf_en
     return kf_follow(course, u) ? course->here->found.margin : 0.0;
 }
 
-/* The time of the smallest determinant within a step. */
-static double critical_time(kf_course *course, const kf_end *before, const kf_end *after)
+/* The time of the smallest determinant within a step; NAN if it cannot be as low as `low_enough`, since it is convex. */
+static double critical_time(kf_course *course, const kf_end *before, const kf_end *after, double low_enough)
 {
     const double length = after->t - before->t;
-    double least = INFINITY, low, high, near, far, of_near, of_far;
-    int k, place = 0;
+    double margins[PLACES + 1], low, high, near, far, of_near, of_far;
+    int k, place = 0, inner;
     for (k = 0; k <= PLACES; ++k) {
-        const double margin = margin_within(course, before, after, before->t + length * k / PLACES);
-        if (margin < least) {
-            least = margin;
-            place = k;
-        }
+        margins[k] = margin_within(course, before, after, before->t + length * k / PLACES);
+        place = margins[k] < margins[place] ? k : place;
+    }
+    inner = place < 1 ? 1 : place < PLACES ? place : PLACES - 1;
+    if (2.0 * margins[inner] - fmax(margins[inner - 1], margins[inner + 1]) > low_enough) {
+        return NAN;
     }
     low = before->t + length * (place > 0 ? place - 1 : 0) / PLACES;
     high = before->t + length * (place < PLACES ? place + 1 : PLACES) / PLACES;
@@ -177,7 +178,11 @@ kf_verdict kf_search_limit(kf_course *course, const kf_end *before, const kf_end
     if (!turns && (KF_DRIVERS == 1 || least >= NEAR)) {
         return KF_GOES_ON;
     }
-    t = critical_time(course, before, after);
+    t = critical_time(course, before, after, DIPS * least);
+    if (isnan(t)) {
+        kf_follow(course, after->y);
+        return KF_GOES_ON;
+    }
     kf_within(before, after, t, u, rates);
     is_reached = kf_follow(course, u);
     margin = is_reached ? course->here->found.margin : 0.0;

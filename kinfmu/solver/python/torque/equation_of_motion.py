@@ -12,7 +12,6 @@ from collections.abc import Callable
 from math import isfinite
 from typing import NamedTuple
 
-from ..linear import factor, lu_solve
 from ..pose import Pose, Vector
 from ..solver import Solver
 from ..tracks import sample_rates
@@ -51,17 +50,25 @@ class EquationOfMotion:
             return None
         return udd if udd and isfinite(sum(udd)) else None
 
-    def _solved(self, numbers: Vector, right: list[float]) -> Vector:
-        """Return J^-1 b in the units of the drivers."""
-        d = len(right)
-        matrix = [[0.0] * d for _ in range(d)]
+    def _solved(self, numbers: Vector, x: list[float]) -> Vector:
+        """Return J^-1 x in the units of the drivers, by L D L^T; empty if a pivot, an inertia, is not positive."""
+        d = len(x)
         entries = iter(numbers[d:])
-        for k in range(d):
-            for j in range(k, d):
-                matrix[k][j] = matrix[j][k] = next(entries)
-        if not all(matrix[k][k] > 0.0 for k in range(d)):
-            return ()
-        return tuple([udd / si for udd, si in zip(lu_solve(factor(matrix), right), self._in_si, strict=True)])
+        rows = [[next(entries) for _ in range(k, d)] for k in range(d)]
+        for k, row in enumerate(rows):
+            if not row[0] > 0.0:
+                return ()
+            for j in range(1, d - k):
+                ratio, below = row[j] / row[0], rows[k + j]
+                for i in range(j, d - k):
+                    below[i - j] -= ratio * row[i]
+                x[k + j] -= ratio * x[k]
+        for k in range(d - 1, -1, -1):
+            row = rows[k]
+            for j in range(1, d - k):
+                x[k] -= row[j] * x[k + j]
+            x[k] /= row[0]
+        return tuple([udd / si for udd, si in zip(x, self._in_si, strict=True)])
 
     def massless(self, solver: Solver, pose: Pose, t: float, ud: Vector, given: Given) -> list[int]:
         """Return the places of the drivers without reduced inertia at a good pose."""

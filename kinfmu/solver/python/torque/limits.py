@@ -8,7 +8,7 @@ which a speed changes its sign, or a pose is near a singular one, is searched fo
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf, sqrt
+from math import sqrt
 from typing import NamedTuple
 
 from ..pose import Pose, Vector
@@ -84,7 +84,9 @@ def suspicion(
         Hermite((before.t, after.t), tuple((end.y[k], end.y[d + k], end.f[d + k]) for end in (before, after)))
         for k in range(d)
     ]
-    t = _turning(curves[0], before, after) if d == 1 else _singular(curves, before.t, after.t, follow)
+    t = _turning(curves[0], before, after) if d == 1 else _singular(curves, before.t, after.t, DIPS * least, follow)
+    if t is None:
+        return None
     pose = follow(tuple([curve(t)[0] for curve in curves]))
     margin = 0.0 if pose is None else pose.margin
     if pose is not None and (pose.is_bridged or margin > (SUSPECT if d == 1 else DIPS * least)):
@@ -104,18 +106,25 @@ def _turning(curve: Hermite, before: StepEnd, after: StepEnd) -> float:
     return 0.5 * (low + high)
 
 
-def _singular(curves: list[Hermite], first: float, last: float, follow: Callable[[Vector], Pose | None]) -> float:
-    """Return the time of the smallest determinant within a step."""
+def _singular(
+    curves: list[Hermite], first: float, last: float, low_enough: float, follow: Callable[[Vector], Pose | None]
+) -> float | None:
+    """Return the time of the smallest determinant within a step; None if it cannot be as low as `low_enough`.
+
+    Towards a limit the determinant is convex, |t - t0| or the root of a square and a little more. So between places it
+    lies above the lines through its neighbours: next to place k, above 2 m_k - max(m_k-1, m_k+1).
+    """
 
     def margin(t: float) -> float:
         pose = follow(tuple([curve(t)[0] for curve in curves]))
         return 0.0 if pose is None else pose.margin
 
-    length, least, place = last - first, inf, 0
-    for k in range(PLACES + 1):
-        found = margin(first + length * k / PLACES)
-        if found < least:
-            least, place = found, k
+    length = last - first
+    margins = [margin(first + length * k / PLACES) for k in range(PLACES + 1)]
+    place = margins.index(min(margins))
+    inner = min(max(place, 1), PLACES - 1)
+    if 2.0 * margins[inner] - max(margins[inner - 1], margins[inner + 1]) > low_enough:
+        return None
     low, high = first + length * max(place - 1, 0) / PLACES, first + length * min(place + 1, PLACES) / PLACES
     near, far = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
     of_near, of_far = margin(near), margin(far)
