@@ -16,9 +16,10 @@ import pytest
 import kinfmu
 from kinfmu.codegen.python import emit
 from kinfmu.codegen.solve_bound import RUNS, solve_bound
+from kinfmu.errors import RequestError
 from kinfmu.mechanism import gallery
 from kinfmu.plan import SolvePlan, compile_plan
-from tests.fmu.conftest import Start
+from tests.fmu.conftest import Build, Start
 from tests.fmu.host import DISCARD, OK, Host
 from tests.fmu.native.test_memory import CC, program
 
@@ -161,6 +162,14 @@ def test_the_limit_does_not_hold_during_initialization(limited: Callable[..., Ho
     assert host.status() <= 2
     assert host.count("solver.work") > 1  # from the anchor to the start, next to a change point
     assert host.count("solver.most_work") == 1
+
+
+def test_a_run_takes_the_limit(built_native: Build, fmi: int) -> None:
+    fmu = built_native("slider_crank", fmi, "time")
+    free, enough = kinfmu.simulate(fmu), kinfmu.simulate(fmu, parameters={"solver.most_work": "1"})
+    assert enough.q.tolist() == free.q.tolist()
+    with pytest.raises(RequestError, match="most_work = 2[.]5 must be a whole number of at least 0"):
+        kinfmu.simulate(fmu, parameters={"solver.most_work": 2.5})
 
 
 def test_an_invalid_limit_is_refused(start: Start) -> None:
