@@ -168,7 +168,7 @@ def test_a_run_takes_the_limit(built_native: Build, fmi: int) -> None:
     fmu = built_native("slider_crank", fmi, "time")
     free, enough = kinfmu.simulate(fmu), kinfmu.simulate(fmu, parameters={"solver.most_work": "1"})
     assert enough.q.tolist() == free.q.tolist()
-    with pytest.raises(RequestError, match="most_work = 2[.]5 must be a whole number of at least 0"):
+    with pytest.raises(RequestError, match=r"most_work = 2[.]5 must be a whole number of at least 0"):
         kinfmu.simulate(fmu, parameters={"solver.most_work": 2.5})
 
 
