@@ -21,6 +21,7 @@ TEXTS: dict[str, tuple[str, tuple[str, ...]]] = {  # module of benchmarks, and t
     "forces": ("forces", ()),
     "step": ("fmu_step", ("fourbar",)),
     "native": ("native_step", ("fourbar",)),
+    "jitter": ("jitter", ("fourbar",)),
     "log": ("log_files", ()),
     "commands": ("commands", ()),
     "chains": ("chains", ()),
@@ -87,6 +88,7 @@ def main(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None,
     forces    efforts and reactions of a sweep, compared with the sweep alone
     step      a step of the FMU, compared with the smallest pythonfmu FMU
     native    a step of the native FMU in a C host, without efforts and with them
+    jitter    the longest steps of the native FMU in a C host at 10 kHz; a round has 100,000
     log       writing and reading records of a million samples, compared with mcap
     commands  whole commands and `import kinfmu`, compared with bare Python and numpy
     chains    chains of up to a thousand loops

@@ -11,7 +11,7 @@ from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from time import perf_counter, process_time
-from typing import Any
+from typing import Any, NamedTuple
 
 from benchmarks.rounds import in_turn, spread, table
 from kinfmu.codegen.c import compiler
@@ -22,6 +22,7 @@ from kinfmu.mechanism import Gravity, Mechanism, Point
 STEPS = 360 * 200  # in a round, of one degree each: whole turns
 ROUNDS = 40
 INSTANCES = 200
+DEGREE = ctypes.c_double(math.pi / 180.0)
 _WORDS = {2: "Real", 3: "Float64"}
 
 
@@ -34,9 +35,10 @@ def run(mechanism: Mechanism, rounds: int = ROUNDS) -> str:
     rows = []
     for fmi in (2, 3):
         with tempfile.TemporaryDirectory(prefix="kinfmu_bench_", ignore_cleanup_errors=True) as folder:
-            plain, instantiate = _stepping(mechanism, fmi, Path(folder, "plain"))
-            loaded, _ = _stepping(with_masses(mechanism), fmi, Path(folder, "loaded"), forces=1)
-            ns = [[value / STEPS * 1e9 for value in row] for row in in_turn([plain, loaded], rounds, process_time)]
+            plain, instantiate = instantiated(mechanism, fmi, Path(folder, "plain"))
+            loaded, _ = instantiated(with_masses(mechanism), fmi, Path(folder, "loaded"), forces=1)
+            seconds = in_turn([_rounds(plain), _rounds(loaded)], rounds, process_time)
+        ns = [[value / STEPS * 1e9 for value in row] for row in seconds]
         ratio = spread([with_effort / without for without, with_effort in zip(*ns, strict=True)])
         rows.append(
             (
@@ -65,8 +67,29 @@ def with_masses(mechanism: Mechanism) -> Mechanism:
     return replace(mechanism, bodies=tuple(bodies), gravity=Gravity(0.0, -9.81))
 
 
-def _stepping(mechanism: Mechanism, fmi: int, folder: Path, *, forces: int = 0) -> tuple[Callable[[], None], float]:
-    """Return a round of the mechanism's FMU, and the seconds that an instance takes; forces: number of those read."""
+class Stepped(NamedTuple):
+    """An initialized instance of an FMU, and the value references of the outputs that are read."""
+
+    fmi: int
+    library: Any
+    instance: ctypes.c_void_p
+    outputs: Sequence[int]
+
+    def arguments(self) -> tuple[Any, ...]:
+        """Return the first arguments of the functions in host.c: of set, step and get."""
+        word, count = _WORDS[self.fmi], len(self.outputs)
+        functions = [self.library[f"fmi{self.fmi}{name}"] for name in (f"Set{word}", "DoStep", f"Get{word}")]
+        references, values = (ctypes.c_uint * count)(*self.outputs), (ctypes.c_double * count)()
+        return (self.instance, *functions, 1, references, ctypes.c_size_t(count), values)
+
+
+def host() -> Any:
+    """Return the compiled functions of host.c."""
+    return compiler.load({"host.c": Path(__file__).with_name("host.c").read_text("utf-8")})
+
+
+def instantiated(mechanism: Mechanism, fmi: int, folder: Path, *, forces: int = 0) -> tuple[Stepped, float]:
+    """Return the mechanism's FMU, and the seconds that an instance takes; forces: number of those read."""
     folder.mkdir()
     fmu = build(mechanism, folder / "ours.fmu", flavour="native", fmi=fmi, drive="inputs")
     with zipfile.ZipFile(fmu) as zipped:
@@ -100,22 +123,16 @@ def _stepping(mechanism: Mechanism, fmi: int, folder: Path, *, forces: int = 0) 
     motion = [about.interface.part(part)[:5] for part in ("values", "rates", "accelerations")]
     motion.append(about.interface.part("forces")[:forces])
     outputs = [references[variable.name] for variables in motion for variable in variables]
-    return _rounds(fmi, library, instance, outputs), seconds
+    return Stepped(fmi, library, instance, outputs), seconds
 
 
-def _rounds(fmi: int, library: Any, instance: ctypes.c_void_p, outputs: Sequence[int]) -> Callable[[], None]:
+def _rounds(stepped: Stepped) -> Callable[[], None]:
     """Return a function that steps an FMU through a round in C, each of which continues the last one."""
-    host = compiler.load({"host.c": Path(__file__).with_name("host.c").read_text("utf-8")})
-    step = getattr(host, f"host_run{fmi}")
-    word = _WORDS[fmi]
-    functions = [library[f"fmi{fmi}{name}"] for name in (f"Set{word}", "DoStep", f"Get{word}")]
-    references, values = (ctypes.c_uint * len(outputs))(*outputs), (ctypes.c_double * len(outputs))()
+    step, arguments = getattr(host(), f"host_run{stepped.fmi}"), stepped.arguments()
     rounds = count()
 
     def one() -> None:
-        first, degree = ctypes.c_long(next(rounds) * STEPS), ctypes.c_double(math.pi / 180.0)
-        length, steps = ctypes.c_size_t(len(outputs)), ctypes.c_long(STEPS)
-        failed = step(instance, *functions, 1, references, length, values, first, steps, degree)
+        failed = step(*arguments, ctypes.c_long(next(rounds) * STEPS), ctypes.c_long(STEPS), DEGREE)
         if failed:
             raise RuntimeError(f"{failed} calls failed")
 

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Literal, NamedTuple
 
 from kinfmu.analysis.singular import DriverRange
+from kinfmu.codegen.solve_bound import solve_bound
 from kinfmu.fmu.force_variables import force_parts, law_constant
 from kinfmu.fmu.interface import RATES_TYPE, STATUS_TYPE, Drive, Interface, InterfacePart, Variable
 from kinfmu.fmu.owned_motion import with_states
@@ -20,6 +21,7 @@ from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.python.pose import Status
 from kinfmu.solver.python.solver import TOLERANCE
+from kinfmu.solver.python.trusted_step import LONGEST_STEP
 from kinfmu.units import CoordinateName, Quantity, unit_of
 
 _INSIDE = 1e-12  # of a range: how far declared limits are from those found, which round-off may miss
@@ -75,6 +77,16 @@ _MESSAGE = Variable(
     "Why the pose is unreachable: driver, value and limit; empty if solver.ok is true",
     initial="calculated",
 )
+_MOST_WORK = Variable(
+    "solver.most_work",
+    "Integer",
+    "parameter",
+    "fixed",
+    "Pose solves that a pose may take after initialization: a step whose pose needs more is discarded; 0: no limit",
+    initial="exact",
+    start=0,
+    minimum=0,
+)
 _TIME = Variable("time", "Real", "independent", "continuous", "Time", unit="s")
 
 
@@ -83,6 +95,7 @@ def interface(
     drive: Drive = "time",
     *,
     has_time: bool = False,
+    has_work: bool = False,
     forces: Mapping[str, ForceSteps] = MappingProxyType({}),
     starts: Sequence[float] = (),
     reach: DriverRange | None = None,
@@ -95,6 +108,7 @@ def interface(
             are states, and efforts are inputs.
         has_time: True for FMI 3.0: time is the last variable, and what the drivers move depends on it and on tunable
             parameters, which FMI 3.0 counts as known after initialization.
+        has_work: True for an FMU that counts and limits the work of a step: a native one without an integrator.
         forces: Stages of the forces that are outputs, by part. Default: none.
         starts: With 'torque': value and speed of each driver at the start.
         reach: Range of the only driver. Its limits are minimum and maximum of the driver's input, unless parameters
@@ -139,6 +153,7 @@ def interface(
         "drive": [replace(_DRIVEN_BY_TIME, start=drive == "time")],
         "rate_source": [_RATES],
         "message": [_MESSAGE],
+        **({"work": [_work(plan), _MOST_WORK]} if has_work else {}),
     }
     parts = [InterfacePart(name, tuple(variables)) for name, variables in lists.items()]
     if drive == "torque":
@@ -298,6 +313,20 @@ def _errors(plan: SolvePlan) -> Iterator[Variable]:
             f"{UNKNOWN_ERROR:g} if there is no estimate"
         )
         yield _solver_output(plan, f"solver.error_{suffix}", text, order, minimum=0.0, maximum=UNKNOWN_ERROR)
+
+
+def _work(plan: SolvePlan) -> Variable:
+    bound = solve_bound(plan)
+    return Variable(
+        "solver.work",
+        "Integer",
+        "local",
+        "discrete",
+        f"Pose solves of this pose: as a rule 1 if drivers move by at most {LONGEST_STEP:g} rad or sizes, and more "
+        f"near singular points. Each takes at most {bound.corrections} Newton corrections, {bound.operations} "
+        f"operations and {bound.functions} sines, cosines and the like",
+        initial="calculated",
+    )
 
 
 def _driven(plan: SolvePlan) -> Iterator[Variable]:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import kinfmu
-from benchmarks import accuracy, case, chains, crank_rockers, designs, log_files, native_sweep, singular
+from benchmarks import accuracy, case, chains, crank_rockers, designs, jitter, log_files, native_sweep, singular
 from benchmarks.__main__ import ALL, MEASUREMENTS, default_folder
 from benchmarks.commands import COMMANDS
 from benchmarks.engines import ENGINES, SHIPPED
@@ -183,7 +183,7 @@ def test_the_charts_name_every_engine_and_quantity(written: Path) -> None:
         (
             ("accurcy",),
             "Invalid value for '[WHAT]...': 'accurcy' is not a measurement; did you mean 'accuracy'?; "
-            "known: accuracy, sample, sweep, designs, forces, step, native, log, commands, chains, size, all",
+            "known: accuracy, sample, sweep, designs, forces, step, native, jitter, log, commands, chains, size, all",
         ),
         (
             ("--mechanism", "slidercrank"),
@@ -226,6 +226,15 @@ def test_a_measurement_prints_a_table_of_what_it_compares(what: str, lines: list
     for line, name in zip(rows[-len(lines) :], lines, strict=True):
         assert line.startswith(name)
         assert re.search(r"\d+\.\d", line)
+
+
+def test_single_steps_at_a_rate_are_compared_with_an_empty_function() -> None:
+    head, step, empty = jitter.run(kinfmu.load("fourbar"), rounds=2, steps=50).splitlines()
+    assert head.startswith("100 steps at 10 kHz")
+    assert step.startswith("fourbar: set 1, step 1 deg, get 15")
+    for line in (step, empty):
+        median, most, longest = map(float, re.findall(r"([\d.]+) us", line))
+        assert 0.0 <= median <= most <= longest
 
 
 def test_designs_are_compared_with_the_closed_form() -> None:

@@ -28,6 +28,6 @@ def fmu_sources(mechanism: Mechanism, fmi: int, drive: Drive) -> tuple[dict[str,
     plan, forces = planned(mechanism)
     plan, owned = owned_motion(plan) if drive == "torque" else (plan, None)
     starts = owned.starts if owned else ()
-    variables = interface(plan, drive, has_time=fmi == 3, forces=forces, starts=starts)
+    variables = interface(plan, drive, has_time=fmi == 3, has_work=owned is None, forces=forces, starts=starts)
     of_motion = (owned.inertia, owned.laws) if owned else (None, None)
     return sources(plan, variables, f"{fmi}.0", TOKEN, forces, *of_motion), variables, plan

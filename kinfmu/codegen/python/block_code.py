@@ -41,7 +41,7 @@ def newton_lines(writer: Writer, block: Block, label: str, starts: Sequence[str]
     return [
         *before,
         "last = inf",
-        f"for iteration in range({ITERATIONS}):",
+        f"for iteration in {tuple(range(ITERATIONS))}:",  # a constant, which costs less than a range
         *indented(inside),
         f"    if {done}:",
         "        break",

@@ -113,7 +113,9 @@ class _Straight:
         summary = "1.0, 0.0, 0, 0.0"
         if self.solved:
             dets = zip(determinants, self.solved, strict=True)
-            lines += [f"{m} = det{m[1:]} * {1.0 / block.determinant_scale!r}" for m, block in dets]
+            for m, block in dets:
+                scale = 1.0 / block.determinant_scale
+                lines.append(f"{m} = det{m[1:]}" if scale == 1.0 else f"{m} = det{m[1:]} * {scale!r}")
             margin = extreme("min", [f"abs({m})" for m in determinants])
             error, count = ("largest", "iterations") if len(self.solved) > 1 else ("error", "iteration")
             summary = f"{margin}, sqrt({error}), {count}, {self._moved()} if {count} else 0.0"

@@ -125,6 +125,8 @@ def _initialize(
                 slave.set_boolean(slave.references[name], value)
             elif isinstance(value, str):
                 slave.set_enumeration(slave.references[name], Rates[value.upper()])
+            elif isinstance(value, int):
+                slave.set_integer(slave.references[name], value)
             else:
                 slave.set([slave.references[name]], [value])
         slave.initialize(float(t[0]))

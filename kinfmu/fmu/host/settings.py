@@ -36,6 +36,8 @@ def fmu_settings(
             chosen[name] = bool(value)
         elif known[name].type == "Enumeration":
             chosen[name] = _rates(value)
+        elif known[name].type == "Integer":
+            chosen[name] = _count(known[name], value)
         elif known[name].causality == "output":
             chosen[name] = _start(known[name], value, interface.length_unit)
         else:
@@ -52,6 +54,18 @@ def _rates(value: float | str | bool) -> str:
         if str(value).lower() == name or (not isinstance(value, str) and value == mode):
             return name
     raise RequestError(f"rates = {quoted(value)} must be auto, estimated or wired")
+
+
+def _count(variable: Variable, value: float | str | bool) -> int:
+    """Return a whole number that is not below the declared minimum, given as number or text."""
+    least = variable.minimum or 0.0
+    try:
+        number = float(value)
+    except ValueError:
+        number = math.nan
+    if not (number >= least and number.is_integer()):
+        raise RequestError(f"{variable.name} = {quoted(value)} must be a whole number of at least {least:g}")
+    return int(number)
 
 
 def _tolerance(variable: Variable, value: float | str | bool) -> float:

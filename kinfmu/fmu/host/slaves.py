@@ -113,7 +113,8 @@ class LoadedSlave(ABC):
     fmpy: Any
     _functions: str  # prefix of the names of C functions
     _real: str  # FMI's name of the type of Real variables
-    _enumeration: str  # FMI's name of the type by which enumerations are set
+    _integer: str  # FMI's name of the type of integers
+    _enumeration: str  # and of the type by which enumerations are set
     _has_value_count: bool  # of lists of values
     _do_step: StepCall
 
@@ -146,6 +147,9 @@ class LoadedSlave(ABC):
 
     def set_enumeration(self, reference: int, value: int) -> None:
         getattr(self.fmpy, f"set{self._enumeration}")([reference], [value])
+
+    def set_integer(self, reference: int, value: int) -> None:
+        getattr(self.fmpy, f"set{self._integer}")([reference], [value])
 
     def reader(self, references: Sequence[int], rows: NDArray[np.float64]) -> RowCall:
         """Return a call that reads Real variables into a row of the table (n, len(references))."""
@@ -183,7 +187,7 @@ class LoadedSlave(ABC):
 class Slave2(LoadedSlave):
     """A slave of FMI 2.0."""
 
-    _functions, _real, _enumeration, _has_value_count = "fmi2", "Real", "Integer", False
+    _functions, _real, _integer, _enumeration, _has_value_count = "fmi2", "Real", "Integer", "Integer", False
 
     def __init__(self, about: Description, folder: Path, log: Log) -> None:
         from fmpy.fmi2 import FMU2Slave
@@ -226,7 +230,7 @@ class Slave2(LoadedSlave):
 class Slave3(LoadedSlave):
     """A slave of FMI 3.0."""
 
-    _functions, _real, _enumeration, _has_value_count = "fmi3", "Float64", "Int64", True
+    _functions, _real, _integer, _enumeration, _has_value_count = "fmi3", "Float64", "Int32", "Int64", True
 
     def __init__(self, about: Description, folder: Path, log: Log) -> None:
         from fmpy.fmi3 import FMU3Slave

@@ -92,7 +92,9 @@ def archive(
 
     """
     starts, reach = owned.starts if owned else (), documents.reach if documents else None
-    variables = interface(plan, drive, has_time=fmi == "3.0", forces=forces, starts=starts, reach=reach)
+    variables = interface(
+        plan, drive, has_time=fmi == "3.0", has_work=owned is None, forces=forces, starts=starts, reach=reach
+    )
     variables = variables.displayed_in(documents.display_length if documents else None)
     metadata = documents.metadata if documents else {}
     unnamed = _contents(plan, variables, version, fmi, "", forces, owned)

@@ -208,6 +208,8 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
         "",
         f"#define KF_STATUS {references['solver.status']}",
         f"#define KF_ITERATIONS {references['solver.iterations']}",
+        f"#define KF_WORK {references.get('solver.work', _NO_VARIABLE)}",
+        f"#define KF_MOST_WORK {references.get('solver.most_work', _NO_VARIABLE)}",
         f"#define KF_SOLVER_OK {references['solver.ok']}",
         f"#define KF_DRIVEN_BY_TIME {references.get('driven_by_time', _NO_VARIABLE)}",
         f"#define KF_RATES {references.get('rates', _NO_VARIABLE)}",

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from enum import IntEnum
 from math import inf
 
+from .layout import Numbers
+
 KEPT = 4  # samples that a slave remembers: the last one, two for the estimates and one more for their errors
 LARGEST = 1e100  # of rates and of values that a host sets: squares of larger numbers overflow
 EPS = 2.220446049250313e-16
@@ -21,10 +23,19 @@ class Rates(IntEnum):
     WIRED = 2
 
 
-def estimated_rates(
-    samples: Sequence[Sample], t: float, u: Sequence[float]
-) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return speed and acceleration of each driver at t, from the parabola through its last three samples.
+def estimated_rates(samples: Sequence[Sample], t: float, u: Sequence[float]) -> tuple[Numbers, Numbers]:
+    """Return speeds and accelerations of all drivers at t, one of each per driver: see estimated_rate."""
+    speeds: Numbers = ()
+    accelerations: Numbers = ()
+    for k, value in enumerate(u):
+        speed, acceleration = estimated_rate(samples, t, value, k)
+        speeds += speed
+        accelerations += acceleration
+    return speeds, accelerations
+
+
+def estimated_rate(samples: Sequence[Sample], t: float, value: float, k: int = 0) -> tuple[Numbers, Numbers]:
+    """Return speed and acceleration of a driver at t, from the parabola through its last three samples.
 
         a = 2 (d2 - d1) / (t2 - t0),   v = d2 + (d2 - d1) (t2 - t1) / (t2 - t0),   d1, d2 the two slopes
 
@@ -34,43 +45,36 @@ def estimated_rates(
     Args:
         samples: Committed samples, oldest first; only those before t are used.
         t: Time [s].
-        u: Driver values at t.
+        value: Of the driver at t.
+        k: Place of the driver among all.
 
     Returns:
-        Speeds and accelerations, one of each per driver.
+        Speed and acceleration, each as a tuple of one number: 0 if it exceeds LARGEST, as between two samples at almost
+        the same time.
 
     """
-    count = len(samples)
-    while count and samples[count - 1][0] >= t:
-        count -= 1
-    if not count:
-        rest = (0.0,) * len(u)
-        return rest, rest
-    t1, u1 = samples[count - 1]
-    h2 = t - t1
-    if count == 1:
-        return tuple([_usable((u[k] - u1[k]) / h2) for k in range(len(u))]), (0.0,) * len(u)
-    t0, u0 = samples[count - 2]
-    h1, span = t1 - t0, t - t0
-    speeds: tuple[float, ...] = ()
-    accelerations: tuple[float, ...] = ()
-    for k, b in enumerate(u1):
-        slope = (u[k] - b) / h2
-        bend = (slope - (b - u0[k]) / h1) / span
-        speed, acceleration = slope + bend * h2, bend + bend
-        speeds += (speed if -LARGEST <= speed <= LARGEST else 0.0,)
-        accelerations += (acceleration if -LARGEST <= acceleration <= LARGEST else 0.0,)
-    return speeds, accelerations
+    last = len(samples) - 1
+    while last >= 0:
+        t1, u1 = samples[last]
+        if t1 < t:
+            break
+        last -= 1
+    else:
+        return (0.0,), (0.0,)
+    step, before = t - t1, u1[k]
+    slope = (value - before) / step
+    if not last:
+        return (slope if -LARGEST <= slope <= LARGEST else 0.0,), (0.0,)
+    t0, u0 = samples[last - 1]
+    bend = (slope - (before - u0[k]) / (t1 - t0)) / (t - t0)
+    speed, acceleration = slope + bend * step, bend + bend
+    return (
+        (speed if -LARGEST <= speed <= LARGEST else 0.0,),
+        (acceleration if -LARGEST <= acceleration <= LARGEST else 0.0,),
+    )
 
 
-def _usable(rate: float) -> float:
-    """Return the rate, or 0 if it exceeds LARGEST because two samples are at almost the same time."""
-    return rate if -LARGEST <= rate <= LARGEST else 0.0
-
-
-def errors_of_estimated_rates(
-    samples: Sequence[Sample], t: float, u: Sequence[float]
-) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def errors_of_estimated_rates(samples: Sequence[Sample], t: float, u: Sequence[float]) -> tuple[Numbers, Numbers]:
     """Return the errors of the estimated speed and acceleration of each driver: the term of one more sample.
 
         v: c3 (t - t2) (t - t1),   a: 2 c3 ((t - t2) + (t - t1)),   c3 the third divided difference

@@ -63,11 +63,13 @@ MOTION = "values", "rates", "accelerations"  # parts that are computed together,
 Computer = Callable[[Any], Numbers]  # computes the numbers of a part at a pose
 
 
-class Fetch(NamedTuple):
-    """How to read a list of Real variables: the numbers of some parts make a row, of which places are picked."""
-
-    parts: tuple[tuple[str, Computer | None], ...]  # each with what computes it; None: it is read as it is set
-    pick: Callable[[Numbers], Sequence[float]] | None  # None: all of them
+# How to read a list of Real variables: the numbers of some parts make a row, of which places are picked. A plain tuple,
+# which is unpacked in every read:
+Fetch = tuple[
+    list[int],  # value references
+    tuple[tuple[str, Computer | None], ...],  # parts, each with what computes it; None: it is read as it is set
+    Callable[[Numbers], Sequence[float]] | None,  # picks the places; None: all of them
+]
 
 
 def plan_fetch(references: Places, vrs: Sequence[int], computers: Mapping[str, Computer]) -> Fetch:
@@ -84,7 +86,7 @@ def plan_fetch(references: Places, vrs: Sequence[int], computers: Mapping[str, C
     names = _joined([layout.parts[part].name for part in parts])
     if width in indices:
         names.append("no_number")
-    return Fetch(tuple([(name, computers.get(name)) for name in names]), _picker(indices, width))
+    return list(vrs), tuple([(name, computers.get(name)) for name in names]), _picker(indices, width)
 
 
 def _joined(names: list[str]) -> list[str]:

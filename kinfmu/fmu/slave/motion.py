@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from ...solver.python import Pose, Solver, Status
 from .base import Fmi2Status
-from .estimated_rates import LARGEST, Sample, errors_of_estimated_rates, estimated_rates
+from .estimated_rates import LARGEST, Sample, errors_of_estimated_rates, estimated_rate, estimated_rates
 from .layout import NOT_A_NUMBER, Numbers
 
 LAST_GOOD = int(Status.BRIDGED)  # compared in every read: faster than `Pose.good`
@@ -80,20 +80,33 @@ class ByInputs:
     def solve(self) -> Pose:
         """Return the requested pose, good or not, solved from the committed one."""
         slave = self.slave
-        return slave.solver.solve(slave.committed, tuple(slave.inputs[::3]))
+        inputs = slave.inputs
+        u = (inputs[0],) if len(inputs) == 3 else tuple(inputs[::3])  # most have one driver: no slice
+        return slave.solver.solve(slave.committed, u)
 
     def drive(self) -> Drive:
         """Return u, ud, udd of the requested pose."""
-        return self._with_rates(self.slave.inputs, self._moment())
+        slave = self.slave
+        history = slave.history
+        if slave.touched or not history:
+            t, u = slave.time, tuple(slave.inputs[::3])
+        else:  # no set since the commit
+            t, u = history[-1]
+        if slave.wired or len(u) > 1:
+            return self._with_rates(slave.inputs, t, u)
+        ud, udd = estimated_rate(history, t, u[0])
+        return u, ud, udd
 
     def committed_drive(self) -> Drive:
         """Return u, ud, udd at the last commit."""
-        return self._with_rates(self.slave.committed_inputs, self.slave.history[-1])
+        return self._with_rates(self.slave.committed_inputs, *self.slave.history[-1])
 
     def errors(self) -> tuple[Numbers, Numbers] | None:
         """Return the errors of ud and udd, which estimates have; None: the motion has none."""
-        speeds, accelerations = errors_of_estimated_rates(self.slave.history, *self._moment())
-        wired = self.slave.wired
+        slave = self.slave
+        t = self.sample_time(is_stale=False)
+        speeds, accelerations = errors_of_estimated_rates(slave.history, t, tuple(slave.inputs[::3]))
+        wired = slave.wired
         return (
             tuple([0.0 if 3 * k + 1 in wired else error for k, error in enumerate(speeds)]),
             tuple([0.0 if 3 * k + 2 in wired else error for k, error in enumerate(accelerations)]),
@@ -107,7 +120,9 @@ class ByInputs:
     def step(self, t: float, h: float) -> bool:
         """Commit the pose at the inputs, with t as its time."""
         slave = self.slave
-        pose = slave.pose or slave.requested()
+        pose = slave.pose
+        if pose is None:
+            pose = slave.pose = self.solve()
         if pose.status > LAST_GOOD:
             return slave.discard(pose, t)
         if not slave.touched or t != slave.time:
@@ -116,18 +131,12 @@ class ByInputs:
         slave.time = t + h
         return True
 
-    def _moment(self) -> Sample:
-        """Return the time and u that the inputs request; without a set since the commit these are the committed."""
-        slave = self.slave
-        return (slave.time, tuple(slave.inputs[::3])) if slave.touched or not slave.history else slave.history[-1]
-
-    def _with_rates(self, inputs: Sequence[float], moment: Sample) -> Drive:
+    def _with_rates(self, inputs: Sequence[float], t: float, u: Numbers) -> Drive:
         """Return u, ud, udd at a time and u, with estimates for rates that are not wired."""
-        wired = self.slave.wired
-        t, u = moment
+        wired, history = self.slave.wired, self.slave.history
         if len(wired) == 2 * len(u):
             return u, tuple(inputs[1::3]), tuple(inputs[2::3])
-        ud, udd = estimated_rates(self.slave.history, t, u)
+        ud, udd = estimated_rates(history, t, u)
         if wired:
             ud = tuple([inputs[k] if k in wired else ud[k // 3] for k in range(1, len(inputs), 3)])
             udd = tuple([inputs[k] if k in wired else udd[k // 3] for k in range(2, len(inputs), 3)])

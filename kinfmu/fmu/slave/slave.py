@@ -147,14 +147,15 @@ class MechanismSlave(SlaveVariables):
         }
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
-        before = dict(self.__dict__)
+        before = {name: getattr(self, name) for name in SlaveVariables.__slots__}
         try:
             if state.get("token") != self.layout.token:
                 self.refuse("state", f"is damaged, or not one of this FMU ({self.layout.token})")
                 return
             self._restore(state)
         except Exception as error:  # an exception here would be Fatal for the host
-            self.__dict__.update(before)
+            for name, value in before.items():
+                setattr(self, name, value)
             self.refuse("state", f"is damaged: {type(error).__name__}: {error}")
 
     def _restore(self, state: dict[str, Any]) -> None:

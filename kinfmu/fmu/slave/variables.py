@@ -35,6 +35,12 @@ class SlaveVariables(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
     each in `meeting`; and `by_efforts`, which makes the motion of an FMU that efforts drive.
     """
 
+    __slots__ = (  # in the dictionary, with those of pythonfmu, they would be too many for Python's fastest access
+        *("_computers", "_counts", "_fetch", "_fetches", "_input_count", "_shown_drive", "committed"),
+        *("committed_inputs", "committed_loads", "driven_by_time", "history", "initialized", "input_starts", "inputs"),
+        *("motion", "pose", "rates", "references", "refused", "rows", "running", "settings", "shown", "solver"),
+        *("start_time", "stop_time", "stray_reported", "time", "touched", "unbound", "wired"),
+    )
     model: ClassVar[Any]
     layout: ClassVar[Layout]
     stages: ClassVar[dict[str, Callable[..., Numbers]]] = {}
@@ -58,6 +64,7 @@ class SlaveVariables(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._counts = {self.references.number(f"solver.{name}"): attrgetter(name) for name in ("status", "iterations")}
         self._computers = self._computed()
         self._fetches: dict[tuple[int, ...], Fetch] = {}
+        self._fetch = plan_fetch(self.references, (), self._computers)  # the last one
         self.solver = with_parameters(self.model, self.settings["parameters"], self.settings["tolerance"][0])
         self.unbound = False  # parameters were set and are not yet bound
 
@@ -79,7 +86,6 @@ class SlaveVariables(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self.forget()
         self.rows: dict[str, Numbers] = {}  # what has been computed at the shown pose so far, by part
         self._shown_drive: Drive | None = None  # u, ud, udd of the shown pose
-        self._is_stale = False  # the last good pose is shown, in place of an unreachable requested one
 
     def new_motion(self) -> ByInputs:
         """Return the motion of the drivers."""
@@ -105,21 +111,15 @@ class SlaveVariables(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             pose = self.pose = self.motion.solve()
         return pose
 
-    def _look(self) -> Pose:
-        """Return the pose that outputs are read from: the requested one if it is good, else the last good one."""
-        shown = self.shown
-        if shown is None:
-            pose = self.pose or self.requested()
-            self._is_stale = pose.status > LAST_GOOD
-            shown = self.shown = self.committed if self._is_stale else pose
-            self.rows, self._shown_drive = {}, None
-        return shown
+    def _is_stale(self) -> bool:
+        """Return whether the last good pose is shown, in place of an unreachable requested one."""
+        return self.shown is not self.pose
 
     def _drive(self) -> Drive:
         """Return u, ud, udd of the shown pose; before the first commit the last good one is at rest."""
         drive = self._shown_drive
         if drive is None:
-            if not self._is_stale:
+            if self.shown is self.pose:
                 drive = self.motion.drive()
             elif self.history:
                 drive = self.motion.committed_drive()
@@ -142,7 +142,7 @@ class SlaveVariables(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return sum(zip(*self._drive()), ())  # noqa: B905  # faster without
 
     def _driven(self, _: Pose) -> Numbers:
-        drive = self.motion.drive() if self._is_stale else self._drive()
+        drive = self.motion.drive() if self._is_stale() else self._drive()
         return sum(zip(*drive), ())  # noqa: B905
 
     def _values(self, pose: Pose) -> Numbers:
@@ -156,10 +156,11 @@ class SlaveVariables(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     def _motion(self, pose: Pose) -> Numbers:
         """Return values, rates and accelerations in one row: common subexpressions are computed once."""
-        if "values" not in self.rows and "rates" not in self.rows:
+        rows = self.rows
+        if not rows or ("values" not in rows and "rates" not in rows):
             _, ud, udd = self._drive()
             return self.solver.motion(pose, ud, udd)
-        return sum([self.rows.get(part) or self._computers[part](pose) for part in MOTION], ())  # some were read before
+        return sum([rows.get(part) or self._computers[part](pose) for part in MOTION], ())  # some were read before
 
     def _residual(self, _: Pose) -> Numbers:
         return (self.requested().residual,)
@@ -169,7 +170,7 @@ class SlaveVariables(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     def _errors(self, pose: Pose) -> Numbers:
         _, ud, udd = self._drive()
-        errors = self.solver.errors(pose, ud, udd, None if self._is_stale else self.motion.errors())
+        errors = self.solver.errors(pose, ud, udd, None if self._is_stale() else self.motion.errors())
         return tuple([min(error, UNKNOWN_ERROR) for error in errors])
 
     def _no_number(self, _: Pose) -> Numbers:
@@ -197,8 +198,8 @@ class SlaveVariables(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             return self._unknown(stage)
         u, ud, udd = self._drive()
         zd, zdd, slopes = sample_rates(self.solver.model, pose, ud, udd)
-        time = self.motion.sample_time(is_stale=self._is_stale)
-        loads = self.committed_loads if self._is_stale else self.settings["loads"]
+        time = self.motion.sample_time(is_stale=self._is_stale())
+        loads = self.committed_loads if self._is_stale() else self.settings["loads"]
         sample = (time, u, ud, udd, pose.z, zd, zdd, slopes, loads, self.settings["parameters"])
         forces = self.stages[stage](*sample)
         if self.meeting and any(map(math.isnan, forces)):
@@ -221,17 +222,23 @@ class SlaveVariables(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     def get_real(self, vrs: Sequence[int]) -> list[float]:
         try:
-            key = tuple(vrs)
-            parts, pick = self._fetches.get(key) or self._plan_fetch(key)
+            references, parts, pick = self._fetch
+            if vrs != references:  # most hosts read the same list over and over
+                key = tuple(vrs)
+                _, parts, pick = self._fetch = self._fetches.get(key) or self._plan_fetch(key)
             row: Numbers = ()
             for part, compute in parts:
                 if compute is None:
                     row += tuple(self.inputs) if part == "inputs" else self.settings[part]
                     continue
-                pose = self.shown or self._look()
+                shown = self.shown
+                if shown is None:  # the requested pose if it is good, else the last good one
+                    pose = self.pose or self.requested()
+                    shown = self.shown = self.committed if pose.status > LAST_GOOD else pose
+                    self.rows, self._shown_drive = {}, None
                 numbers = self.rows.get(part)
                 if numbers is None:
-                    numbers = self.rows[part] = compute(pose)
+                    numbers = self.rows[part] = compute(shown)
                 row += numbers
             return list(pick(row) if pick else row)
         except Exception as error:  # an exception here would be Fatal for the host
@@ -283,12 +290,12 @@ class SlaveVariables(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     def set_real(self, vrs: Sequence[int], values: Sequence[float]) -> None:
         inputs = self.inputs
-        count = self._input_count
-        for vr, value in zip(vrs, values):  # noqa: B905  # the host's lists are equally long
-            k = vr - 1
-            if not (0 <= k < count and -LARGEST <= value <= LARGEST):
+        pairs = ((vrs[0], values[0]),) if len(vrs) == 1 else zip(vrs, values)  # noqa: B905  # the lists are equally long
+        for vr, value in pairs:
+            if not (0 < vr <= self._input_count and -LARGEST <= value <= LARGEST):
                 self._set_real(vr, value)
                 continue
+            k = vr - 1
             if value != inputs[k]:
                 inputs[k] = value
                 self.shown = None

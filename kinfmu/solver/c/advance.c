@@ -219,7 +219,7 @@ kf_pose *kf_advance(kf_solver *solver, kf_pose *start, int map, const double *ta
     if (map != start->map) {
         path.pose = with_map(solver, start, map, solver->scratch.poses);
     }
-    for (k = 0; k < path.most_steps && !path.is_ended; ++k) {
+    for (k = 0; k < path.most_steps && !path.is_ended && !kf_is_overworked(solver); ++k) {
         step(solver, start, &path);
     }
     return kf_path_terminate(&path, limit);

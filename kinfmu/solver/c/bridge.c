@@ -67,6 +67,7 @@ static bool at_node(kf_solver *solver, const kf_bridge *bridge, int node, kf_pos
 #endif
     u = KF_AT(&solver->model, &bridge->u[node], buffer);
     kf_fresh(pose, -1, -INFINITY, INFINITY);
+    ++solver->scratch.work;
     if (bridge->turns == 0.0) { /* as it was found */
         return kf_evaluated_as_given(&solver->model, u, z, &pose->found);
     }
@@ -93,6 +94,7 @@ bool kf_bridge_pose(kf_solver *solver, int number, const double *u, kf_pose *pos
     kf_span_read(span, inner_of(solver, bridge), place(bridge, span, u[KF_ALONG(solver)]), z, zd, zdd);
     turn_on(bridge, z, z);
     kf_fresh(pose, -1, INFINITY, -INFINITY);
+    ++solver->scratch.work;
     if (!kf_evaluated(model, u, z, span->held, &pose->found)) {
         return false;
     }
@@ -122,6 +124,7 @@ static bool find_middle(kf_solver *solver, const kf_bridge *bridge, kf_found *fo
         }
     }
     *size = largest;
+    ++solver->scratch.work;
     return kf_evaluated(&solver->model, KF_AT(&solver->model, &bridge->centre, buffer), z, span->held, found);
 }
 

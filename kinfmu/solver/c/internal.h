@@ -41,6 +41,12 @@ void kf_second_rates(const kf_model *model, const kf_found *found, const double 
 #define KF_HERE(solver, pose) (KF_POSE_U(pose)[KF_ALONG(solver)])
 #define KF_POOL(solver) (&(solver)->pools[KF_ALONG(solver)])
 
+/* Return whether a call needed more pose solves than it may take: trusted steps fail from there on. */
+static inline bool kf_is_overworked(const kf_solver *solver)
+{
+    return solver->scratch.work > solver->most_work;
+}
+
 /* pose.c */
 extern const double kf_alone[KF_DRIVERS]; /* the direction of a single driver: derivatives are with respect to it */
 extern const double kf_at_rest[KF_DRIVERS > KF_UNKNOWNS ? KF_DRIVERS : KF_ROOM(KF_UNKNOWNS)];
@@ -192,6 +198,7 @@ int kf_first_of(int block);
 KF_RARE kf_status kf_failed(kf_pose *pose, kf_status status);
 bool kf_is_refused(kf_solver *solver, const double *u, int driver, bool mixed);
 kf_status kf_checked(kf_solver *solver, kf_pose *pose);
+KF_RARE kf_status kf_overworked(kf_solver *solver, const double *u, kf_pose *pose);
 #if KF_TRACKS
 kf_status kf_solve_along(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose);
 #endif

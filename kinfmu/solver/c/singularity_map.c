@@ -250,6 +250,7 @@ static bool cross(kf_solver *solver, kf_span *span, kf_pose *before, double side
         kf_weights(count, places + first, places[node], weights);
         kf_combined(span, side * span->half, count, order + first, (const double(*)[3])weights, solver->scratch.z);
         kf_fresh(pose, -1, -INFINITY, INFINITY);
+        ++solver->scratch.work;
         if (!kf_evaluated(&solver->model, KF_AT(&solver->model, &u, buffer), solver->scratch.z, NULL, &pose->found)
             || pose->found.moved > KF_STEADY * pose->found.margin) {
             return false;

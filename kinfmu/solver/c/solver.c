@@ -6,6 +6,8 @@ void kf_solver_start(kf_solver *solver)
     int k;
     kf_bind(&solver->model, kf_parameters_written, solver->message, sizeof solver->message);
     solver->tolerance = KF_TOLERANCE;
+    solver->most_work = KF_ANY_WORK;
+    solver->scratch.work = 0;
 #if KF_TRACKS
     solver->model.track = solver->scratch.ahead.track = 0;
 #endif
@@ -23,6 +25,15 @@ KF_RARE kf_status kf_failed(kf_pose *pose, kf_status status)
     kf_fresh(pose, -1, -INFINITY, INFINITY);
     pose->status = status;
     return status;
+}
+
+/* Reject driver values whose pose needs more work than may be done. */
+KF_RARE kf_status kf_overworked(kf_solver *solver, const double *u, kf_pose *pose)
+{
+    solver->message[0] = '\0';
+    kf_append_place(solver->message, u, KF_ROUGHLY, -1);
+    kf_append(solver->message, " is not reached with %d pose solves, the limit solver.most_work", solver->most_work);
+    return kf_failed(pose, KF_OUTSIDE);
 }
 
 /* Set the message for driver values that no mechanism has: not finite, or a distance below 0. mixed: only distances in
@@ -75,6 +86,7 @@ static KF_RARE kf_pose *base_of(kf_solver *solver, const kf_pose *pose)
         kf_bridge_pose(solver, pose->base_bridge, pose->base_u, base);
     } else {
         kf_fresh(base, -1, -INFINITY, INFINITY);
+        ++solver->scratch.work;
         kf_evaluated_as_given(&solver->model, pose->base_u, pose->base_z, &base->found);
     }
     base->map = pose->map;
@@ -109,7 +121,7 @@ static KF_WHOLE bool is_near(kf_solver *solver, kf_pose *start, const double *u,
         && (pose->found.margin >= KF_CLOSE || kf_keeps_branch(solver, start, pose, KF_SPEEDS(&solver->model), s))) {
         kf_keep_maps(solver, start->map, start->map, start->map);
         *map = kf_surveyed(solver, start, pose);
-        return *map == pose->map;
+        return *map == pose->map && !kf_is_overworked(solver);
     }
     return false;
 }
@@ -165,6 +177,9 @@ inline kf_status KF_SOLVE_ALONG(kf_solver *solver, kf_pose *start, const double 
     kf_pose *found;
     kf_limit limit;
     int map;
+    if (!KF_TRACKS) {
+        solver->scratch.work = 0;
+    }
     if (solver->unsolvable) {
         return kf_failed(pose, KF_INCONSISTENT);
     }
@@ -185,6 +200,9 @@ inline kf_status KF_SOLVE_ALONG(kf_solver *solver, kf_pose *start, const double 
         return KF_OK;
     }
     found = kf_advance(solver, start, map, u, &limit);
+    if (kf_is_overworked(solver)) {
+        return kf_overworked(solver, u, pose);
+    }
     if (found == NULL) {
         kf_append_limit(solver->message, &limit, u, KF_NAMED_DRIVER(solver));
         return kf_failed(pose, KF_OUTSIDE);

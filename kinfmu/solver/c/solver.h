@@ -161,14 +161,16 @@ typedef struct {
     double determinants[3][KF_ROOM(KF_BLOCKS)]; /* of nodes around a zero */
     double x1[KF_COORDINATES], x2[KF_COORDINATES];
     int live[3]; /* maps that are needed */
+    int work;    /* pose solves of the call: predictions that were corrected, and poses evaluated at nodes of bridges */
 } kf_scratch;
 
-/* tolerance: residual relative to the size above which a pose is not good (Newton always goes to round-off); anchor:
- * where all paths start; message: the reason of the last failure.
+/* tolerance: residual relative to the size above which a pose is not good (Newton always goes to round-off); most_work:
+ * pose solves above which kf_solve fails; anchor: where all paths start; message: the reason of the last failure.
  */
 typedef struct {
     kf_model model;
     double tolerance;
+    int most_work;
     kf_pose anchor;
     bool unsolvable; /* the parameters have no solution: every pose fails, and the message states why */
     char message[KF_MESSAGE];
@@ -178,7 +180,9 @@ typedef struct {
 
 #define KF_SOLVER_STATE offsetof(kf_solver, scratch)
 
-/* Start with the parameters of the mechanism and tolerance 1e-9. */
+#define KF_ANY_WORK 0x7fffffff /* most_work: no limit */
+
+/* Start with the parameters of the mechanism, tolerance 1e-9 and any work. */
 void kf_solver_start(kf_solver *solver);
 
 /* Set the parameters (KF_PARAMETERS), followed from those of the mechanism with the drivers at rest; the tolerance stays.

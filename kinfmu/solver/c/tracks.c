@@ -22,6 +22,7 @@ kf_pose *kf_on_track(kf_solver *solver, const kf_pose *whole, int driver)
             }
         }
         kf_fresh(own, -1, -INFINITY, INFINITY);
+        ++solver->scratch.work;
         kf_evaluated_as_given(&solver->model, kf_driven_at(&solver->model, &u, buffer), z, &own->found);
     }
     if (whole->has_tracks) {
@@ -183,6 +184,7 @@ static kf_status assembled(kf_solver *solver, kf_pose *start, const double *u, c
     pose->has_base = false;
     pose->has_tracks = true;
     pose->status = status;
+    ++solver->scratch.work;
     if (!kf_evaluated_as_given(&solver->model, u, z, &pose->found)) {
         kf_limit limit;
         kf_limit_at(&limit, KF_POSE_U(start), KF_NO_BLOCK);
@@ -199,6 +201,7 @@ kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *
     kf_status status;
     int k;
     bool is_same = start->has_tracks;
+    solver->scratch.work = 0;
     if (solver->unsolvable) {
         return kf_failed(pose, KF_INCONSISTENT);
     }
@@ -220,6 +223,9 @@ kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *
 #else
     status = assembled(solver, start, u, u, start->found.x, pose);
 #endif
+    if (kf_is_overworked(solver)) {
+        return kf_overworked(solver, u, pose);
+    }
     return KF_GOOD(status) ? kf_checked(solver, pose) : status;
 }
 
@@ -333,6 +339,7 @@ static bool mixed_step(kf_solver *solver, kf_pose *pose, const double *u, const 
         return false;
     }
     iterations = there->found.iterations + trial->found.iterations;
+    ++solver->scratch.work;
     if (!kf_evaluated_as_given(&solver->model, u, trial->found.x, &there->found)) {
         return false;
     }
@@ -372,7 +379,7 @@ kf_status kf_advance_mixed(kf_solver *solver, kf_pose *start, const double *targ
         }
     }
     kf_path_init(&path, pose, target, -1, solver->scratch.whole);
-    for (turn = 0; turn < path.most_steps && !path.is_ended; ++turn) {
+    for (turn = 0; turn < path.most_steps && !path.is_ended && !kf_is_overworked(solver); ++turn) {
         double s;
         const double *const u = kf_path_ahead(&path, &s);
         kf_pose *const before = path.pose, *const trial = kf_path_spare(&path);

@@ -95,6 +95,11 @@ inline bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *dire
     const double *x1 = pose->x1, *x2 = pose->x2;
     double needed;
     int k;
+    if (solver->scratch.work >= solver->most_work) {
+        solver->scratch.work += solver->scratch.work == solver->most_work; /* what is refused is no work */
+        return false;
+    }
+    ++solver->scratch.work;
     if (KF_IS_ONE(solver)) {
         if (pose->derivatives < 2) {
             kf_tangent(model, pose);

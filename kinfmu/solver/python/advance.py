@@ -23,7 +23,8 @@ class Path:
 
     pose: the last trusted one, before: the one before it, regular: the last one away from singular points; distance:
     what is left to the target; length: of the next step; most_steps: 0 where the target is too far; iterations: of
-    Newton, of all steps; end: the pose at the target or the limit before it, None while the path goes on.
+    Newton, of all steps; trial: the pose after the next step, if known; end: the pose at the target or the limit before
+    it, None while the path goes on.
     """
 
     __slots__ = (
@@ -41,6 +42,7 @@ class Path:
         "regular",
         "shortest",
         "target",
+        "trial",
     )
 
     def __init__(self, model: Model, start: Pose, target: Vector) -> None:
@@ -57,6 +59,7 @@ class Path:
         self.shortest = (GIVE_UP if model.LAW_TURNS else SHORTEST_STEP) * self.longest  # rises are short, too
         self.most_steps = 0 if abs(self.distance) > MOST_STEPS * self.longest else MOST_STEPS
         self.iterations = 0
+        self.trial: Pose | None = None
         self.limit: Limit | None = None
         self.end: Pose | Limit | None = None
 
@@ -150,6 +153,7 @@ def _follow_regular(model: Model, path: Path) -> None:
         s = distance if is_last else longest if distance > 0.0 else -longest
         trial = trusted_step(model, pose, UNIT_SPEED, s, target if is_last else (pose.u[0] + s,)) if s else None
         if trial is None or trial.margin < REGULAR:
+            path.trial = trial
             break
         path.iterations += trial.iterations
         path.margin = trial.margin
@@ -169,7 +173,7 @@ def _step(model: Model, path: Path) -> None:
         return
     pose, direction = path.pose, path.direction
     s, u = path.ahead()
-    trial = trusted_step(model, pose, direction, s, u)
+    trial, path.trial = path.trial or trusted_step(model, pose, direction, s, u), None
     if trial is not None:
         path.iterations += trial.iterations
         if trial.margin >= (CLOSE if has_one_driver else REGULAR) or keeps_branch(model, pose, trial, direction, s):

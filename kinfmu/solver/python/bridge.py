@@ -43,13 +43,14 @@ class Bridge:
     angle moved by its own whole turns, `raised`. nodes: the poses of the span, moved.
     """
 
-    __slots__ = ("_miss", "centre", "half", "high", "low", "nodes", "raised", "span", "turns")
+    __slots__ = ("_miss", "_shifts", "centre", "half", "high", "low", "nodes", "raised", "span", "turns")
 
     def __init__(self, span: Span, turns: int = 0, raised: tuple[int, ...] = ()) -> None:
         self.span = span
         self._miss: float | None = None  # not known yet
         self.turns = turns
         self.raised = raised
+        self._shifts = [(n * _HIGH, n * _LOW) for n in raised]  # as in `turned`
         self.centre = turned(span.centre, turns)
         self.half = span.half
         self.nodes = span.nodes if not turns else [self._moved(node) for node in span.nodes]
@@ -60,7 +61,7 @@ class Bridge:
         return Pose(u, evaluated(self.span.model, u, z, held=0))
 
     def _raised(self, z: Vector) -> Vector:
-        return tuple([turned(a, n) for a, n in zip(z, self.raised, strict=True)]) if self.turns else z
+        return tuple([a + high + low for a, (high, low) in zip(z, self._shifts, strict=True)]) if self.turns else z
 
     def covers(self, u: float) -> bool:
         """Return whether `u` is inside the window, where the bridge is used."""

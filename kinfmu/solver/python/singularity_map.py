@@ -28,17 +28,26 @@ class Interval(NamedTuple):
     block: int
 
 
-class SingularityMap(NamedTuple):
+class SingularityMap:
     """Bridges and searched intervals of one driver, the latest last.
 
     A value: each pose refers to the map that was known when it was found. Between `low` and `high`, which hold the
     driver value of that pose, there is no window of a bridge.
     """
 
-    bridges: tuple[Bridge, ...] = ()
-    searched: tuple[Interval, ...] = ()
-    low: float = -inf
-    high: float = inf
+    __slots__ = ("bridges", "high", "low", "searched")
+
+    def __init__(
+        self,
+        bridges: tuple[Bridge, ...] = (),
+        searched: tuple[Interval, ...] = (),
+        low: float = -inf,
+        high: float = inf,
+    ) -> None:
+        self.bridges = bridges
+        self.searched = searched
+        self.low = low
+        self.high = high
 
     def around(self, u: float) -> SingularityMap:
         """Return the same map with the limits of the window-free interval around `u`; inside a window it is empty."""
@@ -60,7 +69,8 @@ class SingularityMap(NamedTuple):
 
     def with_interval(self, interval: Interval, blocks: int) -> SingularityMap:
         """Return the map with one more searched interval; at one place there may be one for each of the blocks."""
-        return self._replace(searched=(*self.searched, interval)[-_KEPT - blocks :])
+        searched = (*self.searched, interval)[-_KEPT - blocks :]
+        return SingularityMap(self.bridges, searched, self.low, self.high)
 
     def knows(self, u: float, block: int) -> bool:
         """Return whether a zero of a block's determinant near `u` need not be searched for.

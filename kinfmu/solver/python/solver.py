@@ -51,15 +51,14 @@ class Solver:
             return self._by_tracks(self._tracks, start, u)
         if start.base is not None and u != start.u:
             start = start.base
-        if u == start.u:
-            return self._again(start)
         singularities = start.singularities
-        if self._has_one_driver:  # most samples: one trusted step, away from all that is singular
+        longest = self._longest
+        if longest:  # one driver; most samples: one trusted step, away from all that is singular
             here = u[0]
             s = here - start.u[0]
-            if -self._longest <= s <= self._longest and (
-                singularities is None or singularities.low <= here <= singularities.high
-            ):
+            if s == 0.0:
+                return self._again(start)
+            if -longest <= s <= longest and (singularities is None or singularities.low <= here <= singularities.high):
                 near = trusted_step(self.model, start, UNIT_SPEED, s, u)
                 if near is not None and near.watch <= self.tolerance >= near.residual:
                     margin = near.margin
@@ -69,6 +68,8 @@ class Solver:
                         singularities = surveyed(self.model, start, near)
                         if singularities is start.singularities:  # nothing new there
                             return near
+        elif u == start.u:
+            return self._again(start)
         refused = self._refused(start, u, self.model.DISTANCES)
         if refused is not None:
             return refused
@@ -143,16 +144,6 @@ class Solver:
             f"{place(self.model, pose.u)}: redundant row {name} does not close: gap {gap:.3g} {self.model.LENGTH_UNIT}"
         )
 
-    def _first(self, pose: Pose, ud: Vector) -> Vector:
-        """Return the argument of the model's rates: z' = dz/du with one driver, else zd."""
-        if self._has_one_driver:
-            return tangent_of(self.model, pose)[0]
-        return (
-            self._both(pose, ud, (0.0,) * len(ud))[0]
-            if pose.is_bridged
-            else tuple(self.model.velocity(pose.values, ud))
-        )
-
     def _both(self, pose: Pose, ud: Vector, udd: Vector) -> tuple[Vector, Vector]:
         """Return the arguments of the model's accelerations: z' and z'' with one driver, else zd and zdd."""
         if self._has_one_driver:
@@ -165,18 +156,22 @@ class Solver:
 
     def rates(self, pose: Pose, ud: Vector) -> Vector:
         """Return rates of the OUTPUTS at driver speeds ud."""
-        return self.model.rates(pose.values, ud, self._first(pose, ud))  # type: ignore[no-any-return]
+        if self._has_one_driver:
+            first = (pose.tangent or tangent_of(self.model, pose))[0]
+        elif pose.is_bridged:
+            first = self._both(pose, ud, (0.0,) * len(ud))[0]
+        else:
+            first = tuple(self.model.velocity(pose.values, ud))
+        return self.model.rates(pose.values, ud, first)  # type: ignore[no-any-return]
 
     def accelerations(self, pose: Pose, ud: Vector, udd: Vector) -> Vector:
         """Return accelerations of the OUTPUTS at driver speeds ud and accelerations udd."""
-        first, second = self._both(pose, ud, udd)
+        first, second = pose.tangent or self._both(pose, ud, udd)
         return self.model.accelerations(pose.values, ud, udd, first, second)  # type: ignore[no-any-return]
 
     def motion(self, pose: Pose, ud: Vector, udd: Vector) -> Vector:
         """Return positions, rates and accelerations of the OUTPUTS in one row; common terms are computed once."""
-        if (
-            self._has_one_driver and pose.tangent is None
-        ):  # the rule in an FMU: each pose is read once, before the next step
+        if self._has_one_driver and pose.tangent is None:  # as a rule in an FMU: each pose is read once
             pose.tangent, row = self.model.first_motion(pose.values, ud, udd)
             return row  # type: ignore[no-any-return]
         first, second = pose.tangent or self._both(pose, ud, udd)

@@ -43,15 +43,15 @@ class Hermite:
             coefficients.append(column[0])
         self._terms = tuple(zip(reversed(coefficients), reversed(repeated), strict=True))  # as they are evaluated
 
-    def __call__(self, x: float) -> FunctionValues:
-        """Return p, p', p'' at x."""
+    def __call__(self, x: float, per_x: float = 1.0) -> FunctionValues:
+        """Return p and its two derivatives with respect to u at x; per_x: dx/du."""
         value = slope = curve = 0.0
         for coefficient, node in self._terms:
             d = x - node
             curve = curve * d + 2.0 * slope
             slope = slope * d + value
             value = value * d + coefficient
-        return value, slope, curve
+        return value, slope * per_x, curve * per_x * per_x
 
 
 @cache  # few combinations of nodes and places are ever asked for
@@ -72,7 +72,8 @@ def weights(nodes: tuple[float, ...], x: float) -> tuple[FunctionValues, ...]:
 class Span:
     """The unknowns of singular blocks around `centre`, for a single driver.
 
-    nodes: six poses at -4, -2, -1, 1, 2, 4 half widths; held: one bit for each block, set if it is interpolated.
+    nodes: six poses at -4, -2, -1, 1, 2, 4 half widths; held: one bit for each block, set if it is interpolated; -1 for
+    all blocks.
     The inner four nodes give the numbers; their difference from the outer four is the error estimate.
     """
 
@@ -88,6 +89,8 @@ class Span:
             before, after = nodes[2].determinants[block], nodes[3].determinants[block]
             if before * after <= 0.0 or min(abs(before), abs(after)) < REGULAR:  # steep ones are regular at both ends
                 self.held |= 1 << block
+        if self.held == (1 << len(model.BLOCKS)) - 1:
+            self.held = -1
         self._inner: list[Hermite] | None = None  # made when first read: many bridges are only crossed
         self._outer: list[Hermite] | None = None
         self._middle: tuple[Vector, Vector] | None = None
@@ -158,9 +161,5 @@ def _polynomials(model: Model, half: float, places: tuple[float, ...], poses: Se
 def _read(polynomials: list[Hermite], x: float, half: float) -> tuple[Vector, Vector, Vector]:
     """Return z and its two derivatives with respect to the driver at x."""
     per_x = 1.0 / half
-    values = [polynomial(x) for polynomial in polynomials]
-    return (
-        tuple([value for value, _, _ in values]),
-        tuple([slope * per_x for _, slope, _ in values]),
-        tuple([curve * per_x * per_x for _, _, curve in values]),
-    )
+    z, zd, zdd = zip(*[polynomial(x, per_x) for polynomial in polynomials], strict=True)
+    return z, zd, zdd

@@ -23,13 +23,13 @@ def trusted_step(model: Model, pose: Pose, direction: Vector, s: float, u: Vecto
     """Return one step of predict and correct, or None if it cannot be trusted to stay on the branch."""
     zd, zdd = pose.tangent or directed(model, pose, direction)
     try:
-        trial = Pose(u, model.position(u, pose.z, zd, zdd, s), pose.singularities)
+        found = model.position(u, pose.z, zd, zdd, s)
     except (ArithmeticError, ValueError):  # singular, diverged, or the sine of an overflow
         return None
+    if found[2] < POLISHED:
+        found = polished(model, u, found)
+    trial = Pose(u, found, pose.singularities)
     margin = trial.margin
-    if margin < POLISHED:
-        trial = Pose(u, polished(model, u, trial.found()), pose.singularities)
-        margin = trial.margin
     needed = TRUST * trial.moved
     if needed > margin or needed > pose.margin or margin == 0.0:
         return None

@@ -48,7 +48,7 @@ def test_description_reads_back_as_the_interface_it_was_written_from(data: bytes
     read = description.read(data, "it")
     mechanism = linkage() if read.interface.name == "settable" else kinfmu.load(read.interface.name)
     plan = compile_plan(mechanism)
-    written = interface(plan, "time", has_time=fmi == 3, reach=documents(plan, fmi).reach)
+    written = interface(plan, "time", has_time=fmi == 3, has_work=True, reach=documents(plan, fmi).reach)
     place = written.value_references()
     assert list(read.interface) == [
         replace(

@@ -26,12 +26,14 @@ OWN: dict[str, Callable[[], kinfmu.Mechanism]] = {"settable": linkage, "motor": 
 DRIVEN_BY_TORQUES = ("motor", "rocker")  # the rocker falls to its dead centre, where its motion ends
 
 
-def _program(mechanism: kinfmu.Mechanism, fmi: int, folder: Path, *flags: str, drive: Drive = "inputs") -> Path:
+def program(
+    mechanism: kinfmu.Mechanism, fmi: int, folder: Path, *flags: str, drive: Drive = "inputs", host: Path = HOST
+) -> Path:
     """The FMU's sources and a host, linked into one program."""
     files, variables, plan = fmu_sources(mechanism, fmi, drive)
     files |= headers(f"{fmi}.0")
-    program = folder / "host"
-    sources_and_host = files | {"host.c": HOST.read_text("utf-8")}
+    path = folder / "host"
+    sources_and_host = files | {"host.c": host.read_text("utf-8")}
     references = variables.value_references()
     outputs = [v.name for v in variables if v.causality == "output" and v.type == "Real"]
     defined = {
@@ -40,18 +42,19 @@ def _program(mechanism: kinfmu.Mechanism, fmi: int, folder: Path, *flags: str, d
         "OUTPUTS": len(outputs),
         "INPUT": references[variables.part("efforts" if drive == "torque" else "inputs")[0].name],
         "AMPLITUDE": 40.0 if drive == "torque" else 2.0,
+        "WORK": references.get("solver.work", 0),
         "PARAMETER": references[plan.parameters[0].name] if plan.parameters else -1,
     }
     for name, text in sources_and_host.items():
         (folder / name).write_text(text, "utf-8")
     command = [str(CC), "-std=c99", "-g", "-ffp-contract=off", *flags]
     command += [*(f"-D{name}={value}" for name, value in defined.items()), *compiler.units(sources_and_host), "-o"]
-    command += [str(program), "-lm"]
+    command += [str(path), "-lm"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     if "cannot find" in done.stderr:
         pytest.skip(f"this compiler has no {flags}")
     assert done.returncode == 0, done.stderr
-    return program
+    return path
 
 
 @pytest.mark.skipif(CC is None, reason="neither gcc nor clang is there")
@@ -76,7 +79,7 @@ def check_under_sanitizers(name: str, fmi: int, tmp_path: Path, *more: str) -> N
     mechanism = OWN[name]() if name in OWN else kinfmu.load(name)
     drive: Drive = "torque" if name in DRIVEN_BY_TORQUES else "inputs"
     flags = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", *more)
-    done = subprocess.run([_program(mechanism, fmi, tmp_path, *flags, drive=drive)], capture_output=True, text=True)
+    done = subprocess.run([program(mechanism, fmi, tmp_path, *flags, drive=drive)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
 
@@ -84,6 +87,6 @@ def check_under_sanitizers(name: str, fmi: int, tmp_path: Path, *more: str) -> N
 @pytest.mark.skipif(CC is None or shutil.which("valgrind") is None, reason="valgrind or a compiler is not there")
 @pytest.mark.long
 def test_valgrind_reports_no_errors(fmi: int, tmp_path: Path) -> None:
-    command = ["valgrind", "--error-exitcode=9", "--leak-check=full", "-q", _program(linkage(), fmi, tmp_path)]
+    command = ["valgrind", "--error-exitcode=9", "--leak-check=full", "-q", program(linkage(), fmi, tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -153,8 +153,9 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
                             : wrong_count(instance, nValueReferences, nValues));
 }
 
-/* solver.status and rates are enumerations, which FMI 3.0 gets as Int64; solver.iterations is an Int32. */
+/* solver.status and rates are enumerations, which FMI 3.0 gets as Int64; solver.iterations and so on are Int32. */
 GET_COUNTS(fmi3GetInt32, fmi3Int32, "Int32")
+SET_COUNTS(fmi3SetInt32, fmi3Int32, "Int32")
 GET_COUNTS(fmi3GetInt64, fmi3Int64, "Int64")
 SET_COUNTS(fmi3SetInt64, fmi3Int64, "Int64")
 
@@ -187,7 +188,6 @@ NONE(fmi3SetInt8, kf_not_settable, "Int8", const fmi3Int8 values[], size_t value
 NONE(fmi3SetUInt8, kf_not_settable, "UInt8", const fmi3UInt8 values[], size_t value_count)
 NONE(fmi3SetInt16, kf_not_settable, "Int16", const fmi3Int16 values[], size_t value_count)
 NONE(fmi3SetUInt16, kf_not_settable, "UInt16", const fmi3UInt16 values[], size_t value_count)
-NONE(fmi3SetInt32, kf_not_settable, "Int32", const fmi3Int32 values[], size_t value_count)
 NONE(fmi3SetUInt32, kf_not_settable, "UInt32", const fmi3UInt32 values[], size_t value_count)
 NONE(fmi3SetUInt64, kf_not_settable, "UInt64", const fmi3UInt64 values[], size_t value_count)
 NONE(fmi3SetString, kf_not_settable, "String", const fmi3String values[], size_t value_count)

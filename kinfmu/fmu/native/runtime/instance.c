@@ -116,6 +116,7 @@ static void hold_discrete(kf_instance *instance)
     kf_state *const s = &instance->now;
     s->held_status = kf_ask(instance);
     s->held_iterations = kf_shown(s)->found.iterations;
+    s->held_work = s->work;
     memcpy(s->held_message, s->message, sizeof s->held_message);
 }
 

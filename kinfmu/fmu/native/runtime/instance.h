@@ -63,6 +63,8 @@ typedef struct {
     int committed, asked; /* indices of poses; equal if the requested pose is the committed one */
     bool solved;          /* poses[asked] is the requested pose */
     kf_status status, committed_status;
+    int work;      /* pose solves of the requested pose */
+    int most_work; /* the parameter; 0: no limit */
     char message[KF_MESSAGE]; /* why the requested pose is unreachable */
     unsigned known;
     bool drive_known;
@@ -95,7 +97,7 @@ typedef struct {
     double start_time, stop_time; /* of the experiment; the stop time is DBL_MAX if none was given */
     double step_size; /* that the integrator would take next, 0 at the start */
     kf_status held_status; /* discrete variables of model exchange, which stay between events */
-    int held_iterations;
+    int held_iterations, held_work;
     char held_message[KF_MESSAGE];
     kf_solver solver; /* the last: what it needs for a call only is not copied */
 } kf_state;

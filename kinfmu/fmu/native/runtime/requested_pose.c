@@ -47,9 +47,12 @@ inline void kf_solve_at(kf_state *s, const double *u)
     if (!s->unsolvable && memcmp(u, s->committed_u, sizeof s->committed_u) == 0) {
         s->asked = s->committed;
         s->status = s->committed_status;
+        s->work = 0;
     } else {
         s->asked = !s->committed;
+        s->solver.most_work = s->most_work && s->mode > KF_INITIALIZATION ? s->most_work : KF_ANY_WORK;
         s->status = kf_solve(&s->solver, &s->poses[s->committed], u, &s->poses[s->asked]);
+        s->work = s->solver.scratch.work;
     }
     if (KF_GOOD(s->status)) {
         s->message[0] = '\0';

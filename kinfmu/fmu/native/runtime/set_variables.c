@@ -74,10 +74,28 @@ kf_answer kf_set_real(kf_instance *instance, const unsigned *references, size_t 
     return KF_DONE;
 }
 
-/* The parameter `rates`. */
+/* The parameter `solver.most_work`. */
+static kf_answer set_most_work(kf_instance *instance, long long value)
+{
+    kf_state *const s = &instance->now;
+    if (value < 0) {
+        return kf_answered(instance, KF_ERROR, "solver.most_work = %lld must be at least 0; %d stays", value, s->most_work);
+    }
+    if (value != s->most_work && s->mode > KF_INITIALIZATION) {
+        return kf_answered(instance, KF_ERROR,
+                           "solver.most_work = %lld comes too late: it is fixed once the FMU is initialized", value);
+    }
+    s->most_work = (int)value;
+    return KF_DONE;
+}
+
+/* The parameters `rates` and `solver.most_work`. */
 kf_answer kf_set_count(kf_instance *instance, unsigned reference, const char *type, long long value)
 {
     kf_state *const s = &instance->now;
+    if (reference == KF_MOST_WORK && strcmp(type, KF_ITERATIONS_WORD) == 0) {
+        return set_most_work(instance, value);
+    }
     if (reference != KF_RATES || strcmp(type, KF_ENUMERATION_WORD) != 0) {
         return kf_not_settable(instance, reference, type);
     }

@@ -166,6 +166,11 @@ kf_answer kf_get_count(kf_instance *instance, unsigned reference, const char *ty
     } else if (reference == KF_ITERATIONS && strcmp(type, KF_ITERATIONS_WORD) == 0) {
         kf_ask(instance);
         *value = kf_holds(s) ? s->held_iterations : kf_shown(s)->found.iterations;
+    } else if (reference == KF_WORK && strcmp(type, KF_ITERATIONS_WORD) == 0) {
+        kf_ask(instance);
+        *value = kf_holds(s) ? s->held_work : s->work;
+    } else if (reference == KF_MOST_WORK && strcmp(type, KF_ITERATIONS_WORD) == 0) {
+        *value = s->most_work;
     } else {
         return kf_not_a(instance, reference, type);
     }
