@@ -219,7 +219,8 @@ def in_order(system: System, rows: Sequence[int] | None = None) -> Ordered:
         slopes = np.any([system.gradients(member, q) != 0.0 for q in poses], axis=0)  # (rows, columns)
         meets += [[column for column, meet in zip(member.columns, row, strict=True) if meet] for row in slopes]
     chosen = range(len(meets)) if rows is None else rows
-    order = ordered_blocks([meets[row] for row in chosen], len(system.coordinates))
+    of_drivers = sum(row >= system.joint_row_count for row in chosen)
+    order = ordered_blocks([meets[row] for row in chosen], len(system.coordinates), of_drivers)
     return Ordered(
         tuple((tuple(chosen[k] for k in members), columns) for members, columns in order.blocks),
         tuple(chosen[k] for k in order.unmatched_rows),
