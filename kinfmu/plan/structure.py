@@ -81,7 +81,7 @@ def find_structure(
         index: [number[symbol.name] for symbol in symbols([row(index, known)]) if symbol.name in number]
         for index in open_rows
     }
-    order = ordered_blocks([meets[index] for index in open_rows], len(unknown))
+    order = ordered_blocks([meets[index] for index in open_rows], len(unknown), len(driving))
     if order.unmatched_rows or order.unmatched_columns:
         missed = [unknown[k] for k in order.unmatched_columns]
         spare = [system.rows[open_rows[k]].name for k in order.unmatched_rows]

@@ -218,7 +218,8 @@ def in_order(system: System, rows: Sequence[int] | None = None) -> Ordered:
     for member in system.members:
         meets += [[member.columns[k] for k in met] for met in system.columns_met(member, poses[:, member.columns])]
     chosen = range(len(meets)) if rows is None else rows
-    order = ordered_blocks([meets[row] for row in chosen], len(system.coordinates))
+    of_drivers = sum(row >= system.joint_row_count for row in chosen)
+    order = ordered_blocks([meets[row] for row in chosen], len(system.coordinates), of_drivers)
     return Ordered(
         tuple((tuple(chosen[k] for k in members), columns) for members, columns in order.blocks),
         tuple(chosen[k] for k in order.unmatched_rows),

@@ -19,13 +19,19 @@ class Ordered(NamedTuple):
     unmatched_columns: tuple[int, ...] = ()
 
 
-def ordered_blocks(meets: Sequence[Sequence[int]], column_count: int) -> Ordered:
+def ordered_blocks(meets: Sequence[Sequence[int]], column_count: int, of_drivers: int = 0) -> Ordered:
     """Return the blocks: rows matched to columns, then strongly connected components (Dulmage-Mendelsohn, fine).
 
-    meets: the columns that each row meets. Ties go to the earlier row, so that equal input gives equal order. Written
-    in Python, since scipy takes longer to import than the largest mechanism to order.
+    Ties go to the earlier row, so that equal input gives equal order. Written in Python, since scipy takes longer to
+    import than the largest mechanism to order.
+
+    Args:
+        meets: The columns that each row meets.
+        column_count: Number of columns.
+        of_drivers: Number of rows at the end that are never to spare where a row before them could be.
+
     """
-    row_of = _matched(meets)
+    row_of = _matched(meets, [*range(len(meets) - of_drivers, len(meets)), *range(len(meets) - of_drivers)])
     column_of = {row: column for column, row in row_of.items()}
     if not len(meets) == column_count == len(row_of):
         return Ordered(
@@ -38,32 +44,31 @@ def ordered_blocks(meets: Sequence[Sequence[int]], column_count: int) -> Ordered
     return Ordered(tuple((tuple(rows), tuple(sorted(column_of[row] for row in rows))) for rows in order))
 
 
-def _matched(meets: Sequence[Sequence[int]]) -> dict[int, int]:
-    """Return columns with their rows, as many as possible; earlier rows come before later ones.
+def _matched(meets: Sequence[Sequence[int]], rows: Sequence[int]) -> dict[int, int]:
+    """Return columns with their rows, as many as possible; a row that comes earlier in `rows` is matched rather.
 
-    Each row in turn takes the nearest free column, along the shortest path of rows that each pass their column on.
+    Each row takes the nearest free column: each row on the shortest path to it passes its column on.
     """
     row_of: dict[int, int] = {}
     column_of: dict[int, int] = {}
-    for row in range(len(meets)):
+    closed: set[int] = set()  # columns from which no path leads to a free one, neither now nor later
+    for start in rows:
         reached_by: dict[int, int] = {}  # the row that reaches a column first
         free: int | None = None
-        reached = [row]
-        for taker in reached:
-            for column in meets[taker]:
-                if column in reached_by:
-                    continue
-                reached_by[column] = taker
-                if column not in row_of:
-                    free = column
-                    break
-                reached.append(row_of[column])
+        reached = [start]
+        for row in reached:
+            new = [column for column in meets[row] if column not in reached_by and column not in closed]
+            reached_by.update(dict.fromkeys(new, row))
+            free = next((column for column in new if column not in row_of), None)
             if free is not None:
                 break
+            reached += [row_of[column] for column in new]
+        else:
+            closed.update(reached_by)
         while free is not None:
-            taker = row_of[free] = reached_by[free]
-            passed_on = column_of.get(taker)
-            column_of[taker], free = free, passed_on
+            row = row_of[free] = reached_by[free]
+            passed_on = column_of.get(row)
+            column_of[row], free = free, passed_on
     return row_of
 
 

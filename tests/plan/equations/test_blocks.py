@@ -51,9 +51,11 @@ def test_as_few_rows_and_columns_as_possible_are_left_over(seed: int) -> None:
     assert bool(order.blocks) is (0 < row_count == column_count == matched)
 
 
-def test_the_later_row_is_left_over() -> None:
+def test_the_later_row_is_left_over_unless_it_is_that_of_a_driver() -> None:
     order = ordered_blocks([[0], [1, 2], [0], [1], [2], [4]], 6)
     assert (order.blocks, order.unmatched_rows, order.unmatched_columns) == ((), (2, 4), (3, 5))
+    order = ordered_blocks([[0], [1, 2], [0], [1], [2], [4]], 6, of_drivers=2)
+    assert (order.blocks, order.unmatched_rows, order.unmatched_columns) == ((), (2, 3), (3, 5))
 
 
 def test_without_rows_there_is_nothing_to_solve() -> None:
