@@ -366,53 +366,6 @@ double kf_turns_after(const kf_segments *segments, double u)
     return segments->repeats && fabs(u) < KF_FARTHEST * kf_reach[0] ? floor((u - kf_anchor_u[0]) / TURN) : 0.0;
 }
 
-/* Where in their segments lanes at..at + KF_VECTOR are, from -1 to 1, and sine and cosine of the driver's angle there.
- *
- * of: centre of the segment, sine and cosine there, whole turns before it.
- */
-static inline void place_driver(const kf_segments *segments, const double *u, double of[4][KF_VECTOR], double *x, double *sine,
-                                double *cosine)
-{
-    const double per_half = 2.0 / segments->width;
-    double step[KF_VECTOR];
-    int i;
-    KF_SIDE_BY_SIDE
-    for (i = 0; i < KF_VECTOR; ++i) {
-        step[i] = u[i] - of[3][i] * HIGH - of[0][i] - of[3][i] * LOW;
-        x[i] = step[i] * per_half;
-        if (kf_driver_is_angle[0]) {
-            kf_turn(step[i], of[1][i], of[2][i], &sine[i], &cosine[i]);
-        }
-    }
-}
-
-/* Predict an unknown in lanes at..at + KF_VECTOR. of: the terms of its polynomials, its base, sine and cosine there. */
-static inline void predict_unknown(int k, bool is_steep, double of[KF_TERMS + 2][KF_VECTOR], const double *x, kf_lanes *lanes,
-                                   int at)
-{
-    double *const z = lanes->z[k] + at, *const sine = lanes->angles[0][k] + at, *const cosine = lanes->angles[1][k] + at;
-    double step[KF_VECTOR];
-    int i;
-    KF_SIDE_BY_SIDE
-    for (i = 0; i < KF_VECTOR; ++i) {
-        const double p = x[i];
-        step[i] = p * KF_FMA(p, KF_FMA(p, KF_FMA(p, KF_FMA(p, KF_FMA(p, KF_FMA(p, KF_FMA(p, of[7][i], of[6][i]), of[5][i]),
-            of[4][i]), of[3][i]), of[2][i]), of[1][i]), of[0][i]);
-        z[i] = of[KF_TERMS - 1][i] + step[i];
-    }
-    if (kf_unknown_is_angle[k] && !is_steep) {
-        KF_SIDE_BY_SIDE
-        for (i = 0; i < KF_VECTOR; ++i) {
-            kf_turn(step[i], of[KF_TERMS][i], of[KF_TERMS + 1][i], &sine[i], &cosine[i]);
-        }
-    } else if (kf_unknown_is_angle[k]) {
-        KF_SIDE_BY_SIDE
-        for (i = 0; i < KF_VECTOR; ++i) {
-            kf_sincos_lane(z[i], &sine[i], &cosine[i]);
-        }
-    }
-}
-
 /* Predict lanes from..to (excluded), all in one segment, KF_VECTOR at a time; lanes past the last one are overwritten. */
 static void predict_within(const kf_segments *segments, const kf_segment *segment, double turns, const double *u, int from,
                            int to, kf_lanes *lanes)
