@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
@@ -12,7 +11,7 @@ import click
 from kinfmu.cli.arguments import InputFile, mechanism_argument, names_in, outputs_option
 from kinfmu.cli.group import Progress, errors_of, main, note, patience
 from kinfmu.cli.settings import checked_settings, set_option
-from kinfmu.errors import CompilerError, KinfmuError, listed
+from kinfmu.errors import KinfmuError, RequestError, listed
 from kinfmu.files import suffix_of
 from kinfmu.mechanism import gallery
 
@@ -59,7 +58,7 @@ if TYPE_CHECKING:
 @click.option(
     "--page/--no-page",
     default=None,
-    help="Put the page of kinfmu play into the FMU's documentation. Default: if ziglang is installed.",
+    help="Put the page of kinfmu play into the FMU's documentation. Default: if the mechanism is not too large for it.",
 )
 @click.option(
     "--si",
@@ -159,12 +158,12 @@ def _page(mechanism: Mechanism, wanted: bool | None) -> str:
     """Return the page of a mechanism, '' if it is not wanted, or if it was not asked for and cannot be made."""
     from kinfmu.page import page
 
-    if wanted is False or (wanted is None and find_spec("ziglang") is None):
+    if wanted is False:
         return ""
     try:
         with patience(hint="; --no-page builds the FMU without it"):
             return page(mechanism)
-    except CompilerError as error:
+    except RequestError as error:
         if wanted:
             raise
         note(f"the FMU is built without the page of kinfmu play: {error}")
