@@ -56,8 +56,8 @@ def drawing(mechanism: Mechanism) -> str:
 
 @widget_of.register
 def live(mechanism: Mechanism) -> Any:
-    """Return the live mechanism; None without anywidget and ziglang, and for large ones, whose page takes long."""
-    if len(mechanism.coordinate_names) > _LARGEST or not (find_spec("anywidget") and find_spec("ziglang")):
+    """Return the live mechanism; None without anywidget, and for large ones, whose page takes long."""
+    if len(mechanism.coordinate_names) > _LARGEST or not find_spec("anywidget"):
         return None
     from kinfmu.page.player import play
 

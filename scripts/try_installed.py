@@ -23,6 +23,7 @@ CALLS = (
     ("simulate", "mine.fmu"),
     ("export", "logs/mine.mcap", "-o", "mine.csv"),
     ("export", "logs/mine.mcap", "-o", "mine.npz"),
+    ("export", "mine.toml", "-o", "mine.html"),
 )
 SAVE = ("review", "logs/mine.mcap", "--save", "saved.rrd")
 

@@ -43,15 +43,16 @@ settings.load_profile("kinfmu")
 
 @pytest.fixture(scope="session", autouse=True)
 def python_fmus() -> Iterator[None]:
-    """FMUs are of the python flavour and have no page if a test asks for neither: compilers take seconds."""
-    module = import_module("kinfmu.fmu.build")
+    """FMUs are of the python flavour and have no page if a test asks for neither: both take long."""
+    module, command = import_module("kinfmu.fmu.build"), import_module("kinfmu.cli.build")
+    page = command._page
 
     def default_flavour(fmi: int = 2, platforms: str = "host") -> str:
         return "python" if (fmi, platforms) == (2, "host") else "native"
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "default_flavour", default_flavour)
-        patch.setattr("kinfmu.cli.build.find_spec", lambda _name: None)
+        patch.setattr(command, "_page", lambda mechanism, wanted: page(mechanism, wanted) if wanted else "")
         yield
 
 

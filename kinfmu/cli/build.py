@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
@@ -12,7 +11,7 @@ import click
 from kinfmu.cli.arguments import InputFile, mechanism_argument, names_in, outputs_option
 from kinfmu.cli.group import Progress, errors_of, main, note, patience
 from kinfmu.cli.settings import checked_settings, set_option
-from kinfmu.errors import KinfmuError, listed
+from kinfmu.errors import KinfmuError, RequestError, listed
 from kinfmu.files import suffix_of
 from kinfmu.mechanism import gallery
 
@@ -59,7 +58,7 @@ if TYPE_CHECKING:
 @click.option(
     "--page/--no-page",
     default=None,
-    help="Put the page of kinfmu play into the FMU's documentation; needs ziglang, which compiles it for some seconds.",
+    help="Put the page of kinfmu play into the FMU's documentation. Default: if the mechanism is not too large for it.",
 )
 @click.option(
     "--si",
@@ -136,7 +135,7 @@ def build(
             si=si,
             ssp=ssp,
             osp=osp,
-            page=bool(page) and (lambda: _page(mech)),
+            page=lambda: _page(mech, page),
             progress=progress,
         )
     if drive == "time":
@@ -148,8 +147,6 @@ def build(
     size = f"{path.stat().st_size / 1000.0:.0f} kB"
     held = "SSP with a " if suffix_of(path) == ".ssp" else ""
     click.echo(f"{path}: {size}, {held}{chosen} FMU for {where}, FMI {fmi}.0 {kinds}, driven by {drive}")
-    if page is None and find_spec("ziglang"):
-        note("built without the page of kinfmu play in its documentation; --page adds it")
     if osp:
         click.echo(path.with_name(f"{mech.name}_OspModelDescription.xml"))
     obstacle = native_obstacle() if flavour is None and not is_native else ""
@@ -157,11 +154,20 @@ def build(
         click.echo(f"a native FMU, which every host can load, is not possible here: {obstacle}", err=True)
 
 
-def _page(mechanism: Mechanism) -> str:
+def _page(mechanism: Mechanism, wanted: bool | None) -> str:
+    """Return the page of a mechanism, '' if it is not wanted, or if it was not asked for and cannot be made."""
     from kinfmu.page import page
 
-    with patience():
-        return page(mechanism)
+    if wanted is False:
+        return ""
+    try:
+        with patience(hint="; --no-page builds the FMU without it"):
+            return page(mechanism)
+    except RequestError as error:
+        if wanted:
+            raise
+        note(f"the FMU is built without the page of kinfmu play: {error}")
+        return ""
 
 
 def _place(given: str, name: str, ending: str) -> Path:

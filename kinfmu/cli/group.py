@@ -172,12 +172,12 @@ def warn(text: str) -> None:
 
 
 @contextmanager
-def patience(seconds: float = 6.0) -> Iterator[None]:
-    """Print a note if this block, which makes a page, lasts longer: zig compiles its C library once, for a minute."""
-    from kinfmu.codegen.c.library_cache import holds_any
+def patience(seconds: float = 6.0, hint: str = "") -> Iterator[None]:
+    """Print a note if this block, which makes a page, lasts longer: that of a large mechanism does.
 
-    first = "" if holds_any(".wasm") else "; the first page on this machine takes a minute, others seconds"
-    timer = threading.Timer(seconds, note, [f"compiling the page{first}"])
+    hint: added to the note, such as how to do without the page.
+    """
+    timer = threading.Timer(seconds, note, [f"making the page{hint}"])
     timer.daemon = True
     timer.start()
     try:

@@ -65,7 +65,7 @@ def build(
         ssp: True: write an .ssp that holds the FMU, with its connectors and a set of all parameters. Default: true if
             the path ends in .ssp.
         osp: True: write also `<name>_OspModelDescription.xml`, next to the FMU, with groups of variables for libcosim.
-        page: True: put the page of `kinfmu play` into its documentation, which needs ziglang. Or a function that is
+        page: True: put the page of `kinfmu play` into its documentation. Or a function that is
             called after the FMU is compiled and returns the page, '' for none. Default: no page.
         progress: Called with (platforms done, number of platforms) during compilation.
 

@@ -13,7 +13,7 @@ from kinfmu.analysis import Report, check
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.page.describe import describe, module_data, written_file
-from kinfmu.page.module import packed, page_module
+from kinfmu.page.module import packed, page_module, solver
 from kinfmu.page.opened import opened
 
 _WEB = Path(__file__).parent / "web"
@@ -44,7 +44,7 @@ _SCRIPTS = (
     "hand",
     "main",
 )
-MOST_NUMBERS = 400  # of a file that its page can change: the C code of more is too long for a small page
+MOST_NUMBERS = 400  # of a file that its page can change: the code of more is too long for a small page
 _IMPORT = re.compile(r"^import .*\n", re.MULTILINE)
 _EXPORT = re.compile(r"^export ", re.MULTILINE)
 _COMMENT = re.compile(r"^ *//.*\n", re.MULTILINE)  # a line of its own
@@ -61,9 +61,9 @@ def page(
 ) -> str:
     """Return a page in which a mechanism is dragged: one HTML file that works offline, without any request.
 
-    It computes with the C code of the FMU, compiled to WebAssembly: as long as no number of the file but a parameter is
-    changed, positions, velocities and accelerations equal those of the FMU to the bit. In pages of files with more than
-    400 numbers only parameters and laws can be changed, and the page states so.
+    It computes with the solver of the native FMU and the formulas of its C code, as WebAssembly: as long as no number
+    of the file but a parameter is changed, positions, velocities and accelerations equal those of the FMU to the bit.
+    In pages of files with more than 400 numbers only parameters and laws can be changed, and the page states so.
 
     Args:
         mechanism: The mechanism.
@@ -78,7 +78,7 @@ def page(
 
     Raises:
         KinfmuError: The mechanism cannot be solved.
-        CompilerError: ziglang is not installed (`pip install 'kinfmu[native]'`), or it fails.
+        RequestError: It is too large for a page, such as one of more than 512 unknowns.
 
     """
     require_mechanism(mechanism, "page")
@@ -98,6 +98,7 @@ def page(
         "over": over and {"driver": drivers.index(over[0]), "from": over[1], "to": over[2]},
         "samples": samples,
         "size": as_written.plan.size,
+        "solver": solver(),
         "modules": modules,
         "closedNumbers": len(change.places) if is_large else 0,
         "file": written_file(mechanism, as_written, places),

@@ -1,22 +1,29 @@
-"""A mechanism as a WebAssembly module: the C of its plan, the solver and `interface.c`, compiled without any import.
+"""A mechanism as a WebAssembly module: the compiled solver of all mechanisms with the model of one.
 
-The module does the same arithmetic as the native engine and the native FMU, operation by operation: numbers are equal
-to the bit. It holds one instance of the mechanism; web/engine.js calls it.
+`solver/` has what was compiled together with kinfmu/solver/c, and the result, solver.wasm: there sizes are variables,
+and what a model defines has a place. The model's C is translated into these places. The module does the same
+arithmetic as the native engine and the native FMU, operation by operation: numbers are equal to the bit. It holds
+one instance of the mechanism; web/engine.js calls it.
 """
 
 from __future__ import annotations
 
 import base64
 import gzip
-from collections.abc import Mapping, Sequence
+import re
+import struct
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
 from kinfmu.codegen.c import compiler, emit
 from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
-from kinfmu.codegen.forces import SIGNATURE, emit_c_forces, solves
+from kinfmu.codegen.forces import emit_c_forces
+from kinfmu.codegen.wasm import Binary, Translator
 from kinfmu.codegen.writer import Names, Writer, identifier
+from kinfmu.errors import RequestError
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import reaction_names_of, shaking_names
 from kinfmu.plan import SolvePlan, compile_plan
@@ -26,7 +33,6 @@ from kinfmu.plan.reactions import reaction_steps, shaking_steps
 from kinfmu.plan.trace import Tracer, parameter_symbol
 from kinfmu.plan.undetermined import undetermined_reactions
 
-FOLLOWER = ("follower.h", "follower.c")
 EXPORTS = (
     "kf_page_start",
     "kf_page_place",
@@ -44,15 +50,19 @@ EXPORTS = (
     "kf_page_sweep",
     "kf_page_sample",
 )
-FLAGS = ("-Oz",)
-_INTERFACE = Path(__file__).with_name("interface.c")
+SOURCES = Path(__file__).with_name("solver")  # with the compiled module, solver.wasm, which scripts/solver makes
+_SIZES = {
+    "HOLD": "numbers that rates read",
+    "LARGEST_BLOCK": "entries in a Jacobian",
+    "OF_JOINTS": "reactions of joints",
+}
 
 
 class PageModule(NamedTuple):
-    """A compiled mechanism and what its arrays hold.
+    """A mechanism compiled for pages and what its arrays hold.
 
     Attributes:
-        data: The WebAssembly module.
+        binary: The WebAssembly module.
         plan: What it solves: all bodies' coordinates that move, then the points of interest.
         points: The points 'body.point' whose places in their bodies it returns.
         parameters: Names of what it can bind, in its order: parameters, or their labels, then constants of the laws.
@@ -62,7 +72,7 @@ class PageModule(NamedTuple):
 
     """
 
-    data: bytes
+    binary: Binary
     plan: SolvePlan
     points: tuple[str, ...]
     parameters: tuple[str, ...]
@@ -76,8 +86,19 @@ class PageModule(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The module for a page."""
-        return packed(self.data)
+        """What a page makes the module from, with the text of `solver`."""
+        return packed(self.binary.difference(EXPORTS))
+
+
+@cache
+def solver() -> str:
+    """Return the solver of all mechanisms for a page."""
+    return packed(_solver())
+
+
+@cache
+def _solver() -> bytes:
+    return (SOURCES / "solver.wasm").read_bytes()
 
 
 def packed(data: bytes) -> str:
@@ -86,7 +107,7 @@ def packed(data: bytes) -> str:
 
 
 def page_module(mechanism: Mechanism, labels: Mapping[str, str] | None = None) -> PageModule:
-    """Return the module of a mechanism, compiled now or taken from the cache of compiled libraries.
+    """Return the module of a mechanism: the compiled solver with its model, which needs no compiler.
 
     Args:
         mechanism: The mechanism.
@@ -94,34 +115,61 @@ def page_module(mechanism: Mechanism, labels: Mapping[str, str] | None = None) -
 
     Raises:
         KinfmuError: The mechanism cannot be solved, as `compile_plan` reports it.
-        CompilerError: ziglang is not installed, or it fails.
+        RequestError: It is larger than `solver/sizes.h` and `solver/instance.h` allow.
 
     """
     labels = labels or {}
     names = force_names(mechanism)
     plan = compile_plan(replace(mechanism, coordinates="moving"), solved=loaded_coordinates(mechanism) if names else ())
     points = tuple(mechanism.body_points)
-    data = compiler.wasm_module(page_sources(plan, points, labels), EXPORTS, FLAGS)
+    reactions = _reaction_stages(plan)
+    counts = [len(steps.names) for steps in reactions.values()] or [0]
+    files = emit(plan, labels)
+    sizes = {name: int(count) for name, count in re.findall(r"#define KF_(\w+) (\d+)", files["sizes.h"])} | {
+        "POINTS": len(points),
+        "FORCES": len(names),
+        "REACTIONS": sum(counts),  # of joints, then shaking force and moment
+        "OF_JOINTS": counts[0],
+        "LOADS": len(load_inputs(plan)),
+    }
+    stages = {"forces": force_steps(plan, names, coefficients="given")} if names else {}
+    texts = [files["model.c"], _instance(plan, points)]
+    texts += [emit_c_forces(plan, steps, stage, are_loads_open=False) for stage, steps in (stages | reactions).items()]
     parameters = (labels.get(parameter.name, parameter.name) for parameter in plan.parameters)
     constants = (constant.name for constant in plan.law_constants)
-    reactions = [name for steps in _reaction_stages(plan).values() for name in steps.names]
-    return PageModule(data, plan, points, (*parameters, *constants), names, tuple(reactions))
+    return PageModule(
+        _binary(mechanism.name, sizes, texts),
+        plan,
+        points,
+        (*parameters, *constants),
+        names,
+        tuple(name for steps in reactions.values() for name in steps.names),
+    )
 
 
-def page_sources(plan: SolvePlan, points: Sequence[str], labels: Mapping[str, str]) -> dict[str, str]:
-    """Return the C files of a module by name; all but forces.c is one unit, page.c."""
-    files = emit(plan, labels) | compiler.sources([*compiler.SOLVER, *FOLLOWER])
-    files |= {"instance.h": _header(plan, points), "points.h": _points(plan, points)}
-    files["interface.c"] = _INTERFACE.read_text("utf-8")
-    names = force_names(plan.mechanism)
-    stages = {"forces": force_steps(plan, names, coefficients="given")} if names else {}
-    stages |= _reaction_stages(plan)
-    if any(map(solves, stages.values())):
-        files |= compiler.sources(["solutions.c"])
-    lines = ["/* The whole module as one unit. Files included here are not compiled separately. */"]
-    lines += [f'#include "{name}"' for name in sorted(files) if name.endswith(".c")]
-    files |= {f"{stage}.c": emit_c_forces(plan, steps, stage, are_loads_open=False) for stage, steps in stages.items()}
-    return files | {"page.c": "\n".join(lines) + "\n"}
+def _binary(name: str, sizes: Mapping[str, int], texts: Iterable[str]) -> Binary:
+    """Return the compiled solver with the C texts of a model and its sizes."""
+    most, structures = _layout()
+    for size, count in sizes.items():
+        if count > most[size]:
+            what = _SIZES.get(size, size.lower().replace("_", " "))
+            raise RequestError(f"'{name}' is too large for a page: it has {count} {what}, at most {most[size]} fit")
+    made = Binary(_solver())
+    for size, count in sizes.items():
+        made.put(made.addresses[f"size_{size.lower()}"], struct.pack("<i", count))
+    translator = Translator(made, {f"KF_{size}": count for size, count in sizes.items()}, most)
+    for text in (structures, *texts):
+        translator.translate(text)
+    return made
+
+
+@cache
+def _layout() -> tuple[dict[str, int], str]:
+    """Return the largest sizes of models in pages, and the structures that models share with the solver."""
+    headers = [(SOURCES / name).read_text("utf-8") for name in ("sizes.h", "instance.h")]
+    most = {name: int(most) for text in headers for name, most in re.findall(r"KF_MOST_KF_(\w+) (\d+)", text)}
+    shared = "\n".join(compiler.sources(["curve.h", "kinfmu.h"]).values())
+    return most, "\n".join(re.findall(r"^typedef struct {[^}]*} \w+;", shared, re.MULTILINE))
 
 
 def _reaction_stages(plan: SolvePlan) -> dict[str, ForceSteps]:
@@ -135,35 +183,9 @@ def _reaction_stages(plan: SolvePlan) -> dict[str, ForceSteps]:
     return {"reactions": reaction_steps(plan, of_joints), "shaking": shaking_steps(plan)}
 
 
-def _header(plan: SolvePlan, points: Sequence[str]) -> str:
+def _instance(plan: SolvePlan, points: Sequence[str]) -> str:
+    """Return what interface.c reads besides the model, and the function of x, y of all points from the parameters."""
     constants = plan.law_constants
-    counts = [len(steps.names) for steps in _reaction_stages(plan).values()] or [0]
-    lines = [
-        f"/* What the page of {plan.mechanism.name} needs to know: generated from its mechanism, not to be edited. */",
-        "#ifndef KF_INSTANCE_H",
-        "#define KF_INSTANCE_H",
-        "",
-        '#include "kinfmu.h"',
-        "",
-        f"#define KF_POINTS {len(points)}",
-        f"#define KF_FORCES {len(force_names(plan.mechanism))}",
-        f"#define KF_REACTIONS {sum(counts)} /* of joints, then shaking force and moment */",
-        f"#define KF_OF_JOINTS {counts[0]}",
-        f"#define KF_LOADS {len(load_inputs(plan))} /* efforts of external loads */",
-        f"#define KF_START {plan.mechanism.run.start!r} /* [s] of the laws */",
-        "",
-        *(f"{SIGNATURE.format(stage=stage)};" for stage in ("forces", "reactions", "shaking")),
-        "",
-        *array("static char *const kf_constant_names", [string(one.name) for one in constants]),
-        *array("static bool kf_constant_is_positive", booleans(one.is_positive for one in constants)),
-        "",
-        "#endif",
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _points(plan: SolvePlan, points: Sequence[str]) -> str:
-    """Return points.h: a function that computes x, y of all points in their bodies from the parameters."""
     tracer = Tracer(plan.mechanism, [parameter.name for parameter in plan.parameters])
     nodes = [tracer.graph.lift(value) for name in points for value in tracer.members.body_points[name]]
     writer = Writer(Names(functions=FUNCTIONS), ())
@@ -173,10 +195,9 @@ def _points(plan: SolvePlan, points: Sequence[str]) -> str:
     places = {parameter_symbol(one.name): f"model->parameters[{k}]" for k, one in enumerate(plan.parameters)}
     loads = [f"{identifier(name)} = {place};" for name, place in places.items() if name in used]
     lines = [
-        f"/* Points of {plan.mechanism.name}: generated from its mechanism, not to be edited. */",
-        '#include "kinfmu.h"',
-        '#include "sincos.h"',
-        "",
-        *function("static void kf_points(const kf_model *model, double *points)", [*loads, *body]),
+        f"const double kf_start = {plan.mechanism.run.start!r};",
+        *array("char *const kf_constant_names", [string(one.name) for one in constants]),
+        *array("bool kf_constant_is_positive", booleans(one.is_positive for one in constants)),
+        *function("void kf_points(const kf_model *model, double *points)", [*loads, *body]),
     ]
     return "\n".join(lines) + "\n"

@@ -321,9 +321,6 @@ def test_a_command_that_fails_leaves_no_folder(words: str, fails: Callable[..., 
 # ----------------------------------------------------------------------------------------------------------------- play
 
 
-pytest.importorskip("ziglang", reason="pages are compiled by zig")
-
-
 @pytest.mark.skipif(os.name != "posix", reason="sends Ctrl-C as a signal")
 def test_play_prints_the_address_of_the_page_and_ends_with_ctrl_c(tmp_path: Path) -> None:
     arguments = [sys.executable, "-m", "kinfmu", "play", "crank_rocker", "--no-browser"]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -210,15 +212,21 @@ def test_build_reports_a_run_beyond_the_range_as_check_does(
     assert notes(*build, "--set", "crank.speed=0.01rad/s") == []
 
 
-@pytest.mark.parametrize("is_first", [True, False])
-def test_only_the_first_page_is_announced_to_take_a_minute(
-    is_first: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
-    if not is_first:
-        (tmp_path / "key-digest.wasm").touch()
+def test_a_page_that_takes_long_is_announced(capsys: pytest.CaptureFixture[str]) -> None:
     with patience(seconds=0.0):
         time.sleep(0.2)
-    printed = capsys.readouterr().err
-    assert printed.startswith("kinfmu: note: compiling the page")
-    assert ("takes a minute" in printed) is is_first
+    assert capsys.readouterr().err == "kinfmu: note: making the page\n"
+
+
+def test_build_states_how_to_do_without_the_page(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def slow(_: kinfmu.Mechanism) -> str:
+        time.sleep(0.2)
+        return "page"
+
+    command = import_module("kinfmu.cli.build")  # kinfmu.cli.build is the command of this module
+    monkeypatch.setattr(import_module("kinfmu.page"), "page", slow)
+    monkeypatch.setattr(command, "patience", partial(patience, seconds=0.0))
+    assert command._page(kinfmu.load("fourbar"), True) == "page"
+    assert capsys.readouterr().err.rstrip().endswith("; --no-page builds the FMU without it")

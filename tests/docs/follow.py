@@ -46,9 +46,8 @@ NOT_RUN = {  # beginnings of the commands and blocks that no page runs in the te
 NEEDS: dict[str, Callable[[], object]] = {  # parts of commands and blocks that need more than kinfmu[dev]
     ".mp4": lambda: shutil.which("ffmpeg"),
     ".dxf": lambda: find_spec("ezdxf"),
-    ".html": lambda: find_spec("ziglang"),
-    "kinfmu play": lambda: os.name == "posix" and find_spec("ziglang"),
-    "kinfmu.play": lambda: find_spec("ziglang") and find_spec("anywidget"),
+    "kinfmu play": lambda: os.name == "posix",
+    "kinfmu.play": lambda: find_spec("anywidget"),
     "ecos simulate": ecos_command,
     "from ecospy": lambda: find_spec("ecospy"),
     "from libcosimpy": lambda: find_spec("libcosimpy"),

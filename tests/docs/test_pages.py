@@ -141,7 +141,6 @@ def test_measures(request: pytest.FixtureRequest, tmp_path: Path) -> None:
 @pytest.mark.long
 def test_playing_has_a_live_mechanism_with_the_length_of_the_page(tmp_path: Path) -> None:
     pytest.importorskip("anywidget", reason="anywidget is not installed")
-    pytest.importorskip("ziglang", reason="pages are compiled by zig")
     live = follow("playing.md", tmp_path).names["live"]
     assert live.parameters.m == 14.5
     assert live.values["crank.speed"] > 0.0

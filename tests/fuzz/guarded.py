@@ -26,7 +26,6 @@ _CHANGED = ("os.mkdir", "os.remove", "os.rename", "os.rmdir", "os.symlink", "os.
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 COMPILERS = ("cc", "gcc", "clang", "uname")  # which builds start, with no text of the input on their command line
-ZIG = (sys.executable, "-m", "ziglang", "cc")  # as these: it compiles the page of an FMU
 
 Trial = Callable[[int, Summary], None]  # does the trial of a seed, counts it and keeps what it finds
 
@@ -137,7 +136,7 @@ def _compiles(program: object, command: object) -> bool:
     """True for a compiler without any text of the input on its command line."""
     if not isinstance(command, list | tuple) or any(CANARY in str(argument) for argument in command):
         return False
-    return Path(str(program)).name in COMPILERS or (program == ZIG[0] and tuple(command[: len(ZIG)]) == ZIG)
+    return Path(str(program)).name in COMPILERS
 
 
 class Watch:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.fuzz import cache, files, fmu, logs, mechanisms
-from tests.fuzz.guarded import ZIG, Watch
+from tests.fuzz.guarded import Watch
 from tests.fuzz.hostile_text import CANARY
 from tests.fuzz.summary import PARTS, Summary, run
 
@@ -59,12 +59,8 @@ def test_no_call_of_fmi_does_harm(seed: int, tmp_path: Path, monkeypatch: pytest
     ("command", "is_seen"),
     [
         (["/usr/bin/cc", "-c", "a.c"], False),
-        ([*ZIG, "-target", "wasm32-wasi", "a.c"], False),
-        ([*ZIG, f"{CANARY}.c"], True),
         (["/usr/bin/cc", CANARY], True),
-        ([sys.executable, "-m", "ziglang", "run"], True),
         ([sys.executable, "-c", "pass"], True),
-        (["/bin/sh", "-m", "ziglang", "cc"], True),
     ],
 )
 def test_only_compilers_without_texts_of_the_input_may_start(command: list[str], is_seen: bool, tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 // input, and prints for each what `broken` returns.
 import { readFileSync } from "node:fs";
 import { Design } from "../../kinfmu/page/web/design.js";
-import { Engine } from "../../kinfmu/page/web/engine.js";
+import { compiled, Engine, unpacked } from "../../kinfmu/page/web/engine.js";
 import { remainder } from "../../kinfmu/page/web/geometry.js";
 import { Linkage } from "../../kinfmu/page/web/linkage.js";
 
@@ -74,9 +74,11 @@ function broken(linkage) {
 const answers = [];
 for (const path of JSON.parse(readFileSync(0, "utf-8"))) {
   const data = JSON.parse(readFileSync(path, "utf-8"));
+  const solver = await unpacked(data.solver);
   const engines = {};
   for (const [which, part] of Object.entries(data.modules)) {
-    engines[which] = part && [await Engine.load(part.text), await Engine.load(part.text)];
+    const module = part && (await compiled(solver, part.text));
+    engines[which] = part && [await Engine.load(module), await Engine.load(module)];
   }
   answers.push(broken(new Linkage(data, engines)));
 }

@@ -8,6 +8,7 @@ import json
 import re
 import zipfile
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +16,13 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu.errors import CompilerError
+from kinfmu.errors import RequestError
 from kinfmu.log import write_mcap
 from tests.cli.conftest import Command, command, fails, program_called, refuses
 from tests.page.engines import CHROMIUM, browser
 
-pytest.importorskip("ziglang", reason="pages are compiled by zig")
+BUILD = import_module("kinfmu.cli.build")
+PAGE = BUILD._page  # before the tests begin, which build without pages
 DATA = re.compile(r'id="data">([^<]*)<')
 __all__ = ["command", "fails", "program_called", "refuses"]  # fixtures
 
@@ -178,36 +180,20 @@ def test_build_puts_the_page_into_the_documentation_if_asked(tmp_path: Path) -> 
 
 
 @pytest.mark.long
-def test_an_fmu_whose_page_cannot_be_compiled(fails: Callable[..., str], tmp_path: Path) -> None:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("kinfmu.codegen.c.compiler.wasm_module", _refused)
-        assert "zig fails" in fails("build", "slider_crank", "--flavour", "python", "--page", "-o", "one.fmu")
-        assert not (tmp_path / "one.fmu").exists()
-
-
-@pytest.mark.parametrize(
-    ("options", "has_zig", "note"),
-    [
-        ((), True, "kinfmu: note: built without the page of kinfmu play in its documentation; --page adds it\n"),
-        ((), False, ""),
-        (("--no-page",), True, ""),
-    ],
-)
-def test_a_build_without_the_option_does_not_wait_for_a_page(
-    command: Command,
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-    options: tuple[str, ...],
-    has_zig: bool,
-    note: str,
+def test_an_fmu_of_a_mechanism_that_is_too_large_for_a_page(
+    command: Command, refuses: Callable[..., str], tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("kinfmu.codegen.c.compiler.wasm_module", _refused)
-    monkeypatch.setattr("kinfmu.cli.build.find_spec", lambda _name: object() if has_zig else None)
-    built = command("build", "slider_crank", "--flavour", "python", *options, "-o", "one.fmu")
-    assert (built.exit_code, built.stderr) == (0, note)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("kinfmu.page.html.page_module", _refused)
+        assert "too large" in refuses("build", "slider_crank", "--flavour", "python", "--page", "-o", "one.fmu")
+        assert not (tmp_path / "one.fmu").exists()
+        patch.setattr(BUILD, "_page", PAGE)
+        built = command("build", "slider_crank", "--flavour", "python", "-o", "one.fmu")
+    assert built.exit_code == 0
+    assert built.stderr == "kinfmu: note: the FMU is built without the page of kinfmu play: too large\n"
     with zipfile.ZipFile(tmp_path / "one.fmu") as archive:
         assert "documentation/play.html" not in archive.namelist()
 
 
-def _refused(*_arguments: object) -> bytes:
-    raise CompilerError("zig fails")
+def _refused(*_arguments: object) -> None:
+    raise RequestError("too large")

@@ -17,7 +17,6 @@ from tests.mechanism.loads.every_load import every_load, fourbar
 from tests.page.engines import Browser, Opened, needs_browser, text_of
 
 pytestmark = needs_browser
-pytest.importorskip("ziglang", reason="pages are compiled by zig")
 VIOLET = "rgb(126,34,206)"
 
 

@@ -11,9 +11,9 @@ import pytest
 
 import kinfmu
 from kinfmu import Status
-from kinfmu.errors import KinfmuError
+from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.mechanism.toml_file import parse
-from kinfmu.page.module import page_module
+from kinfmu.page.module import _layout, page_module
 from tests.page.engines import (
     StepByStep,
     answers,
@@ -144,6 +144,14 @@ def test_reactions_that_need_a_system_of_three_unknowns(swept: dict[str, Any]) -
     assert page_module(THREE_BARS).reactions == tuple(np.array(run.reaction_names)[known])
     assert np.abs(reactions - run.reactions[0, known]).max() < 1e-12 * np.abs(run.reactions[0, known]).max()
     assert np.abs(forces - run.forces[0]).max() < 1e-12 * np.abs(run.forces[0]).max()
+
+
+def test_a_mechanism_that_is_too_large_is_refused_with_its_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    most, structures = _layout()
+    assert most["UNKNOWNS"] == 512
+    monkeypatch.setattr("kinfmu.page.module._layout", lambda: (most | {"UNKNOWNS": 5}, structures))
+    with pytest.raises(RequestError, match="jansen_leg' is too large for a page: it has 6 unknowns, at most 5 fit"):
+        page_module(LEG)
 
 
 @pytest.mark.parametrize("name", MEMBERS)

@@ -36,8 +36,6 @@ VECTORIZED = (  # for loops over samples; results are equal
     "-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math",
     "-fno-tree-slp-vectorize",  # of statements outside of loops: GCC 12 fuses some of them in spite of FLAGS
 )  # fmt: skip
-WASM = "wasm32-wasi"
-MODULE = ("-std=c99", "-ffp-contract=off", "-s", "-mexec-model=reactor", "-Wl,-z,stack-size=1048576")
 
 _ZIG = (sys.executable, "-m", "ziglang", "cc")
 
@@ -101,22 +99,6 @@ def shared_library_bytes(files: Mapping[str, str], flags: Sequence[str] = (), ta
     return _Build(files, flags, target).found_or_compiled()
 
 
-def wasm_module(files: Mapping[str, str], exports: Sequence[str], flags: Sequence[str] = ()) -> bytes:
-    """Return a WebAssembly module of C files without imports, compiled by zig or taken from the cache.
-
-    Args:
-        files: Texts by file name.
-        exports: Names of the functions that the module exports.
-        flags: Flags of the compiler, after MODULE.
-
-    Raises:
-        CompilerError: Zig is not installed, or it fails.
-
-    """
-    exported = (f"-Wl,--export={name}" for name in exports)
-    return _Build(files, (*flags, *exported), WASM, common=MODULE).found_or_compiled()
-
-
 def load(files: Mapping[str, str], flags: Sequence[str] = (), rare: Sequence[str] = ()) -> ctypes.CDLL:
     """Load a shared library of C files, as `shared_library` compiles it.
 
@@ -163,12 +145,11 @@ class _Build:
         flags: Sequence[str],
         target: str | None,
         rare: Sequence[str] = (),
-        common: Sequence[str] | None = None,
     ) -> None:
         self._files = files
         self._rare = rare
         self._compiler = command() if target is None else zig(target)
-        self._flags = (*(FLAGS if common is None else common), *flags)
+        self._flags = (*FLAGS, *flags)
         self.key = _key(self._compiler, [*self._flags, *rare], files)
         self.suffix = _suffix(target)
 
@@ -327,8 +308,6 @@ def zig(target: str) -> tuple[str, ...]:
 def _suffix(target: str | None) -> str:
     """Return the suffix of shared libraries on a platform, as zig names it; default: this platform."""
     system = target or {"win32": "windows", "darwin": "macos"}.get(sys.platform, "")
-    if system == WASM:
-        return ".wasm"
     return ".dll" if "windows" in system else ".dylib" if "macos" in system else ".so"
 
 

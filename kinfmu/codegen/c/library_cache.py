@@ -95,14 +95,6 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache").absolute() / "kinfmu"
 
 
-def holds_any(suffix: str) -> bool:
-    """Return True if a library with this suffix was stored before."""
-    try:
-        return bool(_listed(cache_folder(), "", suffix))
-    except (CompilerError, OSError):
-        return False
-
-
 @contextmanager
 def _private_folder() -> Iterator[Path]:
     """Yield the folder, made private; turn errors of the system in it into a CompilerError."""

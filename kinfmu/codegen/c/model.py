@@ -24,7 +24,7 @@ def emit(plan: SolvePlan, labels: Mapping[str, str] | None = None) -> dict[str, 
     """Return model.c, sizes.h and constants.h, by file name; labels: of parameters that messages name otherwise."""
     parts = Parts(plan)
     model = _model(parts, labels or {})
-    return {"constants.h": _constants(), "sizes.h": _sizes(parts), "model.c": model}
+    return {"constants.h": constants(), "sizes.h": _sizes(parts), "model.c": model}
 
 
 def _model(parts: Parts, labels: Mapping[str, str]) -> str:
@@ -88,7 +88,7 @@ def _sizes(parts: Parts) -> str:
 
 
 @cache
-def _constants() -> str:
+def constants() -> str:
     """Return constants.h: statuses and numbers of the solver in Python. A name with two values does not compile."""
     modules = [import_module(f"{python.__name__}.{one.name}") for one in iter_modules(python.__path__) if not one.ispkg]
     numbers = {(k.strip("_"), x) for each in modules for k, x in vars(each).items() if type(x) in (int, float)}

@@ -41,7 +41,7 @@ class PlaySource:
 
     Raises:
         KinfmuError: The mechanism is invalid or cannot be solved.
-        CompilerError: ziglang is not installed.
+        RequestError: It is too large for a page.
 
     """
 

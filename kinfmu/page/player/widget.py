@@ -40,7 +40,7 @@ def play(mechanism: Mechanism, height: int = HEIGHT) -> Any:
 
     Raises:
         KinfmuError: The mechanism cannot be solved.
-        CompilerError: ziglang is not installed (`pip install 'kinfmu[native]'`).
+        RequestError: It is too large for a page.
         MissingPackageError: anywidget is not installed (`pip install 'kinfmu[notebook]'`).
 
     """

@@ -13,15 +13,41 @@ export async function unpacked(text) {
   return new Response(stream).arrayBuffer();
 }
 
+// Return the module that Binary.difference of kinfmu/codegen/wasm describes: pieces of a solver, and pieces that follow.
+export function assembled(solver, difference) {
+  const count = new DataView(difference).getUint32(0, true);
+  const numbers = new DataView(difference, 4, 8 * count);
+  const pieces = [];
+  for (let k = 0, place = 4 + 8 * count; k < count; k += 1) {
+    const start = numbers.getUint32(8 * k, true);
+    const length = numbers.getUint32(8 * k + 4, true);
+    const follows = start === 2 ** 32 - 1;
+    pieces.push(follows ? new Uint8Array(difference, place, length) : new Uint8Array(solver, start, length));
+    place += follows ? length : 0;
+  }
+  const module = new Uint8Array(pieces.reduce((sum, piece) => sum + piece.length, 0));
+  let end = 0;
+  for (const piece of pieces) {
+    module.set(piece, end);
+    end += piece.length;
+  }
+  return module;
+}
+
+// Return the compiled module of a mechanism: solver: the unpacked text of kinfmu/page/module.py; text: PageModule.text.
+export async function compiled(solver, text) {
+  return WebAssembly.compile(assembled(solver, await unpacked(text)));
+}
+
 // Return whether a status is that of a pose with numbers.
 export function isGood(status) {
   return status <= BRIDGED;
 }
 
 export class Engine {
-  // Return the engine of a module: text as PageModule.text gives it.
-  static async load(text) {
-    const { instance } = await WebAssembly.instantiate(await unpacked(text), {});
+  // Return an engine of the mechanism of a module.
+  static async load(module) {
+    const instance = await WebAssembly.instantiate(module, {});
     return new Engine(instance.exports);
   }
 

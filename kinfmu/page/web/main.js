@@ -5,7 +5,7 @@ import { arrows } from "./marks.js";
 import { CanvasPen, THEMES } from "./pen.js";
 import { draw, foresee } from "./drawing.js";
 import { $, breakable, element } from "./elements.js";
-import { Engine, unpacked } from "./engine.js";
+import { compiled, Engine, unpacked } from "./engine.js";
 import { Frames, Motion } from "./motion.js";
 import { Hand, keyboard } from "./hand.js";
 import { Linkage } from "./linkage.js";
@@ -338,9 +338,11 @@ function fineness(linkage) {
 async function start() {
     try {
         const data = JSON.parse(new TextDecoder().decode(await unpacked($("data").textContent)));
+        const solver = await unpacked(data.solver);
         const engines = {};
         for (const [which, part] of Object.entries(data.modules)) {
-            engines[which] = part && [await Engine.load(part.text, part), await Engine.load(part.text, part)];
+            const module = part && (await compiled(solver, part.text));
+            engines[which] = part && [await Engine.load(module), await Engine.load(module)];
         }
         window.kinfmu = new Page(new Linkage(data, engines));
         return window.kinfmu;

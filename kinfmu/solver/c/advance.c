@@ -103,7 +103,7 @@ inline kf_pose *kf_path_terminate(kf_path *path, kf_limit *limit)
         if (path->margin < KF_NEAR) {
             end->status = KF_NEAR_SINGULAR;
             end->has_base = true;
-            memcpy(end->base_u, KF_POSE_U(regular), sizeof end->base_u);
+            memcpy(end->base_u, KF_POSE_U(regular), KF_DRIVERS * sizeof(double));
             memcpy(end->base_z, regular->found.x, KF_UNKNOWNS * sizeof(double));
             end->base_bridge = regular->bridge;
             end->map = regular->map;
@@ -118,7 +118,7 @@ inline kf_pose *kf_path_terminate(kf_path *path, kf_limit *limit)
 static kf_pose *with_map(kf_solver *solver, const kf_pose *pose, int map, kf_pose *place)
 {
     if (place != pose) {
-        *place = *pose;
+        KF_ASSIGN(place, pose);
     }
     kf_around(solver, map, KF_HERE(solver, place), &place->low, &place->high);
     place->map = map;

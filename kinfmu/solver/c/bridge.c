@@ -62,7 +62,7 @@ static bool at_node(kf_solver *solver, const kf_bridge *bridge, int node, kf_pos
     const double *const z = KF_POOL(solver)->spans[bridge->span].z[node];
     double *const there = solver->scratch.z;
     const double *u;
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
     double buffer[KF_DRIVERS];
 #endif
     u = KF_AT(&solver->model, &bridge->u[node], buffer);
@@ -111,7 +111,7 @@ static bool find_middle(kf_solver *solver, const kf_bridge *bridge, kf_found *fo
 {
     const kf_span *const span = &KF_POOL(solver)->spans[bridge->span];
     double *const z = solver->scratch.z;
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
     double buffer[KF_DRIVERS];
 #endif
     double largest = fmax(kf_row_offset, fabs(bridge->centre) / kf_reach[KF_ALONG(solver)]);
@@ -265,8 +265,8 @@ int kf_moved(kf_solver *solver, int number, kf_pose *pose, double u)
         if (!at_node(solver, other, k, &follow[k % 2])) {
             return -1;
         }
-#if KF_LAWS
-        if (k > 0 && kf_passes_unseen_between(solver, &follow[(k - 1) % 2], &follow[k % 2])) {
+#if KF_HAS(KF_LAWS)
+        if (KF_LAWS && k > 0 && kf_passes_unseen_between(solver, &follow[(k - 1) % 2], &follow[k % 2])) {
             return -1;
         }
 #endif

@@ -25,7 +25,7 @@ static bool is_trusted(const kf_found *found, const kf_found *trial)
     return true;
 }
 
-#if KF_LAWS
+#if KF_HAS(KF_LAWS)
 /* Return whether what laws give outright moves by so much that what follows from it may be a whole turn off. */
 static bool leads_far(const kf_model *model, const kf_model *ahead, const kf_pose *pose, const kf_pose *trial)
 {
@@ -214,7 +214,7 @@ bool kf_continued(kf_solver *solver, const double *from, const double *to, const
                 for (k = 0; k < KF_UNKNOWNS; ++k) {
                     slope[k] = (trial->found.x[k] - pose->found.x[k]) / (there - s);
                 }
-                *pose = *trial;
+                KF_ASSIGN(pose, trial);
                 solver->model = *ahead;
                 s = there;
                 step = fmin(2.0 * step, longest);

@@ -66,8 +66,8 @@ static void make_source(kf_solver *solver, const kf_pose *pose, const kf_driven 
 /* Return how well the arguments of steep laws are known, in radians and sizes; 0 without such laws. */
 static double rounding_of_laws(const kf_solver *solver, const kf_pose *pose)
 {
-#if KF_LAWS
-    double slopes[KF_ROOM(KF_LAW_ARGUMENTS)], added[KF_ROOM(KF_LAW_ARGUMENTS)], here[KF_LAWS], largest = -1.0;
+#if KF_HAS(KF_LAWS)
+    double slopes[KF_ROOM(KF_LAW_ARGUMENTS)], added[KF_ROOM(KF_LAW_ARGUMENTS)], here[KF_ROOM(KF_LAWS)], largest = -1.0;
     int k;
     if (KF_LAW_ARGUMENTS == 0) {
         return 0.0;
@@ -167,7 +167,7 @@ static bool round_node(kf_solver *solver, const kf_span *span, int place, double
     double weight, rounded;
     kf_driven drive;
     kf_fresh(node, -1, -INFINITY, INFINITY);
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
     double buffer[KF_DRIVERS];
 #endif
     if (!kf_evaluated_as_given(&solver->model, KF_AT(&solver->model, &span->u[place], buffer), span->z[place], &node->found)) {
@@ -238,7 +238,7 @@ static bool make_source_of_bridge(kf_solver *solver, const kf_pose *pose, const 
     return true;
 }
 
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
 
 /* Form the source of the bridge of one track, in time. */
 static bool make_source_of_track(kf_solver *solver, const kf_pose *pose, const kf_driven *drive, int driver)
@@ -267,13 +267,15 @@ static bool make_source_of_track(kf_solver *solver, const kf_pose *pose, const k
             source->given_second[k] = pose->x2[k] + (v * v * two + a * one);
         }
     }
-#if KF_MIXES
-    bool of_tracks[KF_BLOCKS];
-    for (block = 0; block < KF_BLOCKS; ++block) {
-        of_tracks[block] = kf_block_drivers[block] != KF_MIXED;
+#if KF_HAS(KF_MIXES)
+    if (KF_MIXES) {
+        bool of_tracks[KF_BLOCKS];
+        for (block = 0; block < KF_BLOCKS; ++block) {
+            of_tracks[block] = kf_block_drivers[block] != KF_MIXED;
+        }
+        KF_VELOCITY(&solver->model, &pose->found, kf_at_rest, source->z, of_tracks, solver->scratch.x1);
+        memcpy(source->z, solver->scratch.x1, sizeof source->z);
     }
-    KF_VELOCITY(&solver->model, &pose->found, kf_at_rest, source->z, of_tracks, solver->scratch.x1);
-    memcpy(source->z, solver->scratch.x1, sizeof source->z);
 #endif
     return is_made;
 }
@@ -327,7 +329,7 @@ static bool tried(kf_solver *solver, kf_pose *pose, const double *ud, const doub
             make_source_of_laws(solver, pose, drive, i == -2 ? -rounded : rounded);
         } else if (i < count) {
             make_source(solver, pose, drive, worst[i], weight);
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
         } else if (!KF_IS_ONE(solver)) {
             if (!pose->has_tracks || pose->own[i - count].bridge < 0) {
                 continue;
@@ -369,7 +371,7 @@ static bool is_at_a_crossing(const kf_solver *solver, const kf_pose *pose, const
 static bool is_a_track_at_a_crossing(kf_solver *solver, const kf_pose *pose)
 {
     bool is_there = false;
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
     int driver;
     for (driver = 0; pose->has_tracks && pose->found.margin < KF_UNDECIDED && driver < KF_DRIVERS; ++driver) {
         kf_pose *own;

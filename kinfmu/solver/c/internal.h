@@ -12,9 +12,9 @@
  * KF_ALONG: the number of the driver; KF_SPEEDS: those of the drivers then; KF_AT: values of all drivers of which one is
  * given.
  */
-#if KF_TRACKS
-#define KF_ALONG_OF(model) ((model)->track - 1)
-#define KF_SPEEDS(model) ((model)->along)
+#if KF_HAS(KF_TRACKS)
+#define KF_ALONG_OF(model) ((model)->track - KF_TRACKS)
+#define KF_SPEEDS(model) (KF_TRACKS ? (model)->along : kf_alone)
 void kf_enter_track(kf_solver *solver, int driver);
 void kf_enter_mixed(kf_solver *solver, const double *z, const double *slopes);
 void kf_leave_track(kf_solver *solver);
@@ -23,8 +23,8 @@ void kf_rates(const kf_model *model, const kf_found *found, const double *ud, co
               double *x1);
 void kf_second_rates(const kf_model *model, const kf_found *found, const double *udd, const double *x1,
                      const double *given, const bool *held, double *x2);
-#define KF_AT(model, value, buffer) kf_driven_at(model, value, buffer)
-#define KF_IS_ON_A_TRACK(block) (kf_block_drivers[block] != KF_MIXED)
+#define KF_AT(model, value, buffer) (KF_TRACKS ? kf_driven_at(model, value, buffer) : (value))
+#define KF_IS_ON_A_TRACK(block) (KF_TRACKS && kf_block_drivers[block] != KF_MIXED)
 #define KF_VELOCITY kf_rates
 #define KF_ACCELERATION kf_second_rates
 #else
@@ -48,8 +48,9 @@ static inline bool kf_is_overworked(const kf_solver *solver)
 }
 
 /* pose.c */
-extern const double kf_alone[KF_DRIVERS]; /* the direction of a single driver: derivatives are with respect to it */
-extern const double kf_at_rest[KF_DRIVERS > KF_UNKNOWNS ? KF_DRIVERS : KF_ROOM(KF_UNKNOWNS)];
+#define KF_REST (KF_ROOM(KF_DRIVERS) > KF_ROOM(KF_UNKNOWNS) ? KF_ROOM(KF_DRIVERS) : KF_ROOM(KF_UNKNOWNS))
+extern const double kf_alone[KF_ROOM(KF_DRIVERS)]; /* the direction of a single driver: derivatives are with respect to it */
+extern const double kf_at_rest[KF_REST];
 void kf_fresh(kf_pose *pose, int map, double low, double high);
 bool kf_evaluated(const kf_model *model, const double *u, const double *z, const bool *held, kf_found *found);
 bool kf_evaluated_as_given(const kf_model *model, const double *u, const double *z, kf_found *found);
@@ -91,7 +92,7 @@ void kf_keep_maps(kf_solver *solver, int start, int pose, int regular);
 
 /* limit.c */
 typedef struct {
-    double u[KF_DRIVERS];
+    double u[KF_ROOM(KF_DRIVERS)];
     int block;
     bool crosses; /* another branch crosses there and no bridge holds: the motion does not turn back */
     int pole;     /* the unknown that runs to infinity there, or KF_NO_POLE */
@@ -122,7 +123,7 @@ void kf_append_watch(char *message, const kf_model *model, const kf_found *found
 typedef struct {
     kf_pose *places, *pose, *before, *regular, *end;
     const double *target;
-    double direction[KF_DRIVERS], u[KF_DRIVERS];
+    double direction[KF_ROOM(KF_DRIVERS)], u[KF_ROOM(KF_DRIVERS)];
     double distance, length, longest, margin;
     int most_steps, iterations;
     bool is_limited, is_ended;
@@ -158,7 +159,7 @@ KF_RARE kf_pose *kf_advance(kf_solver *solver, kf_pose *start, int map, const do
 /* trusted_step.c */
 bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u,
                      kf_pose *trial);
-#if KF_LAWS
+#if KF_HAS(KF_LAWS)
 bool kf_passes_unseen_between(kf_solver *solver, kf_pose *pose, const kf_pose *trial);
 #endif
 bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const double *direction, double s);
@@ -179,11 +180,11 @@ static inline double kf_straight_path(const double *start, const double *target,
 }
 
 /* tracks.c */
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
 kf_pose *kf_on_track(kf_solver *solver, const kf_pose *whole, int driver);
 #endif
 const bool *kf_rates_in_time(const kf_model *model, kf_pose *pose, const double *ud, const double *udd);
-#if KF_MIXES
+#if KF_HAS(KF_MIXES)
 KF_RARE kf_status kf_advance_mixed(kf_solver *solver, kf_pose *start, const double *target, kf_pose *pose);
 #endif
 
@@ -199,7 +200,7 @@ KF_RARE kf_status kf_failed(kf_pose *pose, kf_status status);
 bool kf_is_refused(kf_solver *solver, const double *u, int driver, bool mixed);
 kf_status kf_checked(kf_solver *solver, kf_pose *pose);
 KF_RARE kf_status kf_overworked(kf_solver *solver, const double *u, kf_pose *pose);
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
 kf_status kf_solve_along(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose);
 #endif
 void kf_outputs_of(const kf_model *model, const kf_pose *pose, const double *ud, const double *udd, double *outputs,

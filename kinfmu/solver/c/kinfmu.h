@@ -14,7 +14,11 @@
 #include "curve.h"
 #include "sizes.h"
 
+#ifndef KF_ROOM /* pages define these: they know the sizes at run time (kinfmu/page/solver/sizes.h) */
 #define KF_ROOM(n) ((n) > 0 ? (n) : 1) /* arrays without elements are no C */
+#define KF_HAS(n) (n)                  /* whether there is code for what some models do not have */
+#define KF_ASSIGN(to, from) (*(to) = *(from)) /* of poses */
+#endif
 
 /* Compiler hints: functions that are rarely called, and the function most samples go through, to be inlined as a whole. */
 #if defined(__GNUC__)
@@ -29,14 +33,14 @@
 typedef struct {
     double parameters[KF_ROOM(KF_PARAMETERS)];
     double derived[KF_ROOM(KF_DERIVED)];
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
     int track; /* 0: the whole model; else the number of a driver, from 1, with the blocks that depend on it alone; or
                 * KF_MIXED: the blocks that depend on several drivers */
-    bool outside[KF_BLOCKS]; /* all other blocks */
-    double along[KF_DRIVERS], rest[KF_DRIVERS]; /* speeds of the drivers, and their values */
-    double kept[KF_UNKNOWNS]; /* unknowns of those blocks */
-#if KF_MIXES
-    double slopes[KF_UNKNOWNS]; /* their derivatives on the path, for KF_MIXED; all others rest */
+    bool outside[KF_ROOM(KF_BLOCKS)]; /* all other blocks */
+    double along[KF_ROOM(KF_DRIVERS)], rest[KF_ROOM(KF_DRIVERS)]; /* speeds of the drivers, and their values */
+    double kept[KF_ROOM(KF_UNKNOWNS)]; /* unknowns of those blocks */
+#if KF_HAS(KF_MIXES)
+    double slopes[KF_ROOM(KF_UNKNOWNS)]; /* their derivatives on the path, for KF_MIXED; all others rest */
 #endif
 #endif
 } kf_model;
@@ -49,7 +53,7 @@ typedef struct {
  * numbers of the position stage that rates use.
  */
 typedef struct {
-    double x[KF_COORDINATES];
+    double x[KF_ROOM(KF_COORDINATES)];
     double hold[KF_ROOM(KF_HOLD)];
     double determinants[KF_ROOM(KF_BLOCKS)];
     double margin, residual, moved, watch;
@@ -70,13 +74,13 @@ typedef struct {
 extern const double kf_size;       /* of the mechanism, in its unit of length */
 extern const double kf_offset;     /* from the world's origin, in sizes */
 extern const double kf_row_offset; /* of numbers in rows, in sizes */
-extern const double kf_anchor_u[KF_DRIVERS];
+extern const double kf_anchor_u[KF_ROOM(KF_DRIVERS)];
 extern const double kf_anchor_z[KF_ROOM(KF_UNKNOWNS)];
 extern const double kf_unknown_scales[KF_ROOM(KF_UNKNOWNS)];
-#if KF_TRACKS
-extern const int kf_block_drivers[KF_BLOCKS]; /* the driver that each block depends on; KF_MIXED: several */
+#if KF_HAS(KF_TRACKS)
+extern const int kf_block_drivers[KF_ROOM(KF_BLOCKS)]; /* the driver that each block depends on; KF_MIXED: several */
 #endif
-extern const double kf_reach[KF_DRIVERS]; /* change that counts as a step of 1 */
+extern const double kf_reach[KF_ROOM(KF_DRIVERS)]; /* change that counts as a step of 1 */
 extern const int kf_block_ends[KF_ROOM(KF_BLOCKS)]; /* last unknown + 1 of each block */
 extern const int kf_block_rows[KF_ROOM(KF_BLOCKS)]; /* residuals of each block */
 extern const double kf_row_scales[KF_ROOM(KF_ROWS)]; /* of the residuals, block after block */
@@ -85,9 +89,9 @@ extern const int kf_distance_drivers[KF_ROOM(KF_DISTANCES)]; /* those that drive
 extern const int kf_distance_blocks[KF_ROOM(KF_DISTANCES)];  /* where their rows are */
 extern const int kf_distance_rows[KF_ROOM(KF_DISTANCES)];
 extern const double kf_distance_scales[KF_ROOM(KF_DISTANCES)]; /* of these rows */
-#if KF_LAWS /* motions that steps monitor: arguments of laws, lengths, coordinates that laws give; see trusted_step.py */
+#if KF_HAS(KF_LAWS) /* motions that steps monitor: arguments of laws, lengths, coordinates that laws give; see trusted_step.py */
 extern const double kf_law_turns[KF_ROOM(KF_LAW_ARGUMENTS)]; /* 0 if the argument does not jump back */
-extern const double kf_law_units[KF_LAWS];
+extern const double kf_law_units[KF_ROOM(KF_LAWS)];
 #endif
 extern const double kf_parameters_written[KF_ROOM(KF_PARAMETERS)];
 extern const bool kf_parameter_is_angle[KF_ROOM(KF_PARAMETERS)];
@@ -95,8 +99,8 @@ extern const double kf_constants_written[KF_ROOM(KF_CONSTANTS)]; /* of the laws 
 
 extern const char kf_name[];
 extern const char kf_length_unit[];
-extern const char *const kf_driver_names[KF_DRIVERS];
-extern const bool kf_driver_is_angle[KF_DRIVERS];
+extern const char *const kf_driver_names[KF_ROOM(KF_DRIVERS)];
+extern const bool kf_driver_is_angle[KF_ROOM(KF_DRIVERS)];
 extern const char *const kf_unknown_names[KF_ROOM(KF_UNKNOWNS)];
 extern const bool kf_unknown_is_angle[KF_ROOM(KF_UNKNOWNS)];
 extern const bool kf_output_is_angle[KF_ROOM(KF_OUTPUTS)];
@@ -123,7 +127,7 @@ void kf_output_rates(const kf_model *model, const kf_found *found, const double 
 void kf_output_accelerations(const kf_model *model, const kf_found *found, const double *x1, const double *x2,
                              double v, double a, double *accelerations);
 void kf_watches(const kf_model *model, const kf_found *found, double *watches);
-#if KF_LAWS
+#if KF_HAS(KF_LAWS)
 void kf_law_positions(const kf_model *model, const kf_found *found, double *positions);
 void kf_law_rates(const kf_model *model, const kf_found *found, const double *x1, double *rates);
 void kf_law_accelerations(const kf_model *model, const kf_found *found, const double *x1, const double *x2,

@@ -18,7 +18,7 @@ static void extrapolate(const kf_pose *before, const kf_pose *pose, double near,
 
 void kf_limit_at(kf_limit *limit, const double *u, int block)
 {
-    memcpy(limit->u, u, sizeof limit->u);
+    memcpy(limit->u, u, KF_DRIVERS * sizeof *u);
     limit->block = block;
     limit->crosses = false;
     limit->pole = KF_NO_POLE;
@@ -34,13 +34,13 @@ void kf_limit_beyond(kf_solver *solver, const kf_pose *before, kf_pose *pose, co
     const double *const determinants = pose->found.determinants;
     double near, far, steepest = 0.0;
     int k;
-#if KF_LAWS
+#if KF_HAS(KF_LAWS)
     double lengths[KF_LAWS], longer[KF_LAWS];
     kf_law_positions(&solver->model, &pose->found, lengths);
     kf_law_positions(&solver->model, &before->found, longer);
 #endif
     kf_limit_at(limit, KF_POSE_U(pose), KF_BLOCKS > 0 ? 0 : KF_NO_BLOCK);
-#if KF_LAWS
+#if KF_HAS(KF_LAWS)
     for (k = KF_LAW_ARGUMENTS; k < KF_LAW_ARGUMENTS + KF_LAW_LENGTHS; ++k) {
         if (lengths[k] < KF_VANISHING * kf_size) {
             extrapolate(before, pose, lengths[k], longer[k], limit);

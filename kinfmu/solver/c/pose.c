@@ -1,8 +1,8 @@
 /* Pose: an assembled pose of a mechanism at given driver values. See kinfmu/solver/python/pose.py. */
 #include "internal.h"
 
-const double kf_alone[KF_DRIVERS] = {1.0};
-const double kf_at_rest[KF_DRIVERS > KF_UNKNOWNS ? KF_DRIVERS : KF_ROOM(KF_UNKNOWNS)] = {0.0};
+const double kf_alone[KF_ROOM(KF_DRIVERS)] = {1.0};
+const double kf_at_rest[KF_REST] = {0.0};
 
 /* Reset all that a pose holds besides what was found, with this singularity map. */
 inline void kf_fresh(kf_pose *pose, int map, double low, double high)
@@ -14,7 +14,7 @@ inline void kf_fresh(kf_pose *pose, int map, double low, double high)
     pose->map = map;
     pose->bridge = -1;
     pose->has_base = false;
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
     pose->has_tracks = pose->is_held = false;
 #endif
 }
@@ -47,7 +47,7 @@ inline void kf_tangent(const kf_model *model, kf_pose *pose)
     }
 }
 
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
 
 /* Restrict the model to a track, the blocks that depend on one driver alone. All others stay as in the anchor. */
 void kf_enter_track(kf_solver *solver, int driver)
@@ -65,7 +65,7 @@ void kf_enter_track(kf_solver *solver, int driver)
     }
 }
 
-#if KF_MIXES
+#if KF_HAS(KF_MIXES)
 
 /* Restrict the model to the blocks that depend on several drivers, while all others are at unknowns z and move: slopes are
  * their derivatives along the path of the drivers, second derivatives are 0.
@@ -78,8 +78,8 @@ void kf_enter_mixed(kf_solver *solver, const double *z, const double *slopes)
     for (k = 0; k < KF_BLOCKS; ++k) {
         model->outside[k] = kf_block_drivers[k] != KF_MIXED;
     }
-    memcpy(model->kept, z, sizeof model->kept);
-    memcpy(model->slopes, slopes, sizeof model->slopes);
+    memcpy(model->kept, z, KF_UNKNOWNS * sizeof *z);
+    memcpy(model->slopes, slopes, KF_UNKNOWNS * sizeof *slopes);
 }
 
 #endif
@@ -111,7 +111,7 @@ static const bool *given_blocks(const kf_model *model, const bool *held, bool *b
 /* Derivatives of the unknowns outside a track: they are 0, except for blocks that depend on several drivers. */
 static const double *slopes_of(const kf_model *model)
 {
-#if KF_MIXES
+#if KF_HAS(KF_MIXES)
     if (model->track == KF_MIXED) {
         return model->slopes;
     }

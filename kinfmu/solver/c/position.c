@@ -22,7 +22,7 @@ static inline double watched(const kf_model *model, const kf_found *found)
 /* Return whether a block is outside the track that is followed. */
 inline bool kf_is_outside(const kf_model *model, int block)
 {
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
     return model->track != 0 && model->outside[block];
 #else
     (void)model;
@@ -31,7 +31,7 @@ inline bool kf_is_outside(const kf_model *model, int block)
 #endif
 }
 
-#if KF_MIXES
+#if KF_HAS(KF_MIXES)
 /* The largest length of the residuals of the blocks that are followed: others do not close while they rest. */
 static double own_residual(const kf_model *model, const kf_found *found)
 {
@@ -77,8 +77,8 @@ static inline int solved(const kf_model *model, const double *z, const bool *hel
     }
     found->residual = sqrt(newton.total < INFINITY ? newton.largest : newton.total);
     found->iterations = newton.iterations;
-#if KF_MIXES
-    if (model->track != 0) {
+#if KF_HAS(KF_MIXES)
+    if (KF_MIXES && model->track != 0) {
         found->residual = own_residual(model, found);
     }
 #endif
@@ -104,9 +104,9 @@ static KF_RARE void polish(const kf_model *model, const bool *held, kf_found *fo
     if (!is_polished(held, found)) {
         return;
     }
-    before = *found;
+    KF_ASSIGN(&before, found);
     if (solved(model, before.x, held, 0.0, found) >= 0 || !(found->residual <= before.residual)) {
-        *found = before;
+        KF_ASSIGN(found, &before);
         return;
     }
     found->iterations += before.iterations;
@@ -124,7 +124,7 @@ inline int kf_position(const kf_model *model, const double *u, const double *z, 
     for (k = 0; k < KF_DRIVERS; ++k) {
         x[KF_COORDINATES - KF_DRIVERS + k] = u[k];
     }
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
     bool given[KF_BLOCKS];
     if (model->track != 0) {
         int place = 0;
@@ -149,7 +149,7 @@ inline int kf_position(const kf_model *model, const double *u, const double *z, 
     if (found->margin < KF_POLISHED) {
         polish(model, held, found);
     }
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
     if (model->track != 0) {
         found->watch = 0.0; /* watches belong to the whole model */
         return -1;

@@ -17,8 +17,8 @@ void kf_keep_maps(kf_solver *solver, int start, int pose, int regular)
 static bool is_needed(const kf_solver *solver, int map)
 {
     const int *const live = solver->scratch.live;
-#if KF_MIXES
-    if (map == solver->scratch.origin[KF_ALONG(solver)]) {
+#if KF_HAS(KF_MIXES)
+    if (KF_MIXES && map == solver->scratch.origin[KF_ALONG(solver)]) {
         return true;
     }
 #endif
@@ -28,7 +28,7 @@ static bool is_needed(const kf_solver *solver, int map)
 /* Return the number of a bridge that no needed map holds. */
 int kf_spare_bridge(const kf_solver *solver)
 {
-    bool held[KF_BRIDGES] = {false};
+    bool held[KF_ROOM(KF_BRIDGES)] = {false};
     int i, k;
     for (i = 0; i < KF_MAPS; ++i) {
         for (k = 0; is_needed(solver, i) && k < KF_POOL(solver)->maps[i].bridges; ++k) {
@@ -43,7 +43,7 @@ int kf_spare_bridge(const kf_solver *solver)
 /* Return the number of a span that no needed map holds, other than `other`; -1 if there is none. */
 static int spare_span(const kf_solver *solver, int other)
 {
-    bool held[KF_SPANS] = {false};
+    bool held[KF_ROOM(KF_SPANS)] = {false};
     int i, k;
     for (i = 0; i < KF_MAPS; ++i) {
         for (k = 0; is_needed(solver, i) && k < KF_POOL(solver)->maps[i].bridges; ++k) {
@@ -213,7 +213,7 @@ static bool locate(kf_solver *solver, kf_pose *pose, int block, double *zero)
         if (is_compared && change <= KF_STRAIGHT * fabs(left) && change <= 0.2 * KF_NARROWEST * kf_reach[KF_ALONG(solver)]) {
             return true;
         }
-        solver->scratch.located = *ahead; /* paths from here may fail */
+        KF_ASSIGN(&solver->scratch.located, ahead); /* paths from here may fail */
         pose = &solver->scratch.located;
         is_compared = true;
         step = 0.5 * (better - KF_HERE(solver, pose));
@@ -238,7 +238,7 @@ static bool cross(kf_solver *solver, kf_span *span, kf_pose *before, double side
     static const int order[KF_NODES] = {0, 1, 2, 3, 4, 5};
     double(*const determinants)[KF_ROOM(KF_BLOCKS)] = solver->scratch.determinants; /* before the zero, after, last */
     double *const last = determinants[2];
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
     double buffer[KF_DRIVERS];
 #endif
     int node, k;
@@ -260,8 +260,8 @@ static bool cross(kf_solver *solver, kf_span *span, kf_pose *before, double side
                 return false; /* there is another zero next to the one to be bridged */
             }
         }
-#if KF_LAWS
-        if (kf_passes_unseen_between(solver, before, pose)) {
+#if KF_HAS(KF_LAWS)
+        if (KF_LAWS && kf_passes_unseen_between(solver, before, pose)) {
             return false;
         }
 #endif
@@ -343,7 +343,7 @@ static kf_pose *nearby(kf_solver *solver, kf_pose *pose, int block, double dista
     for (k = 0; k < 2; ++k) {
         const kf_pose *const other = kf_follow_path(solver, pose, KF_HERE(solver, pose) + (k == 0 ? distance : -distance));
         if (other != NULL && fabs(other->found.determinants[block]) > fabs(pose->found.determinants[block])) {
-            solver->scratch.nearby = *other; /* paths start from it */
+            KF_ASSIGN(&solver->scratch.nearby, other); /* paths start from it */
             return &solver->scratch.nearby;
         }
     }

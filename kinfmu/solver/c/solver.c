@@ -8,7 +8,7 @@ void kf_solver_start(kf_solver *solver)
     solver->tolerance = KF_TOLERANCE;
     solver->most_work = KF_ANY_WORK;
     solver->scratch.work = 0;
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
     solver->model.track = solver->scratch.ahead.track = 0;
 #endif
     solver->unsolvable = false;
@@ -159,14 +159,14 @@ static kf_status again(kf_solver *solver, kf_pose *start, kf_pose *pose)
         }
         found = map < 0 ? NULL : kf_advance(solver, start, map, KF_POSE_U(start), &limit);
     }
-    *pose = found == NULL ? *start : *found;
+    KF_ASSIGN(pose, found == NULL ? start : found);
     if (pose->status == KF_OK && pose->found.margin < KF_NEAR) {
         pose->status = KF_NEAR_SINGULAR;
     }
     return kf_checked(solver, pose);
 }
 
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
 #define KF_SOLVE_ALONG kf_solve_along
 #else
 #define KF_SOLVE_ALONG kf_solve
@@ -207,7 +207,7 @@ inline kf_status KF_SOLVE_ALONG(kf_solver *solver, kf_pose *start, const double 
         kf_append_limit(solver->message, &limit, u, KF_NAMED_DRIVER(solver));
         return kf_failed(pose, KF_OUTSIDE);
     }
-    *pose = *found;
+    KF_ASSIGN(pose, found);
     return kf_checked(solver, pose);
 }
 
@@ -231,7 +231,7 @@ inline void kf_motion(const kf_solver *solver, kf_pose *pose, const double *ud, 
 {
     const kf_model *const model = &solver->model;
     const bool one = KF_DRIVERS == 1;
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
     if (pose->is_held && (rates != NULL || accelerations != NULL)) {
         kf_rates_in_time(model, pose, ud, udd);
         kf_outputs_of(model, pose, ud, udd, outputs, rates, accelerations);

@@ -45,20 +45,20 @@ typedef struct {
  */
 typedef struct {
     kf_found found;
-    double x1[KF_COORDINATES];
-    double x2[KF_COORDINATES];
+    double x1[KF_ROOM(KF_COORDINATES)];
+    double x2[KF_ROOM(KF_COORDINATES)];
     double low, high;
-    double base_u[KF_DRIVERS];
+    double base_u[KF_ROOM(KF_DRIVERS)];
     double base_z[KF_ROOM(KF_UNKNOWNS)];
     kf_status status;
     int derivatives;
     int map, bridge, base_bridge;
     bool has_base;
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
     bool has_tracks, is_held;
-    kf_track_pose own[KF_DRIVERS];
-    bool held[KF_BLOCKS]; /* blocks that are interpolated, and their derivatives, each over its own driver */
-    double own1[KF_UNKNOWNS], own2[KF_UNKNOWNS];
+    kf_track_pose own[KF_ROOM(KF_DRIVERS)];
+    bool held[KF_ROOM(KF_BLOCKS)]; /* blocks that are interpolated, and their derivatives, each over its own driver */
+    double own1[KF_ROOM(KF_UNKNOWNS)], own2[KF_ROOM(KF_UNKNOWNS)];
 #endif
 } kf_pose;
 
@@ -112,7 +112,7 @@ typedef struct {
 typedef struct {
     int bridges, intervals;
     int bridge[KF_KEPT]; /* their numbers in the solver, the latest last */
-    kf_interval searched[KF_INTERVALS];
+    kf_interval searched[KF_ROOM(KF_INTERVALS)];
 } kf_singularity_map;
 
 /* In use at the same time are the maps of the start, of the current pose and of the last regular one, and a new one.
@@ -125,9 +125,9 @@ typedef struct {
 
 /* Maps, bridges and spans along one driver. */
 typedef struct {
-    kf_singularity_map maps[KF_MAPS];
-    kf_bridge bridges[KF_BRIDGES];
-    kf_span spans[KF_SPANS];
+    kf_singularity_map maps[KF_ROOM(KF_MAPS)];
+    kf_bridge bridges[KF_ROOM(KF_BRIDGES)];
+    kf_span spans[KF_ROOM(KF_SPANS)];
 } kf_pool;
 
 #define KF_POOLS (KF_TRACKS ? KF_DRIVERS : 1)
@@ -137,7 +137,7 @@ typedef struct {
     double z[KF_ROOM(KF_UNKNOWNS)], first[KF_ROOM(KF_UNKNOWNS)], second[KF_ROOM(KF_UNKNOWNS)];
     double given_first[KF_ROOM(KF_UNKNOWNS)], given_second[KF_ROOM(KF_UNKNOWNS)];
     double missed[3]; /* errors of outputs and their derivatives because lengths miss a change point */
-    double u[KF_DRIVERS];
+    double u[KF_ROOM(KF_DRIVERS)];
     bool is_given, is_of_laws;
 } kf_source;
 
@@ -147,19 +147,19 @@ typedef struct {
 typedef struct {
     kf_inner inner[KF_INNERS];
     kf_pose base, poses[4], follow[2], nearby, located;
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
     kf_pose track[2];
 #endif
-#if KF_MIXES
+#if KF_HAS(KF_MIXES)
     kf_pose whole[4], share[2];
-    int origin[KF_DRIVERS]; /* maps of the tracks where a path of several drivers starts: needed until it ends */
+    int origin[KF_ROOM(KF_DRIVERS)]; /* maps of the tracks where a path of several drivers starts: needed until it ends */
 #endif
     kf_model ahead;
     kf_source source;
     double rows[2][3][KF_ROOM(KF_OUTPUTS)];
     double z[KF_ROOM(KF_UNKNOWNS)], zd[KF_ROOM(KF_UNKNOWNS)], zdd[KF_ROOM(KF_UNKNOWNS)];
     double determinants[3][KF_ROOM(KF_BLOCKS)]; /* of nodes around a zero */
-    double x1[KF_COORDINATES], x2[KF_COORDINATES];
+    double x1[KF_ROOM(KF_COORDINATES)], x2[KF_ROOM(KF_COORDINATES)];
     int live[3]; /* maps that are needed */
     int work;    /* pose solves of the call: predictions that were corrected, and poses evaluated at nodes of bridges */
 } kf_scratch;
@@ -174,7 +174,7 @@ typedef struct {
     kf_pose anchor;
     bool unsolvable; /* the parameters have no solution: every pose fails, and the message states why */
     char message[KF_MESSAGE];
-    kf_pool pools[KF_POOLS];
+    kf_pool pools[KF_ROOM(KF_POOLS)];
     kf_scratch scratch;
 } kf_solver;
 

@@ -3,7 +3,7 @@
  */
 #include "internal.h"
 
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
 
 /* Return the track's part of a pose of the whole mechanism. */
 kf_pose *kf_on_track(kf_solver *solver, const kf_pose *whole, int driver)
@@ -202,6 +202,9 @@ kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *
     int k;
     bool is_same = start->has_tracks;
     solver->scratch.work = 0;
+    if (!KF_TRACKS) {
+        return kf_solve_along(solver, start, u, pose);
+    }
     if (solver->unsolvable) {
         return kf_failed(pose, KF_INCONSISTENT);
     }
@@ -209,7 +212,7 @@ kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *
         is_same = is_same && u[k] == KF_POSE_U(start)[k];
     }
     if (is_same) {
-        *pose = *start;
+        KF_ASSIGN(pose, start);
         return pose->status;
     }
     if (is_near_by_tracks(solver, start, u, pose)) { /* most samples */
@@ -218,8 +221,8 @@ kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *
     if (kf_is_refused(solver, u, -1, true)) {
         return kf_failed(pose, KF_OUTSIDE);
     }
-#if KF_MIXES
-    status = kf_advance_mixed(solver, start, u, pose);
+#if KF_HAS(KF_MIXES)
+    status = KF_MIXES ? kf_advance_mixed(solver, start, u, pose) : assembled(solver, start, u, u, start->found.x, pose);
 #else
     status = assembled(solver, start, u, u, start->found.x, pose);
 #endif
@@ -238,7 +241,7 @@ const bool *kf_rates_in_time(const kf_model *model, kf_pose *pose, const double 
 {
     const bool *held = NULL;
     const double *first = NULL, *second = NULL;
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
     double given_first[KF_UNKNOWNS], given_second[KF_UNKNOWNS];
     int block, k = 0;
     for (block = 0; pose->is_held && block < KF_BLOCKS; ++block) {
@@ -262,14 +265,14 @@ const bool *kf_rates_in_time(const kf_model *model, kf_pose *pose, const double 
     return held;
 }
 
-#if KF_MIXES
+#if KF_HAS(KF_MIXES)
 
 /* Return the part of a pose of the whole mechanism with the blocks that depend on several drivers. */
 static kf_pose *share_of(const kf_pose *whole, kf_pose *share)
 {
     double margin = INFINITY;
     int block;
-    *share = *whole;
+    KF_ASSIGN(share, whole);
     for (block = 0; block < KF_BLOCKS; ++block) {
         double *const determinant = &share->found.determinants[block];
         if (kf_block_drivers[block] == KF_MIXED) {
@@ -408,7 +411,7 @@ kf_status kf_advance_mixed(kf_solver *solver, kf_pose *start, const double *targ
         kf_append_limit(solver->message, &limit, target, -1);
         return kf_failed(found, KF_OUTSIDE);
     }
-    *found = *pose;
+    KF_ASSIGN(found, pose);
     return found->status;
 }
 

@@ -23,7 +23,7 @@ static bool turns_over(const kf_model *model, const kf_pose *pose, const kf_pose
     return false;
 }
 
-#if KF_LAWS
+#if KF_HAS(KF_LAWS)
 /* Return whether a step passes over a part of a law that it has not seen, or over a length below 0.
  *
  * What it monitors moves along the step as predicted, and by what the prediction is `off` to either side. Arguments may
@@ -123,8 +123,8 @@ inline bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *dire
             return false;
         }
     }
-#if KF_LAWS
-    if (passes_unseen(model, &pose->found, x1, x2, &trial->found, s)) {
+#if KF_HAS(KF_LAWS)
+    if (KF_LAWS && passes_unseen(model, &pose->found, x1, x2, &trial->found, s)) {
         return false;
     }
 #endif
@@ -184,7 +184,7 @@ kf_pose *kf_follow_path(kf_solver *solver, kf_pose *start, double u)
     const double longest = KF_LONGEST_STEP * kf_reach[KF_ALONG(solver)];
     kf_pose *const found = solver->scratch.follow, *pose = start;
     double step = longest;
-#if KF_TRACKS
+#if KF_HAS(KF_TRACKS)
     double buffer[KF_DRIVERS];
 #endif
     int k;

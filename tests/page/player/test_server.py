@@ -23,8 +23,6 @@ from tests.page.engines import browser, needs_browser
 
 LENGTH = "bodies.crank.points.P.x"
 
-pytest.importorskip("ziglang", reason="pages are compiled by zig")
-
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:

@@ -16,7 +16,6 @@ from tests.page.engines import browser, needs_browser
 
 traitlets = pytest.importorskip("traitlets", reason="anywidget is not installed")
 pytest.importorskip("anywidget", reason="anywidget is not installed")
-pytest.importorskip("ziglang", reason="pages are compiled by zig")
 
 SYNCED = ("page", "height", "values", "drivers", "problem", "file")
 HOST = """<!doctype html><title>cell</title><div id="cell"></div><script type="module">

@@ -11,7 +11,6 @@
 
 #include "follower.h"
 #include "internal.h"
-#include "points.h"
 
 #define LARGEST_RATE 1e100   /* of drivers; squares of much larger numbers are infinite */
 #define LARGEST_NUMBER 1e30  /* of parameters: as mechanism files have them */
@@ -27,27 +26,32 @@ typedef enum { REFUSED, BOUND, UNREACHED, OTHER_BRANCH } binding;
 /* The pose shown, and another solver with the same parameters: for sweeps, and for parameters that may have no solution. */
 static kf_follower followers[2];
 static int shown;
+#define SPEEDS (drive + KF_DRIVERS)
+#define ACCELERATIONS (drive + 2 * KF_DRIVERS)
+
 static const char *message = "";
 static char refusal[KF_MESSAGE];
 
-static double settings[KF_ROOM(KF_PARAMETERS + KF_CONSTANTS)]; /* asked for: parameters, then constants of the laws */
-static double bound[KF_ROOM(KF_PARAMETERS + KF_CONSTANTS)];
-static double drive[3][KF_DRIVERS];
-static double motion[3][KF_ROOM(KF_OUTPUTS)], swept[3][KF_ROOM(KF_OUTPUTS)];
-static double errors[3], fixed[KF_ROOM(KF_FIXED)], points[KF_ROOM(2 * KF_POINTS)];
+#define PARAMETERS_BOUND offsetof(kf_solver, pools) /* of a follower that restarts: its anchor refers to no pool */
+#define SETTINGS (KF_ROOM(KF_PARAMETERS) + KF_ROOM(KF_CONSTANTS))
+static double settings[SETTINGS]; /* asked for: parameters, then constants of the laws */
+static double bound[SETTINGS];
+static double drive[3 * KF_ROOM(KF_DRIVERS)]; /* values, then speeds, then accelerations */
+static double motion[3 * KF_ROOM(KF_OUTPUTS)], swept[3 * KF_ROOM(KF_OUTPUTS)];
+static double errors[3], fixed[KF_ROOM(KF_FIXED)], points[2 * KF_ROOM(KF_POINTS)];
 static double forces[KF_ROOM(KF_FORCES)], efforts[KF_ROOM(KF_LOADS)], reactions[KF_ROOM(KF_REACTIONS)];
 
 /* The arrays, in the order that web/engine.js gives their numbers. */
 double *kf_page_place(int which)
 {
-    double *const places[] = {settings, bound, drive[0], motion[0], swept[0],
-                              errors,   fixed, points,   forces,    efforts,   reactions};
+    double *const places[] = {settings, bound, drive,  motion, swept,
+                              errors,   fixed, points, forces, efforts, reactions};
     return places[which];
 }
 
 int kf_page_length(int which)
 {
-    static const int lengths[] = {KF_PARAMETERS + KF_CONSTANTS, KF_PARAMETERS + KF_CONSTANTS, 3 * KF_DRIVERS,
+    const int lengths[] = {KF_PARAMETERS + KF_CONSTANTS, KF_PARAMETERS + KF_CONSTANTS, 3 * KF_DRIVERS,
                                   3 * KF_OUTPUTS, 3 * KF_OUTPUTS, 3, KF_FIXED, 2 * KF_POINTS,
                                   KF_FORCES, KF_LOADS, KF_REACTIONS};
     return lengths[which];
@@ -64,13 +68,13 @@ static kf_pose *pose_of(kf_follower *follower)
 }
 
 /* Compute driver values at a time; NaN where a rate is too large. */
-static void drive_at(const kf_model *model, const double *constants, double time, double values[3][KF_DRIVERS])
+static void drive_at(const kf_model *model, const double *constants, double time, double *values)
 {
     int k;
-    kf_drive(model, time, constants, values[0], values[1], values[2]);
+    kf_drive(model, time, constants, values, values + KF_DRIVERS, values + 2 * KF_DRIVERS);
     for (k = 0; k < KF_DRIVERS; ++k) {
-        if (!(fabs(values[1][k]) <= LARGEST_RATE && fabs(values[2][k]) <= LARGEST_RATE)) {
-            values[0][k] = NAN;
+        if (!(fabs(values[KF_DRIVERS + k]) <= LARGEST_RATE && fabs(values[2 * KF_DRIVERS + k]) <= LARGEST_RATE)) {
+            values[k] = NAN;
         }
     }
 }
@@ -100,18 +104,18 @@ static bool is_accepted(void)
 static bool starts(kf_follower *follower)
 {
     const kf_model *const model = &follower->solver.model;
-    double there[3][KF_DRIVERS], written[3][KF_DRIVERS];
+    double there[3 * KF_ROOM(KF_DRIVERS)], written[3 * KF_ROOM(KF_DRIVERS)];
     bool is_elsewhere = false;
     int k;
     for (k = 0; k < KF_PARAMETERS; ++k) {
         is_elsewhere = is_elsewhere || settings[k] != kf_parameters_written[k];
     }
-    kf_drive(model, KF_START, settings + KF_PARAMETERS, there[0], there[1], there[2]);
-    kf_drive(model, KF_START, kf_constants_written, written[0], written[1], written[2]);
+    kf_drive(model, KF_START, settings + KF_PARAMETERS, there, there + KF_DRIVERS, there + 2 * KF_DRIVERS);
+    kf_drive(model, KF_START, kf_constants_written, written, written + KF_DRIVERS, written + 2 * KF_DRIVERS);
     for (k = 0; k < KF_DRIVERS; ++k) {
-        is_elsewhere = is_elsewhere || there[0][k] != written[0][k];
+        is_elsewhere = is_elsewhere || there[k] != written[k];
     }
-    return !is_elsewhere || KF_GOOD(kf_followed(follower, there[0])->status);
+    return !is_elsewhere || KF_GOOD(kf_followed(follower, there)->status);
 }
 
 /* Return the largest difference of two poses with the same parameters, in radians and sizes, without whole turns. */
@@ -119,10 +123,10 @@ static double apart(const kf_solver *solver, kf_pose *here, kf_pose *there)
 {
     double largest = 0.0;
     int k;
-    kf_motion(solver, here, NULL, NULL, swept[0], NULL, NULL);
-    kf_motion(solver, there, NULL, NULL, swept[1], NULL, NULL);
+    kf_motion(solver, here, NULL, NULL, swept, NULL, NULL);
+    kf_motion(solver, there, NULL, NULL, swept + KF_OUTPUTS, NULL, NULL);
     for (k = 0; k < KF_OUTPUTS; ++k) {
-        double gap = swept[0][k] - swept[1][k];
+        double gap = swept[k] - swept[KF_OUTPUTS + k];
         gap = kf_output_is_angle[k] ? gap - TURN * floor(gap / TURN + 0.5) : gap / kf_size;
         largest = fmax(largest, fabs(gap));
     }
@@ -154,7 +158,7 @@ static binding bound_by(kf_follower *next, bool stays)
     kf_continuation path;
     bool is_known;
     memcpy(u, KF_POSE_U(from), sizeof u);
-    expected = *from;
+    KF_ASSIGN(&expected, from);
     is_known = stays && kf_continued(&next->solver, bound, settings, u, SHORTEST, &expected, &path);
     if (!kf_solver_bind(&next->solver, settings) || !starts(next)) {
         return REFUSED;
@@ -178,7 +182,7 @@ static binding bound_by(kf_follower *next, bool stays)
 static void show(int number)
 {
     shown = number;
-    memcpy(&followers[1 - number].solver, &followers[number].solver, KF_SOLVER_STATE);
+    memcpy(&followers[1 - number].solver, &followers[number].solver, PARAMETERS_BOUND);
     kf_restart(&followers[1 - number]);
 }
 
@@ -222,7 +226,7 @@ int kf_page_bind(bool stays)
             return BOUND;
         }
         memcpy(refusal, next->solver.message, sizeof refusal);
-        memcpy(&next->solver, &followers[shown].solver, KF_SOLVER_STATE);
+        memcpy(&next->solver, &followers[shown].solver, PARAMETERS_BOUND);
         kf_restart(next);
     }
     memcpy(settings, bound, sizeof bound);
@@ -256,7 +260,7 @@ bool kf_page_gap(void)
     memcpy(z, pose->found.x, KF_UNKNOWNS * sizeof(double));
     if (kf_bind(model, settings, why, sizeof why)) {
         for (k = 0; k < KF_BLOCKS && !has_gap; ++k) {
-            const double gap = kf_gap(solver, model, k, drive[0], z);
+            const double gap = kf_gap(solver, model, k, drive, z);
             weakest = fabs(pose->found.determinants[k]) < fabs(pose->found.determinants[weakest]) ? k : weakest;
             if (gap > CLOSED) {
                 has_gap = true;
@@ -265,7 +269,7 @@ bool kf_page_gap(void)
                 kf_append(refusal, " %s", kf_length_unit);
             }
         }
-        if (!has_gap && kf_evaluated_as_given(model, drive[0], z, found) && found->watch > solver->tolerance) {
+        if (!has_gap && kf_evaluated_as_given(model, drive, z, found) && found->watch > solver->tolerance) {
             has_gap = true;
             kf_append_watch(refusal, model, found, "gap ", "%.4g");
         } else if (!has_gap && KF_BLOCKS > 0) {
@@ -294,9 +298,9 @@ void kf_page_restart(void)
 int kf_page_at(void)
 {
     kf_follower *const follower = &followers[shown];
-    kf_pose *const pose = kf_followed(follower, drive[0]);
+    kf_pose *const pose = kf_followed(follower, drive);
     if (KF_GOOD(pose->status)) {
-        kf_motion(&follower->solver, pose, drive[1], drive[2], motion[0], motion[1], motion[2]);
+        kf_motion(&follower->solver, pose, SPEEDS, ACCELERATIONS, motion, motion + KF_OUTPUTS, motion + 2 * KF_OUTPUTS);
         message = "";
     } else {
         message = follower->solver.message;
@@ -311,50 +315,47 @@ double kf_page_margin(void)
 
 void kf_page_errors(void)
 {
-    kf_errors(&followers[shown].solver, pose_of(&followers[shown]), drive[1], drive[2], errors);
+    kf_errors(&followers[shown].solver, pose_of(&followers[shown]), SPEEDS, ACCELERATIONS, errors);
 }
 
 /* Compute the forces of a pose with the drive and the efforts, at a time of the laws of loads, or its reactions. */
 static void find_forces(kf_follower *follower, double time, bool are_reactions)
 {
-#if KF_FORCES
     const kf_model *const model = &follower->solver.model;
     kf_pose *const pose = pose_of(follower);
-    double zd[KF_ROOM(KF_UNKNOWNS)], zdd[KF_ROOM(KF_UNKNOWNS)], slopes[KF_ROOM(KF_DRIVERS * KF_UNKNOWNS)];
-    const double *const x = pose->found.x, *const p = model->parameters;
+    double zd[KF_ROOM(KF_UNKNOWNS)], zdd[KF_ROOM(KF_UNKNOWNS)], slopes[KF_ROOM(KF_DRIVERS) * KF_ROOM(KF_UNKNOWNS)];
+    const double *const x = pose->found.x, *const p = model->parameters, *const ud = SPEEDS, *const udd = ACCELERATIONS;
     int k;
-#if KF_DRIVERS == 1
-    kf_tangent(model, pose);
-    memcpy(slopes, pose->x1, sizeof slopes);
-    for (k = 0; k < KF_UNKNOWNS; ++k) {
-        zd[k] = slopes[k] * drive[1][0];
-        zdd[k] = pose->x2[k] * (drive[1][0] * drive[1][0]) + slopes[k] * drive[2][0];
-    }
-#else
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        double unit[KF_DRIVERS] = {0.0};
-        unit[k] = 1.0;
-        kf_rates_in_time(model, pose, unit, NULL);
-        memcpy(slopes + k * KF_UNKNOWNS, pose->x1, KF_UNKNOWNS * sizeof *slopes);
-    }
-    kf_rates_in_time(model, pose, drive[1], drive[2]);
-    memcpy(zd, pose->x1, sizeof zd);
-    memcpy(zdd, pose->x2, sizeof zdd);
-#endif
-    if (!are_reactions) {
-        kf_forces(time, drive[0], drive[1], drive[2], x, zd, zdd, slopes, efforts, p, forces);
+    if (KF_FORCES == 0) {
         return;
     }
-    kf_reactions(time, drive[0], drive[1], drive[2], x, zd, zdd, slopes, efforts, p, reactions);
+    if (KF_DRIVERS == 1) {
+        kf_tangent(model, pose);
+        for (k = 0; k < KF_UNKNOWNS; ++k) {
+            slopes[k] = pose->x1[k];
+            zd[k] = slopes[k] * ud[0];
+            zdd[k] = pose->x2[k] * (ud[0] * ud[0]) + slopes[k] * udd[0];
+        }
+    } else {
+        for (k = 0; k < KF_DRIVERS; ++k) {
+            double unit[KF_ROOM(KF_DRIVERS)] = {0.0};
+            unit[k] = 1.0;
+            kf_rates_in_time(model, pose, unit, NULL);
+            memcpy(slopes + k * KF_UNKNOWNS, pose->x1, KF_UNKNOWNS * sizeof *slopes);
+        }
+        kf_rates_in_time(model, pose, ud, udd);
+        memcpy(zd, pose->x1, KF_UNKNOWNS * sizeof *zd);
+        memcpy(zdd, pose->x2, KF_UNKNOWNS * sizeof *zdd);
+    }
+    if (!are_reactions) {
+        kf_forces(time, drive, ud, udd, x, zd, zdd, slopes, efforts, p, forces);
+        return;
+    }
+    kf_reactions(time, drive, ud, udd, x, zd, zdd, slopes, efforts, p, reactions);
     for (k = 0; pose->status == KF_BRIDGED && k < KF_OF_JOINTS; ++k) {
         reactions[k] = NAN; /* the blocks do not give them there */
     }
-    kf_shaking(time, drive[0], drive[1], drive[2], x, zd, zdd, slopes, efforts, p, reactions + KF_OF_JOINTS);
-#else
-    (void)follower;
-    (void)time;
-    (void)are_reactions;
-#endif
+    kf_shaking(time, drive, ud, udd, x, zd, zdd, slopes, efforts, p, reactions + KF_OF_JOINTS);
 }
 
 void kf_page_forces(double time)
@@ -380,10 +381,10 @@ void kf_page_sweep(void)
 int kf_page_sample(int orders, double time)
 {
     kf_follower *const follower = &followers[1 - shown];
-    kf_pose *const pose = kf_followed(follower, drive[0]);
+    kf_pose *const pose = kf_followed(follower, drive);
     if (KF_GOOD(pose->status)) {
-        kf_motion(&follower->solver, pose, drive[1], drive[2], swept[0], orders > 1 ? swept[1] : NULL,
-                  orders > 2 ? swept[2] : NULL);
+        kf_motion(&follower->solver, pose, SPEEDS, ACCELERATIONS, swept, orders > 1 ? swept + KF_OUTPUTS : NULL,
+                  orders > 2 ? swept + 2 * KF_OUTPUTS : NULL);
         if (orders > 3) {
             find_forces(follower, time, false);
         }
