@@ -88,17 +88,19 @@ def with_companions(
         needs = _needs(found, home, meets)
         members = {k for k in met | own if found[k].unknowns}
         hull = _hull(members | {k for k in met if _behind({k}, needs) & members}, needs)
-        last = found[max(met)]
+        last, carries = found[max(met)], False
         if last.unknowns:
             joined = replace(last, companions=(*last.companions, index))
             before = [found[k] for k in _behind(met, needs) - {max(met)}]
-            # one axis of a pin: the other alone is singular in places
-            if system.rows[index].owner in owners or _regular_only_with(system, [last], [joined], before, pose):
+            is_axis = system.rows[index].owner in owners  # of a pin: the other alone is singular in places
+            carries = not is_axis and _regular_only_with(system, [last], [joined], before, pose)
+            if is_axis or carries:
                 found[max(met)] = joined
         if len(hull) > 1 or (hull and not last.unknowns):
             whole = _whole([found[k] for k in hull], index)
             before = [found[k] for k in _behind({*hull, *met}, needs) - set(hull)]
-            if _regular_only_with(system, [found[k] for k in hull], [whole], before, pose):
+            walks = 1 if carries else _WALKS  # what carries the last block need not carry those before it
+            if _regular_only_with(system, [found[k] for k in hull], [whole], before, pose, walks):
                 found = _merged(found, hull, needs, whole)
     return found
 
@@ -186,6 +188,7 @@ def _regular_only_with(
     joined: Sequence[BlockStructure],
     before: Sequence[BlockStructure],
     pose: FloatArray,
+    walks: int = _WALKS,
 ) -> bool:
     """Return True if blocks are singular somewhere on the motion where one more companion makes them regular.
 
@@ -201,7 +204,7 @@ def _regular_only_with(
     if rank == len(part.columns):
         return False
     joined = [*joined, *(block for block in before if all(_only(system, row, touched) for row in block.all_rows))]
-    walks = min(len(part.columns) - rank, _WALKS)
+    walks = min(len(part.columns) - rank, walks)
     last: list[tuple[FloatArray, list[float]]] = []
     for q in (q for seed in range(walks) for q in _motion(part, pose[part.columns], rank, _POSES, seed)):
         poses = [q]

@@ -178,7 +178,7 @@ def test_what_a_row_of_a_joined_block_meets_is_computed_before_it() -> None:
         np.testing.assert_allclose(run["bar.phi"], run["crank.phi"], atol=1e-12)
 
 
-@pytest.mark.parametrize("seed", [10111, 10113])
+@pytest.mark.parametrize("seed", [10111, 10113, 10615])
 def test_a_table_on_a_table_is_carried_through_the_whole_turn_of_its_crank(seed: int) -> None:
     """Its legs are singular in turn, far from the start poses."""
     assert trial(seed, "translating tables").judged().faults == []
