@@ -115,7 +115,7 @@ def page_module(mechanism: Mechanism, labels: Mapping[str, str] | None = None) -
 
     Raises:
         KinfmuError: The mechanism cannot be solved, as `compile_plan` reports it.
-        RequestError: It is larger than `solver/sizes.h` and `solver/instance.h` allow.
+        RequestError: It is larger than `solver/page_sizes.h` and `solver/instance.h` allow.
 
     """
     labels = labels or {}
@@ -166,7 +166,7 @@ def _binary(name: str, sizes: Mapping[str, int], texts: Iterable[str]) -> Binary
 @cache
 def _layout() -> tuple[dict[str, int], str]:
     """Return the largest sizes of models in pages, and the structures that models share with the solver."""
-    headers = [(SOURCES / name).read_text("utf-8") for name in ("sizes.h", "instance.h")]
+    headers = [(SOURCES / name).read_text("utf-8") for name in ("page_sizes.h", "instance.h")]
     most = {name: int(most) for text in headers for name, most in re.findall(r"KF_MOST_KF_(\w+) (\d+)", text)}
     shared = "\n".join(compiler.sources(["curve.h", "kinfmu.h"]).values())
     return most, "\n".join(re.findall(r"^typedef struct {[^}]*} \w+;", shared, re.MULTILINE))

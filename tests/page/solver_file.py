@@ -42,9 +42,9 @@ _FUNCTION = re.compile(r"^(void|bool|int) (kf_\w+)\(([^;]*)\);", re.MULTILINE)
 
 
 def sources() -> dict[str, str]:
-    """Return the C files by name, without comments."""
+    """Return the C files by name, without comments; page_sizes.h is there in place of a generated sizes.h."""
     files = compiler.sources([*compiler.SOLVER, "follower.h", "follower.c", "solutions.c"])
-    files |= {path.name: path.read_text("utf-8") for path in sorted(SOURCES.glob("*.[ch]"))}
+    files |= {path.name.removeprefix("page_"): path.read_text("utf-8") for path in sorted(SOURCES.glob("*.[ch]"))}
     return {name: _COMMENT.sub("", text) for name, text in (files | {"constants.h": constants()}).items()}
 
 

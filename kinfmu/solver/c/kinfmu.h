@@ -14,7 +14,7 @@
 #include "curve.h"
 #include "sizes.h"
 
-#ifndef KF_ROOM /* pages define these: they know the sizes at run time (kinfmu/page/solver/sizes.h) */
+#ifndef KF_ROOM /* pages define these: they know the sizes at run time (kinfmu/page/solver/page_sizes.h) */
 #define KF_ROOM(n) ((n) > 0 ? (n) : 1) /* arrays without elements are no C */
 #define KF_HAS(n) (n)                  /* whether there is code for what some models do not have */
 #define KF_ASSIGN(to, from) (*(to) = *(from)) /* of poses */
