@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from kinfmu.mechanism.joints import Joint
-from kinfmu.mechanism.members import Parts
+from kinfmu.mechanism.members import MechanismParts
 from kinfmu.units import ForceName, Quantity, force_sizes
 
 _INERTIAS = {("angle", "angle"): "inertia", ("length", "length"): "mass"}
@@ -12,7 +12,7 @@ _MIXED_INERTIA = "mass_moment"  # of a turning and a sliding driver
 NEVER_NEGATIVE = frozenset({"reduced_inertia", "kinetic_energy", "length"})  # sums of masses times squares, distances
 
 
-def force_names(mechanism: Parts) -> tuple[ForceName, ...]:
+def force_names(mechanism: MechanismParts) -> tuple[ForceName, ...]:
     """Return the names of efforts, inertias, energies, springs and external loads; none without masses and loads."""
     has_masses = mechanism.has_masses
     if not (has_masses or mechanism.loads):
@@ -34,7 +34,7 @@ def force_names(mechanism: Parts) -> tuple[ForceName, ...]:
     return (*names, *external_names(mechanism))
 
 
-def external_names(mechanism: Parts) -> tuple[ForceName, ...]:
+def external_names(mechanism: MechanismParts) -> tuple[ForceName, ...]:
     """Return the names of the efforts of external loads, which are those of their inputs."""
     return tuple(ForceName("", name, name.quantity) for load in mechanism.loads for name in load.inputs())
 
@@ -44,7 +44,7 @@ def effort_noun(kind: str) -> str:
     return "torque" if kind == "angle" else "force"
 
 
-def reaction_names_of(mechanism: Parts) -> tuple[ForceName, ...]:
+def reaction_names_of(mechanism: MechanismParts) -> tuple[ForceName, ...]:
     """Return the names of all reactions of a mechanism: of each row of a joint, then shaking force and moment.
 
     There are none without masses and loads.
@@ -53,7 +53,7 @@ def reaction_names_of(mechanism: Parts) -> tuple[ForceName, ...]:
     return (*(name for joint in mechanism.joints for name in names_of_rows(joint)), *of_ground) if of_ground else ()
 
 
-def shaking_names(mechanism: Parts) -> tuple[ForceName, ...]:
+def shaking_names(mechanism: MechanismParts) -> tuple[ForceName, ...]:
     """Return the names of what the mechanism exerts on the ground; none without masses and loads."""
     if not (mechanism.loads or mechanism.has_masses):
         return ()
@@ -71,7 +71,7 @@ def names_of_rows(joint: Joint) -> list[ForceName]:
     return names
 
 
-def measured_forces(mechanism: Parts) -> dict[str, tuple[ForceName, ...]]:
+def measured_forces(mechanism: MechanismParts) -> dict[str, tuple[ForceName, ...]]:
     """Return the forces that measures read, by name, with the columns they are made of.
 
     The size of a pin's force, 'pin.force', is made of 'pin.force_x' and 'pin.force_y', and so is 'shaking_force'.

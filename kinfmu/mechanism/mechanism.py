@@ -25,7 +25,7 @@ from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.joints import Joint
 from kinfmu.mechanism.loads import Load
 from kinfmu.mechanism.measures import Reading
-from kinfmu.mechanism.members import Members, NumberPath, Parts, texts_of
+from kinfmu.mechanism.members import MechanismParts, Members, NumberPath, texts_of
 from kinfmu.mechanism.metres import in_metres
 from kinfmu.mechanism.parameters import Parameter, parameter_values, resolve
 from kinfmu.mechanism.quantities.arithmetic import Value
@@ -35,7 +35,7 @@ from kinfmu.units import OTHER_SPELLINGS, Quantity
 
 
 @dataclass(frozen=True)
-class Mechanism(Parts, Live):
+class Mechanism(MechanismParts, Live):
     """A planar mechanism: bodies, the joints between them, and the drivers that move it.
 
     Every number can also be given as text with a unit or as an expression of parameters ("60 deg", "a/2 + 5 mm"). The

@@ -41,7 +41,7 @@ _MASSES = {
 _START = {"x": LENGTH, "y": LENGTH, "phi": ANGLE}
 
 
-class Parts:
+class MechanismParts:
     """What follows from the bodies, joints, drivers and loads of a mechanism, or of its members."""
 
     bodies: tuple[Body, ...]
@@ -71,7 +71,7 @@ class Parts:
 
 
 @dataclass(frozen=True)
-class Members(Parts):
+class Members(MechanismParts):
     """The parts of a mechanism that contain numbers, in any arithmetic."""
 
     bodies: tuple[Body, ...]

@@ -28,7 +28,7 @@ class SamplesNeededError(Exception):
     """A measure reads more of a motion than extremes."""
 
 
-class Channel(NamedTuple):
+class ExtremeChannel(NamedTuple):
     """What extremes are of: a column, or the size of a vector of two, its derivative of an order, and the part."""
 
     columns: tuple[int, ...]
@@ -36,7 +36,7 @@ class Channel(NamedTuple):
     part: int
 
 
-class Cut(NamedTuple):
+class CutSamples(NamedTuple):
     """A part of the motion as `extremes.c` reads it.
 
     x: (k,) arguments of its samples; inside: number of the first one of the motion; intervals: in which its ends are,
@@ -49,7 +49,7 @@ class Cut(NamedTuple):
     s: FloatArray
 
     @classmethod
-    def of(cls, x: FloatArray, window: tuple[float, float], *, is_closed: bool) -> Cut:
+    def of(cls, x: FloatArray, window: tuple[float, float], *, is_closed: bool) -> CutSamples:
         """Return the part in a window of a motion at arguments x (n,)."""
         whole, inside, last = cut_places(x, *window, is_closed=is_closed)
         ends = np.array(window)
@@ -73,7 +73,7 @@ class Channels:
     """
 
     outputs: Sequence[QuantityRead]
-    channels: list[Channel] = field(default_factory=list)
+    channels: list[ExtremeChannel] = field(default_factory=list)
     windows: list[tuple[Window, Window]] = field(default_factory=lambda: [(None, None)])
 
     @property
@@ -163,7 +163,7 @@ class Extremes:
     ) -> HistoryExtremes:
         """Return the extremes of columns in a part of the motion."""
         part = next(k for k, windows in enumerate(self.channels.windows) if windows[is_closed] == window)
-        channel = Channel(columns, order, part)
+        channel = ExtremeChannel(columns, order, part)
         if self.found is None:
             if channel not in self.channels.channels:
                 self.channels.channels.append(channel)
@@ -258,7 +258,7 @@ class ExtremesReader:
         for k, windows in enumerate(channels.windows):
             for is_closed, window in enumerate(windows):
                 if window is not None:
-                    self._fill(parts[2 * k + is_closed], Cut.of(x, window, is_closed=bool(is_closed)))
+                    self._fill(parts[2 * k + is_closed], CutSamples.of(x, window, is_closed=bool(is_closed)))
         listed = (_Channel * len(channels.channels))()
         for to, channel, found in zip(listed, channels.channels, self._found, strict=True):
             column, other = (*channel.columns, -1)[:2]
@@ -279,7 +279,7 @@ class ExtremesReader:
         function = ctypes.cast(compiled().kf_read_extremes, _Place).value or 0
         self.function = DesignReader(function, ctypes.addressof(of))
 
-    def _fill(self, to: Any, cut: Cut) -> None:
+    def _fill(self, to: Any, cut: CutSamples) -> None:
         to.count, to.inside = len(cut.x), cut.inside
         to.intervals, to.s = (ctypes.c_int64 * 2)(*cut.intervals.tolist()), (ctypes.c_double * 2)(*cut.s.tolist())
         to.x, to.h = self._address(cut.x), self._address(np.diff(cut.x))

@@ -317,7 +317,15 @@ class Model:
         return Library(self.plan)
 
     def by(self, engine: str) -> Model:
-        """Return the model with another engine, with the same plan and the library, if it is loaded."""
+        """Return the model with another engine, with the same plan and the library, if it is loaded.
+
+        Args:
+            engine: 'python', 'native' or 'auto'.
+
+        Returns:
+            The model.
+
+        """
         model = Model(self.plan, engine)
         model.__dict__ |= {name: value for name, value in self.__dict__.items() if name == "_library"}
         return model

@@ -46,7 +46,7 @@ IF, ELSE, END, EMPTY = b"\x04", b"\x05", b"\x0b", b"\x40"
 
 
 @dataclass(frozen=True)
-class Variable:
+class CVariable:
     """A variable of the machine by its number, or one in memory by its address."""
 
     place: int
@@ -105,7 +105,7 @@ class Expressions:
         self.tokens: list[str] = []
         self.at = 0
         self.code = bytearray()
-        self.scopes: list[dict[str, Variable]] = [{}]
+        self.scopes: list[dict[str, CVariable]] = [{}]
         self.callees: dict[str, Callee] = {}
         self._texts: dict[str, int] = {}
 
@@ -136,7 +136,7 @@ class Expressions:
         """Return the error for a token that is not expected here."""
         return CompilerError(f"cannot translate this C: {' '.join(self.tokens[max(self.at - 12, 0) : self.at + 1])}")
 
-    def variable(self, name: str) -> Variable:
+    def variable(self, name: str) -> CVariable:
         """Return the variable of a name."""
         for scope in reversed(self.scopes):
             if name in scope:
@@ -381,7 +381,7 @@ class Expressions:
         self.code += CALL + unsigned(callee.number) + after
         return callee.result
 
-    def _addressed(self) -> Variable | None:
+    def _addressed(self) -> CVariable | None:
         """Read an argument if it is the address of a variable of the machine."""
         if self.tokens[self.at] != "&" or self.tokens[self.at + 2] not in (",", ")"):
             return None

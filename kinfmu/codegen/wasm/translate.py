@@ -32,9 +32,9 @@ from kinfmu.codegen.wasm.expressions import (
     OF_DOUBLES,
     OF_INTEGERS,
     Callee,
+    CVariable,
     Expressions,
     Target,
-    Variable,
     get,
     integer,
     set_to,
@@ -132,12 +132,12 @@ class Translator(Expressions):
         self.scopes[0][name] = self._table(kind, self.module.addresses.get(name))
         self.expect(";")
 
-    def _table(self, kind: CType, address: int | None = None) -> Variable:
+    def _table(self, kind: CType, address: int | None = None) -> CVariable:
         """Read the values of a table, and put it at an address, or in new memory."""
         content = self._content(kind)
         address = self.module.reserve(len(content)) if address is None else address
         self.module.put(address, content)
-        return Variable(address, kind, in_memory=True)
+        return CVariable(address, kind, in_memory=True)
 
     def _content(self, kind: CType) -> bytes:
         """Read an initializer."""
@@ -170,11 +170,11 @@ class Translator(Expressions):
 
     def _function(self, result: CType, name: str) -> None:
         self.expect("(")
-        scope: dict[str, Variable] = {}
+        scope: dict[str, CVariable] = {}
         signature = b""
         while not self.accept(")"):
             kind = self._type()
-            scope[self.next()] = Variable(len(scope), kind, in_memory=False)
+            scope[self.next()] = CVariable(len(scope), kind, in_memory=False)
             signature += self._machine(kind)
             self.accept(",")
         number = self.module.functions.get(name)
@@ -271,11 +271,11 @@ class Translator(Expressions):
                 self.expect("=")
                 variable = self._table(kind)
             elif isinstance(kind, Array):
-                variable = Variable(self.module.reserve(kind.size), kind, in_memory=True)
+                variable = CVariable(self.module.reserve(kind.size), kind, in_memory=True)
                 if self.accept("="):
                     self._fill(variable.place, kind)
             else:
-                variable = Variable(self._count + len(self._locals), kind, in_memory=False)
+                variable = CVariable(self._count + len(self._locals), kind, in_memory=False)
                 self._locals.append(self._machine(kind))
                 if self.accept("="):
                     self.value(kind)
