@@ -86,7 +86,7 @@ def _recorded_next_to(path: Path) -> Run:
 
 
 def _is_beginning(part: Run, whole: Run) -> bool:
-    """True if a run holds the first samples of another, bit for bit; margins and errors are computed when they are read."""
+    """True if a run holds the first samples of another, bit for bit, but for what is computed when it is read."""
     tables = ("t", "values", "rates", "accelerations", "inputs", "residual", "status", "watch")
     return all(getattr(part, name).tobytes() == getattr(whole, name)[: len(part)].tobytes() for name in tables)
 
