@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,9 +17,9 @@ def new_numbers(*shape: int) -> FloatArray:
     A large one begins at a large page of the system and has all of its last one: the small pages that it would have at
     its ends take as long as all the others.
     """
-    count = math.prod(shape)
-    if count < _PAGE:
-        return np.empty(shape)
-    whole = np.empty(count + 2 * _PAGE)
+    numbers = np.empty(shape)
+    if numbers.size < _PAGE:
+        return numbers
+    whole = np.empty(numbers.size + 2 * _PAGE)
     first = -(whole.__array_interface__["data"][0] // whole.itemsize) % _PAGE
-    return whole[first : first + count].reshape(shape)
+    return whole[first : first + numbers.size].reshape(shape)

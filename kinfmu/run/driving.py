@@ -31,6 +31,7 @@ _HALF = 0.5 + 1e-9  # [turns]; a step of half a turn, within rounding, is unchan
 LARGEST_RATE = 1e100  # of drivers; squares of much larger numbers are infinite
 _LARGEST_KEPT = 1_000_000  # numbers of a table of equal ones that is kept
 _FEW = 50  # numbers that are checked sooner one by one
+_MANY = 10_000  # numbers from which on their memory and one pass less count
 _NUMBER = (float, int)
 _DEFAULTS = (0.0, 1.0, 0.0)  # of value (which must be given), speed and acceleration
 
@@ -90,8 +91,11 @@ def driven_by_inputs(
     if len(drivers) == len(inputs) == rows == 1 and not wrap and drivers[0].inputs[0] in inputs:
         (name,) = inputs  # the values of a single driver: a short call is done here
         column = column_of(name, inputs[name])
-        table = new_numbers(len(column), 1)
-        table[:, 0] = column
+        if len(column) <= _MANY:
+            table = column.reshape(-1, 1).copy()
+        else:
+            table = new_numbers(len(column), 1)
+            table[:, 0] = column
         return table, _filled(table.shape, _DEFAULTS[1]), _filled(table.shape, _DEFAULTS[2])
     names = [name for driver in drivers for name in driver.inputs]
     for name in inputs:
@@ -201,7 +205,7 @@ def _is_within(values: FloatArray, largest: float) -> bool:
     """Return True if all values are numbers of at most this size; no temporary arrays are made."""
     if values.size <= _FEW and math.hypot(*values.ravel().tolist()) <= largest:  # NaN stays
         return True
-    if largest == sys.float_info.max:
+    if largest == sys.float_info.max and values.size > _MANY:
         with np.errstate(over="ignore", invalid="ignore"):
             if math.isfinite(values.sum()):  # one pass in place of two: infinity and NaN stay
                 return True

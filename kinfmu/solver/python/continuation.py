@@ -70,12 +70,11 @@ def with_parameters(module: Any, values: Vector, tolerance: float = TOLERANCE) -
 
 def reach(module: Any, values: Vector, tolerance: float = TOLERANCE) -> Reached:
     """Follow the anchor from the parameters of the mechanism to `values`."""
-    written, model, pose = _at_anchor(module)
+    written, angles, model, pose = _at_anchor(module)
     u = pose.u
     slope = at_rest = (0.0,) * len(pose.z)
-    changes = zip(module.PARAMETER_IS_ANGLE, written, values, strict=True)
-    turn = max([abs(b - a) for is_angle, a, b in changes if is_angle], default=0.0)
-    longest = min(1.0, _LONGEST_TURN / turn) if turn else 1.0
+    turn = max([_LONGEST_TURN, *[abs(values[k] - written[k]) for k in angles]])
+    longest = _LONGEST_TURN / turn
     s, step, block = 0.0, longest, -1
     for _ in range(_MOST_CONTINUED):
         if values == written:
@@ -108,12 +107,13 @@ def reach(module: Any, values: Vector, tolerance: float = TOLERANCE) -> Reached:
 
 
 @lru_cache(maxsize=8)
-def _at_anchor(module: Any) -> tuple[Vector, Model, Pose]:
-    """Return the parameters of the mechanism, the model with them, and its anchor: equal in every call."""
+def _at_anchor(module: Any) -> tuple[Vector, tuple[int, ...], Model, Pose]:
+    """Return the parameters of the mechanism, which are angles, the model with them and its anchor: always equal."""
     u, z = module.ANCHOR
     written = tuple([value for _, value in module.PARAMETERS])
+    angles = tuple([k for k, is_angle in enumerate(module.PARAMETER_IS_ANGLE) if is_angle])
     model = module.bound(written)
-    return written, model, Pose(u, evaluated(model, u, z, held=0))
+    return written, angles, model, Pose(u, evaluated(model, u, z, held=0))
 
 
 def _is_trusted(pose: Pose, trial: Pose) -> bool:
