@@ -15,7 +15,7 @@ from kinfmu.cli.group import main, note, patience
 @click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port on this machine. Default: a free one.")
 @click.option("--no-browser", is_flag=True, help="Print the address only.")
 def play(mechanism: str, port: int, no_browser: bool) -> None:
-    """Drag a mechanism in the browser, with the compiled code of its FMU.
+    """Drag a mechanism in the browser, with the solver of its native FMU.
 
     The page follows the file while you edit it; errors in the file are shown in the page. The page saves FMUs, tables,
     drawings and mechanism files with the lengths as set. Only this machine can open the address. Ctrl-C ends it.

@@ -109,8 +109,8 @@ def build_block(
 ) -> Block:
     """Return a block; its rows are traced once, and all its formulas come from that trace.
 
-    anchor: values of all coordinates and parameters, by name of their symbols. far: in the anchor; the scale of a
-    row is as large as its slope there.
+    anchor: values of all coordinates, parameters and drivers, by name of their symbols. far: in the anchor; the scale
+    of a row is as large as its slope there.
     """
     known = ChainMap[str, Node]({}, fixed)  # type: ignore[arg-type]  # the fixed ones are not written to
     assigned = []
@@ -131,7 +131,8 @@ def build_block(
     one = tracer.graph.constant(1.0)
     columns = [tracer.graph.derivative(residuals, {unknown: one}) for unknown in unknowns]
     jacobian = tuple(zip(*columns, strict=True)) if columns else ()
-    scale, usual = _determinant_scale(jacobian, anchor, system.size)
+    turns = {driver.inputs()[0] for driver in system.mechanism.drivers if driver.quantity.kind == "angle"}
+    scale, usual = _determinant_scale(jacobian, anchor, turns, system.size)
     return Block(
         assigned=tuple(assigned),
         unknowns=structure.unknowns,
@@ -167,9 +168,13 @@ def _determinants(jacobians: FloatArray, usual: Sequence[float]) -> FloatArray:
 
 
 def _determinant_scale(
-    jacobian: Sequence[Sequence[Node]], anchor: Mapping[str, float], size: float
+    jacobian: Sequence[Sequence[Node]], anchor: Mapping[str, float], turns: Collection[str], size: float
 ) -> tuple[float, tuple[float, ...]]:
-    """Return the largest |determinant| over random poses, and the usual lengths of rows or columns."""
+    """Return the largest |determinant| over random poses, and the usual lengths of rows or columns.
+
+    turns: names of the drivers' values that are angles. A block has them in its Jacobian where a driver moves a body
+    relative to one that the block solves.
+    """
     if not jacobian:
         return 1.0, ()
     flat = [entry for row in jacobian for entry in row]
@@ -179,7 +184,7 @@ def _determinant_scale(
     values = {symbol.name: [anchor[symbol.name]] * _DETERMINANT_SAMPLES for symbol in met}
     for symbol, part in zip(moving, random.T.tolist(), strict=True):
         at = anchor[symbol.name]
-        is_angle = symbol.coordinate is not None and symbol.coordinate.is_angle
+        is_angle = symbol.name in turns if symbol.coordinate is None else symbol.coordinate.is_angle
         values[symbol.name] = [at, *(-np.pi + math.tau * x if is_angle else at + size * (-0.5 + x) for x in part)]
     m, k = len(jacobian), len(jacobian[0])
     matrices = np.transpose(evaluate_all(flat, values, _DETERMINANT_SAMPLES)).reshape(-1, m, k)

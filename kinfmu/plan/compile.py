@@ -103,6 +103,7 @@ def plan_from(
         motions, coordinate_count = _chosen(motions, coordinate_count, outputs, fixed)
     at_anchor: dict[str, float] = dict(zip(system.coordinates, map(float, anchor.q), strict=True))
     at_anchor |= {parameter_symbol(parameter.name): parameter.value for parameter in settable}
+    at_anchor |= {driver.inputs()[0]: float(u) for driver, u in zip(mechanism.drivers, anchor.u, strict=True)}
     far = far_rows(system, anchor.q)
     blocks = _needed(
         [build_block(system, tracer, row, rates, part, known, at_anchor, far) for part in structure.blocks],

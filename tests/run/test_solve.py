@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import KinfmuError, Run
+from kinfmu import ConstantSpeed, KinfmuError, RelativeAngleDriver, Run
 from kinfmu.draw import animate
 from kinfmu.draw.plots import _sheet, stacks_of
 from kinfmu.errors import LogError, RequestError
@@ -449,3 +449,22 @@ def test_the_largest_numbers_have_the_default_range() -> None:
     few = np.array([-largest, *np.linspace(-0.4, 0.4, 4000) * largest, largest])
     assert shown_range(few, 1.0) is None
     assert shown_range(np.array([*np.linspace(-1.0, 1.0, 4000), 1e300]), 1.0) == pytest.approx((-2.0, 2.0), rel=0.05)
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("between", [("crank", "coupler"), ("coupler", "rocker"), ("rocker", "crank")])
+def test_a_motor_between_two_bodies_of_a_loop_moves_it_as_the_crank_does(between: tuple[str, str], engine: str) -> None:
+    """The block of the loop has the driver's value in its Jacobian."""
+    by_crank = fourbar(4.0, 1.0, 3.5, 3.0)
+    given = kinfmu.solve(by_crank, crank_angle=np.linspace(1.0, 1.6, 40), crank_speed=2.0, crank_acceleration=-3.0)
+    i, j = between
+    driver = RelativeAngleDriver("motor", between, ConstantSpeed(given[f"{j}.phi"][0] - given[f"{i}.phi"][0], 1.0))
+    inputs = {
+        f"motor_{name}": given[f"{j}.{of}"] - given[f"{i}.{of}"]
+        for name, of in (("angle", "phi"), ("speed", "omega"), ("acceleration", "alpha"))
+    }
+    run = kinfmu.solve(dataclasses.replace(by_crank, drivers=(driver,)), engine=engine, **inputs)
+    np.testing.assert_array_equal(run.status, 0)
+    for table in ("values", "rates", "accelerations"):
+        apart = getattr(run, table) - getattr(given, table)[:, [given.outputs.index(name) for name in run.outputs]]
+        assert np.abs(apart).max() < 1e-12
