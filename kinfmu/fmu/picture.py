@@ -29,7 +29,6 @@ _STROKES = {
     "shaft": 4.0,
     "pitch": 0.8,
 }  # [px]
-_AREAS = ("cam", "wheel", "rack", "block", "die")
 _PIN = 3.5  # [px], radius
 _ROUND = np.linspace(0.0, 2.0 * np.pi, 25)
 _LOWEST, _HIGHEST = 160, 480  # [px] of the height
