@@ -18,7 +18,7 @@ from kinfmu.plan.equations.system import System
 from tests import oracle
 from tests.stress import families
 from tests.stress.drawn import Drawn, Frame
-from tests.stress.families import FAMILIES
+from tests.stress.families import FAMILIES, Draw
 from tests.stress.jets import DIGITS, LONG
 from tests.stress.report import Report
 from tests.stress.trial import Trial, trial
@@ -300,3 +300,21 @@ def test_the_next_way_begins_at_the_last_sample_that_was_reached(
     """A sample behind a place too tight to pass is called unreachable; angles count their turns without it."""
     monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
     assert trial(75, "machines with a robot", "native").judged().faults == []
+
+
+def test_kinds_of_four_bars_are_what_they_are_called() -> None:
+    draw = Draw(1)
+    for kind in families.KINDS:
+        for _ in range(20):
+            bars = families.grashof(draw, kind)
+            is_grashof = 2 * (min(bars) + max(bars)) < sum(bars)
+            assert (families.KINDS[bars.index(min(bars))] if is_grashof else "triple rocker") == kind
+
+
+def test_what_is_raised_is_a_fault_of_its_mechanism(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_: Trial) -> tuple[Run, float]:
+        raise ZeroDivisionError("by zero")
+
+    monkeypatch.setattr(Trial, "run", fail)
+    (fault,) = trial(1).judged().faults
+    assert fault == ("raised", -1, "ZeroDivisionError: by zero")
