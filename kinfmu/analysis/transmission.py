@@ -259,7 +259,7 @@ def _extremes(
         return cosine.slope(path.coordinates(pose), path.speeds(pose))
 
     poses = path.fine_poses
-    slopes = [slope(pose) for pose in poses]
+    slopes = [cosine.slope(q, qd) for q, qd in zip(path.fine_coordinates, path.fine_speeds, strict=True)]
     if max(map(abs, slopes)) * (poses[-1].u[0] - poses[0].u[0]) < 1e-9:
         return None
     found = []
@@ -267,7 +267,7 @@ def _extremes(
         if a * b < 0.0:
             pose = path.zero(slope, before, after)
             found.append((cosine.value(path.coordinates(pose)), pose.u[0]))
-    found += [(cosine.value(path.coordinates(pose)), pose.u[0]) for pose in poses]
+    found += [(cosine.value(q), pose.u[0]) for q, pose in zip(path.fine_coordinates, poses, strict=True)]
     in_line = []
     for limit in (path.low, path.high):
         if limit is not None:

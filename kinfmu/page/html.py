@@ -85,13 +85,13 @@ def page(
     report = report or check(mechanism)
     if report.problem is not None and report.plan is None:
         raise report.problem
-    as_written = page_module(mechanism)
+    as_written = page_module(mechanism, report=report)
     change = opened(mechanism)
     is_large = len(change.places) > MOST_NUMBERS
     places = {} if is_large else change.places
     modules = {
         "written": module_data(as_written, {}),
-        "opened": module_data(page_module(change.mechanism, change.labels), places) if places else None,
+        "opened": module_data(page_module(change.mechanism, change.labels, report), places) if places else None,
     }
     drivers = [driver.name for driver in mechanism.drivers]
     data = describe(mechanism, report) | {

@@ -18,6 +18,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from kinfmu.analysis import Report
 from kinfmu.codegen.c import compiler, emit
 from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
 from kinfmu.codegen.forces import emit_c_forces
@@ -28,7 +29,7 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import reaction_names_of, shaking_names
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.efforts import load_inputs
-from kinfmu.plan.forces import ForceSteps, force_names, force_steps, loaded_coordinates
+from kinfmu.plan.forces import ForceSteps, force_names, force_steps
 from kinfmu.plan.reactions import reaction_steps, shaking_steps
 from kinfmu.plan.trace import Tracer, parameter_symbol
 from kinfmu.plan.undetermined import undetermined_reactions
@@ -106,12 +107,16 @@ def packed(data: bytes) -> str:
     return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
 
 
-def page_module(mechanism: Mechanism, labels: Mapping[str, str] | None = None) -> PageModule:
+def page_module(
+    mechanism: Mechanism, labels: Mapping[str, str] | None = None, report: Report | None = None
+) -> PageModule:
     """Return the module of a mechanism: the compiled solver with its model, which needs no compiler.
 
     Args:
         mechanism: The mechanism.
         labels: Names of parameters for messages and `PageModule.parameters`, such as `Opened.labels`. Default: none.
+        report: Of the mechanism, or of the one that `opened` has changed: what it has found is not found again.
+            Default: none.
 
     Raises:
         KinfmuError: The mechanism cannot be solved, as `compile_plan` reports it.
@@ -120,7 +125,7 @@ def page_module(mechanism: Mechanism, labels: Mapping[str, str] | None = None) -
     """
     labels = labels or {}
     names = force_names(mechanism)
-    plan = compile_plan(replace(mechanism, coordinates="moving"), solved=loaded_coordinates(mechanism) if names else ())
+    plan = _planned(mechanism, report)
     points = tuple(mechanism.body_points)
     reactions = _reaction_stages(plan)
     counts = [len(steps.names) for steps in reactions.values()] or [0]
@@ -145,6 +150,16 @@ def page_module(mechanism: Mechanism, labels: Mapping[str, str] | None = None) -
         names,
         tuple(name for steps in reactions.values() for name in steps.names),
     )
+
+
+def _planned(mechanism: Mechanism, report: Report | None) -> SolvePlan:
+    """Return the plan of all coordinates that move."""
+    known = report.plan if report else None
+    if known and known.mechanism is mechanism and mechanism.coordinates == "moving":
+        return known
+    # Numbers seen from an origin of the plan's own are rounded in other ways when they are parameters.
+    redundancy = report.redundancy if report and known and not any(known.origin) else None
+    return compile_plan(replace(mechanism, coordinates="moving"), redundancy=redundancy)
 
 
 def _binary(name: str, sizes: Mapping[str, int], texts: Iterable[str]) -> Binary:
