@@ -225,8 +225,7 @@ def _opposite(b: float, c: float, p: Place, q: Place) -> _Cosine:
         return (b * b + c * c - (qx - px) ** 2 - (qy - py) ** 2) / (2.0 * b * c)
 
     def slope(at: Coordinates, rates: Coordinates) -> float:
-        (px, py), (qx, qy) = p.world(at), q.world(at)
-        (pu, pv), (qu, qv) = p.velocity(at, rates), q.velocity(at, rates)
+        (px, py, pu, pv), (qx, qy, qu, qv) = p.motion(at, rates), q.motion(at, rates)
         return -((qx - px) * (qu - pu) + (qy - py) * (qv - pv)) / (b * c)
 
     return _Cosine(value, slope)
@@ -241,7 +240,7 @@ def _against_normal(p: Place, s: Place, length: float, direction: float) -> _Cos
         return (n[0] * (sx - px) + n[1] * (sy - py)) / length
 
     def slope(q: Coordinates, qd: Coordinates) -> float:
-        vx, vy = p.velocity(q, qd)
+        _, _, vx, vy = p.motion(q, qd)
         return -(n[0] * vx + n[1] * vy) / length
 
     return _Cosine(value, slope)

@@ -6,6 +6,7 @@ import html
 import json
 import re
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -117,6 +118,7 @@ def page(
     )
 
 
+@cache
 def _script(name: str) -> str:
     """Return a module of web/ as a part of one script: without comments, indentation, imports, and the word export."""
     text = _COMMENT.sub("", (_WEB / f"{name}.js").read_text("utf-8"))
