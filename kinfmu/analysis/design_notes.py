@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise
-from statistics import median_low
 from typing import Any, NamedTuple
 
 from kinfmu.analysis.driver_path import DriverPath, law_values
@@ -143,7 +142,9 @@ def _long_links(lengths: Mapping[str, float], unit: str) -> Iterator[str]:
     """Yield a line for moving bodies that are much longer between their joints than most."""
     if len(lengths) < _LEAST_LINKS:
         return
-    usual = median_low(lengths.values())  # of four links two may be in another unit
+    usual = sorted(lengths.values())[
+        (len(lengths) - 1) // 2
+    ]  # the lower median: of four links two may be in another unit
     for body, length in lengths.items():
         if body != GROUND_NAME and length > TOO_LONG * usual:
             yield (

@@ -112,7 +112,11 @@ class DriverPath:
         apart = start.u[0] - limit.u[0]
         parts = [(k / _NEAR_END) ** 2 for k in range(_NEAR_END - 1, 0, -1)]
         poses = [self.solver.solve(start, (limit.u[0] + part * apart,)) for part in parts]
-        last = [pose for pose in self._near_limits[limit is self.high][:1] if abs(pose.u[0] - limit.u[0]) < parts[-1] * abs(apart)]
+        last = [
+            pose
+            for pose in self._near_limits[limit is self.high][:1]
+            if abs(pose.u[0] - limit.u[0]) < parts[-1] * abs(apart)
+        ]
         return tuple(pose for pose in (*poses, *last) if pose.good)
 
     def zero(self, value: Callable[[Pose], float], low: Pose, high: Pose) -> Pose:

@@ -164,8 +164,8 @@ def _is_clear(mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> bool:
 
 def _clearest_row(mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> int:
     """Return the row of poses (n, 3) by body in which links hide one another least, or the first clear one."""
-    rows = np.unique(np.linspace(0, len(poses[GROUND_NAME]) - 1, _CANDIDATES + 1).astype(int))
-    rows = np.array([row for row in rows if all(np.isfinite(pose[row]).all() for pose in poses.values())])
+    rows = list(dict.fromkeys(np.linspace(0, len(poses[GROUND_NAME]) - 1, _CANDIDATES + 1).astype(int).tolist()))
+    rows = [row for row in rows if all(np.isfinite(pose[row]).all() for pose in poses.values())]
     owners, links = _links(mechanism, {body: pose[rows] for body, pose in poses.items()})  # (r, links, 2, 2)
     if not 1 < len(owners) <= _MOST_LINKS:
         return int(rows[0])

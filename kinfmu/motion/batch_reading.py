@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple
@@ -37,6 +36,7 @@ from kinfmu.motion.samples import driven_samples, is_crowded
 from kinfmu.plan.equations.graph import Node, evaluate, symbols
 from kinfmu.plan.plan import PlanParameter
 from kinfmu.plan.trace import parameter_symbol
+from kinfmu.processes import in_threads
 from kinfmu.run.axis import TIME, axis_for
 from kinfmu.run.designs import Batch, Driving, first_failure, parts_of, solve_alone, solve_by_library
 from kinfmu.run.driving import numbers_of, refuse_both
@@ -158,11 +158,7 @@ class BatchReading:
         most = SAMPLES_AT_ONCE if self._channels is None else SAMPLES_READ_AT_ONCE
         parts = parts_of(self._count, max(1, most // samples), workers)
         measure = self._measure if self._in_tables else self._measure_by_design
-        if self._is_native and workers > 1:
-            with ThreadPoolExecutor(workers) as pool:
-                reasons_of_parts = list(pool.map(measure, parts))
-        else:
-            reasons_of_parts = [measure(part) for part in parts]
+        reasons_of_parts = in_threads(measure, parts, workers if self._is_native else 1)
         for part, reasons in zip(parts, reasons_of_parts, strict=True):
             self.reasons |= {part.start + k: reason for k, reason in reasons.items()}
 
