@@ -1,4 +1,4 @@
-"""Types of numpy arrays, and new ones."""
+"""Types of numpy arrays, new arrays, and their finite numbers."""
 
 from __future__ import annotations
 
@@ -23,3 +23,9 @@ def new_numbers(*shape: int) -> FloatArray:
     whole = np.empty(numbers.size + 2 * _PAGE)
     first = -(whole.__array_interface__["data"][0] // whole.itemsize) % _PAGE
     return whole[first : first + numbers.size].reshape(shape)
+
+
+def finite(values: FloatArray) -> FloatArray:
+    """Return the numbers of an array that are finite, (n,); they are not copied if all are."""
+    known = np.isfinite(values)
+    return values.reshape(-1) if known.all() else values[known]
