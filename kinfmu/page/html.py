@@ -14,7 +14,7 @@ from kinfmu.analysis import Report, check
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.page.describe import describe, module_data, written_file
-from kinfmu.page.module import packed, page_module, solver
+from kinfmu.page.module import packed, page_module, require_page_size, solver
 from kinfmu.page.opened import opened
 
 _WEB = Path(__file__).parent / "web"
@@ -79,10 +79,11 @@ def page(
 
     Raises:
         KinfmuError: The mechanism cannot be solved.
-        RequestError: It is too large for a page, such as one of more than 512 unknowns.
+        TooLargeError: It is too large for a page, such as one of more than 512 unknowns.
 
     """
     require_mechanism(mechanism, "page")
+    require_page_size(mechanism)
     report = report or check(mechanism)
     if report.problem is not None and report.plan is None:
         raise report.problem

@@ -13,6 +13,7 @@ import gzip
 import re
 import struct
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -24,7 +25,7 @@ from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
 from kinfmu.codegen.forces import emit_c_forces
 from kinfmu.codegen.wasm import Binary, Translator
 from kinfmu.codegen.writer import Names, Writer, identifier
-from kinfmu.errors import RequestError
+from kinfmu.errors import KinfmuError, TooLargeError
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import reaction_names_of, shaking_names
 from kinfmu.plan import SolvePlan, compile_plan
@@ -120,7 +121,7 @@ def page_module(
 
     Raises:
         KinfmuError: The mechanism cannot be solved, as `compile_plan` reports it.
-        RequestError: It is larger than `solver/page_sizes.h` and `solver/instance.h` allow.
+        TooLargeError: It is larger than `solver/page_sizes.h` and `solver/instance.h` allow.
 
     """
     labels = labels or {}
@@ -152,6 +153,30 @@ def page_module(
     )
 
 
+def require_page_size(mechanism: Mechanism) -> None:
+    """Raise a TooLargeError for a mechanism that is too large for a page, as far as its plan shows it.
+
+    What a report and a module take seconds for is not begun then. Small mechanisms are not planned.
+    """
+    sizes = {"DRIVERS": len(mechanism.drivers), "POINTS": len(mechanism.body_points)}
+    _require_sizes(mechanism.name, sizes)
+    if len(mechanism.coordinate_names) <= _layout()[0]["UNKNOWNS"]:
+        return
+    with suppress(KinfmuError):  # the report states it better
+        plan = compile_plan(replace(mechanism, coordinates="moving"))
+        moving = sum(len(block.coordinates) for block in plan.blocks)
+        sizes = {"UNKNOWNS": len(plan.unknowns), "COORDINATES": moving + len(plan.drivers)}
+    _require_sizes(mechanism.name, sizes)
+
+
+def _require_sizes(name: str, sizes: Mapping[str, int]) -> None:
+    most, _ = _layout()
+    for size, count in sizes.items():
+        if count > most[size]:
+            what = _SIZES.get(size, size.lower().replace("_", " "))
+            raise TooLargeError(f"'{name}' is too large for a page: it has {count} {what}, at most {most[size]} fit")
+
+
 def _planned(mechanism: Mechanism, report: Report | None) -> SolvePlan:
     """Return the plan of all coordinates that move."""
     known = report.plan if report else None
@@ -164,11 +189,8 @@ def _planned(mechanism: Mechanism, report: Report | None) -> SolvePlan:
 
 def _binary(name: str, sizes: Mapping[str, int], texts: Iterable[str]) -> Binary:
     """Return the compiled solver with the C texts of a model and its sizes."""
+    _require_sizes(name, sizes)
     most, structures = _layout()
-    for size, count in sizes.items():
-        if count > most[size]:
-            what = _SIZES.get(size, size.lower().replace("_", " "))
-            raise RequestError(f"'{name}' is too large for a page: it has {count} {what}, at most {most[size]} fit")
     made = Binary(_solver())
     for size, count in sizes.items():
         made.put(made.addresses[f"size_{size.lower()}"], struct.pack("<i", count))
