@@ -93,15 +93,9 @@ def find_structure(
     ]
 
     def met(index: int) -> list[str]:
-        return [symbol.name for symbol in symbols([row(index, known)]) if symbol.name in number]
+        return [symbol.name for symbol in symbols([row(index, known)])]
 
-    candidates = [redundant.index for redundant in redundancy.redundant]
-    rows = [*candidates, *(index for block in blocks for index in block.all_rows)]
-    key = tuple(blocks), tuple(tuple(met(index)) for index in rows) if candidates else ()
-    solved = redundancy.companions.get(key)
-    if solved is None:
-        solved = redundancy.companions[key] = tuple(with_companions(system, met, blocks, redundancy, pose))
-    return Structure(known, fixed_by, solved)
+    return Structure(known, fixed_by, tuple(with_companions(system, met, blocks, redundancy, pose)))
 
 
 def linear_coefficient(row: Node, symbol: Node) -> float | None:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -50,15 +49,13 @@ class Redundancy:
     """What the joint rows leave: mobility = coordinates - independent rows; rows set aside, by index into System.rows.
 
     kept: independent joint rows; dependent: those set aside, redundant or inconsistent; assembly: the start of the
-    mechanism with which the rows were judged, which the plan's anchor is taken from; companions: what plans with this
-    redundancy have found so far.
+    mechanism with which the rows were judged, which the plan's anchor is taken from.
     """
 
     mobility: int
     kept: tuple[int, ...]
     dependent: tuple[DependentRow, ...]
     assembly: AssembledStart
-    companions: dict[Hashable, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def redundant(self) -> tuple[DependentRow, ...]:
