@@ -108,7 +108,7 @@ def dyad_angle(path: DriverPath, dyad: Dyad) -> tuple[TransmissionRange, tuple[P
     None if the driver does not move the links relative to each other, or if their other pins are not on bodies that
     are solved before both links.
     """
-    places = _block_of(path.plan)
+    places = path.plan.block_of
     own = {dyad.first.name, dyad.second.name}
     axes = ("phi",) if dyad.direction is None else ("x", "y")
     blocks = [places.get(f"{dyad.first.name}.phi"), *(places.get(f"{dyad.second.name}.{axis}") for axis in axes)]
@@ -174,7 +174,7 @@ def _led_four_bar(plan: SolvePlan, loop: FourBar) -> tuple[str, str, _Cosine, bo
 
 def is_led_by_last(plan: SolvePlan, loop: FourBar) -> bool:
     """Return True if the last link of a four-bar is solved before the others."""
-    places = _block_of(plan)
+    places = plan.block_of
     first, coupler, last = (places.get(f"{name}.phi") for name in loop.links)
     return _is_before(last, coupler, first)
 
@@ -184,7 +184,7 @@ def _led_slider_crank(plan: SolvePlan, loop: SliderCrank) -> tuple[str, str, _Co
 
     cos mu = n.(S - P) / l        n: normal of the slide
     """
-    places = _block_of(plan)
+    places = plan.block_of
     crank, rod = (places.get(f"{link.name}.phi") for link in (loop.crank, loop.rod))
     slider = None
     if loop.slider != loop.rod.name:
@@ -204,11 +204,6 @@ def _drives_end(plan: SolvePlan, loop: SliderCrank) -> bool:
         driver.quantity.kind == "length" and set(driver.bodies()) <= {loop.rod.name, GROUND_NAME}
         for driver in plan.mechanism.drivers
     )
-
-
-def _block_of(plan: SolvePlan) -> dict[str, int]:
-    """Return the number of the block in which each coordinate is solved."""
-    return {name: k for k, block in enumerate(plan.blocks) for name in block.coordinates}
 
 
 def _is_before(leading: int | None, *others: int | None) -> bool:

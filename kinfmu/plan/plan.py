@@ -132,6 +132,11 @@ class SolvePlan:
         """Coordinates found by Newton, block after block."""
         return tuple(name for block in self.blocks for name in block.unknowns)
 
+    @cached_property
+    def block_of(self) -> Mapping[str, int]:
+        """The number of the block in which each coordinate is solved."""
+        return {name: k for k, block in enumerate(self.blocks) for name in block.coordinates}
+
     @property
     def watch_names(self) -> tuple[str, ...]:
         return tuple(name for name, _ in self.watches)
