@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from sys import getrefcount
 from threading import Lock
 
@@ -16,7 +15,7 @@ IntArray = NDArray[np.int64]
 _PAGE = 2**21 // 8  # numbers in a large page of the system
 _MOST_KEPT = 2**26 // 8  # numbers of large arrays that are kept
 _lock = Lock()
-_kept: deque[FloatArray] = deque()  # memory of large arrays, in use or not, the last used at the end
+_kept: list[FloatArray] = []  # memory of large arrays, in use or not, the last used at the end
 
 
 def new_numbers(*shape: int) -> FloatArray:
@@ -36,24 +35,22 @@ def new_numbers(*shape: int) -> FloatArray:
         if size <= _MOST_KEPT:
             _kept.append(whole)
         while sum(map(len, _kept)) > _MOST_KEPT + 2 * _PAGE * len(_kept):
-            _kept.popleft()
+            del _kept[0]
         first = -(whole.__array_interface__["data"][0] // whole.itemsize) % _PAGE
         return whole[first : first + size].reshape(shape)
 
 
 def _idle(size: int) -> FloatArray | None:
     """Take memory for so many numbers, and not for many more, that no array refers to; None if there is none."""
-    for _ in range(len(_kept)):
-        whole = _kept.popleft()
-        if getrefcount(whole) == _UNUSED and size <= len(whole) - 2 * _PAGE <= 2 * size:
-            return whole
-        _kept.append(whole)
+    for k in range(len(_kept)):
+        if getrefcount(_kept[k]) == _UNUSED and size <= len(_kept[k]) - 2 * _PAGE <= 2 * size:
+            return _kept.pop(k)
     return None
 
 
 def _references_of_unused() -> int:
-    whole = np.empty(1)
-    return getrefcount(whole)
+    kept = [np.empty(1)]
+    return getrefcount(kept[0])
 
 
 _UNUSED = _references_of_unused()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
-
 import numpy as np
 import pytest
 
@@ -23,7 +21,7 @@ def test_new_arrays_are_whole_and_large_ones_begin_at_a_large_page(shape: tuple[
 
 
 def test_memory_of_a_large_array_is_used_again_when_no_array_refers_to_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(arrays, "_kept", deque())
+    monkeypatch.setattr(arrays, "_kept", [])
     first = new_numbers(3, 400_000)
     place, part = first.ctypes.data, first.T[5:, 1]
     part[:] = 7.0
@@ -37,7 +35,7 @@ def test_memory_of_a_large_array_is_used_again_when_no_array_refers_to_it(monkey
 
 
 def test_no_more_than_some_memory_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(arrays, "_kept", deque())
+    monkeypatch.setattr(arrays, "_kept", [])
     monkeypatch.setattr(arrays, "_MOST_KEPT", 1_000_000)
     used = [new_numbers(300_000) for _ in range(5)]
     assert len(arrays._kept) == 3
