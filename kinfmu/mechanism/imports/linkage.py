@@ -84,8 +84,11 @@ class _LinkageReader:
         unit, factor = _UNITS.get(program.attributes.get("units", "").upper(), _UNITS["MILLIMETERS"])
         self.factor = factor * (_number(program, "scalefactor", 1.0) or 1.0)
         self.sketch = Sketch("a file of Linkage", name or "linkage", unit)
+        self.left = 0  # elements without influence on the mechanism
         self.connectors = self._by_id(root.all("connector"))
         links = self._by_id(root.all("Link", "element"))
+        if self.left:
+            self.sketch.notes.append(f"{self.left} elements of drawing layers and dimensions are left out")
         self.actuators = {key: link for key, link in links.items() if link.is_true("actuator")}
         geared = {one.attributes.get("id", "") for ratio in _ratios(root) for one in ratio.all("link")}
         self.links = {
@@ -113,18 +116,15 @@ class _LinkageReader:
     def _by_id(self, elements: Iterable[XmlElement]) -> dict[str, XmlElement]:
         """Return the elements of the mechanism, without drawings and dimensions, by their ids."""
         found: dict[str, XmlElement] = {}
-        left = 0
         for element in elements:
             identity = element.attributes.get("id", "")
             if not identity or identity in found:
                 raise MechanismError(f"<{element.tag}> has {f'the id {identity} of another' if identity else 'no id'}")
             layers = int(_number(element, "layer", 0.0))
             if element.is_true("measurementelement") or (layers and not layers & ~_DRAWING_LAYERS):
-                left += 1
+                self.left += 1
             else:
                 found[identity] = element
-        if left:
-            self.sketch.notes.append(f"{left} elements of drawing layers and dimensions are left out")
         return found
 
     def _held(self, link: XmlElement) -> list[str]:
@@ -132,10 +132,14 @@ class _LinkageReader:
         ids = (child.attributes.get("id", "") for child in link.all("connector"))
         return [identity for identity in ids if identity in self.connectors]
 
+    def _length(self, element: XmlElement, name: str, default: float | None = None) -> float:
+        """Return the length of an attribute in the unit of the drawing; default: in that of the file."""
+        return round(_number(element, name, default) * self.factor, _DECIMALS)
+
     def _add_pins_and_links(self) -> None:
         for key, connector in self.connectors.items():
-            place = (round(_number(connector, axis) * self.factor, _DECIMALS) for axis in ("x", "y"))
-            self.sketch.pin(_pin(key), connector.attributes.get("name") or f"P{key}", *place)
+            name = connector.attributes.get("name") or f"P{key}"
+            self.sketch.pin(_pin(key), name, self._length(connector, "x"), self._length(connector, "y"))
             if connector.is_true("anchor"):
                 self.sketch.hold(GROUND_NAME, _pin(key))
         for key, link in self.links.items():
@@ -203,7 +207,7 @@ class _LinkageReader:
         if not length:
             raise MechanismError(f"{where} slides between two connectors in the same place")
         along_x, along_y = (b_x - a_x) / length, (b_y - a_y) / length
-        radius = abs(_number(connector, "slideradius", 0.0)) * self.factor
+        radius = abs(self._length(connector, "slideradius", 0.0))
         rider = self.sketch.at(riders[0], pin)
         if radius:
             height = math.sqrt(max(radius * radius - length * length / 4.0, 0.0))
@@ -261,7 +265,7 @@ class _LinkageReader:
             )
         length = math.hypot(b.x - a.x, b.y - a.y)
         cycles = _number(link, "cpm", _DEFAULT_CPM)
-        half = math.copysign(_number(link, "throw", length / self.factor / 2.0) * self.factor / 2.0, cycles)
+        half = math.copysign(self._length(link, "throw", length / self.factor / 2.0) / 2.0, cycles)
         between = [self.sketch.at(body, _pin(end)) for body, end in zip((at_a[0], at_b[0]), held, strict=True)]
         law: dict[str, Any] = {"law": "constant", "level": length}
         if half and cycles:
