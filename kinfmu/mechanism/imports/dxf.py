@@ -8,6 +8,7 @@ with a name such as `crank`, gets one.
 from __future__ import annotations
 
 import io
+import logging
 import math
 import re
 from collections.abc import Iterator
@@ -54,6 +55,7 @@ def is_dxf(content: str) -> bool:
 def sketch_of_dxf(content: str, name: str) -> Sketch:
     """Return a drawing; name: of the mechanism."""
     ezdxf = imported_ezdxf(name or "imported data")
+    logging.getLogger("ezdxf").addHandler(logging.NullHandler())  # else warnings with texts of the file go to stderr
     try:
         drawing = ezdxf.read(io.StringIO(content.replace("\r\n", "\n") + "\n"))
         code = drawing.header.get("$INSUNITS", 0)

@@ -84,9 +84,12 @@ def is_pmks_link(content: str) -> bool:
 
 def sketch_of_pmks(content: str, name: str) -> Sketch:
     """Return the drawing of a link; name: of the mechanism."""
-    settings, joints, links, forces = _records(_payload(content))
+    payload = _payload(content)
+    settings, joints, links, forces = _records(payload)
     units = _UNITS[_units_of(settings[3])]
     sketch = Sketch("a link of PMKS+", name or "pmks", units.length)
+    if not _is_whole(payload):
+        sketch.notes.append("the last character of the link does not fit its length: it may be damaged")
     for joint in joints.values():
         sketch.pin(joint.id, joint.name or joint.id, joint.x, joint.y)
     bodies = {link.id: link for link in links.values() if link.is_body}
@@ -133,9 +136,13 @@ def _payload(content: str) -> str:
     return payload
 
 
+def _is_whole(payload: str) -> bool:
+    return payload[-1] == _CHECKS[(len(payload) - 1) % len(_CHECKS)]
+
+
 def _records(payload: str) -> tuple[list[str], dict[str, PmksJoint], dict[str, PmksLink], list[list[str]]]:
     """Return the settings, joints and links by id, and the fields of the forces."""
-    is_whole = payload[-1] == _CHECKS[(len(payload) - 1) % len(_CHECKS)]
+    is_whole = _is_whole(payload)
     body = payload if payload.endswith(".") and not is_whole else payload[:-1]
     records = body.split(".")
     sections: list[list[str]] = [[]]

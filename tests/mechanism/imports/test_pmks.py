@@ -65,6 +65,13 @@ def test_what_is_left_out_or_chosen_is_noted() -> None:
     assert imported(still).notes[-1] == "nothing drives it: add a table [drivers.NAME]"
 
 
+def test_a_check_character_that_does_not_fit_is_noted() -> None:
+    link = CASES["a crank-rocker"].link
+    damaged = imported(link[:-1] + ("0" if link[-1] != "0" else "1"))
+    assert damaged.notes == ("the last character of the link does not fit its length: it may be damaged",)
+    assert parse(damaged.text) == parse(imported(link).text)
+
+
 def test_names_become_valid_and_unique() -> None:
     drawing = imported(
         payload("O 0 0 ground input, 2nd 1 0, B~1 3 2, B-1 4 1, C 4 0 ground", "crank~arm O 2nd, l 2nd B~1")
