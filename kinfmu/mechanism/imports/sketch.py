@@ -122,7 +122,7 @@ class Sketch:
             for pin in held:
                 bodies = self._at.setdefault(pin, [])
                 if self.body(key) not in bodies:
-                    bodies.append(self.body(key))
+                    bodies.insert(0 if self.body(key) == GROUND_NAME else len(bodies), self.body(key))
         joined = set()
         for key, (first, *others) in self._at.items():
             name, x, y = self.pins[key]
@@ -270,14 +270,14 @@ class Sketch:
     def _weld_held_twice(self) -> bool:
         """Weld links that share two pins in different places, and return whether there were any."""
         first_places: dict[tuple[str, str], tuple[float, float]] = {}
-        holders: dict[str, dict[str, str]] = {}
+        holders: dict[str, set[str]] = {}
         for key, held in self._links.items():
             for pin in held:
-                holders.setdefault(pin, {}).setdefault(self._root(key), key)
+                holders.setdefault(pin, set()).add(self._root(key))
         welded = False
         for key, roots in holders.items():
             place = self.pins[key][1:]
-            for pair in combinations(roots, 2):
+            for pair in combinations(sorted(roots), 2):
                 if first_places.setdefault(pair, place) != place and self.weld(*pair):
                     welded = True
                     if GROUND_NAME not in pair:

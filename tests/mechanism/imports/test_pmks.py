@@ -72,6 +72,15 @@ def test_a_check_character_that_does_not_fit_is_noted() -> None:
     assert parse(damaged.text) == parse(imported(link).text)
 
 
+def test_a_link_that_the_ground_holds_is_ground_whatever_the_order_of_links_is() -> None:
+    drawing = imported(payload("O 0 0 ground, X 1 0 ground, A 2 1 input, B 4 1", "arm A B, frame O X A"))
+    mechanism = parse(drawing.text)
+    assert [body.name for body in mechanism.moving_bodies] == ["arm"]
+    assert (mechanism.joints[0].between, mechanism.drivers[0].type) == (("ground.A", "arm.A"), "angle")
+    welded = payload("O 0 0 ground input, A 1 0, D 2 1, W 0 1 weld", "a O A W, c A D, e W D")
+    assert [body.name for body in parse(imported(welded).text).moving_bodies] == ["a"]
+
+
 def test_names_become_valid_and_unique() -> None:
     drawing = imported(
         payload("O 0 0 ground input, 2nd 1 0, B~1 3 2, B-1 4 1, C 4 0 ground", "crank~arm O 2nd, l 2nd B~1")
