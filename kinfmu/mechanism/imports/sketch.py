@@ -206,11 +206,16 @@ class Sketch:
             MechanismError: The drawing is no mechanism.
 
         """
-        self._leave_out_loose()
+        mobility, drivers = self.mobility(), len(self._tables["drivers"])
         if self._renamed:
             self.notes.append(f"names made valid: {some(self._renamed)}")
-        if not self._tables["drivers"]:
+        if not drivers:
             self.notes.append("nothing drives it: add a table [drivers.NAME]")
+        elif mobility < drivers:
+            self.notes.append(
+                f"by count the joints leave {mobility} degrees of freedom for {drivers} drivers: it moves only if links "
+                f"are redundant, which needs exact lengths; those of rounded places differ"
+            )
         mechanism = mechanism_of(self._document(), None)
         head = [f"# Imported from {self._source}.", *_HEAD]
         if self.notes:
