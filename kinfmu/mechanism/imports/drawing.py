@@ -49,7 +49,7 @@ def imported(data: bytes | str, name: str = "") -> Imported:
         MissingPackageError: A DXF drawing, and ezdxf is not installed.
 
     """
-    where = name or "imported data"
+    where = name or "the drawing"
     try:
         content = _text_of(data)
         for is_format, sketch_of in _READERS:

@@ -54,7 +54,7 @@ def is_dxf(content: str) -> bool:
 
 def sketch_of_dxf(content: str, name: str) -> Sketch:
     """Return a drawing; name: of the mechanism."""
-    ezdxf = imported_ezdxf(name or "imported data")
+    ezdxf = imported_ezdxf(name or "the drawing")
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())  # else warnings with texts of the file go to stderr
     try:
         drawing = ezdxf.read(io.StringIO(content.replace("\r\n", "\n") + "\n"))

@@ -213,8 +213,8 @@ class Sketch:
             self.notes.append("nothing drives it: add a table [drivers.NAME]")
         elif mobility < drivers:
             self.notes.append(
-                f"by count the joints leave {mobility} degrees of freedom for {drivers} drivers: it moves only if links "
-                f"are redundant, which needs exact lengths; those of rounded places differ"
+                f"degrees of freedom by count: {mobility}, drivers: {drivers}; it moves only if links are redundant, "
+                "which needs exact lengths, and those of rounded places differ"
             )
         mechanism = mechanism_of(self._document(), None)
         head = [f"# Imported from {self._source}.", *_HEAD]

@@ -62,9 +62,7 @@ def test_what_is_left_out_or_chosen_is_noted() -> None:
     star = payload("O 0 0 ground input, A 1 0, B 3 2, C 4 0 ground, D 0 2", "a O A, b A B, c B C, d O D")
     assert "joint 'O' drives a, the first of a, d" in imported(star).notes
     (note,) = imported(CASES["a parallelogram with three cranks"].link).notes
-    assert note.startswith(
-        "by count the joints leave 0 degrees of freedom for 1 drivers: it moves only if links are redundant"
-    )
+    assert note.startswith("degrees of freedom by count: 0, drivers: 1; it moves only if links are redundant")
     still = payload("O 0 0 ground, A 1 0", "a O A")
     assert imported(still).notes[-1] == "nothing drives it: add a table [drivers.NAME]"
 
