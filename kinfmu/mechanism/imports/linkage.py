@@ -82,8 +82,11 @@ class _LinkageReader:
     def __init__(self, root: XmlElement, name: str) -> None:
         program = next(root.all("program"), XmlElement("program", {}, []))
         unit, factor = _UNITS.get(program.attributes.get("units", "").upper(), _UNITS["MILLIMETERS"])
-        self.factor = factor * (_number(program, "scalefactor", 1.0) or 1.0)
+        scale = _number(program, "scalefactor", 1.0) or 1.0
+        self.factor = factor * scale
         self.sketch = Sketch("a file of Linkage", name or "linkage", unit)
+        if scale != 1.0:
+            self.sketch.notes.append(f"scalefactor = {scale:g}: all lengths are multiplied by it")
         self.left = 0  # elements without influence on the mechanism
         self.connectors = self._by_id(root.all("connector"))
         links = self._by_id(root.all("Link", "element"))

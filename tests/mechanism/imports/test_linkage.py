@@ -143,6 +143,18 @@ def test_connectors_are_in_parts_of_an_inch() -> None:
     assert parse(read("two_inputs").text).body_points["long.B"] == (1.5, 4.0)
 
 
+def test_a_scale_factor_and_unknown_attributes_are_noted() -> None:
+    text = (FOLDER / "four_bar.linkage2").read_text(encoding="utf-8")
+    drawing = imported(
+        text.replace('scalefactor="1.000000"', 'scalefactor="2"').replace('rpm="', 'limitangle="90" rpm="')
+    )
+    assert parse(drawing.text).body_points["coupler.T"] == (120.0, 160.0)
+    assert drawing.notes == (
+        "scalefactor = 2: all lengths are multiplied by it",
+        "limitangle of connector 0 is not read",
+    )
+
+
 def test_what_is_left_out_or_chosen_is_noted() -> None:
     assert read("fastened").notes == ("3 elements of drawing layers and dimensions are left out",)
     assert read("boom").notes == (
