@@ -1,0 +1,177 @@
+"""What a certificate evaluates of a plan: rows along a predicted path, with their derivatives, on one graph."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+from kinfmu.plan import Block, SolvePlan
+from kinfmu.plan.equations.graph import Graph, Node, reachable
+
+TIME = "time"
+WAY = "way along a direction"
+Key = TypeVar("Key")
+ORDERS = 3  # derivatives along the predicted path, the last one for what the path leaves out
+
+
+@dataclass(frozen=True)
+class BlockFormulas:
+    """Formulas of a solved block, over the driver, the unknowns of this and of earlier blocks, and the parameters.
+
+    Attributes:
+        names: The unknowns z.
+        place: Of the first of them among all unknowns.
+        rows: The residuals r and their first, second and third derivative along the predicted path.
+        jacobian: dr/dz, row after row.
+        earlier: dr/dz for the unknowns of earlier blocks on which it depends, by their places.
+        parameters: dr/dp by the names of the parameters.
+        rates: The same for the first derivative of r along the predicted path: by places, then by names.
+
+    """
+
+    names: tuple[str, ...]
+    place: int
+    rows: tuple[tuple[Node, ...], ...]
+    jacobian: tuple[Node, ...]
+    earlier: Mapping[int, tuple[Node, ...]]
+    parameters: Mapping[str, tuple[Node, ...]]
+    rates: Mapping[int | str, tuple[Node, ...]]
+
+    @property
+    def size(self) -> int:
+        """How many unknowns it has."""
+        return len(self.names)
+
+
+class Formulas:
+    """The formulas of a plan as functions of one number x: the value of its only driver, or the time of its run.
+
+    Symbols are x and the unknowns by their contract names, the rates and accelerations of the predicted path by those of
+    derivatives, and constants: the parameters, over time also the constants of laws. Coordinates that rows give outright
+    are replaced by their formulas.
+
+    Args:
+        plan: The plan.
+        over_time: True for the time of the run.
+
+    Attributes:
+        x: Name of x.
+        unknowns: Names of all unknowns, block after block.
+        units: 1 rad or the mechanism's size for each of them.
+        constants: Values of the constants.
+        blocks: Blocks with unknowns.
+        outputs: Each output with its first two derivatives.
+
+    """
+
+    def __init__(self, plan: SolvePlan, *, over_time: bool = False) -> None:
+        self.plan = plan
+        self.graph = Graph()
+        self.constants = dict(plan.parameter_values)
+        self._given: dict[str, Node] = {}
+        self._copies: dict[Node, Node] = {}
+        self._rates: dict[Node, Node] = {}
+        if over_time:
+            self.x = TIME
+            self.constants |= {constant.name: constant.value for constant in plan.law_constants}
+            for driver, law in zip(plan.drivers, plan.laws, strict=True):
+                (self._given[driver.inputs[0]],) = self.inlined([law.position])
+        else:
+            self.x = plan.drivers[0].inputs[0]
+        self._rates[self.graph.symbol(self.x)] = self.graph.constant(1.0)
+        self.names: dict[str, tuple[str, str]] = {}
+        for name in plan.unknowns:
+            self._move(name, name.derivative(1), name.derivative(2))
+        self.unknowns: tuple[str, ...] = plan.unknowns
+        self.units = tuple(1.0 if name.is_angle else plan.size for name in plan.unknowns)
+        self.blocks = tuple(self._blocks(plan.blocks))
+        self.outputs = tuple(self.along(self.inlined([motion.position for motion in plan.outputs_motion]), 2))
+
+    def turned(self, number: int, direction: Sequence[float], at: Sequence[float]) -> Formulas:
+        """Return the formulas near a pose as functions of the way along a direction, with the driver as an unknown.
+
+            c . (z - z0) = x     in place of a given driver
+
+        number: of the last block, from 0, that is solved; the earlier ones are solved with it. direction: c for the unknowns
+        of that block. at: z0 of these.
+        """
+        found = copy.copy(self)
+        found.graph, driver = self.graph, self.plan.drivers[0].inputs
+        found.x = WAY
+        symbol = self.graph.symbol
+        blocks = self.blocks[: number + 1]
+        last = blocks[-1]
+        row = -symbol(WAY)
+        for name, c, z in zip(last.names, direction, at, strict=True):
+            row = row + self.graph.constant(c) * (symbol(name) - self.graph.constant(z))
+        found._rates = {**self._rates, symbol(WAY): self.graph.constant(1.0)}
+        found.names = dict(self.names)
+        found._move(*driver)
+        found.unknowns = (driver[0], *self.unknowns[: last.place + last.size])
+        angle = self.plan.drivers[0].quantity.kind == "angle"
+        found.units = (1.0 if angle else self.plan.size, *self.units[: last.place + last.size])
+        rows = [*(node for block in blocks for node in block.rows[0]), row]
+        found.blocks = (found._block(found.unknowns, 0, rows),)
+        found.outputs = ()
+        return found
+
+    def _move(self, name: str, rate: str, acceleration: str) -> None:
+        symbol = self.graph.symbol
+        self.names[name] = (rate, acceleration)
+        self._rates |= {symbol(name): symbol(rate), symbol(rate): symbol(acceleration)}
+
+    def inlined(self, nodes: Sequence[Node]) -> list[Node]:
+        """Return nodes of the plan as nodes of this graph."""
+        for node in reachable(nodes):
+            if node in self._copies:
+                continue
+            if node.op == "symbol":
+                self._copies[node] = self._given.get(node.name) or self.graph.symbol(node.name)
+            else:
+                self._copies[node] = self.graph.copy(node, *(self._copies[arg] for arg in node.args))
+        return [self._copies[node] for node in nodes]
+
+    def along(self, nodes: Sequence[Node], orders: int = ORDERS) -> list[tuple[Node, ...]]:
+        """Return each node with its derivatives along the predicted path."""
+        rows = [tuple(nodes)]
+        for _ in range(orders):
+            rows.append(tuple(self.graph.derivative(rows[-1], self._rates)))
+        return list(zip(*rows, strict=True))
+
+    def gradient(self, nodes: Sequence[Node], name: str) -> tuple[Node, ...]:
+        """Return the derivatives of nodes with respect to a symbol."""
+        return tuple(self.graph.derivative(nodes, {self.graph.symbol(name): self.graph.constant(1.0)}))
+
+    def _blocks(self, blocks: Sequence[Block]) -> Iterator[BlockFormulas]:
+        place = 0
+        for block in blocks:
+            for name, motion in block.assigned:
+                (self._given[name],) = self.inlined([motion[0]])
+            if block.unknowns:
+                yield self._block(block.unknowns, place, self.inlined(block.residuals))
+                place += len(block.unknowns)
+
+    def _block(self, names: tuple[str, ...], place: int, residuals: Sequence[Node]) -> BlockFormulas:
+        rows = tuple(zip(*self.along(residuals), strict=True))
+        columns = [self.gradient(residuals, name) for name in names]
+        earlier = enumerate(self.unknowns[:place])
+        until = enumerate(self.unknowns[: place + len(names)])
+        return BlockFormulas(
+            names=names,
+            place=place,
+            rows=rows,
+            jacobian=tuple(entry for row in zip(*columns, strict=True) for entry in row),
+            earlier=_moving({k: self.gradient(residuals, name) for k, name in earlier}),
+            parameters=_moving({name: self.gradient(residuals, name) for name in self.constants}),
+            rates=_moving(
+                {k: self.gradient(rows[1], name) for k, name in until}
+                | {name: self.gradient(rows[1], name) for name in self.constants}
+            ),
+        )
+
+
+def _moving(gradients: Mapping[Key, tuple[Node, ...]]) -> dict[Key, tuple[Node, ...]]:
+    """Return the gradients that are not zero everywhere."""
+    return {key: nodes for key, nodes in gradients.items() if any(node.constant != 0.0 for node in nodes)}
