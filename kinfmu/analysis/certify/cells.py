@@ -170,7 +170,7 @@ class Prover:
         proved = np.ones(count, dtype=bool)
         contractions = []
         with np.errstate(all="ignore"):
-            thin, broad, plain = self._enclosures(cells)
+            thin, broad, plain = self.enclosures(cells)
             for block in self.formulas.blocks:
                 own = slice(block.place, block.place + block.size)
                 y = _inverse(np.array(approximate(block.jacobian, plain, (count,))), block.size)
@@ -184,7 +184,7 @@ class Prover:
                     rest = self._rest_of_rates(cells, block, thin, broad, motion, order)
                     part = _within(_times(y, rest), found[3], self.unit[own, None])
                     motion[order].low[own], motion[order].high[own] = part.low, part.high
-        return Tubes(proved, wide, *motion, np.array(contractions))
+        return Tubes(proved, wide, *motion, np.reshape(contractions, (-1, count)))
 
     def _rest_of_rates(
         self,
@@ -225,21 +225,35 @@ class Prover:
                         rest[i] = rest[i] + slope * off
         return rest
 
-    def _enclosures(self, cells: Cells) -> tuple[dict[str, Interval], dict[str, Interval], dict[str, FloatArray]]:
-        """Return the symbols at the centres, over the whole cells, and at the centres as numbers."""
-        count, s = len(cells), cells.s
+    def enclosures(self, cells: Cells) -> tuple[dict[str, Interval], dict[str, Interval], dict[str, FloatArray]]:
+        """Return the symbols on the predicted path: at the centres, over the cells, and at the centres as numbers."""
         plain = self._values(cells.u, *cells.path)
-        thin = {name: Interval(value) for name, value in plain.items()}
-        broad = dict(thin)
-        broad[self.formulas.x] = Interval(cells.u) + s
+        return {name: Interval(value) for name, value in plain.items()}, self.over(cells, cells.s), plain
+
+    def over(self, cells: Cells, s: Interval) -> dict[str, Interval]:
+        """Return the symbols on the predicted path at driver values s from the centres, and the box of constants."""
+        symbols = {self.formulas.x: Interval(cells.u) + s}
         predicted = cells.at(s)
         for k, name in enumerate(self.formulas.unknowns):
             rate, acceleration = cells.path[1:, k]
-            broad[name] = predicted[k]
-            broad[self.formulas.names[name][0]] = Interval(rate) + Interval(acceleration) * s
-        for name, value in self.box.items():
-            broad[name] = Interval(np.full(count, value.low), np.full(count, value.high))
-        return thin, broad, plain
+            symbols[name] = predicted[k]
+            names = self.formulas.names[name]
+            symbols[names[0]] = Interval(rate) + Interval(acceleration) * s
+            symbols[names[1]] = Interval(acceleration)
+        count = len(cells)
+        return symbols | {
+            name: Interval(np.full(count, value.low), np.full(count, value.high)) for name, value in self.box.items()
+        }
+
+    def deviated(self, symbols: Mapping[str, Interval], tubes: Tubes) -> dict[str, Interval]:
+        """Return symbols on the predicted path moved by all deviations: those of the poses."""
+        found = dict(symbols)
+        for k, name in enumerate(self.formulas.unknowns):
+            for symbol, deviations in zip(
+                (name, *self.formulas.names[name]), (tubes.narrow, tubes.rates, tubes.accelerations), strict=True
+            ):
+                found[symbol] = symbols[symbol] + deviations[k]
+        return found
 
     def _rest(
         self, cells: Cells, block: BlockFormulas, thin: Mapping[str, Interval], broad: Mapping[str, Interval], narrow: Interval

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
 from kinfmu.plan import Block, SolvePlan
-from kinfmu.plan.equations.graph import Graph, Node, reachable
+from kinfmu.plan.equations.graph import Graph, Node, reachable, symbols
 
 TIME = "time"
 WAY = "way along a direction"
@@ -55,6 +55,7 @@ class Formulas:
     Args:
         plan: The plan.
         over_time: True for the time of the run.
+        varied: Names of the symbols of constants that are not numbers but intervals.
 
     Attributes:
         x: Name of x.
@@ -66,8 +67,9 @@ class Formulas:
 
     """
 
-    def __init__(self, plan: SolvePlan, *, over_time: bool = False) -> None:
+    def __init__(self, plan: SolvePlan, *, over_time: bool = False, varied: Collection[str] = ()) -> None:
         self.plan = plan
+        self.varied = varied
         self.graph = Graph()
         self.constants = dict(plan.parameter_values)
         self._given: dict[str, Node] = {}
@@ -156,18 +158,19 @@ class Formulas:
     def _block(self, names: tuple[str, ...], place: int, residuals: Sequence[Node]) -> BlockFormulas:
         rows = tuple(zip(*self.along(residuals), strict=True))
         columns = [self.gradient(residuals, name) for name in names]
-        earlier = enumerate(self.unknowns[:place])
-        until = enumerate(self.unknowns[: place + len(names)])
+        met = {symbol.name for symbol in symbols(residuals)}
+        until = [(k, name) for k, name in enumerate(self.unknowns[: place + len(names)]) if name in met]
+        varied = [name for name in self.varied if name in met]
         return BlockFormulas(
             names=names,
             place=place,
             rows=rows,
             jacobian=tuple(entry for row in zip(*columns, strict=True) for entry in row),
-            earlier=_moving({k: self.gradient(residuals, name) for k, name in earlier}),
-            parameters=_moving({name: self.gradient(residuals, name) for name in self.constants}),
+            earlier=_moving({k: self.gradient(residuals, name) for k, name in until if k < place}),
+            parameters=_moving({name: self.gradient(residuals, name) for name in varied}),
             rates=_moving(
                 {k: self.gradient(rows[1], name) for k, name in until}
-                | {name: self.gradient(rows[1], name) for name in self.constants}
+                | {name: self.gradient(rows[1], name) for name in varied}
             ),
         )
 

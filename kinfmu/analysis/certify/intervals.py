@@ -261,7 +261,7 @@ def curve(x: Interval, data: CurveData, order: int = 0) -> Interval:
     breaks, pieces = data
     ends = (-np.inf, *breaks, np.inf)
     found = Interval(np.full_like(x.low, np.inf), np.full_like(x.low, -np.inf))
-    for piece, begin, end in zip(pieces, ends, ends[1:], strict=True):
+    for piece, begin, end in zip(pieces, ends[:-1], ends[1:], strict=True):
         meets = (x.low <= end) & (x.high >= begin)
         if not meets.any():
             continue
