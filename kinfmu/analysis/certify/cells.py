@@ -86,6 +86,7 @@ class Tubes:
         rates: Deviations of z' of the poses from that of the predicted path.
         accelerations: The same of z''.
         contraction: The largest row sum of |1 - Y J| on the wide tube, for each block and cell.
+        sign: Of the determinant of J, for each block and cell.
 
     """
 
@@ -95,6 +96,7 @@ class Tubes:
     rates: Interval
     accelerations: Interval
     contraction: FloatArray
+    sign: FloatArray
 
     def __getitem__(self, which: Any) -> Tubes:
         return Tubes(*(getattr(self, field.name)[..., which] for field in fields(self)))
@@ -168,7 +170,7 @@ class Prover:
         wide, *motion = (Interval(np.zeros((n, count)), np.zeros((n, count))) for _ in range(4))
         narrow = motion[0]
         proved = np.ones(count, dtype=bool)
-        contractions = []
+        contractions, signs = [], []
         with np.errstate(all="ignore"):
             thin, broad, plain = self.enclosures(cells)
             for block in self.formulas.blocks:
@@ -180,11 +182,12 @@ class Prover:
                 for tube, part in ((wide, found[1]), (narrow, found[2])):
                     tube.low[own], tube.high[own] = part.low, part.high
                 contractions.append(found[3])
+                signs.append(np.sign(np.linalg.det(y)))
                 for order in (1, 2):
                     rest = self._rest_of_rates(cells, block, thin, broad, motion, order)
                     part = _within(_times(y, rest), found[3], self.unit[own, None])
                     motion[order].low[own], motion[order].high[own] = part.low, part.high
-        return Tubes(proved, wide, *motion, np.reshape(contractions, (-1, count)))
+        return Tubes(proved, wide, *motion, np.reshape(contractions, (-1, count)), np.reshape(signs, (-1, count)))
 
     def _rest_of_rates(
         self,
@@ -316,6 +319,10 @@ class Prover:
             contraction[done] = off[inside]
             wide.low[:, done], wide.high[:, done] = w.low[:, inside], w.high[:, inside]
             least = image[:, inside]
+            short = around(np.zeros_like(least.low), 2.0 * np.array([part.magnitude[done] for part in moved]) + 1e-300)
+            again, _ = self._image(block, broad, narrow, y, moved, short, done)
+            holds = again.is_inside(short).all(axis=0)  # the only pose lies in it, too
+            least = Interval(np.where(holds, again.low, least.low), np.where(holds, again.high, least.high))
             for _ in range(_CONTRACTIONS):
                 least = least.intersection(self._image(block, broad, narrow, y, moved, least, done)[0])
             narrow_own.low[:, done], narrow_own.high[:, done] = least.low, least.high

@@ -26,7 +26,7 @@ from kinfmu.solver.python.limit import Limit
 
 WIDTH = 0.1  # [rad, sizes] of the driver; of the first cells
 LEAST = 1e-9  # [rad, sizes]; narrower cells are given up
-_TURNING = 1e-5  # [rad, sizes] along the path; half width of the cell in which it turns back
+_ENCLOSED = 2e-10  # [rad, sizes] of the driver, about; how closely a dead centre is enclosed
 _WINDOW = 0.03  # [rad, sizes] from a dead centre along the path, where cells over that way begin
 _PARTS = 6  # of the way to a dead centre
 _MEET = 1e-9  # of the driver; what is covered up to this distance from the end of the range counts as covered
@@ -158,7 +158,6 @@ def _over_range(path: DriverPath, width: float) -> Certificate:
             centres.append(centre)
         else:
             reasons.append((limit.u[0], centre))
-    reasons += [(bridge.centre, "branches cross: a change point") for bridge in path.bridges]
     for centre in centres:
         low, high = (low, centre.high) if centre.is_high else (centre.low, high)
     gaps = _gaps(found, low, high, centres, reasons, _MEET * unit)
@@ -251,10 +250,22 @@ def _gaps(
         is_end = [centre for centre in centres if (centre.is_high if k == len(pieces) else not centre.is_high)]
         if k in (0, len(pieces)) and (is_end or end - begin <= near):
             continue
+        if 0 < k < len(pieces) and begin < end and _changes_sign(found, k):
+            gaps.append(Gap(begin, end, "branches cross: a change point"))
+            continue
+        if begin == end:
+            gaps.append(Gap(begin, end, "the cells on both sides are not joined"))
+            continue
         at = min(reasons, key=lambda reason: abs(reason[0] - 0.5 * (begin + end)), default=None)
         is_near = at is not None and begin - near <= at[0] <= end + near
         gaps.append(Gap(begin, end, at[1] if at is not None and is_near else "not proved"))
     return gaps
+
+
+def _changes_sign(found: Cover, piece: int) -> bool:
+    """Return whether the determinant of a block has other signs before and after a gap, the one before a piece."""
+    before, after = found.pieces[piece - 1][1], found.pieces[piece][0]
+    return bool((found.tubes.sign[:, before] != found.tubes.sign[:, after]).any())
 
 
 def dead_centre(prover: Prover, found: Cover, limit: Limit, *, is_high: bool) -> DeadCentre | str:
@@ -281,11 +292,13 @@ def dead_centre(prover: Prover, found: Cover, limit: Limit, *, is_high: bool) ->
     direction = unscaled / np.linalg.norm(unscaled) / prover.unit[own]
     way = float(ways[k])
     turned = Prover(formulas.turned(limit.block, direction.tolist(), cell.path[0, own, 0].tolist()))
-    z, u0, apart = cell.path[0, : own.stop, 0], float(cell.u[0]), limit.u[0] - float(cell.u[0])
+    solved = [formulas.blocks[number] for number in formulas.behind(limit.block)]
+    places = [place for one in solved for place in range(one.place, one.place + one.size)]
+    u0, apart = float(cell.u[0]), limit.u[0] - float(cell.u[0])
 
     def guess(x: FloatArray) -> FloatArray:
-        rows = np.repeat(z[:, None], len(x), 1)
-        rows[own] += direction[:, None] * prover.unit[own, None] ** 2 * x
+        rows = np.repeat(cell.path[0, places], len(x), 1)
+        rows[-block.size :] += direction[:, None] * prover.unit[own, None] ** 2 * x
         return np.vstack((u0 + apart * (1.0 - (1.0 - x / way) ** 2), rows))
 
     top = way
@@ -296,7 +309,8 @@ def dead_centre(prover: Prover, found: Cover, limit: Limit, *, is_high: bool) ->
         top -= float(at.path[1, 0, 0] / at.path[2, 0, 0])
     if not 0.2 * way < top < 5.0 * way:
         return "a dead centre: the path does not turn back where it was expected"
-    small = min(_TURNING, 0.1 * top)
+    bend_there = abs(float(at.path[2, 0, 0])) / turned.unit[0]
+    small = min(math.sqrt(_ENCLOSED / bend_there), 0.1 * top)
     edges = np.array([*np.linspace(0.0, top - small, _PARTS), *np.linspace(top + small, 2.0 * top, _PARTS)])
     window = cover(turned, edges, guess, 0.01 * small)
     if window.pieces != [(0, len(window.cells) - 1)] or window.cells.low[0] != 0.0:
@@ -308,7 +322,7 @@ def dead_centre(prover: Prover, found: Cover, limit: Limit, *, is_high: bool) ->
     if not ((bend.low > 0.0).all() and begins.low[inner] > 0.0 and ends.high[inner] < 0.0):
         return "a dead centre: its curvature is not proved"
     pose = window.cells.at(Interval(window.cells.low) - window.cells.u) + window.tubes.narrow
-    if not _lies_in(pose[:, :1], found, k, own.stop):
+    if not _lies_in(pose[:, :1], found, k, places):
         return "a dead centre: the path to it is not joined to the cells"
     value = window.cells.at(window.cells.s) + window.tubes.narrow
     return DeadCentre(float(value.low[0, inner]), float(value.high[0, inner]), is_high)
@@ -320,11 +334,11 @@ def turned_rate(window: Cover, x: FloatArray) -> Interval:
     return Interval(cells.path[1, 0]) + Interval(cells.path[2, 0]) * (Interval(x) - cells.u) + window.tubes.rates[0]
 
 
-def _lies_in(pose: Interval, found: Cover, k: int, until: int) -> bool:
+def _lies_in(pose: Interval, found: Cover, k: int, places: Sequence[int]) -> bool:
     """Return whether a driver value with its unknowns lies in the tube of a cell."""
     cell = found.cells[k : k + 1]
     u = pose[0]
     if not (cell.low[0] <= u.low[0] and u.high[0] <= cell.high[0]):
         return False
-    off = pose[1:] - cell.at(u - cell.u)[:until]
-    return bool(off.is_inside(found.tubes[k : k + 1].wide[:until]).all())
+    off = pose[1:] - cell.at(u - cell.u)[places]
+    return bool(off.is_inside(found.tubes[k : k + 1].wide[places]).all())

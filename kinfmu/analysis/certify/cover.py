@@ -13,6 +13,7 @@ from kinfmu.analysis.certify.intervals import Interval
 from kinfmu.arrays import FloatArray
 
 _GENERATIONS = 60  # of halved cells
+MOST_CELLS = 20_000  # that fail in one generation
 
 Guess = Callable[[FloatArray], FloatArray]  # unknowns (n, m) for m driver values; NaN where there are none
 
@@ -53,14 +54,19 @@ def cover(prover: Prover, edges: FloatArray, guess: Guess, least: float) -> Cove
     """
     found: list[tuple[Cells, Tubes]] = []
     low, high = edges[:-1], edges[1:]
+    near = guess(0.5 * (low + high))
     for _ in range(_GENERATIONS):
-        if not len(low):
+        if not 0 < len(low) <= MOST_CELLS:
             break
-        cells, converged = prover.cells(low, high, guess(0.5 * (low + high)))
+        cells, converged = prover.cells(low, high, near)
         tubes = prover.prove(cells)
         good = tubes.is_proved & converged
         found.append((cells[good], tubes[good]))
-        low, high = _halved(low[~good], high[~good], least)
+        low, high, parent = _halved(low[~good], high[~good], least)
+        at = 0.5 * (low + high)
+        near = cells[~good][parent].at(at - cells.u[~good][parent]).middle
+        lost = ~converged[~good][parent]
+        near[:, lost] = guess(at[lost])
         if not len(low):
             joined = _joined(found)
             apart = np.flatnonzero(~joined.is_joined & (joined.cells.high[:-1] == joined.cells.low[1:]))
@@ -71,15 +77,17 @@ def cover(prover: Prover, edges: FloatArray, guess: Guess, least: float) -> Cove
             kept = np.ones(len(joined.cells), dtype=bool)
             kept[apart] = False
             found = [(joined.cells[kept], joined.tubes[kept])]
-            low, high = _halved(joined.cells.low[apart], joined.cells.high[apart], least)
+            low, high, _ = _halved(joined.cells.low[apart], joined.cells.high[apart], least)
+            near = guess(0.5 * (low + high))
     return _joined(found)
 
 
-def _halved(low: FloatArray, high: FloatArray, least: float) -> tuple[FloatArray, FloatArray]:
-    large = high - low > 2.0 * least
+def _halved(low: FloatArray, high: FloatArray, least: float) -> tuple[FloatArray, FloatArray, Any]:
+    """Return both halves of the cells that are wide enough, and the number of the cell of each."""
+    large = np.flatnonzero(high - low > 2.0 * least)
     low, high = low[large], high[large]
     middle = 0.5 * (low + high)
-    return np.concatenate((low, middle)), np.concatenate((middle, high))
+    return np.concatenate((low, middle)), np.concatenate((middle, high)), np.concatenate((large, large))
 
 
 def _joined(found: list[tuple[Cells, Tubes]]) -> Cover:
