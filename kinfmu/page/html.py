@@ -14,7 +14,7 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.page.describe import describe, module_data, written_file
 from kinfmu.page.module import packed, page_module, solver
-from kinfmu.page.opened import opened
+from kinfmu.mechanism.opened import opened
 
 _WEB = Path(__file__).parent / "web"
 _SCRIPTS = (

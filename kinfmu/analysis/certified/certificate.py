@@ -3,31 +3,34 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from kinfmu.analysis.certify.bounds import Bounds, bounds
-from kinfmu.analysis.certify.cells import Cells, Prover
-from kinfmu.analysis.certify.cover import Cover, Guess, cover
-from kinfmu.analysis.certify.formulas import Formulas
-from kinfmu.analysis.certify.intervals import Interval
-from kinfmu.analysis.driver_path import DriverPath, follow
+from kinfmu.analysis.certified.bounds import Bounds, Quantity, bounds
+from kinfmu.analysis.certified.cells import Cells, Prover
+from kinfmu.analysis.certified.cover import Cover, Guess, cover
+from kinfmu.analysis.certified.formulas import Formulas
+from kinfmu.analysis.certified.intervals import Interval, around
+from kinfmu.analysis.driver_path import DriverPath, follow, place_text
 from kinfmu.arrays import FloatArray
 from kinfmu.codegen.python import load_model
 from kinfmu.errors import RequestError, listed
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.opened import opened
 from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.plan.equations.graph import Node
+from kinfmu.plan.trace import parameter_symbol
 from kinfmu.solver.python import Pose, Solver
 from kinfmu.solver.python.limit import Limit
 
 WIDTH = 0.1  # [rad, sizes] of the driver; of the first cells
 LEAST = 1e-9  # [rad, sizes]; narrower cells are given up
 _ENCLOSED = 2e-10  # [rad, sizes] of the driver, about; how closely a dead centre is enclosed
-_WINDOW = 0.03  # [rad, sizes] from a dead centre along the path, where cells over that way begin
+_WINDOWS = (0.03, 0.003, 0.0003)  # [rad, sizes] from a dead centre along the path, where cells over that way begin
 _PARTS = 6  # of the way to a dead centre
 _MEET = 1e-9  # of the driver; what is covered up to this distance from the end of the range counts as covered
 
@@ -98,6 +101,47 @@ class Certificate:
         wide = self.cover.tubes.wide
         return float((wide.high / self.prover.unit[:, None]).min(initial=math.inf))
 
+    def __str__(self) -> str:
+        """The certificate as lines of the report of `kinfmu check`."""
+        unit = "s"
+        if self.driver != "time":
+            kind = self.mechanism.drivers[0].quantity.kind
+            unit = "rad" if kind == "angle" else self.mechanism.length_unit
+        turns = f"; the poses come back after {_turns_text(self.turns)}" if self.turns else ""
+        lines = [
+            f"certified   {self.driver} from {place_text(self.low, unit)} to {place_text(self.high, unit)}, "
+            f"{100.0 * self.share:.9g} % of it in {len(self.cover.cells)} cells: the loops close, no other pose is within "
+            f"{self.tube:.2g} rad or sizes, no block is singular{turns}"
+        ]
+        if not len(self.cover.cells):
+            lines = [f"certified   {self.driver}: nothing"]
+        for low, high, _ in self.dead_centres:
+            lines.append(
+                f"            dead centre at {self.driver} = {place_text(0.5 * (low + high), unit)}, within "
+                f"{high - low:.1g} {unit}: no pose of this branch lies beyond"
+            )
+        for low, high, reason in self.gaps:
+            lines.append(
+                f"not proved  {self.driver} = {place_text(0.5 * (low + high), unit)}, over {high - low:.1g} {unit}: {reason}"
+            )
+        return "\n".join(f"  {line}" for line in lines)
+
+    def as_json(self) -> dict[str, Any]:
+        """The certificate as values of JSON: angles in rad, lengths in the unit of the file."""
+        return {
+            "mechanism": self.mechanism.name,
+            "driver": self.driver,
+            "low": self.low,
+            "high": self.high,
+            "turns": self.turns,
+            "complete": self.is_complete,
+            "share": self.share,
+            "tube": self.tube if math.isfinite(self.tube) else None,
+            "cells": len(self.cover.cells),
+            "dead_centres": [centre._asdict() for centre in self.dead_centres],
+            "not_proved": [gap._asdict() for gap in self.gaps],
+        }
+
     def bounds(self, output: str, order: int = 0) -> Bounds:
         """Return the bounds of an output (order 0), its rate (1) or acceleration (2) over all that is proved.
 
@@ -107,14 +151,45 @@ class Certificate:
             RequestError: There is no such output.
 
         """
+        return bounds(self.prover, self.cover.cells, self.cover.tubes, self._node(output), order)
+
+    def enclosed(self, output: str, x: FloatArray, order: int = 0) -> tuple[FloatArray, FloatArray]:
+        """Return lower and upper bounds of an output, its rate or acceleration, at values of the driver or at times.
+
+        NaN where nothing is proved.
+
+        Args:
+            output: The output.
+            x: Values of the driver, or times, (n,).
+            order: Of the derivative.
+
+        Raises:
+            RequestError: There is no such output.
+
+        """
+        x = np.asarray(x, dtype=float)
+        node, cells = self._node(output), self.cover.cells
+        k = np.clip(np.searchsorted(cells.low, x, "right") - 1, 0, max(len(cells) - 1, 0))
+        known = np.flatnonzero((cells.low[k] <= x) & (x <= cells.high[k])) if len(cells) else np.array([], dtype=int)
+        k, low, high = k[known], np.full_like(x, np.nan), np.full_like(x, np.nan)
+        value = Quantity(self.prover, node, order).at(cells[k], self.cover.tubes[k], Interval(x[known]) - cells.u[k])
+        low[known], high[known] = value.low, value.high
+        return low, high
+
+    def _node(self, output: str) -> Node:
         names = list(self.prover.formulas.plan.outputs)
         if output not in names:
             raise RequestError(f"'{output}' is no output; outputs: {listed(names)}")
-        node = self.prover.formulas.outputs[names.index(output)][0]
-        return bounds(self.prover, self.cover.cells, self.cover.tubes, node, order)
+        return self.prover.formulas.outputs[names.index(output)][0]
 
 
-def certify(mechanism: Mechanism, *, over: str = "range", width: float = WIDTH) -> Certificate:
+def certify(
+    mechanism: Mechanism,
+    *,
+    over: str | None = None,
+    tolerances: float | Mapping[str, float] | None = None,
+    width: float = WIDTH,
+) -> Certificate:
     """Prove that a motion is what it says, between its samples too.
 
     For every cell of the range the certificate proves: the loops close; the pose is the only one in a tube around it, so
@@ -123,32 +198,57 @@ def certify(mechanism: Mechanism, *, over: str = "range", width: float = WIDTH) 
     Args:
         mechanism: The mechanism.
         over: "range": all values that the only driver can take from the start pose; "run": the times of the run.
+            Default: the range of one driver, the run of several.
+        tolerances: For a certificate of all mechanisms whose numbers differ from those of the file by at most this: a part
+            of every length, such as 0.001, or numbers [rad or the file's unit of length] by the names of parameters and
+            of places such as "bodies.crank.points.P.x". Default: none.
         width: Width of the first cells [rad or sizes of the mechanism; over a run: steps of it].
 
     Raises:
-        RequestError: `over` is not known, or there are several drivers and it is "range".
+        RequestError: `over` is not known, or there are several drivers and it is "range"; or a tolerance is of no number.
         KinfmuError: The mechanism cannot be solved.
 
     """
-    plan = compile_plan(mechanism)
+    mechanism = replace(mechanism, coordinates="all")
+    made, varied = (mechanism, {}) if tolerances is None else _varied(mechanism, tolerances)
+    plan = compile_plan(made)
+    box = {
+        parameter_symbol(one.name): around(np.array(one.value), np.array(varied[one.name]))
+        for one in plan.parameters
+        if one.name in varied
+    }
+    over = over or ("range" if len(plan.drivers) == 1 else "run")
     if over not in ("range", "run"):
         raise RequestError(f"over = '{over}' is not known; known are 'range' and 'run'")
     if over == "run":
-        return _over_run(plan)
+        return _over_run(plan, box)
     if len(plan.drivers) > 1:
         raise RequestError("several drivers have no range in common; use over = 'run'")
-    return _over_range(follow(plan, 0), width)
+    return _over_range(follow(plan, 0), width, box)
 
 
-def _over_range(path: DriverPath, width: float) -> Certificate:
+def _varied(mechanism: Mechanism, tolerances: float | Mapping[str, float]) -> tuple[Mechanism, dict[str, float]]:
+    """Return the mechanism with its numbers as parameters, and the tolerances of these by name."""
+    made = opened(mechanism)
+    names = {label: name for name, label in made.labels.items()} | {name: name for name in mechanism.parameters}
+    if isinstance(tolerances, Mapping):
+        for name in tolerances:
+            if name not in names:
+                raise RequestError(f"tolerance of '{name}': not a number of this mechanism, such as {listed(list(names)[:3])}")
+        return made.mechanism, {names[name]: abs(float(value)) for name, value in tolerances.items()}
+    lengths = {name: one for name, one in made.mechanism.parameters.items() if one.quantity.kind == "length"}
+    return made.mechanism, {name: abs(tolerances * float(one.value)) for name, one in lengths.items()}
+
+
+def _over_range(path: DriverPath, width: float, box: Mapping[str, Interval]) -> Certificate:
     plan = path.plan
-    prover = Prover(_formulas(plan))
+    prover = Prover(_formulas(plan, varied=box), box)
     unit = 1.0 if path.kind == "angle" else plan.size
     low = path.low.u[0] if path.low else path.poses[0].u[0]
     high = path.high.u[0] if path.high else path.poses[-1].u[0]
     edges = np.linspace(low, high, max(2, math.ceil((high - low) / (width * unit)) + 1))
     poses = {pose.u[0]: pose for pose in path.poses}
-    found = cover(prover, edges, _guess(path.solver, poses, lambda u: (u,)), LEAST * unit)
+    found = _of_branch(cover(prover, edges, _guess(path.solver, poses, lambda u: (u,)), LEAST * unit), poses)
     centres, reasons = [], []
     for limit, is_high in ((path.low, False), (path.high, True)):
         if limit is None:
@@ -165,9 +265,9 @@ def _over_range(path: DriverPath, width: float) -> Certificate:
     return Certificate(plan.mechanism, path.name, low, high, turns, found, tuple(centres), tuple(gaps), prover)
 
 
-def _over_run(plan: SolvePlan) -> Certificate:
+def _over_run(plan: SolvePlan, box: Mapping[str, Interval]) -> Certificate:
     run = plan.mechanism.run
-    prover = Prover(_formulas(plan, over_time=True))
+    prover = Prover(_formulas(plan, over_time=True, varied=box), box)
     solver = Solver(load_model(plan))
     times = np.arange(run.start, run.stop, run.step)
     edges = np.unique([*times, run.stop, *_jumps(plan, run.start, run.stop)])
@@ -181,19 +281,25 @@ def _over_run(plan: SolvePlan) -> Certificate:
         arrived = solver.solve(pose, values(t))
         if arrived.good:
             pose = poses[t] = arrived
-    found = cover(prover, edges, _guess(solver, poses, values), LEAST * (run.stop - run.start))
+    found = _of_branch(cover(prover, edges, _guess(solver, poses, values), LEAST * (run.stop - run.start)), poses)
     gaps = _gaps(found, float(run.start), float(run.stop), [], [], 0.0)
     return Certificate(plan.mechanism, "time", float(run.start), float(run.stop), None, found, (), tuple(gaps), prover)
 
 
-def _formulas(plan: SolvePlan, *, over_time: bool = False) -> Formulas:
+def _of_branch(found: Cover, poses: Mapping[float, Pose]) -> Cover:
+    """Return the pieces of the branch that the solver follows."""
+    known = {x: pose for x, pose in poses.items() if not pose.status}
+    return found.with_poses(np.array(list(known)), np.array([pose.z for pose in known.values()]).T)
+
+
+def _formulas(plan: SolvePlan, *, over_time: bool = False, varied: Collection[str] = ()) -> Formulas:
     for block in plan.blocks:
         if len(block.residuals) > len(block.unknowns):
             raise RequestError(
                 f"{listed(block.unknowns)}: solved with redundant rows ({listed(block.row_names)}); such blocks cannot be "
                 "certified yet"
             )
-    return Formulas(plan, over_time=over_time)
+    return Formulas(plan, over_time=over_time, varied=varied)
 
 
 def _jumps(plan: SolvePlan, start: float, stop: float) -> list[float]:
@@ -275,6 +381,18 @@ def dead_centre(prover: Prover, found: Cover, limit: Limit, *, is_high: bool) ->
     the only curve through a window; its second derivative has one sign in all cells, and its first derivative changes its sign
     within the one whose values of the driver are returned. The curve begins at a pose of the proved cells.
     """
+    found_there: DeadCentre | str = ""
+    for within in _WINDOWS:
+        found_there = _dead_centre(prover, found, limit, within, is_high=is_high)
+        if isinstance(found_there, DeadCentre):
+            break
+    return found_there
+
+
+def _dead_centre(prover: Prover, found: Cover, limit: Limit, within: float, *, is_high: bool) -> DeadCentre | str:
+    """Return what `dead_centre` does, for cells over the way that begin within a distance."""
+    if prover.formulas.varied:
+        return "a dead centre, whose place depends on the tolerances"
     if limit.block < 0 or limit.crosses or limit.pole >= 0 or not len(found.cells):
         return "the path ends: not at a dead centre"
     formulas = prover.formulas
@@ -283,7 +401,8 @@ def dead_centre(prover: Prover, found: Cover, limit: Limit, *, is_high: bool) ->
     toward = 1.0 if is_high else -1.0
     speeds = np.linalg.norm(found.cells.path[1, own] / prover.unit[own, None], axis=0)
     ways = 2.0 * abs(limit.u[0] - found.cells.u) * speeds
-    near = np.flatnonzero((ways < _WINDOW) & (abs(limit.u[0] - found.cells.u) < 0.5 * np.ptp([*found.cells.u, limit.u[0]])))
+    first, last = found.pieces[-1 if is_high else 0]
+    near = first + np.flatnonzero(ways[first : last + 1] < within)
     if not len(near):
         return "a dead centre: cells end before it"
     k = int(near[np.argmax(ways[near])])
@@ -332,6 +451,10 @@ def turned_rate(window: Cover, x: FloatArray) -> Interval:
     """Return the driver's rate along the way, at one place of each cell."""
     cells = window.cells
     return Interval(cells.path[1, 0]) + Interval(cells.path[2, 0]) * (Interval(x) - cells.u) + window.tubes.rates[0]
+
+
+def _turns_text(turns: int) -> str:
+    return "a turn" if turns == 1 else f"{turns} turns"
 
 
 def _lies_in(pose: Interval, found: Cover, k: int, places: Sequence[int]) -> bool:

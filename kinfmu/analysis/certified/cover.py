@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from kinfmu.analysis.certify.cells import Cells, Prover, Tubes
-from kinfmu.analysis.certify.intervals import Interval
+from kinfmu.analysis.certified.cells import Cells, Prover, Tubes
+from kinfmu.analysis.certified.intervals import Interval
 from kinfmu.arrays import FloatArray
 
 _GENERATIONS = 60  # of halved cells
@@ -40,6 +40,20 @@ class Cover:
             return []
         ends = np.flatnonzero(~self.is_joined)
         return list(zip([0, *(ends + 1).tolist()], [*ends.tolist(), len(self.cells) - 1], strict=True))
+
+
+    def with_poses(self, x: FloatArray, z: FloatArray) -> Cover:
+        """Return the pieces in which poses lie, (n, m) at m driver values, without those that leave out one of them.
+
+        A piece without such a pose may be another branch.
+        """
+        cells, kept = self.cells, np.zeros(len(self.cells), dtype=bool)
+        for first, last in self.pieces:
+            which = np.flatnonzero((x >= cells.low[first]) & (x <= cells.high[last]))
+            k = np.clip(np.searchsorted(cells.low[first : last + 1], x[which], "right") - 1, 0, None) + first
+            off = Interval(z[:, which]) - cells[k].at(Interval(x[which]) - cells.u[k])
+            kept[first : last + 1] = len(which) and off.is_inside(self.tubes[k].wide).all()
+        return _joined([(cells[kept], self.tubes[kept])])
 
 
 def cover(prover: Prover, edges: FloatArray, guess: Guess, least: float) -> Cover:

@@ -17,13 +17,13 @@ the remainder of third order over the whole cell, or of second order where a law
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
-from kinfmu.analysis.certify.formulas import BlockFormulas, Formulas
-from kinfmu.analysis.certify.intervals import Interval, approximate, around, enclosed, interval, joined_intervals
+from kinfmu.analysis.certified.formulas import BlockFormulas, Formulas
+from kinfmu.analysis.certified.intervals import Interval, approximate, around, enclosed, interval, joined_intervals
 from kinfmu.arrays import FloatArray
 from kinfmu.plan.equations.graph import Node
 
@@ -85,7 +85,7 @@ class Tubes:
         narrow: Where it is.
         rates: Deviations of z' of the poses from that of the predicted path.
         accelerations: The same of z''.
-        contraction: The largest row sum of |1 - Y J| on the wide tube, for each block and cell.
+        contraction: The largest row sum of |1 - Y J| on the narrow tube, for each block and cell.
         sign: Of the determinant of J, for each block and cell.
 
     """
@@ -187,7 +187,40 @@ class Prover:
                     rest = self._rest_of_rates(cells, block, thin, broad, motion, order)
                     part = _within(_times(y, rest), found[3], self.unit[own, None])
                     motion[order].low[own], motion[order].high[own] = part.low, part.high
-        return Tubes(proved, wide, *motion, np.reshape(contractions, (-1, count)), np.reshape(signs, (-1, count)))
+        shape = (len(contractions), count)
+        return Tubes(proved, wide, *motion, np.reshape(contractions, shape), np.reshape(signs, shape))
+
+    def closer(self, cells: Cells, tubes: Tubes, s: Interval) -> Tubes:
+        """Return the tubes with closer enclosures of rates and accelerations at driver values s from the centres."""
+        count, n = len(cells), len(self.formulas.unknowns)
+        plain = self.enclosures(cells)[2]
+        symbols = self.over(cells, s)
+        motion = [tubes.narrow, *(Interval(np.zeros((n, count)), np.zeros((n, count))) for _ in range(2))]
+        for number, block in enumerate(self.formulas.blocks):
+            own = slice(block.place, block.place + block.size)
+            y = _inverse(np.array(approximate(block.jacobian, plain, (count,))), block.size)
+            for order in (1, 2):
+                tube = self._moving_at(symbols, motion, block, order)
+                rest = enclosed(block.rows[order], tube, (count,))
+                part = _within(_times(y, rest), tubes.contraction[number], self.unit[own, None])
+                part = part.intersection((tubes.rates, tubes.accelerations)[order - 1][own])
+                motion[order].low[own], motion[order].high[own] = part.low, part.high
+        return replace(tubes, rates=motion[1], accelerations=motion[2])
+
+    def _moving_at(
+        self, symbols: Mapping[str, Interval], motion: Sequence[Interval], block: BlockFormulas, order: int
+    ) -> dict[str, Interval]:
+        """Return the symbols of a block's rows of an order, its own derivative of this order as predicted."""
+        until = block.place + block.size
+        narrow, rates, accelerations = motion
+        tube = self._tubes_at(symbols, narrow, until)
+        for number, name in enumerate(self.formulas.unknowns[:until]):
+            rate, acceleration = self.formulas.names[name]
+            if order == 2 or number < block.place:
+                tube[rate] = symbols[rate] + rates[number]
+            if number < block.place:
+                tube[acceleration] = symbols[acceleration] + accelerations[number]
+        return tube
 
     def _rest_of_rates(
         self,
@@ -203,16 +236,10 @@ class Prover:
         The derivative of order n of r(z(x)) is 0, and linear in that of z: J w_n = -rest, w_n its deviation.
         """
         shape, s, k = (len(cells),), cells.s, block.size
-        narrow, rates, accelerations = motion
-        until = block.place + block.size
-        tube = self._tubes_at(broad, narrow, until)
         if order == 2:
-            for number, name in enumerate(self.formulas.unknowns[:until]):
-                rate, acceleration = self.formulas.names[name]
-                tube[rate] = broad[rate] + rates[number]
-                if number < block.place:
-                    tube[acceleration] = broad[acceleration] + accelerations[number]
-            return enclosed(block.rows[2], tube, shape)
+            return enclosed(block.rows[2], self._moving_at(broad, motion, block, 2), shape)
+        narrow, rates, _ = motion
+        tube = self._tubes_at(broad, narrow, block.place + block.size)
         flat = enclosed([*block.rows[1], *block.rows[2]], thin, shape)
         last = enclosed([*block.rows[2], *block.rows[3]], broad, shape)
         half = s.square() * 0.5
@@ -316,7 +343,6 @@ class Prover:
             inside = image.is_inside(w).all(axis=0)
             done = todo[inside]
             proved[done] = True
-            contraction[done] = off[inside]
             wide.low[:, done], wide.high[:, done] = w.low[:, inside], w.high[:, inside]
             least = image[:, inside]
             short = around(np.zeros_like(least.low), 2.0 * np.array([part.magnitude[done] for part in moved]) + 1e-300)
@@ -324,7 +350,8 @@ class Prover:
             holds = again.is_inside(short).all(axis=0)  # the only pose lies in it, too
             least = Interval(np.where(holds, again.low, least.low), np.where(holds, again.high, least.high))
             for _ in range(_CONTRACTIONS):
-                least = least.intersection(self._image(block, broad, narrow, y, moved, least, done)[0])
+                again, contraction[done] = self._image(block, broad, narrow, y, moved, least, done)
+                least = least.intersection(again)
             narrow_own.low[:, done], narrow_own.high[:, done] = least.low, least.high
             shrink = np.minimum(_CONTRACTION / np.maximum(off[~inside], 1e-300), 0.5)
             todo = todo[~inside]
