@@ -28,7 +28,9 @@ FIGURES = (".svg", ".png", ".pdf")
 @mechanism_argument
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON, for programs.")
 @click.option("--matrices", is_flag=True, help="Also print the Jacobians at the assembled pose and at singular points.")
-@click.option("--certify", "is_certified", is_flag=True, help="Prove the motion between samples, by interval arithmetic.")
+@click.option(
+    "--certify", "is_certified", is_flag=True, help="Prove the motion between samples, by interval arithmetic."
+)
 @click.option("--assemblies", is_flag=True, help="List the ways to assemble the mechanism, and how to choose one.")
 @click.option(
     "--figure", "picture", type=OutputFile(*FIGURES), help="Draw the mechanism with its names: .svg, .png or .pdf."

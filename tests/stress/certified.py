@@ -92,9 +92,15 @@ def _check_poses(seed: int, branch: Interval, certificate: Certificate, found: C
             if order == 0 and name.endswith(".phi"):
                 values = values + TURN * np.rint((expected.angles[name][inside] - values) / TURN)
             low, high = certificate.enclosed(name, u, order)
-            slack = ROUNDED * np.maximum(1.0 if name.endswith(".phi") else scale, abs(values)) * (1.0 if order == 0 else 1e4)
+            slack = (
+                ROUNDED
+                * np.maximum(1.0 if name.endswith(".phi") else scale, abs(values))
+                * (1.0 if order == 0 else 1e4)
+            )
             wrong = np.flatnonzero((values < low - slack) | (values > high + slack))
-            found.faults += [f"{name} order {order} at {u[k]!r}: {values[k]!r}, not {low[k]!r} to {high[k]!r}" for k in wrong[:1]]
+            found.faults += [
+                f"{name} order {order} at {u[k]!r}: {values[k]!r}, not {low[k]!r} to {high[k]!r}" for k in wrong[:1]
+            ]
 
 
 def main() -> int:
@@ -107,14 +113,15 @@ def main() -> int:
         of = [one for one in found if one.family == family]
         done = [one for one in of if not one.refused]
         shares = np.array([one.share for one in done] or [0.0])
+        poses, whole = sum(one.checked for one in of), sum(not one.gaps for one in done)
+        seconds = np.median([one.seconds for one in done] or [0.0])
         print(
-            f"{family}: {len(done)} of {len(of)}, {sum(one.checked for one in of)} poses, certified {shares.mean():.5f} of the "
-            f"range, least {shares.min():.4f}, whole {sum(not one.gaps for one in done)}, "
-            f"median {np.median([one.seconds for one in done] or [0]):.2f} s"
+            f"{family}: {len(done)} of {len(of)}, {poses} poses, certified {shares.mean():.5f} of the range, "
+            f"least {shares.min():.4f}, whole {whole}, median {seconds:.2f} s"
         )
         for reason in sorted({gap for one in done for gap in one.gaps}):
             print(f"    {sum(reason in one.gaps for one in done)} with: {reason}")
-        for reason in sorted({one.refused.partition(':')[2][:60] for one in of if one.refused}):
+        for reason in sorted({one.refused.partition(":")[2][:60] for one in of if one.refused}):
             print(f"    refused: {reason}")
     for one in found:
         for fault in one.faults[:2]:

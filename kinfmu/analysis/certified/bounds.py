@@ -68,8 +68,8 @@ def _most(quantity: Quantity, cells: Cells, tubes: Tubes, sign: float) -> tuple[
 def _halved(prover: Prover, cells: Cells, tubes: Tubes) -> tuple[Cells, Tubes, Any]:
     """Return the halves of cells, proved again, and which cells are too narrow or have a half that is not proved.
 
-    The pose in the middle of a half is that of its cell, since it lies in the tube in which that is the only one; so are
-    the others, since both change continuously.
+    The pose in the middle of a half is that of its cell, since it lies in the tube in which that is the only one; so
+    are the others, since both change continuously.
     """
     ends = [(cells.low, cells.u), (cells.u, cells.high)]
     halves = []
@@ -119,4 +119,3 @@ class Quantity:
             for k, slope in zip(used, enclosed([nodes[k] for k in used], moving, shape), strict=True):
                 value = value + slope * deviations[k]
         return value.intersection(enclosed([self.series[0]], moving, shape)[0])
-

@@ -5,13 +5,13 @@ In a cell, |s| <= h around its centre u, the path is predicted by
     zp(s) = z + z' s + z'' s^2 / 2
 
 and the unknowns are zp(s) + w. With Y close to the inverse of the Jacobian J at the centre, Krawczyk's operator on
-a box W of deviations w,
+a box W of deviations w, 0 among them,
 
     K(W) = -Y r(zp) + (1 - Y J(zp + W)) W,
 
 lies in the interior of W only if each s of the cell has exactly one w in W with r = 0, and that w lies in K(W)
-(Krawczyk, 1969; Neumaier, Interval Methods for Systems of Equations, 1990, section 5.1). r(zp) is enclosed by its series in s with
-the remainder of third order over the whole cell, or of second order where a law's curvature jumps.
+(Krawczyk, 1969; Neumaier, Interval Methods for Systems of Equations, 1990, section 5.1). r(zp) is enclosed by its
+series in s with the remainder of third order over the whole cell, or of second order where a law's curvature jumps.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ _CONTRACTION = 0.4  # of a tube by Krawczyk's operator, aimed at
 _TRIES = 6  # of narrower tubes
 _CONTRACTIONS = 3  # of a proved tube
 _NEWTON = 6  # corrections of a predicted pose
+_LARGEST_CONTRACTION = 1.0 - 1e-6  # by which rates are bounded
 _SLACK = 1.02  # of a tube over what it must hold
 
 
@@ -72,7 +73,8 @@ class Cells:
         """Return the predicted unknowns at driver values from the centre, (n, cells)."""
         s = interval(s)
         z, rate, acceleration = self.path
-        return Interval(z) + Interval(rate) * s + Interval(0.5 * acceleration) * s.square()
+        found: Interval = Interval(z) + Interval(rate) * s + Interval(0.5 * acceleration) * s.square()
+        return found
 
 
 @dataclass(frozen=True)
@@ -104,8 +106,11 @@ class Tubes:
     @classmethod
     def joined(cls, parts: Sequence[Tubes]) -> Tubes:
         """Return the tubes of several parts."""
-        columns = [[getattr(part, field.name) for part in parts] for field in fields(cls)]
-        return cls(*(joined_intervals(c) if isinstance(c[0], Interval) else np.concatenate(c, -1) for c in columns))
+        columns: list[Any] = [[getattr(part, field.name) for part in parts] for field in fields(cls)]
+        found: list[Any] = [
+            joined_intervals(c) if isinstance(c[0], Interval) else np.concatenate(c, -1) for c in columns
+        ]
+        return cls(*found)
 
 
 class Prover:
@@ -160,15 +165,16 @@ class Prover:
         """Return J^-1 rows, (n, cells)."""
         shape = values[self.formulas.x].shape
         found = np.array(approximate([*rows, *block.jacobian], values, shape))
-        return np.einsum("cij,jc->ic", _inverse(found[len(rows) :], block.size), found[: len(rows)])
+        inverse = _inverse(found[len(rows) :], block.size)
+        return np.asarray(np.einsum("cij,jc->ic", inverse, found[: len(rows)]))
 
     # ---- proofs
 
     def prove(self, cells: Cells) -> Tubes:
         """Return the tubes of cells, block after block."""
         n, count = len(self.formulas.unknowns), len(cells)
-        wide, *motion = (Interval(np.zeros((n, count)), np.zeros((n, count))) for _ in range(4))
-        narrow = motion[0]
+        wide, narrow, rates, accelerations = (Interval(np.zeros((n, count)), np.zeros((n, count))) for _ in range(4))
+        motion = (narrow, rates, accelerations)
         proved = np.ones(count, dtype=bool)
         contractions, signs = [], []
         with np.errstate(all="ignore"):
@@ -188,7 +194,9 @@ class Prover:
                     part = _within(_times(y, rest), found[3], self.unit[own, None])
                     motion[order].low[own], motion[order].high[own] = part.low, part.high
         shape = (len(contractions), count)
-        return Tubes(proved, wide, *motion, np.reshape(contractions, shape), np.reshape(signs, shape))
+        return Tubes(
+            proved, wide, narrow, rates, accelerations, np.reshape(contractions, shape), np.reshape(signs, shape)
+        )
 
     def closer(self, cells: Cells, tubes: Tubes, s: Interval) -> Tubes:
         """Return the tubes with closer enclosures of rates and accelerations at driver values s from the centres."""
@@ -243,10 +251,8 @@ class Prover:
         flat = enclosed([*block.rows[1], *block.rows[2]], thin, shape)
         last = enclosed([*block.rows[2], *block.rows[3]], broad, shape)
         half = s.square() * 0.5
-        rest = [
-            (flat[i] + last[i] * s).intersection(flat[i] + flat[k + i] * s + last[k + i] * half) for i in range(k)
-        ]
-        slopes = [(block.earlier, rates), (block.rates, narrow)]
+        rest = [(flat[i] + last[i] * s).intersection(flat[i] + flat[k + i] * s + last[k + i] * half) for i in range(k)]
+        slopes: list[tuple[Mapping[Any, tuple[Node, ...]], Interval]] = [(block.earlier, rates), (block.rates, narrow)]
         for gradients, deviations in slopes:
             for place, nodes in gradients.items():
                 off = deviations[place] if isinstance(place, int) else broad[place] - self.middle[place]
@@ -286,7 +292,12 @@ class Prover:
         return found
 
     def _rest(
-        self, cells: Cells, block: BlockFormulas, thin: Mapping[str, Interval], broad: Mapping[str, Interval], narrow: Interval
+        self,
+        cells: Cells,
+        block: BlockFormulas,
+        thin: Mapping[str, Interval],
+        broad: Mapping[str, Interval],
+        narrow: Interval,
     ) -> list[Interval]:
         """Return the residuals of a block along the predicted path, with what earlier blocks and parameters may add."""
         shape, s = (len(cells),), cells.s
@@ -299,7 +310,9 @@ class Prover:
         rest = []
         for i in range(k):
             start = flat[i] + flat[k + i] * s
-            rest.append((start + last[i] * squared).intersection(start + flat[2 * k + i] * squared + last[k + i] * cubed))
+            rest.append(
+                (start + last[i] * squared).intersection(start + flat[2 * k + i] * squared + last[k + i] * cubed)
+            )
         tube = self._tubes_at(broad, narrow, block.place)
         for place, nodes in block.earlier.items():
             for i, slope in enumerate(enclosed(nodes, tube, shape)):
@@ -348,10 +361,10 @@ class Prover:
             short = around(np.zeros_like(least.low), 2.0 * np.array([part.magnitude[done] for part in moved]) + 1e-300)
             again, _ = self._image(block, broad, narrow, y, moved, short, done)
             holds = again.is_inside(short).all(axis=0)  # the only pose lies in it, too
-            least = Interval(np.where(holds, again.low, least.low), np.where(holds, again.high, least.high))
+            least = _with_zero(Interval(np.where(holds, again.low, least.low), np.where(holds, again.high, least.high)))
             for _ in range(_CONTRACTIONS):
                 again, contraction[done] = self._image(block, broad, narrow, y, moved, least, done)
-                least = least.intersection(again)
+                least = _with_zero(least.intersection(again))
             narrow_own.low[:, done], narrow_own.high[:, done] = least.low, least.high
             shrink = np.minimum(_CONTRACTION / np.maximum(off[~inside], 1e-300), 0.5)
             todo = todo[~inside]
@@ -401,9 +414,16 @@ def _inverse(entries: FloatArray, size: int) -> FloatArray:
         return np.asarray(np.linalg.pinv(np.nan_to_num(safe)))
 
 
+def _with_zero(w: Interval) -> Interval:
+    """Return deviations with 0 among them: slopes between the predicted path and a pose are those of all between."""
+    return Interval(np.minimum(w.low, 0.0), np.maximum(w.high, 0.0))
+
+
 def _within(image: list[Interval], contraction: FloatArray, unit: FloatArray) -> Interval:
     """Return the solutions w of (Y J) w = -image, if |1 - Y J| <= contraction < 1 in units of the unknowns."""
     largest = np.max([part.magnitude / of for part, of in zip(image, unit, strict=True)], axis=0)
+    contracts = contraction < _LARGEST_CONTRACTION
+    largest, contraction = np.where(contracts, largest, np.inf), np.where(contracts, contraction, 0.5)
     solution = Interval(largest) / (interval(1.0) - Interval(contraction))
     spread = (solution * Interval(contraction)).magnitude * _SLACK * unit
     within = [-part + around(np.zeros_like(of), of) for part, of in zip(image, spread, strict=True)]

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kinfmu.analysis.certified.bounds import Bounds, Quantity, bounds
-from kinfmu.analysis.certified.cells import Cells, Prover
+from kinfmu.analysis.certified.cells import Prover
 from kinfmu.analysis.certified.cover import Cover, Guess, cover
 from kinfmu.analysis.certified.formulas import Formulas
 from kinfmu.analysis.certified.intervals import Interval, around
@@ -110,8 +110,8 @@ class Certificate:
         turns = f"; the poses come back after {_turns_text(self.turns)}" if self.turns else ""
         lines = [
             f"certified   {self.driver} from {place_text(self.low, unit)} to {place_text(self.high, unit)}, "
-            f"{100.0 * self.share:.9g} % of it in {len(self.cover.cells)} cells: the loops close, no other pose is within "
-            f"{self.tube:.2g} rad or sizes, no block is singular{turns}"
+            f"{100.0 * self.share:.9g} % of it in {len(self.cover.cells)} cells: the loops close, no other pose is "
+            f"within {self.tube:.2g} rad or sizes, no block is singular{turns}"
         ]
         if not len(self.cover.cells):
             lines = [f"certified   {self.driver}: nothing"]
@@ -122,7 +122,8 @@ class Certificate:
             )
         for low, high, reason in self.gaps:
             lines.append(
-                f"not proved  {self.driver} = {place_text(0.5 * (low + high), unit)}, over {high - low:.1g} {unit}: {reason}"
+                f"not proved  {self.driver} = {place_text(0.5 * (low + high), unit)}, over {high - low:.1g} {unit}: "
+                f"{reason}"
             )
         return "\n".join(f"  {line}" for line in lines)
 
@@ -177,7 +178,7 @@ class Certificate:
         return low, high
 
     def _node(self, output: str) -> Node:
-        names = list(self.prover.formulas.plan.outputs)
+        names: list[str] = list(self.prover.formulas.plan.outputs)
         if output not in names:
             raise RequestError(f"'{output}' is no output; outputs: {listed(names)}")
         return self.prover.formulas.outputs[names.index(output)][0]
@@ -192,27 +193,27 @@ def certify(
 ) -> Certificate:
     """Prove that a motion is what it says, between its samples too.
 
-    For every cell of the range the certificate proves: the loops close; the pose is the only one in a tube around it, so
-    that the branch is continuous; no block of the plan is singular. Cells that fail are halved.
+    For every cell of the range the certificate proves: the loops close; the pose is the only one in a tube around it,
+    so that the branch is continuous; no block of the plan is singular. Cells that fail are halved.
 
     Args:
         mechanism: The mechanism.
         over: "range": all values that the only driver can take from the start pose; "run": the times of the run.
             Default: the range of one driver, the run of several.
-        tolerances: For a certificate of all mechanisms whose numbers differ from those of the file by at most this: a part
-            of every length, such as 0.001, or numbers [rad or the file's unit of length] by the names of parameters and
-            of places such as "bodies.crank.points.P.x". Default: none.
+        tolerances: For a certificate of all mechanisms whose numbers differ from those of the file by at most this: a
+            part of every length, such as 0.001, or numbers [rad or the file's unit of length] by the names of
+            parameters and of places such as "bodies.crank.points.P.x". Default: none.
         width: Width of the first cells [rad or sizes of the mechanism; over a run: steps of it].
 
     Raises:
-        RequestError: `over` is not known, or there are several drivers and it is "range"; or a tolerance is of no number.
+        RequestError: `over` is not known, or there are several drivers and it is "range"; a tolerance is of no number.
         KinfmuError: The mechanism cannot be solved.
 
     """
     mechanism = replace(mechanism, coordinates="all")
     made, varied = (mechanism, {}) if tolerances is None else _varied(mechanism, tolerances)
     plan = compile_plan(made)
-    box = {
+    box: dict[str, Interval] = {
         parameter_symbol(one.name): around(np.array(one.value), np.array(varied[one.name]))
         for one in plan.parameters
         if one.name in varied
@@ -234,9 +235,12 @@ def _varied(mechanism: Mechanism, tolerances: float | Mapping[str, float]) -> tu
     if isinstance(tolerances, Mapping):
         for name in tolerances:
             if name not in names:
-                raise RequestError(f"tolerance of '{name}': not a number of this mechanism, such as {listed(list(names)[:3])}")
+                raise RequestError(
+                    f"tolerance of '{name}': not a number of this mechanism, such as {listed(list(names)[:3])}"
+                )
         return made.mechanism, {names[name]: abs(float(value)) for name, value in tolerances.items()}
-    lengths = {name: one for name, one in made.mechanism.parameters.items() if one.quantity.kind == "length"}
+    given = made.mechanism.parameters.items()
+    lengths = {name: one for name, one in given if one.quantity is not None and one.quantity.kind == "length"}
     return made.mechanism, {name: abs(tolerances * float(one.value)) for name, one in lengths.items()}
 
 
@@ -296,8 +300,8 @@ def _formulas(plan: SolvePlan, *, over_time: bool = False, varied: Collection[st
     for block in plan.blocks:
         if len(block.residuals) > len(block.unknowns):
             raise RequestError(
-                f"{listed(block.unknowns)}: solved with redundant rows ({listed(block.row_names)}); such blocks cannot be "
-                "certified yet"
+                f"{listed(block.unknowns)}: solved with redundant rows ({listed(block.row_names)}); such blocks cannot "
+                "be certified yet"
             )
     return Formulas(plan, over_time=over_time, varied=varied)
 
@@ -345,7 +349,12 @@ def _closes(found: Cover, turns: int) -> bool:
 
 
 def _gaps(
-    found: Cover, low: float, high: float, centres: Sequence[DeadCentre], reasons: Sequence[tuple[float, str]], near: float
+    found: Cover,
+    low: float,
+    high: float,
+    centres: Sequence[DeadCentre],
+    reasons: Sequence[tuple[float, str]],
+    near: float,
 ) -> list[Gap]:
     """Return what the joined cells and the dead centres leave uncovered, with the reason that is nearest."""
     pieces = [(float(found.cells.low[a]), float(found.cells.high[b])) for a, b in found.pieces]
@@ -377,9 +386,10 @@ def _changes_sign(found: Cover, piece: int) -> bool:
 def dead_centre(prover: Prover, found: Cover, limit: Limit, *, is_high: bool) -> DeadCentre | str:
     """Return a dead centre with the proof that the branch turns back there; or why there is no proof.
 
-    Near it the driver is a function of the way x along the direction in which the unknowns move there. Cells over x prove
-    the only curve through a window; its second derivative has one sign in all cells, and its first derivative changes its sign
-    within the one whose values of the driver are returned. The curve begins at a pose of the proved cells.
+    Near it the driver is a function of the way x along the direction in which the unknowns move there. Cells over x
+    prove the only curve through a window; its second derivative has one sign in all cells, and its first derivative
+    changes its sign within the one whose values of the driver are returned. The curve begins at a pose of the proved
+    cells.
     """
     found_there: DeadCentre | str = ""
     for within in _WINDOWS:

@@ -41,7 +41,6 @@ class Cover:
         ends = np.flatnonzero(~self.is_joined)
         return list(zip([0, *(ends + 1).tolist()], [*ends.tolist(), len(self.cells) - 1], strict=True))
 
-
     def with_poses(self, x: FloatArray, z: FloatArray) -> Cover:
         """Return the pieces in which poses lie, (n, m) at m driver values, without those that leave out one of them.
 

@@ -52,9 +52,9 @@ class BlockFormulas:
 class Formulas:
     """The formulas of a plan as functions of one number x: the value of its only driver, or the time of its run.
 
-    Symbols are x and the unknowns by their contract names, the rates and accelerations of the predicted path by those of
-    derivatives, and constants: the parameters, over time also the constants of laws. Coordinates that rows give outright
-    are replaced by their formulas.
+    Symbols are x and the unknowns by their contract names, the rates and accelerations of the predicted path by those
+    of derivatives, and constants: the parameters, over time also the constants of laws. Coordinates that rows give
+    outright are replaced by their formulas.
 
     Args:
         plan: The plan.
@@ -101,8 +101,8 @@ class Formulas:
 
             c . (z - z0) = x     in place of a given driver
 
-        number: of the block, from 0; the blocks on which it depends are solved with it. direction: c for the unknowns of
-        that block. at: z0 of these.
+        number: of the block, from 0; the blocks on which it depends are solved with it. direction: c for the unknowns
+        of that block. at: z0 of these.
         """
         found = copy.copy(self)
         driver = self.plan.drivers[0].inputs
@@ -195,12 +195,13 @@ class Formulas:
 class _Equals:
     """Finds nodes that are equal in exact arithmetic, such as the rounding errors of sums and products, which are 0.
 
-    Each node has a value modulo a prime; symbols and functions have random ones. Sums, products and quotients of different
-    values by formulas of degree d agree by chance with a probability of d / p (Schwartz, 1980): less than 1e-30.
+    Each node has a value modulo a prime; symbols and functions have random ones. Sums, products and quotients of
+    different values by formulas of degree d agree by chance with a probability of d / p (Schwartz, 1980): less than
+    1e-30.
     """
 
     def __init__(self, graph: Graph) -> None:
-        self._random = random.Random(1980)
+        self._random = random.Random(1980)  # noqa: S311  no secrets
         self._values: dict[Node, int] = {}
         zero = graph.constant(0.0)
         self._values[zero] = 0

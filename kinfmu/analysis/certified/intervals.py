@@ -1,8 +1,8 @@
 """Arrays of intervals: every operation of the graph with its result rounded outward.
 
-An operation on intervals encloses all results of the operation on numbers from them, in exact arithmetic. Sums, products,
-quotients and roots of floats are rounded to the nearest float (IEEE 754), so that the next float in either direction is a
-bound. Sine and cosine are computed here, since libraries state no bound that holds on every machine.
+An operation on intervals encloses all results of the operation on numbers from them, in exact arithmetic. Sums,
+products, quotients and roots of floats are rounded to the nearest float (IEEE 754), so that the next float in either
+direction is a bound. Sine and cosine are computed here, since libraries state no bound that holds on every machine.
 """
 
 from __future__ import annotations
@@ -193,10 +193,10 @@ def _sine_and_cosine(x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return sine and cosine of angles up to 1e6 rad, each within 2^-50 of the exact value.
 
     x = k pi/2 + r with |r| <= pi/4 (1 + 1e-9). k C, C one of the first three parts of pi/2, is exact for |k| < 2^20;
-    the first difference is exact, the other three are rounded by at most 2^-54 each, and what is left out of pi/2 is less
-    than 2^-100 k. So r is within 2^-52. The series stop at r^17 and r^18, with terms below 1e-19 left out. Of Horner's
-    sums the last two operations are rounded by at most 2^-53 each, the ones before contribute less than 2^-53: altogether
-    less than 2^-50.
+    the first difference is exact, the other three are rounded by at most 2^-54 each, and what is left out of pi/2 is
+    less than 2^-100 k. So r is within 2^-52. The series stop at r^17 and r^18, with terms below 1e-19 left out. Of
+    Horner's sums the last two operations are rounded by at most 2^-53 each, the ones before contribute less than
+    2^-53: altogether less than 2^-50.
     """
     k = np.rint(np.where(abs(x) <= _LARGEST_ANGLE, x, 0.0) * (2.0 / math.pi))
     r = np.where(abs(x) <= _LARGEST_ANGLE, x, 0.0)

@@ -58,7 +58,9 @@ def test_bounds_enclose_the_extremes_in_50_digits(crank_rocker: Certificate) -> 
     assert found.most[1] - found.most[0] < 1e-4
 
 
-@pytest.mark.parametrize("name", mostly_long(sorted({*names()} - {*SLOW}), ("crank_rocker", "fourbar", "triple_rocker", "excavator")))
+@pytest.mark.parametrize(
+    "name", mostly_long(sorted({*names()} - {*SLOW}), ("crank_rocker", "fourbar", "triple_rocker", "excavator"))
+)
 def test_the_gallery_is_certified(name: str) -> None:
     certificate = kinfmu.certify(load(name))
     reasons = [gap.reason for gap in certificate.gaps]
@@ -89,7 +91,7 @@ def test_a_dead_centre_is_enclosed_and_nothing_lies_beyond() -> None:
 
 
 @pytest.mark.parametrize("gap", [1e-3, 1e-6, 1e-9])
-def test_two_branches_that_nearly_cross_are_told_apart_or_named(gap: float) -> None:
+def test_two_branches_that_nearly_cross_are_distinguished_or_named(gap: float) -> None:
     # a parallelogram that is not one: its two branches avoid each other by about the root of the gap
     certificate = kinfmu.certify(fourbar(4.0, 2.0, 4.0 + gap, 2.0))
     u = np.array([certificate.cover.cells.low, certificate.cover.cells.high]).ravel()
@@ -107,7 +109,9 @@ def test_a_skipped_cell_is_named(crank_rocker: Certificate, monkeypatch: pytest.
     def without_one(self: Cover, x: np.ndarray, z: np.ndarray) -> Cover:
         found = whole(self, x, z)
         kept = np.arange(len(found.cells)) != 30
-        return Cover(found.cells[kept], found.tubes[kept], np.delete(found.is_joined, 30) & (np.arange(len(kept) - 2) != 29))
+        return Cover(
+            found.cells[kept], found.tubes[kept], np.delete(found.is_joined, 30) & (np.arange(len(kept) - 2) != 29)
+        )
 
     monkeypatch.setattr(Cover, "with_poses", without_one)
     certificate = kinfmu.certify(load("crank_rocker"))
@@ -124,7 +128,6 @@ def test_with_a_wrong_sign_nothing_is_enclosed(monkeypatch: pytest.MonkeyPatch) 
         test_enclosures_hold_the_poses_in_50_digits(certificate)
 
 
-
 def test_a_certificate_of_tolerances_holds_for_every_corner() -> None:
     certificate = kinfmu.certify(load("crank_rocker"), tolerances=0.001)
     assert certificate.is_complete
@@ -138,7 +141,7 @@ def test_a_certificate_of_tolerances_holds_for_every_corner() -> None:
     low, high = alone.enclosed("rocker.phi", u)
     middle = oracle.fourbar(40, 20.05, 50, 50, u).q[:, 2]
     assert all(a <= value <= b for a, value, b in zip(low, middle, high, strict=True))
-    with pytest.raises(RequestError, match="tolerance of 'crank.P': not a number of this mechanism, such as bodies"):
+    with pytest.raises(RequestError, match=r"tolerance of 'crank.P': not a number of this mechanism, such as bodies"):
         kinfmu.certify(load("crank_rocker"), tolerances={"crank.P": 0.05})
 
 
@@ -156,7 +159,9 @@ def test_check_prints_the_certificate() -> None:
     assert "certified   crank from 0 deg to 360 deg, 100 % of it" in shown.output
     shown = CliRunner().invoke(main, ["check", "fourbar", "--certify"])
     assert shown.output.count("not proved  crank = ") == 2
-    found = json.loads(CliRunner().invoke(main, ["check", "triple_rocker", "--certify", "--json"]).output)["certificate"]
+    found = json.loads(CliRunner().invoke(main, ["check", "triple_rocker", "--certify", "--json"]).output)[
+        "certificate"
+    ]
     assert found["complete"]
     assert len(found["dead_centres"]) == 2
 

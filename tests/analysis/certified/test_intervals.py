@@ -18,7 +18,20 @@ from kinfmu.solver.python.curve import curve as curve_value
 COUNT = 1500
 mp = mpmath.mp.clone()
 mp.dps = 100
-HOSTILE = (0.0, 5e-324, -5e-324, 1e-300, 1.0, math.pi, 0.5 * math.pi, -1.5 * math.pi, 1e5 * math.pi, 1e16, -1e300, 1.0 / 3.0)
+HOSTILE = (
+    0.0,
+    5e-324,
+    -5e-324,
+    1e-300,
+    1.0,
+    math.pi,
+    0.5 * math.pi,
+    -1.5 * math.pi,
+    1e5 * math.pi,
+    1e16,
+    -1e300,
+    1.0 / 3.0,
+)
 BINARY: dict[str, tuple[Callable[[Any, Any], Any], Callable[[Any, Any], Any]]] = {
     "+": (lambda a, b: a + b, lambda a, b: a + b),
     "-": (lambda a, b: a - b, lambda a, b: a - b),
@@ -40,7 +53,9 @@ def drawn(seed: int) -> Interval:
     random = np.random.default_rng(seed)
     middle = random.choice((1.0, -1.0), COUNT) * 10.0 ** random.uniform(-12, 4, COUNT)
     middle[::5] = random.choice(HOSTILE, len(middle[::5]))
-    width = np.where(random.random(COUNT) < 0.3, 0.0, 10.0 ** random.uniform(-14, 1, COUNT)) * np.maximum(abs(middle), 1e-3)
+    width = np.where(random.random(COUNT) < 0.3, 0.0, 10.0 ** random.uniform(-14, 1, COUNT)) * np.maximum(
+        abs(middle), 1e-3
+    )
     return Interval(middle - width, middle + width)
 
 
