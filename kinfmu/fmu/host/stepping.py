@@ -3,36 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinfmu.fmu.host.samples import DISCARD, ERROR
+from kinfmu.fmu.host.samples import DISCARD, ERROR, Samples
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-class Recorded(Protocol):
-    """The samples of what is stepped; now: time of its messages [s]."""
-
-    now: float
-
-    def log(self, status: int, text: str) -> None:
-        """Store a message at the current time."""
-
-    def read(self, t: float, *, is_kept: bool) -> bool:
-        """Read a sample, if it is to be kept; return False if it holds no numbers."""
-
-    def is_unreachable(self) -> bool:
-        """Return whether the mechanism is asked for an unreachable pose."""
-
-    def message(self) -> str:
-        """Return why it is unreachable."""
-
-
 def step_through(
-    samples: Recorded,
+    samples: Samples,
     t: NDArray[np.float64],
     kept: NDArray[np.int64],
     set_inputs: Callable[[int], None] | None,
