@@ -11,12 +11,11 @@ import numpy as np
 from kinfmu.errors import FmuError, RequestError, listed
 from kinfmu.fmu import description
 from kinfmu.fmu.host.input_table import InputTable, input_notes, input_table, times, undriven
-from kinfmu.fmu.host.interruption import Interruption
 from kinfmu.fmu.host.ports import Port
 from kinfmu.fmu.host.samples import Samples, own_info
 from kinfmu.fmu.host.settings import as_set, fmu_settings
 from kinfmu.fmu.host.slaves import LoadedSlave, slave
-from kinfmu.fmu.host.stepping import step_through
+from kinfmu.fmu.host.stepping import Interruption, step_through
 from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.slave.estimated_rates import Rates
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, MECHANISM, text_in, unpacked

@@ -13,12 +13,11 @@ import numpy as np
 from kinfmu.errors import FmuError, RequestError, valid_names
 from kinfmu.fmu.host.exchange import check_exchange, exchange_of, ordered
 from kinfmu.fmu.host.input_table import InputTable, table_of, times
-from kinfmu.fmu.host.interruption import Interruption
 from kinfmu.fmu.host.ports import Port
 from kinfmu.fmu.host.samples import DISCARD, ERROR, Samples, own_info
 from kinfmu.fmu.host.settings import as_set
 from kinfmu.fmu.host.slaves import require_fmpy, slave
-from kinfmu.fmu.host.stepping import step_through
+from kinfmu.fmu.host.stepping import Interruption, step_through
 from kinfmu.fmu.host.structure import STRUCTURE, Component, SystemStructure, of_fmu, of_ssp
 from kinfmu.fmu.unpacked import unpacked
 from kinfmu.mechanism import Mechanism, toml_file, toml_text
