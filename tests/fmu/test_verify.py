@@ -229,6 +229,8 @@ def test_drivers_whose_law_is_external_swing(tmp_path: Path) -> None:
     ("content", "message"),
     [
         ("a,b\n1,2\n", "has no column time; columns: a, b"),
+        ("t,coupler.x\n1,2\n", "has no column time; columns: t, coupler.x"),
+        ("time,coupler.x\n0,true\n", "row 1 after the header, column 'coupler.x': 'true'; valid are numbers"),
         ("time,b\n1,2\n", "has no output of the FMU, such as crank.phi, coupler.x, coupler.y"),
         (
             "time,coupler.x\n0,1\n1,two\n",
