@@ -34,21 +34,23 @@ DISCARD, ERROR = 2, 3  # of FMI's statuses
 _LEVELS = ("info", "warning", "error", "error", "error", "info")  # of FMI's OK, Warning, Discard, Error, Fatal, Pending
 _FORCES = ("forces", "loads", "reactions", "shaking")
 _REALS = ("values", "rates", "accelerations", "driven", "residual", "watch", *_FORCES, "margin", "errors")
+ERRORS = ("error_q", "error_qd", "error_qdd")
 _ESTIMATES = 2  # number of parts at the end that follow from the others
-_DIAGNOSTICS = {"residual": ("residual",), "margin": ("margin",), "errors": ("error_q", "error_qd", "error_qdd")}
-_NO_MOTION = Interface(
-    "",
-    "",
-    "m",
-    RunSettings(),
-    0,
-    tuple(
-        InterfacePart(
-            part, tuple(Variable(f"solver.{name}", "Real", "output", "continuous", "not solved") for name in names)
-        )
-        for part, names in _DIAGNOSTICS.items()
-    ),
-)  # of a run of signals alone
+
+
+def _unsolved(part: str, *names: str) -> InterfacePart:
+    variables = [Variable(f"solver.{name}", "Real", "output", "continuous", "of a mechanism") for name in names]
+    return InterfacePart(part, tuple(variables))
+
+
+_NO_MOTION = Interface(  # of a run of signals alone
+    name="",
+    title="",
+    length_unit="m",
+    experiment=RunSettings(),
+    coordinate_count=0,
+    parts=(_unsolved("residual", "residual"), _unsolved("margin", "margin"), _unsolved("errors", *ERRORS)),
+)
 _UNSOLVED = frozenset(("solver.iterations", *(variable.name for variable in _NO_MOTION)))
 
 
