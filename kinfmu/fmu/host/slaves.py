@@ -46,7 +46,7 @@ class RowCall:
     ) -> None:
         self._name = function
         count = c_size_t(len(references))
-        self._address = c_void_p()
+        self._address = c_void_p(rows.ctypes.data)
         variables = (c_uint * len(references))(*references)
         more = (count,) if has_value_count else ()
         self._function = _function_of(fmu, function, variables, count, self._address, *more)
@@ -55,6 +55,10 @@ class RowCall:
     def __call__(self, row: int) -> None:
         """Get or set; raise fmpy's FMICallException for a status above Warning."""
         self._address.value = self._base + row * self._stride
+        self.again()
+
+    def again(self) -> None:
+        """Get or set the row of the last call, at first the first one."""
         status = self._function()
         if status > WARNING:
             from fmpy.fmi1 import FMICallException
@@ -106,8 +110,9 @@ class LoadedSlave:
 
     def __init__(self, fmpy: Any, name: str, references: Mapping[str, int], *, is_fmi3: bool) -> None:
         self.name, self.references, self._fmpy, self._is_fmi3 = name, references, fmpy, is_fmi3
-        self._terminates = (c_bool * 1)()
-        results = (c_bool * 1)(), self._terminates, (c_bool * 1)(), (c_double * 1)()  # flags and the time reached
+        needs_event, terminates, returns_early = ((c_bool * 1)() for _ in range(3))
+        results = needs_event, terminates, returns_early, (c_double * 1)()  # the last one: the time reached
+        self._terminates = terminates if is_fmi3 else None
         more = (c_bool(True), *results) if is_fmi3 else (c_int(1),)  # the state before is not needed
         self._do_step = StepCall(fmpy, "fmi3DoStep" if is_fmi3 else "fmi2DoStep", *more)
         if references:
@@ -117,7 +122,7 @@ class LoadedSlave:
                 self._row_call(f"Get{kind}", [references[count] for count in of], row)
                 for (kind, of), row in zip(counts.items(), rows, strict=True)
             ]
-            self._counts = rows[0][0].data, rows[-1][0].data
+            self._status, self._iterations = rows[0][0].data, rows[-1][0, -1:].data
 
     def free(self) -> None:
         """Free the instance and its library.
@@ -184,9 +189,8 @@ class LoadedSlave:
     def counts(self) -> tuple[int, int]:
         """Return solver.status and solver.iterations of an FMU of kinfmu."""
         for read in self._read_counts:
-            read(0)
-        status, iterations = self._counts
-        return status[0], iterations[-1]
+            read.again()
+        return self._status[0], self._iterations[0]
 
     def message(self) -> str:
         """Return solver.message of an FMU of kinfmu."""
@@ -197,7 +201,7 @@ class LoadedSlave:
         """Step; return False if the FMU discards the step or asks to end. Raise an FmuError for any other failure."""
         status = self._do_step(time, step)
         if status <= WARNING:
-            return not self._terminates[0]
+            return self._terminates is None or not self._terminates[0]
         if status == DISCARD:
             return False
         from fmpy.fmi1 import FMICallException
