@@ -52,13 +52,10 @@ class RowCall:
         self._function = _function_of(fmu, function, variables, count, self._address, *more)
         self._rows, self._base, self._stride = rows, rows.ctypes.data, rows.strides[0]
 
-    def __call__(self, row: int) -> None:
-        """Get or set; raise fmpy's FMICallException for a status above Warning."""
-        self._address.value = self._base + row * self._stride
-        self.again()
-
-    def again(self) -> None:
-        """Get or set the row of the last call, at first the first one."""
+    def __call__(self, row: int | None = None) -> None:
+        """Get or set a row, by default that of the last call; raise fmpy's FMICallException for a failure."""
+        if row is not None:
+            self._address.value = self._base + row * self._stride
         status = self._function()
         if status > WARNING:
             from fmpy.fmi1 import FMICallException
@@ -189,7 +186,7 @@ class LoadedSlave:
     def counts(self) -> tuple[int, int]:
         """Return solver.status and solver.iterations of an FMU of kinfmu."""
         for read in self._read_counts:
-            read.again()
+            read()
         return self._status[0], self._iterations[0]
 
     def message(self) -> str:
