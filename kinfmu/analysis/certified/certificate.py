@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kinfmu.analysis.certified.bounds import ExtremeBounds, EnclosedQuantity, bounds
+from kinfmu.analysis.certified.bounds import EnclosedQuantity, ExtremeBounds, bounds
 from kinfmu.analysis.certified.cells import Prover
 from kinfmu.analysis.certified.cover import Cover, Guess, cover
 from kinfmu.analysis.certified.formulas import Formulas
