@@ -26,6 +26,7 @@ void kf_start(kf_instance *instance, bool model_exchange)
     s->time = s->last_time = kf_start_time;
     s->stop_time = DBL_MAX;
     s->mode = KF_INSTANTIATED;
+    s->committed_status = KF_INCONSISTENT;
     memcpy(s->committed_u, KF_POSE_U(&s->poses[0]), sizeof s->committed_u);
     for (k = 0; k < 3 * KF_DRIVERS; ++k) {
         s->committed_inputs[k] = s->real[k];
