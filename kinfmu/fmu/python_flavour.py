@@ -74,6 +74,8 @@ This FMU runs Python code in the process of its host. It needs:
 
 - a host process that holds Python 3.11 or newer, such as fmpy, libcosimpy or ecospy; other hosts cannot load it
 - Linux (glibc 2.32 or newer) or Windows, on x86-64
+- to be unpacked below folders named by the letters A to Z and a to z, digits, blanks, and - . _ ~ only: elsewhere
+  pythonfmu's library does not find its files, and ends the process of the host
 
 It needs no Python packages: what it imports is the standard library and the modules in resources/.
 An FMU of the same mechanism that needs none of this is the native one: kinfmu build MECH --flavour native

@@ -209,6 +209,11 @@ class Slave2(LoadedSlave):
 
         path = (folder / "resources").absolute().as_posix()
         address = f"file://{path}" if path.startswith("/") else f"file:///{path}"
+        if "%20" in path and (folder / "resources/slavemodule.txt").exists():
+            raise FmuError(
+                f"pythonfmu's library reads '%20' in '{folder.parent}' as a blank; "
+                "let TMPDIR be another folder, or build with --flavour native"
+            )
         slave = self.fmpy
         slave.callbacks = callbacks  # the binary keeps a pointer to it
         slave.component = slave.fmi2Instantiate(
