@@ -74,7 +74,9 @@ class MechanismSlave(SlaveVariables):
             if pose.good:
                 self.motion.begin(pose)
             elif not isinstance(self.solver, UnsolvableModel):
-                self.log(f"initialization fails: at t = {self.time:g} s: {pose.message}", Fmi2Status.error)
+                shifted = self.driven_by_time and self.time != self.layout.start_time
+                hint = "; laws count from t = 0 s" if shifted else ""
+                self.log(f"initialization fails: at t = {self.time:g} s: {pose.message}{hint}", Fmi2Status.error)
         except Exception as error:  # an exception here would be Fatal for the host
             self.report_defect(error)
 

@@ -102,7 +102,8 @@ kf_answer kf_exit_initialization(kf_instance *instance)
         return kf_answered(instance, KF_ERROR, "initialization fails: %s", s->solver.message);
     }
     if (!KF_GOOD(kf_ask(instance))) {
-        return kf_answered(instance, KF_ERROR, "initialization fails: at t = %g s: %s", s->time, s->message);
+        return kf_answered(instance, KF_ERROR, "initialization fails: at t = %g s: %s%s", s->time, s->message,
+                           s->driven_by_time && s->time != kf_start_time ? "; laws count from t = 0 s" : "");
     }
     if (kf_begin_motion(instance) != KF_DONE) {
         return KF_ERROR;
