@@ -38,7 +38,8 @@ def test_the_page_has_picture_law_range_wiring_and_check(built: Built) -> None:
     root = ET.fromstring(tag + rest.partition("</svg>")[0] + "</svg>")  # noqa: S314  # written by this test's FMU
     assert len(list(root)) > 20
     for words in (
-        "constant_speed: start = 90 deg, speed = 360 deg/s",
+        "constant_speed: start = 90 deg, speed = 60 rpm",  # as the file writes it
+        "<td>crank.speed</td><td>parameter</td><td>rad/s</td><td>6.283185307179586 (60 rpm)</td>",
         "<td>unlimited; no change points</td>",
         "torque of crank = <code>crank.reduced_inertia</code> &middot; acceleration + <code>crank.bias_torque</code>",
         "kinfmu verify toggle_press.fmu --results host.csv",
