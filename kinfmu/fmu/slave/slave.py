@@ -8,7 +8,6 @@ host may continue), passes messages only to hosts that instantiate with loggingO
 
 from __future__ import annotations
 
-import ctypes
 import json
 import math
 import sys
@@ -189,12 +188,3 @@ class MechanismSlave(SlaveVariables):
         if len(state) < DIGEST or sha256(data).digest() != state[:DIGEST]:
             return {}  # setting it is refused; an exception here would be Fatal for the host
         return json.loads(data)  # type: ignore[no-any-return]  # written by _fmu_state_to_bytes
-
-
-def hold(namespace: dict[str, Any]) -> None:
-    """Take a permanent reference to a module's namespace.
-
-    pythonfmu 0.7 runs the slave's module once per instance, and each time releases a reference to its namespace that it
-    does not own: without this, the third instance of a process would find the namespace freed and crash.
-    """
-    ctypes.pythonapi.Py_IncRef(ctypes.py_object(namespace))
