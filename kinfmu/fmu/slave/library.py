@@ -1,7 +1,7 @@
 """What pythonfmu 0.7's library leaves behind in the process of a host, put right from Python.
 
-For each instance the library runs the slave's module once more, and keeps the classes that it finds there. So that module
-holds one class, which another module defines, and calls `hold`.
+For each instance the library runs the slave's module once more, and keeps the classes that it finds there: that module
+imports one class, and calls `hold`.
 """
 
 from __future__ import annotations

@@ -59,6 +59,10 @@ static const struct {
 kf_answer kf_possible(const kf_instance *instance, kf_call call)
 {
     const bool is_possible = calls[call].modes >> instance->now.mode & 1u;
+    if (!kf_rounds_to_nearest() && call != KF_TERMINATE) {
+        return kf_answered(instance, KF_ERROR,
+                           "the host does not round to nearest; call fesetround(FE_TONEAREST) before the FMU");
+    }
     return is_possible ? KF_DONE : kf_answered(instance, KF_ERROR, "%s", calls[call].refusal);
 }
 
