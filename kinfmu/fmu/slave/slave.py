@@ -8,7 +8,6 @@ host may continue), passes messages only to hosts that instantiate with loggingO
 
 from __future__ import annotations
 
-import ctypes
 import json
 import math
 import sys
@@ -19,13 +18,10 @@ from typing import Any
 
 from ...solver.python import Pose, UnsolvableModel, with_parameters
 from .base import Fmi2Status
-from .estimated_rates import KEPT
+from .estimated_rates import LATE, ROUNDING, SAME_TIME, SAMPLES
 from .layout import Numbers
-from .motion import SAME_TIME
 from .variables import SlaveVariables
 
-LATE = 1e-3  # of a step: a sum of a million steps may end this late
-ROUNDING = 4.44e-16  # of a time: its last digits
 DIGEST = 32  # bytes of a SHA-256
 PLAIN = (  # attributes that are a number or a truth value: a state has them as they are
     *("driven_by_time", "rates", "initialized", "running", "touched", "stray_reported"),
@@ -74,7 +70,9 @@ class MechanismSlave(SlaveVariables):
             if pose.good:
                 self.motion.begin(pose)
             elif not isinstance(self.solver, UnsolvableModel):
-                self.log(f"initialization fails: at t = {self.time:g} s: {pose.message}", Fmi2Status.error)
+                shifted = self.driven_by_time and self.time != self.layout.start_time
+                hint = "; laws count from t = 0 s" if shifted else ""
+                self.log(f"initialization fails: at t = {self.time:g} s: {pose.message}{hint}", Fmi2Status.error)
         except Exception as error:  # an exception here would be Fatal for the host
             self.report_defect(error)
 
@@ -107,7 +105,7 @@ class MechanismSlave(SlaveVariables):
             return f"doStep from t = {t:g} s by {h:g} s: they must be finite, the step at least 0"
         if t < self.start_time - SAME_TIME * h:
             return f"doStep from t = {t!r} s: that is before the start at {self.start_time!r} s"
-        if t + h - self.stop_time > LATE * h + ROUNDING * abs(self.stop_time):
+        if t + h - self.stop_time > LATE * h + 2.0 * ROUNDING * abs(self.stop_time):
             past = f"past the stop time of the experiment, {self.stop_time:.12g} s"
             return f"doStep from t = {t:.12g} s by {h:.12g} s: {past}"
         return ""
@@ -170,7 +168,7 @@ class MechanismSlave(SlaveVariables):
         self.committed = self.solver.restore(state["committed"])
         self.committed_inputs = as_numbers(state["committed_inputs"], self.inputs)
         self.committed_loads = as_numbers(state["committed_loads"], self.committed_loads)
-        self.history = deque([(t, tuple(u)) for t, u in state["history"]], KEPT)
+        self.history = deque([(t, tuple(u)) for t, u in state["history"]], SAMPLES)
         self.motion = self.new_motion()
         self.forget()
         self.motion.restore(state["motion"])
@@ -187,12 +185,3 @@ class MechanismSlave(SlaveVariables):
         if len(state) < DIGEST or sha256(data).digest() != state[:DIGEST]:
             return {}  # setting it is refused; an exception here would be Fatal for the host
         return json.loads(data)  # type: ignore[no-any-return]  # written by _fmu_state_to_bytes
-
-
-def hold(namespace: dict[str, Any]) -> None:
-    """Take a permanent reference to a module's namespace.
-
-    pythonfmu 0.7 runs the slave's module once per instance, and each time releases a reference to its namespace that it
-    does not own: without this, the third instance of a process would find the namespace freed and crash.
-    """
-    ctypes.pythonapi.Py_IncRef(ctypes.py_object(namespace))

@@ -10,9 +10,6 @@
 #include "interface.h"
 #include "solver.h"
 
-#define KF_SAMPLES 4      /* committed ones: two for rates estimated with the current one, one more for their errors */
-#define KF_LARGEST 1e100  /* of what a host sets and of rates: the squares of larger numbers are infinite */
-#define KF_SAME_TIME 1e-9 /* of a step: hosts add up time with rounding errors, which move no pose */
 #define KF_INPUT_ORDERS 3 /* derivatives of an input that a step may follow */
 #define KF_NO_STATES "there are no continuous states and no event indicators"
 
@@ -229,6 +226,14 @@ void kf_find_errors(kf_state *state, double errors[3]);
 extern const double kf_sixth_order[3];
 double kf_largest_rate(const double *v);
 double kf_trial_step(kf_state *state);
+
+/* Return whether numbers are rounded to nearest: sines and cosines, among others, rely on it. */
+static inline bool kf_rounds_to_nearest(void)
+{
+    static const volatile double small = 1e-40; /* volatile: added when the program runs */
+    const double added = small;
+    return 1.0 + added == 1.0 - added;
+}
 
 /* Return whether a call has valid arguments: an instance, and arrays that are not NULL. */
 static inline kf_answer kf_check(const kf_instance *instance, const void *references, const void *values, size_t count)

@@ -1,7 +1,6 @@
 /* Poses: the one that is requested, and the one that is committed, from which all others are followed. */
 #include "instance.h"
 
-#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -33,7 +32,7 @@ KF_RARE kf_answer kf_bind_parameters(kf_instance *instance)
     s->unsolvable = !kf_solver_bind(&s->solver, KF_REAL(s, KF_PART_PARAMETERS));
     s->committed = s->asked = 0;
     s->poses[0] = s->solver.anchor;
-    s->committed_status = KF_OK;
+    s->committed_status = KF_INCONSISTENT; /* no pose of a solve: the solver has not judged its anchor yet */
     memcpy(s->committed_u, KF_POSE_U(&s->poses[0]), sizeof s->committed_u);
     s->samples = 0;
     kf_forget(s);
@@ -44,7 +43,7 @@ KF_RARE kf_answer kf_bind_parameters(kf_instance *instance)
 inline void kf_solve_at(kf_state *s, const double *u)
 {
     s->solver.tolerance = *KF_REAL(s, KF_PART_TOLERANCE);
-    if (!s->unsolvable && memcmp(u, s->committed_u, sizeof s->committed_u) == 0) {
+    if (KF_GOOD(s->committed_status) && memcmp(u, s->committed_u, sizeof s->committed_u) == 0) {
         s->asked = s->committed;
         s->status = s->committed_status;
         s->work = 0;
@@ -95,7 +94,7 @@ void kf_commit(kf_state *s, double t, double step)
 {
     kf_sample *sample;
     const double *const u = KF_POSE_U(&s->poses[s->asked]);
-    const double same = t - KF_SAME_TIME * step - 2.0 * DBL_EPSILON * fabs(t);
+    const double same = t - KF_SAME_TIME * step - KF_ROUNDING * fabs(t);
     while (s->samples && s->history[s->samples - 1].t >= same) { /* the host went back, or stayed */
         --s->samples;
     }
