@@ -58,7 +58,7 @@ def describe(mechanism: Mechanism, report: Report) -> dict[str, Any]:
         report: Its report, without a problem.
 
     """
-    shown = instant(mechanism)
+    shown = instant(mechanism, plan=report.plan)
     numbers = {name: k for k, name in enumerate(mechanism.body_points)}
     sliding = slides(shown)
     along = {body: iter([slide for slide in sliding if slide.holder == body]) for body in shown.poses}  # of rods
