@@ -369,7 +369,7 @@ class Prover:
             least = image[:, inside]
             short = around(np.zeros_like(least.low), 2.0 * np.array([part.magnitude[done] for part in moved]) + 1e-300)
             again, _ = self._image(block, broad, narrow, y, moved, short, done)
-            holds = (again.is_inside(short) & short.is_inside(w[:, inside])).all(axis=0)  # the only pose lies in it, too
+            holds = (again.is_inside(short) & short.is_inside(w[:, inside])).all(axis=0)  # the only pose lies in it
             least = _with_zero(
                 Intervals(np.where(holds, again.low, least.low), np.where(holds, again.high, least.high))
             )

@@ -28,6 +28,7 @@ from tests.mechanisms import fourbar
 
 CHANGE_POINTS = {"fourbar": 2, "parallel_jaw": 2}  # of which nothing is proved
 SLOW = ("fourbar_chain",)  # a hundred loops
+NOT_PROVED = "the cell from 0.498665501 to 0.598398601 is not proved"
 
 
 @pytest.fixture(scope="module")
@@ -188,8 +189,8 @@ def test_a_certificate_of_tolerances_is_proved_again(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda of: of["cells"]["path"][0][0].__setitem__(5, 9.0), "the cell from 0.498665501 to 0.598398601 is not proved"),
-        (lambda of: of["cells"]["radii"][0].__setitem__(5, 1.0), "the cell from 0.498665501 to 0.598398601 is not proved"),
+        (lambda of: of["cells"]["path"][0][0].__setitem__(5, 9.0), NOT_PROVED),
+        (lambda of: of["cells"]["radii"][0].__setitem__(5, 1.0), NOT_PROVED),
         (lambda of: [of["cells"][key].pop(5) for key in ("low", "high", "u")], "cells.path must be 3 x 2 x 62 finite"),
         (lambda of: of["states"].update(high=7.0), "its range is not that of the mechanism"),
         (lambda of: of["states"].update(turns=2), "its range is not that of the mechanism"),
@@ -219,7 +220,7 @@ def test_a_missing_cell_is_missed_when_it_is_proved_again(crank_rocker: Certific
     for row in (*content["cells"]["radii"], *(row for table in content["cells"]["path"] for row in table)):
         del row[5]
     path.write_text(json.dumps(content))
-    with pytest.raises(KinfmuError, match="0.498665501 to 0.598398601 is not proved: not proved"):
+    with pytest.raises(KinfmuError, match=r"0\.498665501 to 0\.598398601 is not proved: not proved"):
         proved_again(path)
 
 
