@@ -85,6 +85,17 @@ def page(
     report = report or check(mechanism)
     if report.problem is not None and report.plan is None:
         raise report.problem
+    data = page_data(mechanism, report)
+    drivers = [driver.name for driver in mechanism.drivers]
+    data |= {"over": over and {"driver": drivers.index(over[0]), "from": over[1], "to": over[2]}, "samples": samples}
+    if samples:
+        first, *_, last = samples["t"]
+        data["run"] = {"from": first, "to": last, "step": (last - first) / (len(samples["t"]) - 1)}
+    return page_of(data, script)
+
+
+def page_data(mechanism: Mechanism, report: Report) -> dict[str, Any]:
+    """Return the data of a page, without the solver; report: of the mechanism, with a plan."""
     as_written = page_module(mechanism)
     change = opened(mechanism)
     is_large = len(change.places) > MOST_NUMBERS
@@ -93,23 +104,23 @@ def page(
         "written": module_data(as_written, {}),
         "opened": module_data(page_module(change.mechanism, change.labels), places) if places else None,
     }
-    drivers = [driver.name for driver in mechanism.drivers]
-    data = describe(mechanism, report) | {
-        "over": over and {"driver": drivers.index(over[0]), "from": over[1], "to": over[2]},
-        "samples": samples,
+    return describe(mechanism, report) | {
+        "over": None,
+        "samples": None,
         "size": as_written.plan.size,
-        "solver": solver(),
         "modules": modules,
         "closedNumbers": len(change.places) if is_large else 0,
         "file": written_file(mechanism, as_written, places),
     }
-    if samples:
-        first, *_, last = samples["t"]
-        data["run"] = {"from": first, "to": last, "step": (last - first) / (len(samples["t"]) - 1)}
+
+
+def page_of(data: Mapping[str, Any], script: str = "") -> str:
+    """Return the HTML text of a page with its data; script: as of `page`."""
+    data = {**data, "solver": solver()}
     return _filled(
         (_WEB / "index.html").read_text("utf-8"),
         {
-            "title": html.escape(mechanism.name),
+            "title": html.escape(data["name"]),
             "style": (_WEB / "style.css").read_text("utf-8"),
             "data": packed(json.dumps(data, separators=(",", ":"), allow_nan=False).encode()),
             "script": "\n".join([*(_script(name) for name in _SCRIPTS), f"{{\n{script}\n}}"]),  # names of its own
