@@ -47,6 +47,7 @@ _SCRIPTS = (
 _EDITOR = ("editor_places", "editor_tools", "editor_sketch", "editor_session", "editor_picture", "editor_panel", "editor")
 MOST_NUMBERS = 400  # of a file that its page can change: the code of more is too long for a small page
 _IMPORT = re.compile(r"^import .*\n", re.MULTILINE)
+_NAMES = re.compile(r'^import \{ (.*) \} from "\./(\w+)\.js";$', re.MULTILINE)
 _EXPORT = re.compile(r"^export ", re.MULTILINE)
 _COMMENT = re.compile(r"^ *//.*\n", re.MULTILINE)  # a line of its own
 _INDENT = re.compile(r"^ +", re.MULTILINE)  # a tenth of a page; no text of the scripts goes over lines
@@ -153,9 +154,17 @@ def page_text(data: Mapping[str, Any], script: str = "") -> str:
 
 
 def editor_script() -> str:
-    """Return the JavaScript with which a mechanism is drawn in a page, to be part of the script of `page_text`."""
-    style = json.dumps((_WEB / "editor.css").read_text("utf-8"))
-    return "\n".join([f"const EDITOR_STYLE = {style};", *(_script(name) for name in _EDITOR)])
+    """Return the JavaScript with which a mechanism is drawn in a page, to be part of the script of `page_text`.
+
+    It is EDITOR: packed text, which makes `window.kinfmuEditor` when it runs, and the names of the page that it needs.
+    """
+    modules = {name: (_WEB / f"{name}.js").read_text("utf-8") for name in _EDITOR}
+    imports = [(names, source) for text in modules.values() for names, source in _NAMES.findall(text)]
+    names = ", ".join(sorted({name for found, source in imports if source not in modules for name in found.split(", ")}))
+    style = f"const EDITOR_STYLE = {json.dumps((_WEB / 'editor.css').read_text('utf-8'))};"
+    code = "\n".join([style, *map(_script, modules), "return Editor;"])
+    text = packed(f"window.kinfmuEditor = ({{ {names} }}) => {{\n{code}\n}};".encode())
+    return f'const EDITOR = ["{text}", {{ {names} }}];\n'
 
 
 def _script(name: str) -> str:

@@ -5,10 +5,10 @@ import { arrows } from "./marks.js";
 import { CanvasPen, THEMES } from "./pen.js";
 import { draw, fineness, foresee } from "./drawing.js";
 import { $, breakable, element } from "./elements.js";
-import { compiled, Engine, unpacked } from "./engine.js";
+import { unpacked } from "./engine.js";
 import { Frames, Motion } from "./motion.js";
 import { Hand, keyboard } from "./hand.js";
-import { Linkage } from "./linkage.js";
+import { linkageOf } from "./linkage.js";
 import { ofJoints, withStop } from "./numbers.js";
 import { PATIENCE, Spots } from "./names.js";
 import { filesPanel, Plots, showPanel } from "./panels.js";
@@ -341,21 +341,12 @@ function storedTheme() {
     return window.matchMedia?.("(prefers-color-scheme: dark)").matches ? "dark" : "light";
 }
 
-// Return the mechanism of the data of a page, with its engines.
-async function linkageOf(data, solver) {
-    const engines = {};
-    for (const [which, part] of Object.entries(data.modules)) {
-        const module = part && (await compiled(solver, part.text));
-        engines[which] = part && [await Engine.load(module), await Engine.load(module)];
-    }
-    return new Linkage(data, engines);
-}
-
 async function start() {
     try {
         const data = JSON.parse(new TextDecoder().decode(await unpacked($("data").textContent)));
         const solver = await unpacked(data.solver);
         window.kinfmu = new Page(data.modules && (await linkageOf(data, solver)), solver);
+        window.kinfmu.isEditable = data.isEditable;
         return window.kinfmu;
     } catch (error) {
         $("banner").hidden = false;
