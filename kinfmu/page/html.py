@@ -84,13 +84,13 @@ def page(
 
     """
     require_mechanism(mechanism, "page")
-    return page_text(page_data(mechanism, report=report, over=over, samples=samples), script)
+    return page_of(page_data(mechanism, report, over=over, samples=samples), script)
 
 
 def page_data(
     mechanism: Mechanism,
-    *,
     report: Report | None = None,
+    *,
     over: tuple[str, float, float] | None = None,
     samples: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
@@ -133,7 +133,7 @@ def page_data(
     return data
 
 
-def page_text(data: Mapping[str, Any], script: str = "") -> str:
+def page_of(data: Mapping[str, Any], script: str = "") -> str:
     """Return the HTML text of a page.
 
     Args:
@@ -154,7 +154,7 @@ def page_text(data: Mapping[str, Any], script: str = "") -> str:
 
 
 def editor_script() -> str:
-    """Return the JavaScript with which a mechanism is drawn in a page, to be part of the script of `page_text`.
+    """Return the JavaScript with which a mechanism is drawn in a page, to be part of the script of `page_of`.
 
     It is EDITOR: packed text, which makes `window.kinfmuEditor` when it runs, and the names of the page that it needs.
     """
