@@ -95,6 +95,7 @@ export class Editor {
         if (!this.machine && this.isPlayable) await this.#takeValues();
         this.machine = id in OF_PICTURE ? { tool: id, picks: [] } : chosen(id);
         if (id !== "move") this.chosenName = null;
+        this.tell("");
         this.#changed();
     }
 
@@ -170,7 +171,15 @@ export class Editor {
         return this.#answered(await this.session.operate(operations));
     }
 
-    undo(isRedo = false) {
+    // Return whether a step of the drawing, not of values, is the next to undo or to redo.
+    canUndo(isRedo) {
+        const { answer } = this.session;
+        const { design } = this.page;
+        const isOfValues = !this.isShown && (isRedo ? design.future : design.past).length > 0;
+        return Boolean(answer && !isOfValues && (isRedo ? answer.canRedo : answer.canUndo));
+    }
+
+    undo(isRedo) {
         this.session.next(async () => this.#answered(await this.session.step(isRedo ? "redo" : "undo")));
     }
 
@@ -208,9 +217,11 @@ export class Editor {
         const isFirst = !this.sketch;
         const wasPlayable = this.isPlayable && !isFirst;
         this.sketch = new Sketch(answer.sketch);
-        this.isPlayable = Boolean(answer.view);
-        if (!answer.badge.isComplete && page.isPlaying) page.motion.play(false);
-        if (isFirst && !this.machine) this.machine = chosen(answer.sketch.points.length ? "move" : "link");
+        this.isPlayable &&= answer.badge.isComplete;
+        if (!this.isPlayable) {
+            if (page.isPlaying) page.motion.play(false);
+            this.machine ||= chosen(answer.sketch.points.length ? "move" : "link");
+        }
         this.locked = new Set([...this.locked].filter((body) => this.sketch.body(body) >= 0));
         $("name").textContent = breakable(answer.name);
         document.title = answer.name;
@@ -226,7 +237,8 @@ export class Editor {
         this.panel.update();
         this.#changed();
         if (isFirst) page.fit();
-        if (answer.isViewComing || answer.view) this.#view(wasPlayable);
+        const isKnown = isFirst && page.linkage && answer.isSaved;
+        if (answer.isViewComing && !isKnown) this.#view(wasPlayable);
     }
 
     // Show the mechanism that moves, as soon as the server has it.
@@ -388,8 +400,7 @@ export class Editor {
         this.#highlights(pen, shown);
         if (this.machine) this.#preview(pen, shown);
         [page.handles, page.hasHidden] = [[], false];
-        const { canUndo, canRedo } = this.session.answer;
-        [$("undo").disabled, $("redo").disabled] = [!canUndo, !canRedo];
+        [$("undo").disabled, $("redo").disabled] = [!this.canUndo(false), !this.canUndo(true)];
         return true;
     }
 
@@ -487,7 +498,7 @@ export class Editor {
         if (machine.tool !== "move" || here.isKey) {
             const arm = here.isKey ? 14 : 7;
             for (const [dx, dy] of [[arm, 0], [0, arm]]) pen.line([[at[0] - dx, at[1] - dy], [at[0] + dx, at[1] + dy]], { width: 1.5, colour: theme.accent });
-            pen.text(at[0] + 14, at[1] - 14, measured(target.at, base?.at), { colour: theme.ink, size: 12, halo: theme.paper });
+            if (!base || distance(base.at, target.at)) pen.text(at[0] + 14, at[1] - 14, measured(target.at, base?.at), { colour: theme.ink, size: 12, halo: theme.paper });
         }
     }
 
@@ -719,7 +730,7 @@ export class Editor {
             });
             tools.append(button);
         }
-        header.after(tools, element("div", { id: "draw-banner", role: "alert", hidden: true }));
+        header.after(tools);
         const save = element("button", { id: "save", title: "Write the file (Ctrl+S)", textContent: "Save", hidden: true });
         save.addEventListener("click", () => this.save());
         $("reset").before(save);
@@ -727,7 +738,7 @@ export class Editor {
         button.innerHTML = `${PEN}<span>Draw</span>`;
         button.addEventListener("click", () => (this.machine && this.isPlayable ? this.leave() : this.choose(this.sketch && !this.sketch.data.points.length ? "link" : "move")));
         $("edit").before(button, element("span", { id: "badge", role: "status", hidden: true }));
-        $("stage").append(element("div", { id: "draw-bar", hidden: true }), this.#field());
+        $("stage").append(element("div", { id: "draw-banner", role: "alert", hidden: true }), element("div", { id: "draw-bar", hidden: true }), this.#field());
         const panel = element("div", { id: "draw-panel", hidden: true });
         document.querySelector("aside").append(panel);
         this.panel = new DrawPanel(this, panel);

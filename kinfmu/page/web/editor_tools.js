@@ -11,7 +11,7 @@ const onOther = (target, picks) => (moving(target).some((body) => body !== movin
 
 // Return a target as operations name a place.
 export function placeOf({ kind, point, body, at }) {
-    if (kind === "point") return { point, at };
+    if (kind === "point") return { point };
     return kind === "body" ? { body, at } : { at };
 }
 
@@ -19,7 +19,7 @@ export function placeOf({ kind, point, body, at }) {
 function ownPlace(target) {
     const [body] = moving(target);
     const point = target.points?.find((name) => name.split(".")[0] === body);
-    return point ? { point, at: target.at } : { body, at: target.at };
+    return point ? { point } : { body, at: target.at };
 }
 
 const two = (kind) => ([from, to]) => [{ do: kind, from: placeOf(from), to: placeOf(to) }];
@@ -42,7 +42,7 @@ export const TOOLS = [
         make: (targets, { option }) => [{ do: "cam", body: bodiesOf(targets)[0], follower: ownPlace({ ...targets[1], bodies: [bodiesOf(targets)[1]] }), kind: option }] },
     { id: "spring", key: "n", label: "Spring", hints: ["Click one end of the spring.", "Click its other end."], accepts: [anywhere, elsewhere], make: two("spring") },
     { id: "force", key: "f", label: "Force", hints: ["Click where the force acts.", "Click where it points."], accepts: [onLink, elsewhere], make: ([at, to]) => [{ do: "force", at: ownPlace(at), to: to.at }] },
-    { id: "interest", key: "i", label: "Point", hints: ["Click a point of a link whose path is of interest."], accepts: [onLink], make: ([at]) => [{ do: "interest", at: ownPlace(at) }] },
+    { id: "interest", key: "i", label: "Point", hints: ["Click a link that gets a point, or a pin.", "Click where the point is; it may be next to the link."], accepts: [onLink, anywhere], isEarly: (target) => target.kind === "point", options: [["interest", "Show its path"], ["corner", "Corner only"]], make: pointed },
     { id: "delete", key: "x", label: "Delete", hints: ["Click what to delete: of a pin its joint, then the pin."], accepts: [(target) => (target.kind === "free" ? "There is nothing to delete." : "")], hasMembers: true, make: ([target]) => deletions(target) },
 ];
 export const toolOf = (id) => TOOLS.find((tool) => tool.id === id);
@@ -65,7 +65,7 @@ function pinned([first, second]) {
 function sliding([from, to], { option }) {
     const own = ownPlace(from);
     const [body] = moving(from);
-    const on = moving(to).find((one) => one !== body && !from.bodies.includes(one));
+    const on = moving(to).find((one) => one !== body);
     const along = on && to.along ? to.along : vector(from, to);
     const held = on ? { on } : {};
     return [option === "block" ? { do: "slider", body, point: own.point || own, along, ...held, block: true } : { do: "slider", point: own.point || own, along, ...held }];
@@ -75,6 +75,11 @@ function slotted([pin, from, to]) {
     const own = ownPlace(pin);
     const [body] = moving(pin);
     return [{ do: "slot", point: own.point || own, body: from.bodies.find((one) => one !== body) || GROUND, from: from.at, to: to.at }];
+}
+
+function pointed([link, place], { option }) {
+    const at = place ? { body: moving(link)[0], at: place.at } : ownPlace(link);
+    return option === "interest" ? [{ do: "interest", at }] : place ? [{ do: "point", ...at }] : [];
 }
 
 // Return operations that delete what a target is.

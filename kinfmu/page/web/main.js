@@ -154,8 +154,8 @@ class Page {
         if (!this.isPlaying) this.canvas.setAttribute("aria-label", `Drawing of the mechanism at ${this.transport.pose()}. Arrow keys move the driver, space plays, question mark lists all keys.`);
         const note = linkage.leftOut.length ? `Not drawn with these values: ${linkage.leftOut.join("; ")}. The lines of kinfmu check hold for the saved file.` : "";
         if ($("note").textContent !== note) [$("note").textContent, $("note").hidden] = [note, !note]; // screen readers speak it
-        $("undo").disabled = !design.past.length;
-        $("redo").disabled = !design.future.length;
+        $("undo").disabled = !design.past.length && !this.editor?.canUndo(false);
+        $("redo").disabled = !design.future.length && !this.editor?.canUndo(true);
         $("reset").disabled = !design.changes().length;
         const head = design.isInvalid ? "Not valid: " : design.isOtherBranch ? "Another branch: " : "Does not close: ";
         if (!design.isOk) this.#banner(head, `${withStop(this.inWords(design.failure))} The last good pose is shown in grey.`);
@@ -212,10 +212,11 @@ class Page {
     }
 
     undo(isRedo = false) {
-        if (this.editor?.isShown) {
+        if (this.editor?.canUndo(isRedo)) {
             this.editor.undo(isRedo);
             return;
         }
+        if (this.editor?.isShown) return;
         this.refresh(() => {
             if (!(isRedo ? this.design.redo() : this.design.undo())) return;
             this.#taken();
