@@ -73,7 +73,7 @@ export class Editor {
     get box() {
         if (!this.isShown) return null;
         const [x0, y0, x1, y1] = this.sketch.box();
-        const least = 0.1 * Math.max(x1 - x0, y1 - y0) || 50;
+        const least = this.sketch.data.box ? 0.1 * Math.max(x1 - x0, y1 - y0) || 50 : 0;
         return [x0 - least, y0 - least, x1 + least, y1 + least];
     }
 
@@ -130,7 +130,11 @@ export class Editor {
         $("draw-tools").hidden = !this.sketch;
         $("draw-panel").hidden = !this.isShown;
         $("draw").setAttribute("aria-pressed", String(Boolean(machine)));
-        for (const button of $("draw-tools").children) button.setAttribute("aria-pressed", String(button.dataset.tool === machine?.tool));
+        for (const button of $("draw-tools").children) {
+            const isChosen = button.dataset.tool === machine?.tool;
+            if (isChosen && button.ariaPressed === "false") button.scrollIntoView({ block: "nearest", inline: "nearest" });
+            button.ariaPressed = isChosen;
+        }
         this.#bar();
         if (this.sketch) this.panel.selected();
         page.refresh();
@@ -625,7 +629,7 @@ export class Editor {
     }
 
     #openField(text) {
-        const field = $("typed");
+        const { field } = this;
         field.hidden = false;
         field.value = text;
         field.focus();
@@ -634,8 +638,7 @@ export class Editor {
 
     // Put the field for typed numbers next to the pointer; with a finger it is always in the bar.
     #placeField() {
-        const field = $("typed");
-        const { machine, here, isTouch } = this;
+        const { field, machine, here, isTouch } = this;
         const isWaiting = machine && (machine.tool !== "move" || this.selection);
         const isInBar = isTouch && isWaiting;
         if (isInBar !== (field.parentElement === $("draw-bar"))) (isInBar ? $("draw-bar") : $("stage")).append(field);
@@ -649,7 +652,7 @@ export class Editor {
     }
 
     #closeField() {
-        const field = $("typed");
+        const { field } = this;
         const isFocused = document.activeElement === field;
         field.value = "";
         field.classList.remove("wrong");
@@ -738,7 +741,8 @@ export class Editor {
         button.innerHTML = `${PEN}<span>Draw</span>`;
         button.addEventListener("click", () => (this.machine && this.isPlayable ? this.leave() : this.choose(this.sketch && !this.sketch.data.points.length ? "link" : "move")));
         $("edit").before(button, element("span", { id: "badge", role: "status", hidden: true }));
-        $("stage").append(element("div", { id: "draw-banner", role: "alert", hidden: true }), element("div", { id: "draw-bar", hidden: true }), this.#field());
+        this.field = this.#field();
+        $("stage").append(element("div", { id: "draw-banner", role: "alert", hidden: true }), element("div", { id: "draw-bar", hidden: true }), this.field);
         const panel = element("div", { id: "draw-panel", hidden: true });
         document.querySelector("aside").append(panel);
         this.panel = new DrawPanel(this, panel);

@@ -5,7 +5,7 @@ import { distance, outline, placed, seen } from "./geometry.js";
 import { grouped } from "./numbers.js";
 import { ONE_PIN } from "./editor_places.js";
 
-export const EMPTY_BOX = [-60, -60, 240, 140]; // of a drawing without anything
+export const EMPTY_BOX = [-50, -50, 190, 130]; // of a drawing without anything
 
 export class Sketch {
     // locals: places of the points in their bodies, if they are not those of the data
