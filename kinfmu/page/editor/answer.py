@@ -1,0 +1,124 @@
+"""What the page is told of a drawing: what is drawn at the start pose, the mobility, what is missing; its full data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from kinfmu.analysis import check
+from kinfmu.draw.scene.instant import Instant
+from kinfmu.errors import KinfmuError, MobilityError
+from kinfmu.page.describe import drawn
+from kinfmu.page.editor.drawing import NOBODY, Drawing
+from kinfmu.page.html import page_data
+from kinfmu.plan import SolvePlan, plan_from
+from kinfmu.plan.equations.redundancy import Redundancy
+
+
+def answer(drawing: Drawing) -> dict[str, Any]:
+    """Return what the page is told of a drawing at once."""
+    problem = _problem(drawing)
+    badge = _badge(drawing, problem)
+    return {
+        "name": drawing.mechanism.name,
+        "text": drawing.text,
+        "badge": badge,
+        "findings": _findings(drawing, problem),
+        "sketch": sketch(drawing),
+        "view": None,
+        "isViewComing": badge["isComplete"],
+    }
+
+
+def sketch(drawing: Drawing) -> dict[str, Any]:
+    """Return what is drawn at the start pose, with the keys of the data of a page; nothing of it needs a solution."""
+    mechanism, poses = drawing.mechanism, drawing.poses
+    rows = {name: np.array([pose]) for name, pose in poses.items()}
+    found = drawn(Instant(mechanism, rows, {driver.name: 1.0 for driver in mechanism.drivers}))
+    for body in found["bodies"]:
+        body["pose"] = list(poses[body["name"]])
+    for point in found["points"]:
+        point["at"] = list(drawing.at(f"{point['body']}.{point['name']}"))
+    if not drawing.has_bodies:
+        found["bodies"] = [body for body in found["bodies"] if body["name"] != NOBODY]
+        found["shapes"] = [shape for shape in found["shapes"] if shape["frame"] != NOBODY]
+    places = np.array([point["at"] for point in found["points"]]).reshape(-1, 2)
+    box = [places.min(axis=0).tolist(), places.max(axis=0).tolist()] if len(places) else None
+    return found | {"box": box, "over": None, "samples": None, "modules": None, "file": None, "closedNumbers": 0}
+
+
+def _problem(drawing: Drawing) -> KinfmuError | None:
+    """Return why a drawing cannot be solved; None if it can."""
+    if isinstance(drawing.redundancy, KinfmuError):
+        return drawing.redundancy
+    try:
+        _plan(drawing, drawing.redundancy)
+    except KinfmuError as problem:
+        return problem
+    return None
+
+
+def _plan(drawing: Drawing, redundancy: Redundancy) -> SolvePlan:
+    return plan_from(drawing.mechanism, drawing.system, drawing.origin, redundancy)
+
+
+def _badge(drawing: Drawing, problem: KinfmuError | None) -> dict[str, Any]:
+    """Return the mobility, the number of drivers, and a line on what is missing."""
+    drivers = len(drawing.mechanism.drivers)
+    redundancy = drawing.redundancy
+    if not drawing.has_bodies:
+        return {"mobility": 0, "drivers": 0, "text": "nothing drawn yet", "isComplete": False}
+    if not isinstance(redundancy, Redundancy):
+        return {"mobility": None, "drivers": drivers, "text": "cannot be solved", "isComplete": False}
+    mobility = redundancy.mobility
+    missing = mobility - drivers
+    if missing > 0:
+        text = f"{missing} more joint{'s'[: missing > 1]} or driver{'s'[: missing > 1]}"
+    elif missing < 0:
+        text = f"{-missing} driver{'s'[: missing < -1]} too many"
+    elif problem is None:
+        text = "complete" if drivers else "a structure: nothing moves"
+    else:
+        text = "does not close" if not isinstance(problem, MobilityError) else "the drivers do not determine the motion"
+    return {"mobility": mobility, "drivers": drivers, "text": text, "isComplete": problem is None and drivers > 0}
+
+
+def _findings(drawing: Drawing, problem: KinfmuError | None) -> list[dict[str, Any]]:
+    """Return lines on what is missing, with operations that would help."""
+    if not drawing.has_bodies:
+        return []
+    found: list[dict[str, Any]] = []
+    if problem is not None:
+        found.append({"kind": "problem", "text": str(problem), "edits": _help(drawing)})
+    return found
+
+
+def _help(drawing: Drawing) -> list[dict[str, Any]]:
+    """Return operations that may complete a drawing: motors of bodies that are pinned to the ground."""
+    redundancy, mechanism = drawing.redundancy, drawing.mechanism
+    if not isinstance(redundancy, Redundancy) or redundancy.mobility <= len(mechanism.drivers):
+        return []
+    driven = {body for driver in mechanism.drivers for body in driver.bodies()}
+    return [
+        {"text": f"add a motor to {body}", "operations": [{"do": "motor", "body": body}]}
+        for body in drawing.pinned_to("ground")
+        if body not in driven
+    ]
+
+
+def view(drawing: Drawing) -> dict[str, Any]:
+    """Return the data of the page of a drawing and the findings of its check.
+
+    Raises:
+        KinfmuError: It cannot be solved, or is too large for a page.
+
+    """
+    report = check(drawing.mechanism)
+    if report.problem is not None and report.plan is None:
+        raise report.problem
+    lines: Sequence[str] = report.notes
+    problem = [{"kind": "problem", "text": str(report.problem), "edits": []}] if report.problem else []
+    findings = problem + [{"kind": "note", "text": line, "edits": []} for line in lines]
+    return {"view": page_data(drawing.mechanism, report), "findings": findings}
