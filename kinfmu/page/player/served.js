@@ -7,8 +7,10 @@ started.then((page) => {
     if (page) serve(page);
 });
 
-function serve(page) {
-    takeBack(page);
+async function serve(page) {
+    if (page.isEditable) page.editor = await editorOf(page);
+    if (page.linkage) takeBack(page);
+    else page.editor.choose("link");
     const style = "padding: 10px 14px; color: var(--ink); overflow-wrap: anywhere; font-size: 14px; ";
     const line = element("div", { id: "file-problem", role: "alert", hidden: true });
     line.style = `${style}border-bottom: 1px solid var(--bad); background: var(--bad-back)`;
@@ -21,12 +23,15 @@ function serve(page) {
         line.hidden = !text;
         busy.hidden = !isBusy;
     };
-    const buttons = serverButtons(page);
+    let buttons = [];
+    page.whenTaken = () => (buttons = serverButtons(page));
+    if (page.linkage) page.whenTaken();
     const states = new EventSource("changes");
     states.addEventListener("state", (event) => {
-        const { version, problem, isBusy } = JSON.parse(event.data);
+        const { version, problem, isBusy, editor } = JSON.parse(event.data);
         buttons.forEach((button) => (button.disabled = false));
-        if (version !== SERVED) {
+        if (page.editor?.sketch) page.editor.follow(editor);
+        else if (version !== SERVED) {
             keep(page);
             location.reload();
         } else tell(problem && `The file cannot be used as it is: ${problem}`, isBusy);
@@ -36,6 +41,13 @@ function serve(page) {
         tell("kinfmu play has ended. This page goes on working; it no longer follows the file.");
     });
     window.addEventListener("pagehide", () => states.close());
+}
+
+// Return the editor, whose script is packed: pages of many mechanisms stay small.
+async function editorOf(page) {
+    const [text, names] = EDITOR;
+    document.head.append(element("script", { textContent: new TextDecoder().decode(await unpacked(text)) }));
+    return new (window.kinfmuEditor(names))(page);
 }
 
 // ---- FMU and file

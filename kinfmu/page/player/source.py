@@ -12,7 +12,7 @@ from kinfmu.files import suffix_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.gallery import load
 from kinfmu.page.editor import Drawing, Session, sketch
-from kinfmu.page.html import page_data, page_of
+from kinfmu.page.html import editor_script, page_data, page_of
 
 PERIOD = 0.2  # [s] between two looks at the file
 _SCRIPT = Path(__file__).with_name("served.js")
@@ -202,4 +202,6 @@ class PlaySource:
         return drawing.mechanism, self._page_of(sketch(drawing))
 
     def _page_of(self, data: dict[str, Any]) -> str:
-        return page_of(data | {"isEditable": self.path is not None}, _SCRIPT.read_text("utf-8"))
+        is_editable = self.path is not None
+        script = (editor_script() if is_editable else "") + _SCRIPT.read_text("utf-8")
+        return page_of(data | {"isEditable": is_editable}, script)
