@@ -3,6 +3,7 @@
 import { draw } from "./drawing.js";
 import { $, breakable, element } from "./elements.js";
 import { distance, placed } from "./geometry.js";
+import { mechanismFile } from "./exports.js";
 import { linkageOf } from "./linkage.js";
 import { CanvasPen, css, GREY, edgeOf, fillOf } from "./pen.js";
 import { Spots } from "./names.js";
@@ -40,6 +41,7 @@ const KEYS = [
     ["Digits", "type a length, a length &lt; angle in degrees, or x, y; <kbd>Enter</kbd> accepts it"],
     ["<kbd>Alt</kbd>, <kbd>Shift</kbd> with a click", "nothing snaps; links snap to steps of 15\u00b0"],
     ["<kbd>Esc</kbd>", "leaves a link half-way, then the tool"],
+    ["<kbd>Space</kbd>, <kbd>V</kbd>", "play the mechanism; draw again"],
     ["<kbd>Del</kbd>, <kbd>Ctrl</kbd>+<kbd>S</kbd>, <kbd>Home</kbd>", "delete what is selected, save, fit to view"],
     ["Middle button, or two fingers", "move the view"],
 ];
@@ -118,9 +120,13 @@ export class Editor {
         });
     }
 
+    // Take the values that were set while the mechanism moved into the drawing.
     async #takeValues() {
-        const values = Object.fromEntries(this.page.design.changes());
-        if (Object.keys(values).length) await this.operate([{ do: "values", values }]);
+        const { design, linkage } = this.page;
+        const values = Object.fromEntries(design.changes());
+        if (!Object.keys(values).length) return;
+        const { status } = await this.session.operate([{ do: "values", values }]);
+        if (status !== 200) await this.operate([{ do: "replace", text: mechanismFile(linkage, design) }]);
     }
 
     #changed() {
@@ -580,9 +586,9 @@ export class Editor {
             }
             const { target } = event;
             const isField = target.closest?.("input, select, textarea, dialog[open], pre");
-            if (isField || event.ctrlKey || event.metaKey || !this.isShown) return;
+            if (isField || event.ctrlKey || event.metaKey) return;
             const isButton = target.closest?.("button, summary");
-            const act = this.#actOf(event.key, key, event, isButton);
+            const act = this.isShown ? this.#actOf(event.key, key, event, isButton) : key === "v" && (() => this.choose("move")); // other letters are those of the page
             if (!act) return;
             event.preventDefault();
             event.stopImmediatePropagation();
@@ -640,7 +646,7 @@ export class Editor {
     #placeField() {
         const { field, machine, here, isTouch } = this;
         const isWaiting = machine && (machine.tool !== "move" || this.selection);
-        const isInBar = isTouch && isWaiting;
+        const isInBar = Boolean(isTouch && isWaiting);
         if (isInBar !== (field.parentElement === $("draw-bar"))) (isInBar ? $("draw-bar") : $("stage")).append(field);
         if (document.activeElement !== field && !field.value) field.hidden = !isInBar;
         field.placeholder = machine && baseOf2(machine) ? "length < angle" : "x, y";

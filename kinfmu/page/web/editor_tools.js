@@ -68,7 +68,7 @@ function sliding([from, to], { option }) {
     const on = moving(to).find((one) => one !== body);
     const along = on && to.along ? to.along : vector(from, to);
     const held = on ? { on } : {};
-    return [option === "block" ? { do: "slider", body, point: own.point || own, along, ...held, block: true } : { do: "slider", point: own.point || own, along, ...held }];
+    return [{ do: "slider", point: own.point || own, along, ...held, ...(option === "block" ? { block: true } : {}) }];
 }
 
 function slotted([pin, from, to]) {
