@@ -126,7 +126,7 @@ class Drawing:
         x, y = self.origin
         rows = (self._drawn.reshape(-1, 3) + np.array([x, y, 0.0])).tolist()
         poses = {body.name: tuple(row) for body, row in zip(self.mechanism.moving_bodies, rows, strict=True)}
-        return {GROUND_NAME: (0.0, 0.0, 0.0), **poses}  # type: ignore[dict-item]  # rows have three numbers
+        return {GROUND_NAME: (0.0, 0.0, 0.0), **poses}
 
     @property
     def _drawn(self) -> Any:

@@ -40,7 +40,7 @@ def move(pen: Pen, values: Arguments) -> None:
     to = values.spot("to")
     kept = []
     if values.has("keep"):
-        for pair in values.list("keep"):
+        for pair in values.entries("keep"):
             if not isinstance(pair, list) or len(pair) != 2 or not all(isinstance(one, str) for one in pair):
                 raise values.wrong("keep", "a list of pairs of points")
             kept.append([pen.drawing.point(one, f"{values.name}: keep") for one in pair])
@@ -66,8 +66,8 @@ def _kept(pen: Pen, values: Arguments, point: str, to: Spot, kept: list[list[str
     circles: dict[Spot, float] = {}
     for a, b in kept:
         if (a in moved) != (b in moved):
-            centre, end = (b, a) if a in moved else (a, b)
-            circles.setdefault(pen.spot(centre), math.dist(pen.spot(centre), pen.spot(end)))
+            fixed, end = map(pen.spot, (b, a) if a in moved else (a, b))
+            circles.setdefault(fixed, math.dist(fixed, end))
     if len(circles) > 2:
         raise values.error(f"{point} is held by {len(circles)} lengths that stay, so it cannot move; release one")
     if not circles:
@@ -80,7 +80,8 @@ def _kept(pen: Pen, values: Arguments, point: str, to: Spot, kept: list[list[str
             return spot
         part = radius / away
         return centre[0] + part * (to[0] - centre[0]), centre[1] + part * (to[1] - centre[1])
-    (other, _), d_x, d_y = others[0], others[0][0][0] - centre[0], others[0][0][1] - centre[1]
+    other = others[0][0]
+    d_x, d_y = other[0] - centre[0], other[1] - centre[1]
     across = 2.0 * ((spot[0] - centre[0]) * -d_y + (spot[1] - centre[1]) * d_x) / math.dist(centre, other) ** 2
     mirrored = spot[0] + across * d_y, spot[1] - across * d_x
     return min(spot, mirrored, key=lambda place: math.dist(place, to))  # two lengths allow these two places

@@ -72,13 +72,13 @@ class Arguments:
 
     def spot(self, key: str) -> Spot:
         """Return a place or a vector (x, y) in the world."""
-        found = self.list(key, "two numbers [x, y]")
+        found = self.entries(key, "two numbers [x, y]")
         numbers = [_number(value) for value in found]
         if len(numbers) != 2 or numbers[0] is None or numbers[1] is None:
             raise self.wrong(key, "two numbers [x, y]")
         return numbers[0], numbers[1]
 
-    def list(self, key: str, valid: str = "a list") -> list[Any]:
+    def entries(self, key: str, valid: str = "a list") -> list[Any]:
         """Return a list."""
         value = self.any(key)
         if not isinstance(value, list):
@@ -88,7 +88,7 @@ class Arguments:
     def texts(self, key: str, length: int | None = None) -> list[str]:
         """Return a list of texts."""
         valid = "a list of texts" if length is None else f"a list of {length} texts"
-        found = self.list(key, valid)
+        found = self.entries(key, valid)
         if not found or any(not isinstance(one, str) for one in found) or (length or len(found)) != len(found):
             raise self.wrong(key, valid)
         return found
@@ -180,9 +180,8 @@ class Pen:
 
     def letter(self, others: Iterable[str] = ()) -> str:
         """Return the next letter that no point and no member has as its name, and that is not one of others."""
-        taken = (
-            {*others} | self.names() | {point for body in self._bodies().values() for point in body.get("points", {})}
-        )
+        of_bodies = (point for body in self._bodies().values() for point in body.get("points", {}))
+        taken = {*others, *self.names(), *of_bodies}
         letters = (f"{letter}{k}" for k, letter in product(["", *range(1, 10_000)], ascii_uppercase))
         return next(letter for letter in letters if letter not in taken)
 
@@ -247,6 +246,7 @@ class Pen:
         values = Arguments(given)
         if values.has("point"):
             point = self.drawing.point(values.text("point"), f"{values.name}: point")
+            values.has("at")  # where the point was seen
             values.finish()
             return point, self.drawing.at(point)
         spot = values.spot("at")

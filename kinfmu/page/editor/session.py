@@ -265,7 +265,7 @@ class Session:
         return self._drawings[name]
 
     def _on_disk(self) -> tuple[str, str | None]:
-        """Return the digest and the text of the file, "" and None if there is none; of what is no text only a digest."""
+        """Return the digest and the text of the file, "" and None without a file; of what is no text only a digest."""
         try:
             data = self.path.read_bytes()
         except FileNotFoundError:

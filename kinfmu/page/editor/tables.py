@@ -27,7 +27,7 @@ _WITH_POINTS = ("density", "areal_density", "thickness", "width")
 
 def set_value(pen: Pen, values: Arguments) -> None:
     """Put a value at a place; the last key may be the number of an entry of a list."""
-    place = values.list("place")
+    place = values.entries("place")
     value = _value(values, "value", values.any("value"))
     *tables, last = _place(values, "place", place, with_number=True)
     if isinstance(last, int):
@@ -41,7 +41,7 @@ def set_value(pen: Pen, values: Arguments) -> None:
 
 def edit(pen: Pen, values: Arguments) -> None:
     """Make edits that are given as values: {put, value} and {remove}."""
-    for one in values.list("edits"):
+    for one in values.entries("edits"):
         if not isinstance(one, dict) or one.keys() not in ({"put", "value"}, {"remove"}):
             raise values.wrong("edits", "a list of {put, value} and {remove}")
         if "put" in one:
@@ -92,7 +92,8 @@ def _at(document: Any, place: Iterable[str]) -> Any:
 def references(member: Any) -> set[str]:
     """Return the points and bodies that a joint, driver, load or measured quantity names."""
     found: set[str] = set()
-    for key in keys_of(type(member)):
+    cls: object = type(member)  # object: mypy does not take type[Any] for hashable
+    for key in keys_of(cls):
         value = getattr(member, key.name)
         if isinstance(value, PoseQuantity):
             found |= references(value)
@@ -103,7 +104,7 @@ def references(member: Any) -> set[str]:
 
 def delete(drawing: Drawing, values: Arguments) -> Drawing:
     """Remove a place with all that depends on it."""
-    place = _place(values, "place", values.list("place"))
+    place = _place(values, "place", values.entries("place"))
     if _at(drawing.document, place) is None:
         raise values.error(f"{'.'.join(place)} is not in the file")
     pen = Pen(drawing)
@@ -145,7 +146,7 @@ def _remove_dependents(pen: Pen, body: str, point: str) -> None:
 
 def rename(drawing: Drawing, values: Arguments) -> Drawing:
     """Give a member or a point another name, also where it is named."""
-    place = _place(values, "place", values.list("place"))
+    place = _place(values, "place", values.entries("place"))
     name = values.text("name")
     check_name("name", name)
     is_point = len(place) == 4 and place[0] == "bodies" and place[2] == "points"
@@ -195,14 +196,14 @@ def _rename_references(pen: Pen, place: Place, name: str) -> None:
         found = _at(document, at)
         if isinstance(found, str) and change(found) != found:
             pen.put(at, change(found))
-        elif (
-            isinstance(found, list)
-            and (texts := [change(one) if isinstance(one, str) else one for one in found]) != found
-        ):
-            pen.put(at, texts)
+        elif isinstance(found, list):
+            texts = [change(one) if isinstance(one, str) else one for one in found]
+            if texts != found:
+                pen.put(at, texts)
 
     def look(at: Place, member: Any) -> None:
-        for key in keys_of(type(member)):
+        cls: object = type(member)
+        for key in keys_of(cls):
             value = getattr(member, key.name)
             kind = key.refers.kind if key.refers is not None else ""
             if isinstance(value, PoseQuantity):

@@ -32,8 +32,7 @@ def edited_text(text: str, document: Mapping[str, Any], edits: Iterable[Edit]) -
 
     def edit(written: Any, of_tables: tuple[str, ...]) -> None:
         for one in edits:
-            is_put = isinstance(one, Put)
-            apply(written, Put(one.place, _item(one.place, one.value, of_tables)) if is_put else one)
+            apply(written, Put(one.place, _item(one.place, one.value, of_tables)) if isinstance(one, Put) else one)
 
     try:
         return _rewritten(text, wanted, lambda written: edit(written, _OF_TABLES))

@@ -1,4 +1,4 @@
-"""The server of `kinfmu play`: a page, the changes of its file, its drawing, and FMUs with lengths that the page has set.
+"""The server of `kinfmu play`: a page, the changes of its file, its drawing, and FMUs with the lengths as set.
 
 Only programs of this machine reach it, and only with the token in its address. Requests of pages of other sites are
 refused: by their Origin, by the browser's Sec-Fetch-Site, and by their Host, which differs if a foreign host name

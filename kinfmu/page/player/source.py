@@ -41,8 +41,8 @@ class PlaySource:
     """A mechanism and its page, made again when its file changes.
 
     Args:
-        name: A name of the gallery, which is not watched, or a mechanism file (.toml). A file that is drawn in part only
-            has a page in which it can be drawn further.
+        name: A name of the gallery, which is not watched, or a mechanism file (.toml). A file that is drawn in part
+            only has a page in which it can be drawn further.
         is_new: True for a file that is not there yet: an empty drawing.
 
     Raises:
