@@ -26,15 +26,20 @@ async function serve(page) {
     let buttons = [];
     page.whenTaken = () => (buttons = serverButtons(page));
     if (page.linkage) page.whenTaken();
+    let wasBusy = false;
     const states = new EventSource("changes");
     states.addEventListener("state", (event) => {
         const { version, problem, isBusy, editor } = JSON.parse(event.data);
         buttons.forEach((button) => (button.disabled = false));
-        if (page.editor?.sketch) page.editor.follow(editor);
+        const isDrawn = Boolean(page.editor?.sketch);
+        if (isDrawn) page.editor.follow(editor, wasBusy && !isBusy);
         else if (version !== SERVED) {
             keep(page);
             location.reload();
-        } else tell(problem && `The file cannot be used as it is: ${problem}`, isBusy);
+            return;
+        }
+        wasBusy = isBusy;
+        tell(problem && `The file cannot be used as it is: ${problem}`, isBusy && !isDrawn);
     });
     states.addEventListener("error", () => {
         buttons.forEach((button) => (button.disabled = true));

@@ -113,10 +113,10 @@ export class Editor {
         if (message) this.tell(message);
     }
 
-    // Draw a state that another window or program has made.
-    follow(state) {
+    // Draw what another window or program has made: the number of the drawing's state; isFile: its file was read again.
+    follow(state, isFile) {
         this.session.next(async () => {
-            if (state && state !== this.session.state) await this.open();
+            if (isFile || (state && state !== this.session.state)) await this.open();
         });
     }
 
@@ -177,7 +177,11 @@ export class Editor {
     }
 
     // Make operations after those that wait; return whether they were made.
-    async operate(operations) {
+    operate(operations) {
+        return this.session.next(() => this.#operate(operations));
+    }
+
+    async #operate(operations) {
         return this.#answered(await this.session.operate(operations));
     }
 
@@ -225,6 +229,8 @@ export class Editor {
     #take(answer) {
         const { page } = this;
         const isFirst = !this.sketch;
+        const isOther = answer.state !== this.shownState;
+        this.shownState = answer.state;
         const wasPlayable = this.isPlayable && !isFirst;
         this.sketch = new Sketch(answer.sketch);
         this.isPlayable &&= answer.badge.isComplete;
@@ -248,7 +254,7 @@ export class Editor {
         this.#changed();
         if (isFirst) page.fit();
         const isKnown = isFirst && page.linkage && answer.isSaved;
-        if (answer.isViewComing && !isKnown) this.#view(wasPlayable);
+        if (answer.isViewComing && isOther && !isKnown) this.#view(wasPlayable);
     }
 
     // Show the mechanism that moves, as soon as the server has it.
@@ -315,7 +321,7 @@ export class Editor {
         if (refusal) this.#bar(refusal);
         if (!operations.length) return;
         this.isDrawn = true;
-        const isMade = await this.operate(operations);
+        const isMade = await this.#operate(operations);
         if (this.machine?.tool !== state.tool) return;
         const [last] = state.picks;
         this.machine = { ...this.machine, number: null, picks: isMade && last ? [hit(this.sketch, last.at, ONE_PIN * this.sketch.size)] : [] };
@@ -410,6 +416,7 @@ export class Editor {
         this.#highlights(pen, shown);
         if (this.machine) this.#preview(pen, shown);
         [page.handles, page.hasHidden] = [[], false];
+        if (this.isPlayable) page.transport.update();
         [$("undo").disabled, $("redo").disabled] = [!this.canUndo(false), !this.canUndo(true)];
         return true;
     }
@@ -564,7 +571,7 @@ export class Editor {
         const { machine, here } = this;
         const drag = this.#drag();
         if (machine.tool === "move" && !machine.picks.length) {
-            if (drag && pressed.isMoved) this.session.next(() => this.operate([{ do: "move", point: drag.point, to: drag.to }]));
+            if (drag && pressed.isMoved) this.operate([{ do: "move", point: drag.point, to: drag.to }]);
             else if (!pressed.isMoved) this.click(here);
             return;
         }
@@ -768,6 +775,7 @@ function baseOf2(machine) {
 
 function lock(pen, [x, y], theme) {
     const style = { width: 1.5, colour: theme.ink };
+    pen.circle(x, y, 11, { ...style, width: 1, fill: theme.paper });
     pen.line(Array.from({ length: 9 }, (_, k) => [x - 3 * Math.cos((Math.PI * k) / 8), y - 3 - 3 * Math.sin((Math.PI * k) / 8)]), style);
     pen.line([[x - 5, y - 2], [x + 5, y - 2], [x + 5, y + 5], [x - 5, y + 5]], { ...style, fill: theme.paper, closed: true });
 }
