@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ import numpy as np
 from kinfmu.errors import KinfmuError, MechanismError, suggestion
 from kinfmu.mechanism import Mechanism, Point
 from kinfmu.mechanism.body import GROUND_NAME
-from kinfmu.mechanism.edits import Edit
+from kinfmu.mechanism.edits import Edit, Put
 from kinfmu.mechanism.joints import Revolute
 from kinfmu.mechanism.quantities.placement import BodyFrame, Placement, body_of, unit_vector
 from kinfmu.mechanism.repeats import expanded
@@ -26,7 +27,7 @@ from kinfmu.plan import localized
 from kinfmu.plan.equations.closing import CLOSED, close
 from kinfmu.plan.equations.part import Part
 from kinfmu.plan.equations.redundancy import Redundancy, find_redundancy
-from kinfmu.plan.equations.start_poses import law_targets, start_from_poses
+from kinfmu.plan.equations.start_poses import is_in_world_coordinates, law_targets, start_from_poses
 from kinfmu.plan.equations.system import System
 
 AS_DRAWN = 1e-9  # of the size; start poses that close this well are the drawn poses, to the bit
@@ -92,6 +93,24 @@ class Drawing:
 
         """
         return Drawing.of(edited_text(self.text, self.document, edits), self.folder)
+
+    def started_at(self, poses: Mapping[str, Pose]) -> Drawing:
+        """Return the drawing with start poses in its file for the bodies that are elsewhere than in these poses."""
+        allowed = AS_DRAWN * max(1.0, self.size)
+        bodies = self.document.get("bodies", {})
+        edits = [
+            Put(("bodies", name, "start"), _start_table(poses[name]))
+            for name, pose in self.poses.items()
+            if name in poses and name in bodies and math.dist(pose, poses[name]) > allowed
+        ]
+        return self.with_edits(edits) if edits else self
+
+    def started_as_drawn(self) -> Drawing:
+        """Return the drawing with the drawn poses as start poses, if its points are in coordinates of the world."""
+        if not is_in_world_coordinates(self.mechanism) or not any(map(any, self.poses.values())):
+            return self
+        moved = ((name, pose) for name, pose in self.poses.items() if any(pose) and name in self.document["bodies"])
+        return self.with_edits(Put(("bodies", name, "start"), _start_table(pose)) for name, pose in moved)
 
     @property
     def has_bodies(self) -> bool:
@@ -205,8 +224,25 @@ class Drawing:
         return found
 
 
+def _start_table(pose: Pose) -> dict[str, Any]:
+    x, y, phi = pose
+    return {"x": written_number(x), "y": written_number(y), "phi": written_angle(phi)}
+
+
 def new_text(name: str) -> str:
     """Return the text of a file in which nothing is drawn yet; name: of the mechanism, made valid."""
     valid = re.sub(r"\W", "_", name, flags=re.ASCII)[:100] or "mechanism"
     valid = valid if not valid[0].isdigit() else f"_{valid}"[:100]
     return f'name = "{valid}"\n\n[units]\nlength = "mm"\n\n[bodies.ground]\npoints = {{}}\n'
+
+
+def written_number(value: float) -> float | int:
+    """Return a number as it is written: with at most 15 digits, a whole number without a point."""
+    value = float(f"{value:.15g}")
+    return int(value) if value == int(value) and abs(value) < 1e15 else value
+
+
+def written_angle(angle: float) -> str:
+    """Return an angle [rad] as it is written, in degrees."""
+    degrees = float(f"{math.degrees(angle):.12g}")
+    return f"{written_number(degrees)} deg"

@@ -9,7 +9,6 @@ from typing import Any
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism.drivers import Driver
 from kinfmu.mechanism.edits import Place
-from kinfmu.mechanism.expression import Computed
 from kinfmu.mechanism.joints import (
     CamFlatFace,
     CamRoller,
@@ -22,14 +21,11 @@ from kinfmu.mechanism.joints import (
 )
 from kinfmu.mechanism.joints.joint import Joint
 from kinfmu.mechanism.laws import ConstantValue, Law, Polynomial
-from kinfmu.mechanism.members import path_text
-from kinfmu.mechanism.number import given_unit
+from kinfmu.mechanism.members import LENGTH
 from kinfmu.mechanism.quantities.placement import Placement, body_of
 from kinfmu.page.editor.drawing import Spot
-from kinfmu.page.editor.pen import Arguments, Pen, written_number
-from kinfmu.units import Quantity, factors
+from kinfmu.page.editor.pen import Arguments, Pen
 
-_LENGTH = Quantity("length")
 _KEYS = {Distance: "length", Coordinate: "value", RackAndPinion: "offset", CamTranslating: "offset"}
 _CHANGED = 1e-12  # of the size; numbers that differ by less stay as they are written
 
@@ -149,25 +145,10 @@ def _put_point(pen: Pen, point: str, spot: Spot) -> None:
     if any(value is not was for value, was in zip(values, old, strict=True)):
         written = pen.document["bodies"][body]["points"][name]
         new = [
-            written[k] if value is was else _written(pen, (*place, str(k)), was, value)
+            written[k] if value is was else pen.written((*place, k), was, value, LENGTH)
             for k, (value, was) in enumerate(zip(values, old, strict=True))
         ]
         pen.put(place, new)
-
-
-def _written(pen: Pen, place: Place, old: Any, value: float) -> Any:
-    """Return a length as it is written in the place of an older one: in the same unit.
-
-    Raises:
-        MechanismError: The older one follows from parameters.
-
-    """
-    if isinstance(old, Computed):
-        where = path_text(place)
-        raise MechanismError(f'{where} is "{old.expression.text}": set its parameters, or put a number there first')
-    unit = given_unit(old)
-    factor = factors(_LENGTH, pen.drawing.mechanism.length_unit).get(unit)
-    return written_number(value) if factor is None else f"{written_number(value / factor)} {unit}"
 
 
 def _follow(pen: Pen, local: Mapping[str, Spot]) -> None:
@@ -193,7 +174,7 @@ def _follow(pen: Pen, local: Mapping[str, Spot]) -> None:
 
 def _shift(pen: Pen, place: Place, old: Any, by: float) -> None:
     if abs(by) > _CHANGED * pen.drawing.size:
-        pen.put(place, _written(pen, place, old, float(old) + by))
+        pen.put(place, pen.written(place, old, float(old) + by, LENGTH))
 
 
 def _shift_law(pen: Pen, owner: Place, law: Law, by: float) -> None:
@@ -202,7 +183,7 @@ def _shift_law(pen: Pen, owner: Place, law: Law, by: float) -> None:
         _shift(pen, (*owner, "level"), law.level, by)
     elif isinstance(law, Polynomial):
         if abs(by) > _CHANGED * pen.drawing.size:
-            first = _written(pen, (*owner, "coefficients"), law.coefficients[0], float(law.coefficients[0]) + by)
+            first = pen.written((*owner, "coefficients"), law.coefficients[0], float(law.coefficients[0]) + by, LENGTH)
             table: Any = pen.document
             for key in owner:
                 table = table[key]

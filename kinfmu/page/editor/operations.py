@@ -24,9 +24,17 @@ from kinfmu.page.editor.parts import (
     spring,
 )
 from kinfmu.page.editor.pen import Arguments, Pen
-from kinfmu.page.editor.tables import delete, edit, rename, set_value
+from kinfmu.page.editor.tables import delete, edit, rename, set_numbers, set_value
 
+_THAT_MOVE = ("move", "length", "pin")  # points; bodies stay where they are
 MOST_OPERATIONS = 1000  # in one request
+
+
+def _replace(drawing: Drawing, values: Arguments) -> Drawing:
+    """Return the drawing of another text; name: of the file that it comes from."""
+    values.text("name", "")
+    return Drawing.of(values.text("text"), drawing.folder)
+
 
 _OPERATIONS: dict[str, Callable[[Pen, Arguments], None]] = {
     "bar": bar,
@@ -45,12 +53,15 @@ _OPERATIONS: dict[str, Callable[[Pen, Arguments], None]] = {
     "move": move,
     "length": length,
     "set": set_value,
+    "values": set_numbers,
+    "name": lambda pen, values: pen.put(("name",), values.text("name")),
+    "units": lambda pen, values: pen.put(("units", "length"), values.text("length")),
     "edit": edit,
 }
 _WHOLE: dict[str, Callable[[Drawing, Arguments], Drawing]] = {  # of the text, not only of its tables
     "rename": rename,
     "delete": delete,
-    "replace": lambda drawing, values: Drawing.of(values.text("text"), drawing.folder),
+    "replace": _replace,
 }
 
 
@@ -86,4 +97,7 @@ def _after(drawing: Drawing, operation: object) -> Drawing:
     pen = Pen(drawing)
     _OPERATIONS[name](pen, values)
     values.finish()
-    return drawing.with_edits(pen.edits)
+    after = drawing.with_edits(pen.edits)
+    if name in _THAT_MOVE:
+        return after.started_at(drawing.poses)
+    return after.started_as_drawn() if name == "values" else after

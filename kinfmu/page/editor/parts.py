@@ -9,9 +9,9 @@ from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.drivers import AngleDriver, RelativeAngleDriver
 from kinfmu.mechanism.quantities.placement import body_of, point_of
 from kinfmu.mechanism.valid import check_name, quoted
-from kinfmu.page.editor.drawing import Spot
+from kinfmu.page.editor.drawing import Spot, written_angle, written_number
 from kinfmu.page.editor.moving import carry
-from kinfmu.page.editor.pen import Arguments, Pen, written_angle, written_number, written_spot
+from kinfmu.page.editor.pen import Arguments, Pen, written_spot
 
 _RUN = {"start": 0, "stop": 2, "step": 0.01}  # [s], of files without a run: one turn of a motor
 _SPEED = "30 rpm"
@@ -128,13 +128,13 @@ def _add_run(pen: Pen) -> None:
 
 def slider(pen: Pen, values: Arguments) -> None:
     """Let a point slide along a line of the ground or of another body; as a block, without turning."""
-    moved = pen.drawing.point(values.text("point"), f"{values.name}: point")
     holder = pen.body(values.text("on", GROUND_NAME))
     along, is_block = values.spot("along"), values.truth("block")
+    moved = _point_of_body(pen, values)
     if body_of(moved) == holder:
         raise values.error(f"{moved} is a point of {holder}; a slide is between two bodies")
     at = pen.add_point(holder, pen.spot(moved), point_of(moved))
-    if at in pen.drawing.pins[moved]:
+    if at in pen.drawing.pins.get(moved, ()):
         raise values.error(f"{moved} is pinned to {at}; delete that joint first")
     line = {"between": [at, moved], "axis": _axis(pen, values, holder, along)}
     if is_block:
@@ -157,9 +157,17 @@ def _turned(angle: float) -> float:
     return angle if -math.pi <= angle <= math.pi else math.remainder(angle, math.tau)
 
 
+def _point_of_body(pen: Pen, values: Arguments) -> str:
+    """Return the point that slides: a point of a body, or a new one."""
+    moved, _ = pen.target(values.target("point"))
+    if moved is None:
+        raise values.error("its point must be on a body")
+    return moved
+
+
 def slot(pen: Pen, values: Arguments) -> None:
     """Let a point run in a slot of a body, which is moved onto the point."""
-    moved = pen.drawing.point(values.text("point"), f"{values.name}: point")
+    moved = _point_of_body(pen, values)
     body, a, b = pen.body(values.text("body")), values.spot("from"), values.spot("to")
     if body_of(moved) == body:
         raise values.error(f"{moved} is a point of {body}; a slot is in another body")

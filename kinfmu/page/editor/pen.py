@@ -11,10 +11,14 @@ from typing import Any
 from kinfmu.errors import MechanismError, suggestion
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.edits import Edit, Place, Put, Remove, apply, edited
+from kinfmu.mechanism.expression import Computed
+from kinfmu.mechanism.members import NumberPath, path_text
+from kinfmu.mechanism.number import given_unit
 from kinfmu.mechanism.quantities.placement import body_of, point_of
 from kinfmu.mechanism.repeats import expanded
 from kinfmu.mechanism.valid import LARGEST_NUMBER, quoted
-from kinfmu.page.editor.drawing import Drawing, Spot
+from kinfmu.page.editor.drawing import Drawing, Spot, written_number
+from kinfmu.units import Quantity, factors
 
 TABLES = ("bodies", "joints", "drivers", "loads", "points", "parameters", "measures")
 SAME = 1e-9  # of the size; places that are nearer are one place
@@ -161,6 +165,20 @@ class Pen:
         apply(self.document, edit)
         self.edits.append(edit)
 
+    def written(self, place: NumberPath, old: Any, value: float, quantity: Quantity) -> Any:
+        """Return a number as it is written in the place of an older one: in the same unit.
+
+        Raises:
+            MechanismError: The older one follows from parameters.
+
+        """
+        if isinstance(old, Computed):
+            where = path_text(place)
+            raise MechanismError(f"{where} is {quoted(old.expression.text)}: set its parameters, or put a number there")
+        unit = given_unit(old)
+        factor = factors(quantity, self.drawing.mechanism.length_unit).get(unit)
+        return written_number(value) if factor is None else f"{written_number(value / factor)} {unit}"
+
     # ---- names
 
     def names(self) -> set[str]:
@@ -271,15 +289,3 @@ def _numbered(name: str) -> Iterator[str]:
 def written_spot(spot: Spot) -> list[float | int]:
     """Return coordinates as they are written."""
     return [written_number(value) for value in spot]
-
-
-def written_number(value: float) -> float | int:
-    """Return a number as it is written: with at most 15 digits, a whole number without a point."""
-    value = float(f"{value:.15g}")
-    return int(value) if value == int(value) and abs(value) < 1e15 else value
-
-
-def written_angle(angle: float) -> str:
-    """Return an angle [rad] as it is written, in degrees."""
-    degrees = float(f"{math.degrees(angle):.12g}")
-    return f"{written_number(degrees)} deg"

@@ -6,21 +6,25 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from kinfmu.errors import MechanismError
+from kinfmu.errors import MechanismError, suggestion
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.checks import coordinate_orders
 from kinfmu.mechanism.declared import keys_of
 from kinfmu.mechanism.edits import Place, Remove, edited
+from kinfmu.mechanism.members import NumberPath
 from kinfmu.mechanism.quantities import PoseQuantity
 from kinfmu.mechanism.toml_document import document_of
 from kinfmu.mechanism.valid import LARGEST_NUMBER, check_name, quoted
 from kinfmu.page.editor.drawing import Drawing
 from kinfmu.page.editor.pen import TABLES, Arguments, Pen
 from kinfmu.page.editor.text_edits import edited_text, renamed_text
+from kinfmu.page.opened import place_text
+from kinfmu.units import Quantity
 
 _DEEPEST = 8  # levels of a value
 _LONGEST = 10_000  # numbers in a list
 _MEASURE = re.compile(r"^\[measures\.(\w+)\]")
+_NUMBER = Quantity("number")
 _OF_POINTS = ("rod", "plate")  # keys of a body that name its points, with those that follow from them
 _WITH_POINTS = ("density", "areal_density", "thickness", "width")
 
@@ -37,6 +41,52 @@ def set_value(pen: Pen, values: Arguments) -> None:
         pen.put(tuple(tables), [value if k == last else one for k, one in enumerate(array)])
     else:
         pen.put((*tables, last), value)
+
+
+def set_numbers(pen: Pen, values: Arguments) -> None:
+    """Set numbers by the names that a page has for them, such as 'bodies.crank.points.P.x' or 'motor.speed'."""
+    given = values.any("values")
+    if not isinstance(given, dict):
+        raise values.wrong("values", "numbers by name")
+    mechanism = pen.drawing.mechanism
+    numbers = {place_text(path): (path, old, quantity) for path, old, quantity in mechanism.members.numbers()}
+    for constant in (*mechanism.law_constants, *mechanism.load_constants):
+        table = "drivers" if constant in mechanism.law_constants else "loads"
+        numbers[constant.name] = (table, constant.owner, "law", constant.key), constant.value, constant.quantity
+    for name, parameter in mechanism.parameters.items():
+        numbers[name] = ("parameters", name), parameter.value, parameter.quantity or _NUMBER
+    for name, value in given.items():
+        if name not in numbers:
+            raise values.error(f"there is no number {quoted(name)}{suggestion(name, numbers)}")
+        path, old, quantity = numbers[name]
+        number = Arguments({"do": f"{values.name}: {name}", "value": value}).number("value")
+        if number != float(old):
+            _put_number(pen, values, path, pen.written(path, old, number, quantity))
+
+
+def _put_number(pen: Pen, values: Arguments, path: NumberPath, written: Any) -> None:
+    """Put a number at its path; numbers of laws are in the table of their owner, or in a list of it."""
+    *tables, last = (key for key in path if key != "law")
+    table = _at(pen.document, tables)
+    word, _, count = str(last).rpartition("_")
+    if path[0] == "parameters" and isinstance(_at(pen.document, path), Mapping):
+        pen.put((*map(str, path), "value"), written)
+    elif isinstance(last, int):
+        if not isinstance(table, list):
+            raise values.error(f"{place_text(path)} is in a repeated part of the file; change its text")
+        pen.put(tuple(map(str, tables)), [written if k == last else one for k, one in enumerate(table)])
+    elif not isinstance(table, Mapping):
+        raise values.error(f"{place_text(path)} is in a repeated part of the file; change its text")
+    elif word in ("rise", "duration") and "segments" in table:
+        segments = [
+            {**one, word: written} if k == int(count) else one for k, one in enumerate(table["segments"], start=1)
+        ]
+        pen.put((*map(str, tables), "segments"), segments)
+    elif "coefficients" in table and "law" in path:
+        listed = [written if f"c{k}" == last else one for k, one in enumerate(table["coefficients"])]
+        pen.put((*map(str, tables), "coefficients"), listed)
+    else:
+        pen.put((*map(str, tables), last), written)
 
 
 def edit(pen: Pen, values: Arguments) -> None:
@@ -80,7 +130,7 @@ def _value(values: Arguments, key: str, value: Any, depth: int = 0) -> Any:
     raise values.error(f"{key}: {quoted(value)} cannot be written into a file")
 
 
-def _at(document: Any, place: Iterable[str]) -> Any:
+def _at(document: Any, place: Iterable[str | int]) -> Any:
     """Return what is at a place; None if nothing is there."""
     for key in place:
         if not isinstance(document, Mapping) or key not in document:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import InlineTable
 
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism.edits import Edit, Place, Put, apply, edited
 
 _OF_TABLES = ("bodies", "drivers", "loads", "measures")  # a member of these is a table of its own
+_COMMENTED = re.compile(r"^(?P<comments>(?:#[^\n]*\n)+)(?P<header>\[[^\n]*)$", re.MULTILINE)
+_CLOSE = re.compile(r"^(?P<above>[^\n#]*[^\n\s#][^\n]*\n)(?=\[)", re.MULTILINE)  # a line above a header
 
 
 def edited_text(text: str, document: Mapping[str, Any], edits: Iterable[Edit]) -> str:
@@ -33,6 +37,7 @@ def edited_text(text: str, document: Mapping[str, Any], edits: Iterable[Edit]) -
     def edit(written: Any, of_tables: tuple[str, ...]) -> None:
         for one in edits:
             apply(written, Put(one.place, _item(one.place, one.value, of_tables)) if isinstance(one, Put) else one)
+            _space(written, one.place[:-1])
 
     try:
         return _rewritten(text, wanted, lambda written: edit(written, _OF_TABLES))
@@ -58,40 +63,88 @@ def renamed_text(text: str, document: Mapping[str, Any], place: Place, name: str
         table = written
         for key in tables:
             table = table[key]
-        item = table.item(last) if hasattr(table, "item") else table[last]
+        item = table.item(last)
         if getattr(item, "display_name", None) is not None:
             item.display_name = None
         table.value._replace(last, tomlkit.key(name), item)  # no other way keeps the place
+        _space(written, tuple(tables))
 
     return _rewritten(text, wanted, rename)
 
 
 def _rewritten(text: str, wanted: Mapping[str, Any], edit: Callable[[Any], None]) -> str:
     """Return the text after an edit of it as a document of tomlkit; it must then hold the wanted tables."""
-    found, is_as_wanted = text, False
     try:
         written = tomlkit.parse(text)
         edit(written)
         found = tomlkit.dumps(written)
-        is_as_wanted = tomllib.loads(found) == wanted
+        found = _with_comments(found, text)
+        for one in (_with_blank_lines(found, text), found):
+            if _without_empty(tomllib.loads(one)) == _without_empty(wanted):
+                return one
     except (TOMLKitError, ValueError, TypeError, LookupError, AttributeError, RecursionError):
         pass
-    if not is_as_wanted:
-        raise MechanismError("this change cannot be written into the file as it is written; change its text")
-    return found
+    raise MechanismError("this change cannot be written into the file as it is written; change its text")
+
+
+def _without_empty(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables that are not empty; one whose last member is removed is gone from the text."""
+    return {key: value for key, value in document.items() if value != {}}
+
+
+def _with_comments(text: str, before: str) -> str:
+    """Return the text with the comments above its headers; tomlkit removes them with the table before them."""
+    for found in _COMMENTED.finditer(before):
+        header = f"\n{found['header']}"
+        if found[0] not in text and text.count(header) == 1:
+            at = text.index(header) + 1
+            text = text[:at] + found["comments"] + text[at:]
+    return text
+
+
+def _with_blank_lines(text: str, before: str) -> str:
+    """Return the text with a blank line above each header that has none and that was not like this before."""
+
+    def spaced(found: re.Match[str]) -> str:
+        header = text[found.end() :].partition("\n")[0]
+        return found["above"] + ("" if found["above"] + header in before else "\n")
+
+    return _CLOSE.sub(spaced, text)
+
+
+def _space(written: Any, place: Place) -> None:
+    """Write a table in braces at a place with blanks inside its braces, as the others are."""
+    *tables, last = place or ("",)
+    table = written
+    for key in tables:
+        table = table[key]
+    inner = table.get(last) if last else None
+    if isinstance(inner, InlineTable):
+        entries = [
+            f"{key.as_string().strip()} = {item.as_string()}" for key, item in inner.value.body if key is not None
+        ]
+        table[last] = tomlkit.value(_braces(entries))
+
+
+def _braces(entries: Iterable[str]) -> str:
+    inside = ", ".join(entries)
+    return f"{{ {inside} }}" if inside else "{}"
 
 
 def _item(place: Place, value: Any, of_tables: tuple[str, ...]) -> Any:
     """Return a value as it is written at a place: members of most tables as tables, what is in them on one line."""
+    if not isinstance(value, Mapping) or not (len(place) == 1 or (len(place) == 2 and place[0] in of_tables)):
+        return tomlkit.value(_line(value))
+    table = tomlkit.table()
+    for key, inner in value.items():
+        table.append(key, _item((*place, key), inner, of_tables))
+    return table
+
+
+def _line(value: Any) -> str:
+    """Return a value as it is written on one line."""
     if isinstance(value, Mapping):
-        is_table = len(place) == 1 or (len(place) == 2 and place[0] in of_tables)
-        table: Any = tomlkit.table() if is_table else tomlkit.inline_table()
-        for key, inner in value.items():
-            table.append(key, _item((*place, key), inner, of_tables))
-        return table
+        return _braces(f"{tomlkit.key(key).as_string()} = {_line(inner)}" for key, inner in value.items())
     if isinstance(value, list | tuple):
-        array = tomlkit.array()
-        for inner in value:
-            array.append(_item((*place, "", ""), inner, of_tables))
-        return array
-    return value
+        return f"[{', '.join(map(_line, value))}]"
+    return str(tomlkit.item(value).as_string())
