@@ -3,7 +3,6 @@
 import { draw } from "./drawing.js";
 import { $, breakable, element } from "./elements.js";
 import { distance, placed } from "./geometry.js";
-import { mechanismFile } from "./exports.js";
 import { linkageOf } from "./linkage.js";
 import { CanvasPen, css, GREY, edgeOf, fillOf } from "./pen.js";
 import { Spots } from "./names.js";
@@ -122,11 +121,8 @@ export class Editor {
 
     // Take the values that were set while the mechanism moved into the drawing.
     async #takeValues() {
-        const { design, linkage } = this.page;
-        const values = Object.fromEntries(design.changes());
-        if (!Object.keys(values).length) return;
-        const { status } = await this.session.operate([{ do: "values", values }]);
-        if (status !== 200) await this.operate([{ do: "replace", text: mechanismFile(linkage, design) }]);
+        const values = Object.fromEntries(this.page.design.changes());
+        if (Object.keys(values).length) await this.operate([{ do: "values", values }]);
     }
 
     #changed() {

@@ -109,8 +109,8 @@ export class DrawPanel {
         const { editor } = this;
         const units = element("select", { "aria-label": "Unit of length" }, ...UNITS.map((unit) => element("option", { value: unit, textContent: unit })));
         units.value = editor.unit;
-        units.addEventListener("change", () => editor.operate([{ do: "set", place: ["units", "length"], value: units.value }]));
-        const name = this.#field("Name", answer.name, "", (text) => editor.operate([{ do: "set", place: ["name"], value: text }]));
+        units.addEventListener("change", () => editor.operate([{ do: "units", length: units.value }]));
+        const name = this.#field("Name", answer.name, "", (text) => editor.operate([{ do: "name", name: text }]));
         this.parts.mechanism.replaceChildren(element("h2", { textContent: "Mechanism" }), name, element("label", { className: "row" }, element("span", { className: "label", textContent: "Unit" }), units));
     }
 

@@ -74,7 +74,7 @@ function sliding([from, to], { option }) {
 function slotted([pin, from, to]) {
     const own = ownPlace(pin);
     const [body] = moving(pin);
-    return [{ do: "slot", point: own.point || own, body: from.bodies.find((one) => one !== body) || GROUND, from: from.at, to: to.at }];
+    return [{ do: "slot", point: own.point || own, body: moving(from).find((one) => one !== body) || GROUND, from: from.at, to: to.at }];
 }
 
 function pointed([link, place], { option }) {
