@@ -24,7 +24,7 @@ from kinfmu.mechanism.toml_file import mechanism_of
 from kinfmu.mechanism.valid import quoted
 from kinfmu.page.editor.text_edits import edited_text
 from kinfmu.plan import localized
-from kinfmu.plan.equations.closing import CLOSED, close
+from kinfmu.plan.equations.closing import CLOSED, close, followed
 from kinfmu.plan.equations.part import Part
 from kinfmu.plan.equations.redundancy import Redundancy, find_redundancy
 from kinfmu.plan.equations.start_poses import is_in_world_coordinates, law_targets, start_from_poses
@@ -154,10 +154,15 @@ class Drawing:
         start = start_from_poses(system).q
         if self._is_closed(start):
             return start
-        if isinstance(self.redundancy, Redundancy) and self.redundancy.assembly.pose is not None:
-            return self.redundancy.assembly.pose.q
+        law = law_targets(system)
+        pose = self.redundancy.assembly.pose if isinstance(self.redundancy, Redundancy) else None
+        if pose is not None:
+            if np.array_equal(pose.u, law):
+                return pose.q
+            q, u = followed(system, pose.q, pose.u, law)
+            return q if np.array_equal(u, law) else pose.q
         try:
-            q, gap = close(Part(system, range(system.joint_row_count)), start, law_targets(system))
+            q, gap = close(Part(system, range(system.joint_row_count)), start, law)
         except KinfmuError:
             return start
         return q if gap <= CLOSED else start
