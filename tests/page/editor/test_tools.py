@@ -14,7 +14,7 @@ import kinfmu.page
 from tests.page.engines import NODE, needs_node
 
 WEB = Path(kinfmu.page.__file__).parent / "web"
-SCRIPT = Path(__file__).with_name("call_editor.mjs")
+SCRIPT = Path(__file__).with_name("call_tools.mjs")
 
 pytestmark = needs_node
 
