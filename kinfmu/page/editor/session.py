@@ -64,7 +64,7 @@ class Session:
         self._lock = threading.RLock()
         self._drawings: dict[str, Drawing] = {}
         with self._alone():
-            self._take_file(self._read())
+            self._take_file(self._read(), is_begin=True)
 
     # ---- what there is
 
@@ -191,15 +191,17 @@ class Session:
         texts = (*states.texts[: states.at + 1], name)[-MOST_STATES:]
         return self._write(replace(states, number=states.number + 1, texts=texts, at=len(texts) - 1))
 
-    def _take_file(self, states: States) -> States:
-        """Make the text of the file a state, if another program wrote it and nothing here is unsaved."""
+    def _take_file(self, states: States, *, is_begin: bool = False) -> States:
+        """Make the text of the file a state, if another program wrote it and nothing here is unsaved.
+
+        is_begin: True when the program begins: then it is a state in any case, and one can go back to what is unsaved.
+        """
         digest, text = self._on_disk()
-        if (
-            states.texts and not digest and states.saved
-        ):  # the file was removed: it begins again, and this can be undone
+        if states.texts and is_begin and not digest and states.saved:  # the file was removed
             return self._push(replace(states, saved=""), Drawing.of(new_text(self.path.stem), self.path.parent))
         if states.texts:
-            if digest == states.saved or text is None or _digest(self._text(states)) != states.saved:
+            is_unsaved = _digest(self._text(states)) != states.saved
+            if digest == states.saved or text is None or (is_unsaved and not is_begin):
                 return states
             try:
                 drawing = Drawing.of(text, self.path.parent)

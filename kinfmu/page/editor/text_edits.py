@@ -74,6 +74,8 @@ def renamed_text(text: str, document: Mapping[str, Any], place: Place, name: str
 
 def _rewritten(text: str, wanted: Mapping[str, Any], edit: Callable[[Any], None]) -> str:
     """Return the text after an edit of it as a document of tomlkit; it must then hold the wanted tables."""
+    if "\r\n" in text:
+        return _rewritten(text.replace("\r\n", "\n"), wanted, edit).replace("\n", "\r\n")
     try:
         written = tomlkit.parse(text)
         edit(written)

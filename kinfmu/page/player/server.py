@@ -215,9 +215,9 @@ class _Handler(BaseHTTPRequestHandler):
                 raise Refusal(HTTPStatus.NOT_FOUND, f"'{place}' is not known")
             answer()
         except Refusal as refusal:
-            self._send(refusal.status, "text/plain", str(refusal).encode())
+            self._send_line(refusal.status, str(refusal))
         except KinfmuError as error:
-            self._send(HTTPStatus.UNPROCESSABLE_ENTITY, "text/plain", str(error).encode())
+            self._send_line(HTTPStatus.UNPROCESSABLE_ENTITY, str(error))
         except (BrokenPipeError, ConnectionError, TimeoutError):
             pass  # the page was closed
 
@@ -240,6 +240,9 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_response(status)
         self._send_headers({"Content-Type": f"{kind}; charset=utf-8", "Content-Length": str(len(data))})
         self.wfile.write(data)
+
+    def _send_line(self, status: HTTPStatus, line: str) -> None:
+        self._send(status, "text/plain", line.encode("utf-8", "backslashreplace"))
 
     def _send_headers(self, headers: dict[str, str]) -> None:
         for name, value in (headers | _SECURITY).items():

@@ -138,8 +138,8 @@ def _assembled(system: System, start: StartValues) -> Assembled | None:
         found = _assembled_nearby(system, start) if gap < _NEARLY else None
         return found if found or order.blocks else assemble_from_random_starts(system, start, None, order)
     found = _without_spare_rows(system, q, u) or Assembled(q, u, margin(system, q))
-    if found.margin > comfortable(system):
-        return found
+    if found.margin > comfortable(system) or (found.margin > SINGULAR and not len(u)):
+        return found  # without drivers it stays where it is
     nearby = []
     for side in (1.0, -1.0):
         if found.margin > SINGULAR:

@@ -16,7 +16,7 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.gallery.load import folder
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.page.editor import Drawing
-from tests.page.editor.drawn import FOURBAR, bar, drawn, ground, interest, put, target
+from tests.page.editor.drawn import FOURBAR, bar, drawn, interest, put, target
 
 SAME = 1e-9  # of the largest value
 Drawn = tuple[Drawing, Mechanism, list[str]]  # by operations, by hand, and the columns that are equal
