@@ -115,7 +115,10 @@ export class Editor {
     // Draw what another window or program has made: the number of the drawing's state; isFile: its file was read again.
     follow(state, isFile) {
         this.session.next(async () => {
-            if (isFile || (state && state !== this.session.state)) await this.open();
+            const before = this.session.state;
+            if (!isFile && (!state || state === before)) return;
+            await this.open();
+            if (this.session.state !== before) this.page.hint("The drawing was changed elsewhere; this is its newer state.");
         });
     }
 
@@ -238,7 +241,7 @@ export class Editor {
         $("name").textContent = breakable(answer.name);
         document.title = answer.name;
         const { badge } = answer;
-        $("badge").textContent = badge.text;
+        $("badge").textContent = badge.text + (answer.isViewComing && !this.isPlayable ? "\u2026" : "");
         $("badge").title = `Mobility ${badge.mobility ?? "unknown"}, drivers ${badge.drivers}`;
         $("badge").hidden = false;
         $("badge").classList.toggle("complete", badge.isComplete);
@@ -270,12 +273,21 @@ export class Editor {
         page.take(linkage);
         if (this.machine) Object.assign(page.view, { scale, x, y, isFitted });
         this.isPlayable = true;
+        $("badge").textContent = this.session.answer.badge.text;
         const isIdle = !this.machine?.picks.length && !this.isPressed;
         if (!wasPlayable && isIdle && this.session.answer.badge.isComplete && this.isDrawn && !window.matchMedia("(prefers-reduced-motion: reduce)").matches) {
             this.machine = null;
+            const [x0, y0, x1, y1] = linkage.box();
+            if (![[x0, y0], [x1, y1]].every((p) => this.#isInView(p))) page.fit();
             page.motion.play(true);
         }
         this.#changed();
+    }
+
+    #isInView(p) {
+        const { view } = this.page;
+        const [x, y] = view.pixel(p);
+        return x > 0 && y > 0 && x < view.width && y < view.height;
     }
 
     // ---- clicks
@@ -317,7 +329,9 @@ export class Editor {
         if (refusal) this.#bar(refusal);
         if (!operations.length) return;
         this.isDrawn = true;
+        this.page.view.isFitted = false; // what is drawn stays where it is, also when the window has other parts
         const isMade = await this.#operate(operations);
+        if (!this.#isInView(target.at)) this.page.fit();
         if (this.machine?.tool !== state.tool) return;
         const [last] = state.picks;
         this.machine = { ...this.machine, number: null, picks: isMade && last ? [hit(this.sketch, last.at, ONE_PIN * this.sketch.size)] : [] };
@@ -423,7 +437,7 @@ export class Editor {
         return drag && this.sketch.moved(drag.number, drag.to);
     }
 
-    // Return the pin that is moved and where to: { number, point, to }.
+    // Return the pin that is moved, where to, and the operations; on another pin it is pinned to that.
     #drag() {
         const { machine, pressed, here, sketch } = this;
         if (machine?.tool !== "move" || !here) return null;
@@ -433,7 +447,9 @@ export class Editor {
         if (number < 0) return null;
         const own = new Set(sketch.movingWith(number));
         const over = snapped({ ...sketch, pins: sketch.pins.filter((one) => !one.points.some((k) => own.has(k))), lines: [], areas: [], nameOf: (k) => sketch.nameOf(k), heldWith: (k) => sketch.heldWith(k) }, here.p, { reach: here.reach, step: this.step, isFree: here.isFree });
-        return { number, point: pin.point, to: kept(sketch.point(number), over.at, sketch.placesKept(number, this.locked)) };
+        const to = kept(sketch.point(number), over.at, sketch.placesKept(number, this.locked));
+        const joins = over.kind === "point" && distance(to, over.at) === 0 ? [{ do: "pin", points: [pin.point, over.point] }] : [];
+        return { number, to, operations: [{ do: "move", point: pin.point, to }, ...joins] };
     }
 
     // Draw points that no joint holds, places on the ground without a joint, motors and locks.
@@ -567,7 +583,7 @@ export class Editor {
         const { machine, here } = this;
         const drag = this.#drag();
         if (machine.tool === "move" && !machine.picks.length) {
-            if (drag && pressed.isMoved) this.operate([{ do: "move", point: drag.point, to: drag.to }]);
+            if (drag && pressed.isMoved) this.operate(drag.operations);
             else if (!pressed.isMoved) this.click(here);
             return;
         }

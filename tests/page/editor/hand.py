@@ -114,7 +114,7 @@ class DrawingHand:
 
 @contextmanager
 def drawing_hand(chromium: Browser, folder: Path, text: str = "", **options: Any) -> Iterator[DrawingHand]:
-    """Yield a hand on the page of a new file, or of one with a text; options: of the browser's context."""
+    """Yield a hand that draws in the page of a new file, or of one with a text; options: of the browser's context."""
     path = folder / "mine.toml"
     if text:
         path.write_text(text, "utf-8")

@@ -16,7 +16,7 @@ from kinfmu.page.player import PlayServer, PlaySource
 from tests.page.editor.drawn import FOURBAR, drawn
 from tests.page.editor.hand import DrawingHand, drawing_hand
 from tests.page.engines import Browser, needs_browser
-from tests.page.test_page import LARGEST
+from tests.page.test_page import CONTRASTS, LABELS, LARGEST
 
 pytestmark = [needs_browser, pytest.mark.long]
 CONFLICT = "Failed to load resource: the server responded with a status of 409 (Conflict)"
@@ -24,9 +24,10 @@ CONFLICT = "Failed to load resource: the server responded with a status of 409 (
 
 @pytest.fixture
 def hand(chromium: Browser, tmp_path: Path) -> Iterator[DrawingHand]:
-    """A hand on a four-bar, with a tool for moving."""
+    """A hand that draws in the page of a four-bar, with the tool for moving."""
     with drawing_hand(chromium, tmp_path, drawn(*FOURBAR).text) as opened:
         opened.button("#draw")
+        opened.page.tab.wait_for_function("window.kinfmu.editor.machine")
         yield opened
 
 
@@ -197,3 +198,24 @@ def test_pages_with_an_editor_are_small(name: str, tmp_path: Path) -> None:
     kinfmu.save(kinfmu.load(name), path)
     with PlayServer(PlaySource(str(path))) as server:
         assert len(server.source.page().encode()) <= LARGEST
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_all_controls_have_names_and_texts_can_be_read(hand: DrawingHand, theme: str) -> None:
+    if hand.page.tab.evaluate("document.documentElement.dataset.theme") != theme:
+        hand.page.tab.click("#theme")
+    hand.click((0, 20))
+    hand.page.tab.wait_for_timeout(300)  # transitions of colours
+    assert hand.page.tab.evaluate(f"({LABELS})()")["found"] == []
+    dim = [one for one in hand.page.tab.evaluate(f"({CONTRASTS})()") if one["ratio"] < one["least"]]
+    assert dim == []
+
+
+def test_a_pin_that_is_dropped_on_another_one_is_pinned_there(hand: DrawingHand) -> None:
+    hand.tool("link")
+    hand.click((40, 20), (60, 20))
+    hand.tool("move")
+    hand.drag((60, 20), (100, 0))
+    (end,) = (name for name, at in places(hand).items() if name.startswith("link_1.") and at == [100, 0])
+    joints = hand.get(f"e.sketch.data.joints.filter((j) => j.points.some((k) => e.sketch.nameOf(k) === '{end}'))")
+    assert [joint["type"] for joint in joints] == ["revolute"]

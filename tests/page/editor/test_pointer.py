@@ -22,9 +22,7 @@ from tests.page.engines import Browser, needs_browser
 
 pytestmark = needs_browser
 
-Drawn = tuple[
-    dict[str, Any], *tuple[dict[str, Any], ...]
-]  # places that are compared, by name; operations that give numbers
+Drawn = tuple[dict[str, Any], ...]  # places that are compared, by name; operations that give numbers
 
 
 @pytest.fixture
@@ -87,18 +85,18 @@ def inverted_slider_crank(hand: DrawingHand) -> Drawn:
 def watt_six_bar(hand: DrawingHand) -> Drawn:
     written = gallery("watt_six_bar")
     crank, coupler, rocker = written.at("crank.P"), written.at("coupler.Q"), (80, 0)
-    beside, other, end = written.at("coupler.R"), written.at("rocker.S"), written.at("left.T")
+    corner, other, end = written.at("coupler.R"), written.at("rocker.S"), written.at("left.T")
     hand.typed((0, 0), crank, coupler, rocker)
     hand.fit()
     hand.tool("ground")
     hand.click((0, 0), rocker)
-    for link, place in (((crank, coupler), beside), ((coupler, rocker), other)):
+    for link, place in (((crank, coupler), corner), ((coupler, rocker), other)):
         hand.tool("interest", "Corner")
         hand.click(((link[0][0] + link[1][0]) / 2, (link[0][1] + link[1][1]) / 2))
         hand.typed(place)
     hand.fit()
     hand.tool("link")
-    hand.click(beside)
+    hand.click(corner)
     hand.typed(end)
     hand.fit()
     hand.click(other)
@@ -176,7 +174,9 @@ def cam_with_roller(hand: DrawingHand) -> Drawn:
     hand.click((10, 0))
     by_operations, _, _ = references.cam_with_roller()
     numbers = by_operations.document["joints"]["cam_1"]
-    puts = (put("joints", "cam_1", key, value=numbers[key]) for key in ("start", "begin", "roller_radius", "segments"))
+    puts = tuple(
+        put("joints", "cam_1", key, value=numbers[key]) for key in ("start", "begin", "roller_radius", "segments")
+    )
     return ({"roller": roller}, *puts, *motor(written.mechanism))
 
 

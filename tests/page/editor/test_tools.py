@@ -41,7 +41,7 @@ def sketch(**bodies: dict[str, tuple[float, float]]) -> dict[str, Any]:
             joints.append({"name": point["name"], "type": "revolute", "points": [others[-1], k]})
     names = ["ground", *(body for body in bodies if body != "ground")]
     data = {"bodies": [{"name": name, "colour": [0, 0, 0], "pose": [0, 0, 0]} for name in names], "points": points}
-    empty = {key: [] for key in ("drivers", "shapes", "loads", "interest", "cams")}
+    empty: dict[str, Any] = {key: [] for key in ("drivers", "shapes", "loads", "interest", "cams")}
     return {"sketch": data | empty | {"joints": joints, "unit": "mm", "box": [[0, 0], [100, 60]]}}
 
 
@@ -51,12 +51,12 @@ FOUR_BAR = sketch(
     coupler={"B": (0, 40), "C": (100, 60)},
     rocker={"C": (100, 60), "D": (100, 0)},
 )
-NEAR = {"reach": 5, "step": 2}
+NEAR: dict[str, Any] = {"reach": 5, "step": 2}
 
 
 def test_clicks_snap_to_pins_then_links_then_the_grid() -> None:
     places = [(98, 57), (1.5, 20.7), (33, 21.4), (33, 21.4)]
-    more = [{}, {}, {}, {"isFree": True}]
+    more: list[dict[str, Any]] = [{}, {}, {}, {"isFree": True}]
     calls = [["editor_places", "snapped", [FOUR_BAR, p, NEAR | one]] for p, one in zip(places, more, strict=True)]
     pin, link, grid, free = called(*calls)
     assert (pin["kind"], pin["point"], pin["at"]) == ("point", "coupler.C", [100, 60])
@@ -188,9 +188,9 @@ def test_tools_make_their_operations() -> None:
     assert made("cam", crank, pin("rod.C"), option="flat_face") == [cam]
     assert made("force", pin("rod.C"), free(0, 9)) == [{"do": "force", "at": {"point": "rod.C"}, "to": [0, 9]}]
     assert made("interest", pin("rod.C")) == [{"do": "interest", "at": {"point": "rod.C"}}]
-    beside = {"body": "crank", "at": [50, 50]}
-    assert made("interest", crank, free(50, 50)) == [{"do": "interest", "at": beside}]
-    assert made("interest", crank, free(50, 50), option="corner") == [{"do": "point", **beside}]
+    corner = {"body": "crank", "at": [50, 50]}
+    assert made("interest", crank, free(50, 50)) == [{"do": "interest", "at": corner}]
+    assert made("interest", crank, free(50, 50), option="corner") == [{"do": "point", **corner}]
     assert made("delete", pin("a.P", "b.Q")) == [{"do": "delete", "place": ["joints", "J"]}]
     assert made("delete", pin("a.P")) == [{"do": "delete", "place": ["bodies", "a", "points", "P"]}]
     assert made("delete", crank) == [{"do": "delete", "place": ["bodies", "crank"]}]
