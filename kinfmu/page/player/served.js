@@ -89,6 +89,10 @@ function serverButtons(page) {
     const buttons = [
         add("FMU with the values as set (FMI 3.0)", "save-fmu3", "Building the FMU\u2026", build(3)),
         add("FMU with the values as set (FMI 2.0)", "save-fmu2", "Building the FMU\u2026", build(2)),
+        add("Page with the values as set (HTML)", "save-page", "Making the page\u2026", async () => {
+            download(`${linkage.data.name}.html`, await (await post("page")).blob(), "text/html");
+            return `Made: ${linkage.data.name}.html, which works offline.`;
+        }),
         add("Mechanism file, into the folder of the file", "keep-file", "Saving\u2026", async () => `Saved: ${await (await post("file")).text()}`),
     ];
     part.after(note);

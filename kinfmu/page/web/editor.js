@@ -31,7 +31,7 @@ const ICONS = {
 };
 const PEN = '<svg viewBox="0 0 20 20"><path d="M3 17l1-4L14 3l3 3L7 16zM12 5l3 3"/></svg>';
 const CLICK = 7; // [px] that the pointer may move in a click
-const PALE = 0.55; // of what is half-drawn
+const PALE = 0.62; // of what is half-drawn
 const PICTURES = ["image/png", "image/jpeg"];
 const OF_PICTURE = { scale: ["Click one end of a known length in the picture.", "Click its other end.", "Type this length."], shift: ["Click a place of the picture.", "Click where it belongs."] };
 const KEYS = [
@@ -458,10 +458,12 @@ export class Editor {
         const { data } = sketch;
         const size = Math.max(2.4, 0.33 * Math.max(4, Math.min(15, 13 * sketch.fineness)));
         const used = new Set(data.joints.flatMap((joint) => joint.points || []));
+        const supports = (sketch.shapesOf.get("support") || []).map(({ frame, points }) => placed(sketch.bodyPose(sketch.body(frame)), ...points[0]));
         for (const { at, points } of sketch.pins) {
             if (points.some((k) => used.has(k))) continue;
             const [x, y] = view.pixel(at);
-            if (points.some((k) => data.points[k].body === GROUND)) {
+            const isSupported = supports.some((p) => distance(p, at) < ONE_PIN * sketch.size);
+            if (!isSupported && points.some((k) => data.points[k].body === GROUND)) {
                 const colour = edgeOf(GREY, theme);
                 pen.line([[x, y], [x - 10, y + 17], [x + 10, y + 17]], { width: 1.3, colour, fill: fillOf(GREY, theme), closed: true });
                 pen.line([[x - 15, y + 17], [x + 15, y + 17]], { width: 1.6, colour });
@@ -514,7 +516,7 @@ export class Editor {
         const drag = this.#drag();
         if (drag) {
             pen.circle(...view.pixel(drag.to), 10, { width: 2.5, colour: theme.accent });
-            pen.text(...view.pixel(drag.to).map((x, k) => x + [16, -18][k]), measured(drag.to, null), { colour: theme.ink, size: 12, halo: theme.paper });
+            this.#note(pen, view.pixel(drag.to), measured(drag.to, null));
             return;
         }
         if (!here || (machine.tool === "scale" && picks.length > 1)) return;
@@ -527,8 +529,15 @@ export class Editor {
         if (machine.tool !== "move" || here.isKey) {
             const arm = here.isKey ? 14 : 7;
             for (const [dx, dy] of [[arm, 0], [0, arm]]) pen.line([[at[0] - dx, at[1] - dy], [at[0] + dx, at[1] + dy]], { width: 1.5, colour: theme.accent });
-            if (!base || distance(base.at, target.at)) pen.text(at[0] + 14, at[1] - 14, measured(target.at, base?.at), { colour: theme.ink, size: 12, halo: theme.paper });
+            if (!base || distance(base.at, target.at)) this.#note(pen, at, measured(target.at, base?.at));
         }
+    }
+
+    // Write next to a place, on the side that is in the view.
+    #note(pen, [x, y], text) {
+        const { view, theme } = this.page;
+        const isLeft = x > view.width - 140;
+        pen.text(x + (isLeft ? -15 : 15), y - 16, text, { colour: theme.ink, size: 12, halo: theme.paper, align: isLeft ? "right" : "left" });
     }
 
     // ---- the pointer
@@ -771,6 +780,7 @@ export class Editor {
         const panel = element("div", { id: "draw-panel", hidden: true });
         document.querySelector("aside").append(panel);
         this.panel = new DrawPanel(this, panel);
+        Object.assign($("keys-title"), { tabIndex: -1, autofocus: true }); // the dialog begins at its top
         for (const [head, text] of KEYS) {
             const row = element("tr");
             row.innerHTML = `<td>${head}</td><td>${text}</td>`;

@@ -100,6 +100,9 @@ def test_findings_apply_their_edits_and_the_mechanism_plays_in_the_same_page(chr
         fmu = tmp_path / "drawn.fmu"
         download.value.save_as(fmu)
         assert kinfmu.simulate(fmu).t[-1] == pytest.approx(2)
+        with hand.page.tab.expect_download() as download:
+            hand.page.tab.click("#save-page")
+        assert download.value.path().read_text("utf-8").startswith("<!doctype html>")
         hand.press("Control+z")
         assert hand.get("e.session.answer.badge.drivers") == 0
         assert hand.page.tab.is_hidden("#transport")
