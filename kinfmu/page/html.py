@@ -44,15 +44,7 @@ _SCRIPTS = (
     "hand",
     "main",
 )
-_EDITOR = (
-    "editor_places",
-    "editor_tools",
-    "editor_sketch",
-    "editor_session",
-    "editor_picture",
-    "editor_panel",
-    "editor",
-)
+_EDITOR = tuple(f"editor{name}" for name in ("_places", "_tools", "_sketch", "_session", "_picture", "_panel", ""))
 MOST_NUMBERS = 400  # of a file that its page can change: the code of more is too long for a small page
 _IMPORT = re.compile(r"^import .*\n", re.MULTILINE)
 _NAMES = re.compile(r'^import \{ (.*) \} from "\./(\w+)\.js";$', re.MULTILINE)
@@ -168,9 +160,8 @@ def editor_script() -> str:
     """
     modules = {name: (_WEB / f"{name}.js").read_text("utf-8") for name in _EDITOR}
     imports = [(names, source) for text in modules.values() for names, source in _NAMES.findall(text)]
-    names = ", ".join(
-        sorted({name for found, source in imports if source not in modules for name in found.split(", ")})
-    )
+    of_page = {name for found, source in imports if source not in modules for name in found.split(", ")}
+    names = ", ".join(sorted(of_page))
     style = f"const EDITOR_STYLE = {json.dumps((_WEB / 'editor.css').read_text('utf-8'))};"
     code = "\n".join([style, *map(_script, modules), "return Editor;"])
     text = packed(f"window.kinfmuEditor = ({{ {names} }}) => {{\n{code}\n}};".encode())

@@ -26,15 +26,20 @@ async function serve(page) {
     let buttons = [];
     page.whenTaken = () => (buttons = serverButtons(page));
     if (page.linkage) page.whenTaken();
+    let wasBusy = false;
     const states = new EventSource("changes");
     states.addEventListener("state", (event) => {
         const { version, problem, isBusy, editor } = JSON.parse(event.data);
         buttons.forEach((button) => (button.disabled = false));
-        if (page.editor?.sketch) page.editor.follow(editor);
+        const isDrawn = Boolean(page.editor?.sketch);
+        if (isDrawn) page.editor.follow(editor, wasBusy && !isBusy);
         else if (version !== SERVED) {
             keep(page);
             location.reload();
-        } else tell(problem && `The file cannot be used as it is: ${problem}`, isBusy);
+            return;
+        }
+        wasBusy = isBusy;
+        tell(problem && `The file cannot be used as it is: ${problem}`, isBusy && !isDrawn);
     });
     states.addEventListener("error", () => {
         buttons.forEach((button) => (button.disabled = true));
@@ -84,6 +89,10 @@ function serverButtons(page) {
     const buttons = [
         add("FMU with the values as set (FMI 3.0)", "save-fmu3", "Building the FMU\u2026", build(3)),
         add("FMU with the values as set (FMI 2.0)", "save-fmu2", "Building the FMU\u2026", build(2)),
+        add("Page with the values as set (HTML)", "save-page", "Making the page\u2026", async () => {
+            download(`${linkage.data.name}.html`, await (await post("page")).blob(), "text/html");
+            return `Made: ${linkage.data.name}.html, which works offline.`;
+        }),
         add("Mechanism file, into the folder of the file", "keep-file", "Saving\u2026", async () => `Saved: ${await (await post("file")).text()}`),
     ];
     part.after(note);

@@ -24,6 +24,7 @@ from kinfmu.files import temporary_folder
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.page.editor import StaleState, answer, view
+from kinfmu.page.html import page
 from kinfmu.page.player.source import PlaySource
 
 ADDRESS = "127.0.0.1"
@@ -198,9 +199,10 @@ class _Handler(BaseHTTPRequestHandler):
         self._answer({"": self._page, "changes": self._changes, "editor": self._editor, "editor/view": self._view})
 
     def do_POST(self) -> None:
-        """Answer with an FMU, the name of a file that was saved, or the drawing after a change."""
+        """Answer with an FMU, a page, the name of a file that was saved, or the drawing after a change."""
         changes = {f"editor/{name}": partial(self._edit, name) for name in ("operations", "undo", "redo", "save")}
         answers: dict[str, object] = {"fmu2": partial(self._fmu, 2), "fmu3": partial(self._fmu, 3), "file": self._file}
+        answers["page"] = self._page_of_file
         self._answer(answers | changes)
 
     def log_message(self, format: str, *args: object) -> None:  # noqa: A002  the name that http.server has
@@ -271,6 +273,10 @@ class _Handler(BaseHTTPRequestHandler):
     def _fmu(self, fmi: int) -> None:
         mechanism, _ = self._mechanism()
         self._send(HTTPStatus.OK, "application/zip", self.server.play.build_fmu(mechanism, fmi))
+
+    def _page_of_file(self) -> None:
+        mechanism, _ = self._mechanism()
+        self._send(HTTPStatus.OK, "text/html", page(mechanism).encode())
 
     def _file(self) -> None:
         _, text = self._mechanism()

@@ -31,7 +31,7 @@ const ICONS = {
 };
 const PEN = '<svg viewBox="0 0 20 20"><path d="M3 17l1-4L14 3l3 3L7 16zM12 5l3 3"/></svg>';
 const CLICK = 7; // [px] that the pointer may move in a click
-const PALE = 0.55; // of what is half-drawn
+const PALE = 0.62; // of what is half-drawn
 const PICTURES = ["image/png", "image/jpeg"];
 const OF_PICTURE = { scale: ["Click one end of a known length in the picture.", "Click its other end.", "Type this length."], shift: ["Click a place of the picture.", "Click where it belongs."] };
 const KEYS = [
@@ -40,6 +40,7 @@ const KEYS = [
     ["Digits", "type a length, a length &lt; angle in degrees, or x, y; <kbd>Enter</kbd> accepts it"],
     ["<kbd>Alt</kbd>, <kbd>Shift</kbd> with a click", "nothing snaps; links snap to steps of 15\u00b0"],
     ["<kbd>Esc</kbd>", "leaves a link half-way, then the tool"],
+    ["<kbd>Space</kbd>, <kbd>V</kbd>", "play the mechanism; draw again"],
     ["<kbd>Del</kbd>, <kbd>Ctrl</kbd>+<kbd>S</kbd>, <kbd>Home</kbd>", "delete what is selected, save, fit to view"],
     ["Middle button, or two fingers", "move the view"],
 ];
@@ -111,13 +112,17 @@ export class Editor {
         if (message) this.tell(message);
     }
 
-    // Draw a state that another window or program has made.
-    follow(state) {
+    // Draw what another window or program has made: the number of the drawing's state; isFile: its file was read again.
+    follow(state, isFile) {
         this.session.next(async () => {
-            if (state && state !== this.session.state) await this.open();
+            const before = this.session.state;
+            if (!isFile && (!state || state === before)) return;
+            await this.open();
+            if (this.session.state !== before) this.page.hint("The drawing was changed elsewhere; this is its newer state.");
         });
     }
 
+    // Take the values that were set while the mechanism moved into the drawing.
     async #takeValues() {
         const values = Object.fromEntries(this.page.design.changes());
         if (Object.keys(values).length) await this.operate([{ do: "values", values }]);
@@ -171,7 +176,11 @@ export class Editor {
     }
 
     // Make operations after those that wait; return whether they were made.
-    async operate(operations) {
+    operate(operations) {
+        return this.session.next(() => this.#operate(operations));
+    }
+
+    async #operate(operations) {
         return this.#answered(await this.session.operate(operations));
     }
 
@@ -219,6 +228,8 @@ export class Editor {
     #take(answer) {
         const { page } = this;
         const isFirst = !this.sketch;
+        const isOther = answer.state !== this.shownState;
+        this.shownState = answer.state;
         const wasPlayable = this.isPlayable && !isFirst;
         this.sketch = new Sketch(answer.sketch);
         this.isPlayable &&= answer.badge.isComplete;
@@ -230,7 +241,7 @@ export class Editor {
         $("name").textContent = breakable(answer.name);
         document.title = answer.name;
         const { badge } = answer;
-        $("badge").textContent = badge.text;
+        $("badge").textContent = badge.text + (answer.isViewComing && !this.isPlayable ? "\u2026" : "");
         $("badge").title = `Mobility ${badge.mobility ?? "unknown"}, drivers ${badge.drivers}`;
         $("badge").hidden = false;
         $("badge").classList.toggle("complete", badge.isComplete);
@@ -242,7 +253,7 @@ export class Editor {
         this.#changed();
         if (isFirst) page.fit();
         const isKnown = isFirst && page.linkage && answer.isSaved;
-        if (answer.isViewComing && !isKnown) this.#view(wasPlayable);
+        if (answer.isViewComing && isOther && !isKnown) this.#view(wasPlayable);
     }
 
     // Show the mechanism that moves, as soon as the server has it.
@@ -262,12 +273,21 @@ export class Editor {
         page.take(linkage);
         if (this.machine) Object.assign(page.view, { scale, x, y, isFitted });
         this.isPlayable = true;
+        $("badge").textContent = this.session.answer.badge.text;
         const isIdle = !this.machine?.picks.length && !this.isPressed;
         if (!wasPlayable && isIdle && this.session.answer.badge.isComplete && this.isDrawn && !window.matchMedia("(prefers-reduced-motion: reduce)").matches) {
             this.machine = null;
+            const [x0, y0, x1, y1] = linkage.box();
+            if (![[x0, y0], [x1, y1]].every((p) => this.#isInView(p))) page.fit();
             page.motion.play(true);
         }
         this.#changed();
+    }
+
+    #isInView(p) {
+        const { view } = this.page;
+        const [x, y] = view.pixel(p);
+        return x > 0 && y > 0 && x < view.width && y < view.height;
     }
 
     // ---- clicks
@@ -309,7 +329,9 @@ export class Editor {
         if (refusal) this.#bar(refusal);
         if (!operations.length) return;
         this.isDrawn = true;
-        const isMade = await this.operate(operations);
+        this.page.view.isFitted = false; // what is drawn stays where it is, also when the window has other parts
+        const isMade = await this.#operate(operations);
+        if (!this.#isInView(target.at)) this.page.fit();
         if (this.machine?.tool !== state.tool) return;
         const [last] = state.picks;
         this.machine = { ...this.machine, number: null, picks: isMade && last ? [hit(this.sketch, last.at, ONE_PIN * this.sketch.size)] : [] };
@@ -404,6 +426,7 @@ export class Editor {
         this.#highlights(pen, shown);
         if (this.machine) this.#preview(pen, shown);
         [page.handles, page.hasHidden] = [[], false];
+        if (this.isPlayable) page.transport.update();
         [$("undo").disabled, $("redo").disabled] = [!this.canUndo(false), !this.canUndo(true)];
         return true;
     }
@@ -414,7 +437,7 @@ export class Editor {
         return drag && this.sketch.moved(drag.number, drag.to);
     }
 
-    // Return the pin that is moved and where to: { number, point, to }.
+    // Return the pin that is moved, where to, and the operations; on another pin it is pinned to that.
     #drag() {
         const { machine, pressed, here, sketch } = this;
         if (machine?.tool !== "move" || !here) return null;
@@ -424,7 +447,9 @@ export class Editor {
         if (number < 0) return null;
         const own = new Set(sketch.movingWith(number));
         const over = snapped({ ...sketch, pins: sketch.pins.filter((one) => !one.points.some((k) => own.has(k))), lines: [], areas: [], nameOf: (k) => sketch.nameOf(k), heldWith: (k) => sketch.heldWith(k) }, here.p, { reach: here.reach, step: this.step, isFree: here.isFree });
-        return { number, point: pin.point, to: kept(sketch.point(number), over.at, sketch.placesKept(number, this.locked)) };
+        const to = kept(sketch.point(number), over.at, sketch.placesKept(number, this.locked));
+        const joins = over.kind === "point" && distance(to, over.at) === 0 ? [{ do: "pin", points: [pin.point, over.point] }] : [];
+        return { number, to, operations: [{ do: "move", point: pin.point, to }, ...joins] };
     }
 
     // Draw points that no joint holds, places on the ground without a joint, motors and locks.
@@ -433,10 +458,12 @@ export class Editor {
         const { data } = sketch;
         const size = Math.max(2.4, 0.33 * Math.max(4, Math.min(15, 13 * sketch.fineness)));
         const used = new Set(data.joints.flatMap((joint) => joint.points || []));
+        const supports = (sketch.shapesOf.get("support") || []).map(({ frame, points }) => placed(sketch.bodyPose(sketch.body(frame)), ...points[0]));
         for (const { at, points } of sketch.pins) {
             if (points.some((k) => used.has(k))) continue;
             const [x, y] = view.pixel(at);
-            if (points.some((k) => data.points[k].body === GROUND)) {
+            const isSupported = supports.some((p) => distance(p, at) < ONE_PIN * sketch.size);
+            if (!isSupported && points.some((k) => data.points[k].body === GROUND)) {
                 const colour = edgeOf(GREY, theme);
                 pen.line([[x, y], [x - 10, y + 17], [x + 10, y + 17]], { width: 1.3, colour, fill: fillOf(GREY, theme), closed: true });
                 pen.line([[x - 15, y + 17], [x + 15, y + 17]], { width: 1.6, colour });
@@ -489,7 +516,7 @@ export class Editor {
         const drag = this.#drag();
         if (drag) {
             pen.circle(...view.pixel(drag.to), 10, { width: 2.5, colour: theme.accent });
-            pen.text(...view.pixel(drag.to).map((x, k) => x + [16, -18][k]), measured(drag.to, null), { colour: theme.ink, size: 12, halo: theme.paper });
+            this.#note(pen, view.pixel(drag.to), measured(drag.to, null));
             return;
         }
         if (!here || (machine.tool === "scale" && picks.length > 1)) return;
@@ -502,8 +529,15 @@ export class Editor {
         if (machine.tool !== "move" || here.isKey) {
             const arm = here.isKey ? 14 : 7;
             for (const [dx, dy] of [[arm, 0], [0, arm]]) pen.line([[at[0] - dx, at[1] - dy], [at[0] + dx, at[1] + dy]], { width: 1.5, colour: theme.accent });
-            if (!base || distance(base.at, target.at)) pen.text(at[0] + 14, at[1] - 14, measured(target.at, base?.at), { colour: theme.ink, size: 12, halo: theme.paper });
+            if (!base || distance(base.at, target.at)) this.#note(pen, at, measured(target.at, base?.at));
         }
+    }
+
+    // Write next to a place, on the side that is in the view.
+    #note(pen, [x, y], text) {
+        const { view, theme } = this.page;
+        const isLeft = x > view.width - 140;
+        pen.text(x + (isLeft ? -15 : 15), y - 16, text, { colour: theme.ink, size: 12, halo: theme.paper, align: isLeft ? "right" : "left" });
     }
 
     // ---- the pointer
@@ -558,7 +592,7 @@ export class Editor {
         const { machine, here } = this;
         const drag = this.#drag();
         if (machine.tool === "move" && !machine.picks.length) {
-            if (drag && pressed.isMoved) this.session.next(() => this.operate([{ do: "move", point: drag.point, to: drag.to }]));
+            if (drag && pressed.isMoved) this.operate(drag.operations);
             else if (!pressed.isMoved) this.click(here);
             return;
         }
@@ -580,9 +614,9 @@ export class Editor {
             }
             const { target } = event;
             const isField = target.closest?.("input, select, textarea, dialog[open], pre");
-            if (isField || event.ctrlKey || event.metaKey || !this.isShown) return;
+            if (isField || event.ctrlKey || event.metaKey) return;
             const isButton = target.closest?.("button, summary");
-            const act = this.#actOf(event.key, key, event, isButton);
+            const act = this.isShown ? this.#actOf(event.key, key, event, isButton) : key === "v" && (() => this.choose("move")); // other letters are those of the page
             if (!act) return;
             event.preventDefault();
             event.stopImmediatePropagation();
@@ -640,7 +674,7 @@ export class Editor {
     #placeField() {
         const { field, machine, here, isTouch } = this;
         const isWaiting = machine && (machine.tool !== "move" || this.selection);
-        const isInBar = isTouch && isWaiting;
+        const isInBar = Boolean(isTouch && isWaiting);
         if (isInBar !== (field.parentElement === $("draw-bar"))) (isInBar ? $("draw-bar") : $("stage")).append(field);
         if (document.activeElement !== field && !field.value) field.hidden = !isInBar;
         field.placeholder = machine && baseOf2(machine) ? "length < angle" : "x, y";
@@ -746,6 +780,7 @@ export class Editor {
         const panel = element("div", { id: "draw-panel", hidden: true });
         document.querySelector("aside").append(panel);
         this.panel = new DrawPanel(this, panel);
+        Object.assign($("keys-title"), { tabIndex: -1, autofocus: true }); // the dialog begins at its top
         for (const [head, text] of KEYS) {
             const row = element("tr");
             row.innerHTML = `<td>${head}</td><td>${text}</td>`;
@@ -762,6 +797,7 @@ function baseOf2(machine) {
 
 function lock(pen, [x, y], theme) {
     const style = { width: 1.5, colour: theme.ink };
+    pen.circle(x, y, 11, { ...style, width: 1, fill: theme.paper });
     pen.line(Array.from({ length: 9 }, (_, k) => [x - 3 * Math.cos((Math.PI * k) / 8), y - 3 - 3 * Math.sin((Math.PI * k) / 8)]), style);
     pen.line([[x - 5, y - 2], [x + 5, y - 2], [x + 5, y + 5], [x - 5, y + 5]], { ...style, fill: theme.paper, closed: true });
 }

@@ -90,7 +90,7 @@ export class DrawPanel {
         const numbers = target.kind === "point" ? target.points.map((name) => this.editor.sketch.numberOfPoint(name)) : [];
         const isHere = (one) => one.points?.some((k) => numbers.includes(k)) || (target.kind === "body" && (one.body === target.body || one.frame === target.body));
         const drivers = data.drivers.filter((one) => isHere(one) || (target.kind === "point" && bodies.includes(one.body)));
-        return [["joints", data.joints.filter(isHere)], ["drivers", drivers], ["loads", data.loads.filter(isHere)]].flatMap(([table, all]) => all.map(({ name, type }) => ({ name: `${type.replaceAll("_", " ")} ${name}`, place: [table, name] })));
+        return [["joints", data.joints.filter(isHere)], ["drivers", drivers], ["loads", data.loads.filter(isHere)]].flatMap(([table, all]) => all.map(({ name, type }) => ({ name: `${name} (${type.replaceAll("_", " ")})`, place: [table, name] })));
     }
 
     #member(name, place) {

@@ -87,7 +87,7 @@ export function snapped(sketch, p, { reach, step, base = null, isFree = false, i
     if (found.ends) return { ...found, at: alongLine(found.ends, p, step) };
     if (found.kind === "free" && base && isAngled) {
         const angle = ANGLE * Math.round(Math.atan2(p[1] - base[1], p[0] - base[0]) / ANGLE);
-        return { ...found, at: polar(base, clean(distance(p, base), step), angle, fine) };
+        return { ...found, at: polar(base, clean(distance(p, base), step), angle, step / 1e6) };
     }
     return { ...found, at: p.map((x) => clean(x, step)) };
 }

@@ -49,7 +49,7 @@ export class Session {
             this.answer = answer;
             this.take(answer);
         }
-        return { status, message: status === 200 ? "" : answer?.message || text };
+        return { status, message: status === 200 ? "" : answer?.problem || text };
     }
 }
 

@@ -29,7 +29,7 @@ const vector = (from, to) => [to.at[0] - from.at[0], to.at[1] - from.at[1]];
 export const TOOLS = [
     { id: "move", key: "v", label: "Move", hints: ["Drag a pin. Click a link or pin to select it.", "Choose the new place."], accepts: [(target) => (target.kind === "point" ? "" : "Choose a pin."), anywhere],
         make: ([from, to]) => [{ do: "move", point: from.point, to: to.at }] },
-    { id: "link", key: "l", label: "Link", hints: ["Click where the link begins.", "Click where it ends, or type length, length < angle, or x, y. The same place again, or Esc, stops."], accepts: [anywhere, anywhere], isChain: true, make: two("bar") },
+    { id: "link", key: "l", label: "Link", hints: ["Click one end of the link.", "Click its other end, or type length, length < angle, or x, y. Esc, or a second click there, stops."], accepts: [anywhere, anywhere], isChain: true, make: two("bar") },
     { id: "pin", key: "p", label: "Pin", hints: ["Click where two links meet, or the pin of one link.", "Click the pin of the other link."], accepts: [onLink, (target, picks) => (target.kind === "point" && picks[0].kind === "point" ? onOther(target, picks) : "Click the pins of two links, or where they cross.")], make: pinned, isEarly: (target) => target.bodies.length > 1 && (target.kind === "body" || target.open.length > 0 || target.bodies.length > target.points.length) },
     { id: "ground", key: "g", label: "Ground", hints: ["Click a pin or a place to fix it to the ground."], accepts: [anywhere], make: ([at]) => [{ do: "ground", at: placeOf(at) }] },
     { id: "motor", key: "m", label: "Motor", hints: ["Click the link that turns."], accepts: [onLink], make: ([target]) => [{ do: "motor", body: moving(target)[0], ...(target.joints?.length === 1 ? { joint: target.joints[0] } : {}) }] },
@@ -68,13 +68,13 @@ function sliding([from, to], { option }) {
     const on = moving(to).find((one) => one !== body);
     const along = on && to.along ? to.along : vector(from, to);
     const held = on ? { on } : {};
-    return [option === "block" ? { do: "slider", body, point: own.point || own, along, ...held, block: true } : { do: "slider", point: own.point || own, along, ...held }];
+    return [{ do: "slider", point: own.point || own, along, ...held, ...(option === "block" ? { block: true } : {}) }];
 }
 
 function slotted([pin, from, to]) {
     const own = ownPlace(pin);
     const [body] = moving(pin);
-    return [{ do: "slot", point: own.point || own, body: from.bodies.find((one) => one !== body) || GROUND, from: from.at, to: to.at }];
+    return [{ do: "slot", point: own.point || own, body: moving(from).find((one) => one !== body) || GROUND, from: from.at, to: to.at }];
 }
 
 function pointed([link, place], { option }) {

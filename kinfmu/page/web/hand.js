@@ -188,6 +188,7 @@ export function keyboard(page) {
         }
         if (isField(event.target) || event.ctrlKey || event.metaKey || event.altKey) return;
         const { linkage } = page;
+        if (!linkage) return;
         const k = page.driver;
         const step = linkage.data.drivers[k]?.kind === "angle" ? Math.PI / 180 : (linkage.ranges[k][1] - linkage.ranges[k][0]) / 200;
         const by = (way) => {

@@ -47,7 +47,12 @@ EACH = (  # an operation of each kind that is possible on the four-bar, with all
     {"do": "replace", "text": 'name = "x"\n[bodies.a]\n', "name": "x.toml"},
 )
 WRONG = (True, {}, {"at": [1]}, {"a": [[{}]]}, [True], [[]], ["no", "such", "thing"], "no such", 1e31, -(10**30) * 11)
-POSSIBLE = {("delete", "place"), ("replace", "name"), ("slider", "block"), ("values", "values")}  # arguments for which some of these are valid
+POSSIBLE = {
+    ("delete", "place"),
+    ("replace", "name"),
+    ("slider", "block"),
+    ("values", "values"),
+}  # arguments for which some of these are valid
 
 
 @pytest.fixture
