@@ -1,4 +1,4 @@
-"""What the page is told of a drawing: what is drawn at the start pose, the mobility, what is missing; its full data."""
+"""Answers to a page: what is drawn at the start pose, the mobility, what is missing; the full data of a page."""
 
 from __future__ import annotations
 
@@ -10,15 +10,18 @@ import numpy as np
 from kinfmu.analysis import check
 from kinfmu.draw.scene.instant import Instant
 from kinfmu.errors import KinfmuError, MobilityError
+from kinfmu.mechanism.quantities.placement import body_of
 from kinfmu.page.describe import drawn
-from kinfmu.page.editor.drawing import NOBODY, Drawing
+from kinfmu.page.editor.drawing import AS_DRAWN, PLACEHOLDER, Drawing
 from kinfmu.page.html import page_data
 from kinfmu.plan import plan_from
 from kinfmu.plan.equations.redundancy import Redundancy
 
+_MOST_NOTES = 5  # of one kind in an answer
+
 
 def answer(drawing: Drawing) -> dict[str, Any]:
-    """Return what the page is told of a drawing at once."""
+    """Return the answer to a page after a change: the text, and what of it needs no run."""
     problem = _problem(drawing)
     badge = _badge(drawing, problem)
     return {
@@ -42,11 +45,19 @@ def sketch(drawing: Drawing) -> dict[str, Any]:
     for point in found["points"]:
         point["at"] = list(drawing.at(f"{point['body']}.{point['name']}"))
     if not drawing.has_bodies:
-        found["bodies"] = [body for body in found["bodies"] if body["name"] != NOBODY]
-        found["shapes"] = [shape for shape in found["shapes"] if shape["frame"] != NOBODY]
+        found["bodies"] = [body for body in found["bodies"] if body["name"] != PLACEHOLDER]
+        found["shapes"] = [shape for shape in found["shapes"] if shape["frame"] != PLACEHOLDER]
     places = np.array([point["at"] for point in found["points"]]).reshape(-1, 2)
     box = [places.min(axis=0).tolist(), places.max(axis=0).tolist()] if len(places) else None
-    return found | {"box": box, "over": None, "samples": None, "modules": None, "file": None, "closedNumbers": 0}
+    return found | {
+        "box": box,
+        "over": None,
+        "samples": None,
+        "modules": None,
+        "file": None,
+        "closedNumbers": 0,
+        "size": drawing.size,
+    }
 
 
 def _problem(drawing: Drawing) -> KinfmuError | None:
@@ -98,7 +109,23 @@ def _findings(drawing: Drawing, problem: KinfmuError | None) -> list[dict[str, A
     found: list[dict[str, Any]] = []
     if problem is not None:
         found.append({"kind": "problem", "text": str(problem), "edits": _help(drawing)})
+        found += _unpinned(drawing)
     return found
+
+
+def _unpinned(drawing: Drawing) -> list[dict[str, Any]]:
+    """Return a line for each place where points of two bodies meet that no joint holds together."""
+    held = {frozenset(map(body_of, joint.between)) for joint in drawing.mechanism.joints if hasattr(joint, "between")}
+    points = [*drawing.mechanism.body_points]
+    places = np.array([drawing.at(point) for point in points]).reshape(-1, 2)
+    near = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1)) <= AS_DRAWN * drawing.size
+    found = []
+    for k, j in np.argwhere(np.triu(near, 1)).tolist():
+        a, b = points[k], points[j]
+        if body_of(a) != body_of(b) and b not in drawing.pins[a] and frozenset((body_of(a), body_of(b))) not in held:
+            pin = {"text": f"pin {a} and {b}", "operations": [{"do": "pin", "points": [a, b]}]}
+            found.append({"kind": "note", "text": f"{a} and {b} are in one place and not joined", "edits": [pin]})
+    return found[:_MOST_NOTES]
 
 
 def _help(drawing: Drawing) -> list[dict[str, Any]]:

@@ -33,7 +33,7 @@ from kinfmu.plan.equations.start_poses import is_in_world_coordinates, law_targe
 from kinfmu.plan.equations.system import System
 
 AS_DRAWN = 1e-9  # of the size; start poses that close this well are the drawn poses, to the bit
-NOBODY = "_"  # stands for the bodies of a file that has only the ground, which is no mechanism yet
+PLACEHOLDER = "_"  # stands for the bodies of a file that has only the ground, which is no mechanism yet
 
 Pose = tuple[float, float, float]
 Spot = tuple[float, float]
@@ -47,7 +47,7 @@ class Drawing:
         text: The text of the file.
         folder: Where relative paths of files in it start.
         document: The tables of the text.
-        mechanism: Its mechanism; that of a file with only the ground has one body without points, `NOBODY`.
+        mechanism: Its mechanism; that of a file with only the ground has one body without points, `PLACEHOLDER`.
 
     """
 
@@ -74,7 +74,7 @@ class Drawing:
         bodies = expanded(document).get("bodies", {})
         shown: dict[str, Any] = document
         if isinstance(bodies, Mapping) and not bodies.keys() - {GROUND_NAME}:
-            shown = document | {"bodies": {**document.get("bodies", {}), NOBODY: {}}}
+            shown = document | {"bodies": {**document.get("bodies", {}), PLACEHOLDER: {}}}
         return cls(text, folder, document, mechanism_of(shown, folder))
 
     @classmethod
@@ -117,7 +117,7 @@ class Drawing:
     @property
     def has_bodies(self) -> bool:
         """True if there is a body that can move."""
-        return self.mechanism.moving_bodies[0].name != NOBODY
+        return self.mechanism.moving_bodies[0].name != PLACEHOLDER
 
     @cached_property
     def system(self) -> System:
@@ -149,7 +149,7 @@ class Drawing:
 
     @cached_property
     def assembled(self) -> Redundancy | KinfmuError:
-        """The mobility with the assembled start pose, which may lie beside a singular one; or why it is not known."""
+        """The mobility with the assembled start pose, which may be next to a singular one; or why it is not known."""
         try:
             return find_redundancy(self.system)
         except KinfmuError as problem:

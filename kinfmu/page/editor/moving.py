@@ -99,8 +99,9 @@ def carry(pen: Pen, point: str, to: Spot) -> None:
                 x, y = pen.spot(held)
                 places |= dict.fromkeys(_moved_with(pen, held) - moved, (x + across * n_x, y + across * n_y))
     local = {one: drawing.seen_from(body_of(one), spot) for one, spot in places.items()}
-    for one, spot in local.items():
-        _put_point(pen, one, spot)
+    for one in drawing.mechanism.body_points:  # in the order of the file
+        if one in local:
+            _put_point(pen, one, local[one])
     _follow(pen, local)
 
 

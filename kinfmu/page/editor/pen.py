@@ -107,7 +107,7 @@ class Arguments:
         return {"do": f"{self.name}, {key}", **value}
 
     def finish(self) -> None:
-        """Raise a MechanismError for an argument that nobody has read."""
+        """Raise a MechanismError for an argument that is not read."""
         for key in self._values:
             if key not in self._read:
                 raise self.error(f"'{key:.40}' is not known{suggestion(key, self._read)}")

@@ -82,7 +82,7 @@ class Session:
             return 0
 
     def current(self) -> tuple[int, Drawing, dict[str, Any]]:
-        """Return the number of the current state, its drawing, and what a page is told of the session."""
+        """Return the number of the current state, its drawing, and the keys of an answer that belong to the session."""
         with self._alone():
             states = self._take_file(self._read())
             return states.number, self._drawing(states), self._about(states)

@@ -130,7 +130,7 @@ class PlayServer:
             return kinfmu.build(mechanism, folder, fmi=fmi).read_bytes()
 
     def drawing(self) -> tuple[int, dict[str, Any]]:
-        """Return the number of the current state of the drawing, and what a page is told of it.
+        """Return the number of the current state of the drawing, and the answer to a page.
 
         Raises:
             KinfmuError: The file cannot be edited.
@@ -306,11 +306,11 @@ class _Handler(BaseHTTPRequestHandler):
             else:
                 session.redo(number)
         except StaleState as problem:
+            source.report_states()
             self._send_drawing(HTTPStatus.CONFLICT, problem=str(problem))
         else:
+            source.report_states()
             self._send_drawing(HTTPStatus.OK)
-        finally:
-            source.tell_states()
 
     def _send_drawing(self, status: HTTPStatus, **more: str) -> None:
         _, found = self.server.play.drawing()

@@ -62,7 +62,7 @@ class PlaySource:
         self._closed = threading.Event()
         self._stamp = self._seen = self._stamped()
         self._state = State(1, 1, "")
-        self._seen_states = 0
+        self._reported: tuple[object, object] | None = None
         self.mechanism, self._page = self._made(may_be_partial=True)
 
     def _check_new(self, name: str) -> None:
@@ -99,12 +99,15 @@ class PlaySource:
                 self._session = Session(self.path)
         return self._session
 
-    def tell_states(self) -> None:
-        """Let all pages know the current state of the drawing."""
+    def report_states(self) -> None:
+        """Report the current state of the drawing to all pages."""
         if self._session is None:
             return
-        self._seen_states = self._session.stamp()
-        number = self._session.number
+        self._reported = self._session.stamp(), self._stamp
+        try:
+            number = self._session.current()[0]
+        except KinfmuError:
+            return  # requests report it
         with self._news:
             if number != self._state.editor:
                 self._state = self._state._replace(change=self._state.change + 1, editor=number)
@@ -151,8 +154,8 @@ class PlaySource:
         """Look at the file until `close`; what is in the gallery does not change."""
         while self.path and not self._closed.wait(PERIOD):
             self.look()
-            if self._session is not None and self._session.stamp() != self._seen_states:  # also of another process
-                self.tell_states()
+            if self._session is not None and (self._session.stamp(), self._stamp) != self._reported:
+                self.report_states()  # of another program
 
     def _tell(
         self, mechanism: Mechanism | None = None, text: str = "", problem: str = "", *, is_busy: bool = False

@@ -255,7 +255,7 @@ def test_tabs_that_draw_at_once_lose_nothing(server: PlayServer) -> None:
     assert len(done) == 20
 
 
-def test_pages_are_told_of_new_states(server: PlayServer, fourbar: dict[str, Any]) -> None:
+def test_new_states_are_reported_to_pages(server: PlayServer, fourbar: dict[str, Any]) -> None:
     assert server.source.state.editor == fourbar["state"]
     after = draw(server, ground(9, 9))
     assert server.source.state.editor == after["state"]

@@ -108,6 +108,14 @@ def test_what_is_missing_can_be_added_by_the_operations_of_a_finding() -> None:
         assert answer(changed(drawing, edit["operations"]))["badge"]["isComplete"]
 
 
+def test_points_in_one_place_that_are_not_joined_are_pinned_by_a_finding() -> None:
+    drawing = drawn(bar(("ground", 0, 0), (30, 0), "a"), bar((30, 0), (50, 20), "b"))
+    (note,) = (finding for finding in answer(drawing)["findings"] if finding["kind"] == "note")
+    assert note["text"] == "a.B and b.C are in one place and not joined"
+    after = changed(drawing, note["edits"][0]["operations"])
+    assert [joint.between for joint in after.mechanism.joints] == [("ground.A", "a.A"), ("a.B", "b.C")]
+
+
 @pytest.mark.parametrize("name", gallery.names())
 def test_files_of_the_gallery_are_edited_without_another_change(name: str) -> None:
     drawing = drawing_of(name)

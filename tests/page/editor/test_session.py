@@ -230,9 +230,9 @@ def test_being_killed_loses_nothing(path: Path) -> None:
             assert process.stdout.readline() == "begin\n"
             time.sleep(rng.uniform(0.1, 0.4))
             process.send_signal(signal.SIGKILL)
-            told = process.stdout.read().splitlines()
+            lines = process.stdout.read().splitlines()
         stated, saved = (
-            max([int(line.split()[1]) for line in told if line.startswith(word)], default=-1)
+            max([int(line.split()[1]) for line in lines if line.startswith(word)], default=-1)
             for word in ("state", "saved")
         )
         drawing = Session(path).current()[1]
