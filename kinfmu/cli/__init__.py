@@ -3,7 +3,18 @@
 Importing a file adds its commands to the group `main`.
 """
 
-from kinfmu.cli import build, check, design, export, gallery, play, records, simulate, solve  # noqa: F401  add commands
+from kinfmu.cli import (  # noqa: F401  add commands
+    build,
+    check,
+    design,
+    export,
+    gallery,
+    imports,
+    play,
+    records,
+    simulate,
+    solve,
+)
 from kinfmu.cli.group import main
 
 __all__ = ["main"]

@@ -50,7 +50,7 @@ class InputFile(_File):
     """An existing file."""
 
     def read(self, text: str) -> Path:
-        path = _existing(text)
+        path = existing(text)
         _check_suffix(path, self.suffixes)
         return path
 
@@ -91,7 +91,7 @@ class MechanismName(ArgumentType):
 
     def read(self, text: str) -> str:
         if suffix_of(text) in self.suffixes:
-            _existing(text)
+            existing(text)
             return text
         known = gallery.names()
         files = (f"{text}.toml", str(Path(text) / "mechanism.toml"))
@@ -150,7 +150,7 @@ def _is_folder(path: Path) -> bool:
         return False
 
 
-def _existing(text: str) -> Path:
+def existing(text: str) -> Path:
     """Return the path of a file; the ValueError for a missing one suggests a name with the same ending."""
     path = Path(text)
     if _is_folder(path):

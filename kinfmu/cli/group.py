@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 ORDER = (
     "list",
     "new",
+    "import",
     "check",
     "play",
     "solve",

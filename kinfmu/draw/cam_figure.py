@@ -9,12 +9,13 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.draw.chart import SMALL, degree_ticks, dress
-from kinfmu.draw.dxf_file import imported_ezdxf, written_drawing
+from kinfmu.draw.dxf_file import written_drawing
 from kinfmu.draw.marks import COLOUR
 from kinfmu.draw.scene import palette
 from kinfmu.draw.sheet import GREY, INK, arc, ink, titled_figure
 from kinfmu.draw.writing import SUFFIXES, check_suffix, write
 from kinfmu.files import suffix_of
+from kinfmu.mechanism.imports.dxf import imported_ezdxf
 from kinfmu.motion.cams import CamProfile
 
 if TYPE_CHECKING:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -20,15 +19,15 @@ from kinfmu.draw.scene.palette import Colour
 from kinfmu.draw.scene.placing import poses_after, poses_of
 from kinfmu.draw.scene.shapes import shapes
 from kinfmu.draw.writing import check_suffix, write_bytes
-from kinfmu.errors import FigureError, MissingPackageError
+from kinfmu.errors import FigureError
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.imports.dxf import DXF_UNITS, imported_ezdxf
 from kinfmu.mechanism.laws import External
 from kinfmu.mechanism.quantities.placement import body_of
 from kinfmu.run import Run
 from kinfmu.run.axis import SAMPLE, Axis, axis_of
 
-DXF_UNITS = {"in": 1, "ft": 2, "mm": 4, "cm": 5, "m": 6, "km": 7, "um": 13}  # $INSUNITS
 _DRAWN = (  # what has true dimensions
     *("link", "rod", "face", "bar", "slot", "rail", "rack", "wheel", "barrel", "shaft"),
     *("cam", "pitch", "roller"),
@@ -90,14 +89,6 @@ def _fill(drawing: Any, shown: Instant, colour_number: Callable[[Colour], int]) 
         space.add_circle((x, y), radius, dxfattribs={"layer": layer})
     for name in shown.body_points:
         space.add_point(tuple(map(float, shown.point(name))), dxfattribs={"layer": body_of(name)})
-
-
-def imported_ezdxf(path: Path) -> Any:
-    """Return the package ezdxf; MissingPackageError about `path` if it is not installed."""
-    try:
-        return import_module("ezdxf")
-    except ImportError:
-        raise MissingPackageError(f"{path}: a DXF file needs ezdxf: pip install 'kinfmu[dxf]'") from None
 
 
 @contextmanager

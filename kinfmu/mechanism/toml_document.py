@@ -55,7 +55,16 @@ def text_in(path: Path, what: str, where: str = "") -> str:
 
     what: What it should be, such as 'a mechanism file'. where: The key that names it, in messages. Default: the path.
     """
-    begin, what_is = (where, "is ") if where else (f"{path}:", "")
+    begin, what_is = _beginning(path, where)
+    try:
+        return content_of(path, what, where).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise MechanismError(f"{begin} {what_is}not a text file (byte {error.start} is not UTF-8)") from None
+
+
+def content_of(path: Path, what: str, where: str = "") -> bytes:
+    """Return the content of a file, or raise a MechanismError; arguments as of `text_in`."""
+    begin, what_is = _beginning(path, where)
     try:
         with path.open("rb") as file:
             content = file.read(LARGEST_FILE + 1)  # a device or a pipe has no size to ask for
@@ -63,10 +72,12 @@ def text_in(path: Path, what: str, where: str = "") -> str:
         raise MechanismError(f"{begin} cannot be read ({getattr(error, 'strerror', None) or error})") from None
     if len(content) > LARGEST_FILE:
         raise MechanismError(f"{begin} {what_is}too large for {what} (largest: {LARGEST_FILE} bytes)")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise MechanismError(f"{begin} {what_is}not a text file (byte {error.start} is not UTF-8)") from None
+    return content
+
+
+def _beginning(path: Path, where: str) -> tuple[str, str]:
+    """Return how a message begins, and what follows before an adjective."""
+    return (where, "is ") if where else (f"{path}:", "")
 
 
 def document_of(text: str, where: str) -> dict[str, Any]:

@@ -68,6 +68,8 @@ WRONG_USAGE = [
     ("solve five_bar -o run.csv --angle 0:1:2", "five_bar has left, right; simulate --input drives them"),
     ("solve fourbar -o run.csv --angle 0:1:2 --set crank.speed=2", "give --times A:B:STEP in place of --angle"),
     ("solve fourbar -o run.csv --engine nativ", "'nativ' is not one of"),
+    ("import none.dxf", "none.dxf: there is no such file"),
+    ("import short.csv -o run.csv", "run.csv: its name must end in .toml"),
     ("build forbar", "did you mean 'fourbar'?"),
     ("build fourbar -o four.zip", "four.zip: is no folder, and the file of an FMU ends in .fmu"),
     ("build fourbar --flavour python --fmi 3", "--fmi 3 needs --flavour native; the python flavour has --fmi 2"),
@@ -123,6 +125,8 @@ WRONG_USAGE = [
     ("verify short.csv", "short.csv: its name must end in .fmu"),
 ]
 AT_FAULT = [
+    ("import broken.toml", "broken.toml: is not a link of PMKS+, a .linkage2 file of Linkage, or a DXF drawing"),
+    ("import https://example.org/", "is an address without a drawing"),
     ("check broken.toml", "broken.toml: [bodies.crank] ponts: unknown key"),
     ("check contradicting.toml", "contradicts the other joints"),
     ("solve broken.toml -o run.csv", "broken.toml: [bodies.crank] ponts: unknown key"),

@@ -74,8 +74,9 @@ BEFORE = {  # commands for the files that a page takes as given
 }
 FROM_PAGES = {"commands.md": ["fitting.md", "studies.md"]}  # pages whose files a page takes as given
 SHOWN = re.compile(r"(print\(.*\))  # (.*)")
-INPUTS = {  # tables of inputs that pages take as given
+INPUTS = {  # files that pages take as given
     "crank.csv": "time,crank_angle\n0,0\n0.5,0.5\n1,1\n",
+    "press.linkage2": (ROOT / "tests/mechanism/imports/linkage/slider_crank.linkage2").read_text(encoding="utf-8"),
     "torque.csv": "time,crank_torque [N m]\n0,50\n0.2,50\n",
 }
 

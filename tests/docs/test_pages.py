@@ -42,6 +42,16 @@ def test_cams(request: pytest.FixtureRequest, tmp_path: Path) -> None:
     assert not differences(picture(committed), picture(drawn)), "docs/cam.svg is old; --update draws it anew"
 
 
+def test_the_sketch_of_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("ezdxf")
+    monkeypatch.chdir(tmp_path)
+    found = blocks(page_text("commands.md"))
+    at = next(k for k, block in enumerate(found) if "ezdxf.new" in block.text)
+    exec(found[at].text, {})  # noqa: S102  the Python of the page
+    result = CliRunner().invoke(main, commands(found[at + 1])[0].split()[1:])
+    assert result.output == found[at + 2].text
+
+
 @pytest.mark.long
 def test_coupling(request: pytest.FixtureRequest, tmp_path: Path) -> None:
     followed = follow("coupling.md", tmp_path)

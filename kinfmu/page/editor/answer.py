@@ -13,7 +13,7 @@ from kinfmu.errors import KinfmuError, MobilityError
 from kinfmu.page.describe import drawn
 from kinfmu.page.editor.drawing import NOBODY, Drawing
 from kinfmu.page.html import page_data
-from kinfmu.plan import SolvePlan, plan_from
+from kinfmu.plan import plan_from
 from kinfmu.plan.equations.redundancy import Redundancy
 
 
@@ -51,17 +51,21 @@ def sketch(drawing: Drawing) -> dict[str, Any]:
 
 def _problem(drawing: Drawing) -> KinfmuError | None:
     """Return why a drawing cannot be solved; None if it can."""
-    if isinstance(drawing.redundancy, KinfmuError):
-        return drawing.redundancy
+    problem = _problem_with(drawing, drawing.redundancy)
+    if problem is None or not isinstance(drawing.redundancy, Redundancy):
+        return problem
+    is_matched = drawing.redundancy.mobility == len(drawing.mechanism.drivers)
+    return _problem_with(drawing, drawing.assembled) if is_matched else problem  # a start pose may be singular
+
+
+def _problem_with(drawing: Drawing, redundancy: Redundancy | KinfmuError) -> KinfmuError | None:
+    if not isinstance(redundancy, Redundancy):
+        return redundancy
     try:
-        _plan(drawing, drawing.redundancy)
+        plan_from(drawing.mechanism, drawing.system, drawing.origin, redundancy)
     except KinfmuError as problem:
         return problem
     return None
-
-
-def _plan(drawing: Drawing, redundancy: Redundancy) -> SolvePlan:
-    return plan_from(drawing.mechanism, drawing.system, drawing.origin, redundancy)
 
 
 def _badge(drawing: Drawing, problem: KinfmuError | None) -> dict[str, Any]:
@@ -78,8 +82,10 @@ def _badge(drawing: Drawing, problem: KinfmuError | None) -> dict[str, Any]:
         text = f"{missing} more joint{'s'[: missing > 1]} or driver{'s'[: missing > 1]}"
     elif missing < 0:
         text = f"{-missing} driver{'s'[: missing < -1]} too many"
+    elif not drivers:
+        text = "a structure: nothing moves"
     elif problem is None:
-        text = "complete" if drivers else "a structure: nothing moves"
+        text = "complete"
     else:
         text = "does not close" if not isinstance(problem, MobilityError) else "the drivers do not determine the motion"
     return {"mobility": mobility, "drivers": drivers, "text": text, "isComplete": problem is None and drivers > 0}

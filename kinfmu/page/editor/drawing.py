@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from kinfmu.arrays import FloatArray
 from kinfmu.errors import KinfmuError, MechanismError, suggestion
 from kinfmu.mechanism import Mechanism, Point
 from kinfmu.mechanism.body import GROUND_NAME
@@ -24,6 +25,7 @@ from kinfmu.mechanism.toml_file import mechanism_of
 from kinfmu.mechanism.valid import quoted
 from kinfmu.page.editor.text_edits import edited_text
 from kinfmu.plan import localized
+from kinfmu.plan.equations.assembly import closed_start
 from kinfmu.plan.equations.closing import CLOSED, close, followed
 from kinfmu.plan.equations.part import Part
 from kinfmu.plan.equations.redundancy import Redundancy, find_redundancy
@@ -132,8 +134,22 @@ class Drawing:
         return localized(self.mechanism)
 
     @cached_property
+    def _start(self) -> FloatArray | None:
+        """The start pose of the file, all coordinates (n,), if all joints and drivers are closed there."""
+        system, start, law = self.system, start_from_poses(self.system).q, law_targets(self.system)
+        open_by = np.abs(system.residual(start, law) / system.scales) if system.rows else np.zeros(1)
+        return start if np.max(open_by) <= AS_DRAWN * system.size else None
+
+    @cached_property
     def redundancy(self) -> Redundancy | KinfmuError:
-        """The mobility and the assembled start pose, or why they are not known."""
+        """The mobility, of the start pose if it is closed, else assembled; or why it is not known."""
+        if self._start is None:
+            return self.assembled
+        return find_redundancy(self.system, closed_start(self.system, self._start, law_targets(self.system)))
+
+    @cached_property
+    def assembled(self) -> Redundancy | KinfmuError:
+        """The mobility with the assembled start pose, which may lie beside a singular one; or why it is not known."""
         try:
             return find_redundancy(self.system)
         except KinfmuError as problem:
@@ -148,29 +164,23 @@ class Drawing:
         return {GROUND_NAME: (0.0, 0.0, 0.0), **poses}
 
     @property
-    def _drawn(self) -> Any:
-        """Return all coordinates of the drawn poses, (n,)."""
-        system = self.system
-        start = start_from_poses(system).q
-        if self._is_closed(start):
-            return start
-        law = law_targets(system)
+    def _drawn(self) -> FloatArray:
+        """All coordinates of the drawn poses, (n,)."""
+        if self._start is not None:
+            return self._start
+        system, law = self.system, law_targets(self.system)
         pose = self.redundancy.assembly.pose if isinstance(self.redundancy, Redundancy) else None
         if pose is not None:
             if np.array_equal(pose.u, law):
                 return pose.q
             q, u = followed(system, pose.q, pose.u, law)
             return q if np.array_equal(u, law) else pose.q
+        start = start_from_poses(system).q
         try:
             q, gap = close(Part(system, range(system.joint_row_count)), start, law)
         except KinfmuError:
             return start
         return q if gap <= CLOSED else start
-
-    def _is_closed(self, q: Any) -> bool:
-        system = self.system
-        open_by = np.abs(system.residual(q, law_targets(system)) / system.scales) if system.rows else np.zeros(1)
-        return bool(np.max(open_by, initial=0.0) <= AS_DRAWN * system.size)
 
     @cached_property
     def placement(self) -> Placement:

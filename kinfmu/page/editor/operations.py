@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.files import suffix_of
+from kinfmu.mechanism.imports import imported, is_pmks_link
 from kinfmu.mechanism.valid import quoted
 from kinfmu.page.editor.drawing import Drawing
 from kinfmu.page.editor.moving import length, move
@@ -31,9 +33,16 @@ MOST_OPERATIONS = 1000  # in one request
 
 
 def _replace(drawing: Drawing, values: Arguments) -> Drawing:
-    """Return the drawing of another text; name: of the file that it comes from."""
-    values.text("name", "")
-    return Drawing.of(values.text("text"), drawing.folder)
+    """Return the drawing of another text: a mechanism file, a link of PMKS+, or the file of another program.
+
+    The name of the file that it comes from shows what it is.
+    """
+    text, name = values.text("text"), values.text("name", "")
+    if is_pmks_link(text.strip()):
+        text = imported(text.strip()).text
+    elif suffix_of(name) not in ("", ".toml"):
+        text = imported(text, name).text
+    return Drawing.of(text, drawing.folder)
 
 
 _OPERATIONS: dict[str, Callable[[Pen, Arguments], None]] = {

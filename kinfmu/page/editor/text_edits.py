@@ -97,10 +97,14 @@ def _without_empty(document: Mapping[str, Any]) -> dict[str, Any]:
 def _with_comments(text: str, before: str) -> str:
     """Return the text with the comments above its headers; tomlkit removes them with the table before them."""
     for found in _COMMENTED.finditer(before):
-        header = f"\n{found['header']}"
-        if found[0] not in text and text.count(header) == 1:
-            at = text.index(header) + 1
-            text = text[:at] + found["comments"] + text[at:]
+        comments, header = found["comments"], f"\n{found['header']}"
+        if found[0] in text or text.count(header) != 1:
+            continue
+        above, below = text.split(header)
+        if above.rstrip("\n").endswith(comments.rstrip("\n")):  # with a blank line between them
+            text = above.rstrip("\n") + header + below
+        else:
+            text = f"{above}\n{comments}{header[1:]}{below}"
     return text
 
 

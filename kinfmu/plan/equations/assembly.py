@@ -107,6 +107,12 @@ def find_assembly(system: System) -> AssembledStart:
     )
 
 
+def closed_start(system: System, q: FloatArray, u: FloatArray) -> AssembledStart:
+    """Return the start of a mechanism that closes in a pose q (n,) at driver values u (d,) as it is."""
+    pose = _without_spare_rows(system, q, u) or Assembled(q, u, margin(system, q))
+    return AssembledStart(StartValues(q, u), pose)
+
+
 def start_values(system: System) -> StartValues:
     """Return the start values of `find_assembly`; nothing is assembled if start poses and laws agree."""
     given = start_from_poses(system)
