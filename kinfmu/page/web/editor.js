@@ -60,6 +60,7 @@ export class Editor {
         this.chosenName = null; // { kind, ... } of what is selected
         this.marked = null; // names that are marked
         this.spots = new Spots();
+        this.layer = new OffscreenCanvas(1, 1); // of what is drawn lighter
         this.#build();
         this.#pointer();
         this.#keys();
@@ -181,6 +182,7 @@ export class Editor {
     }
 
     async #operate(operations) {
+        this.isDrawn = true;
         return this.#answered(await this.session.operate(operations));
     }
 
@@ -193,6 +195,7 @@ export class Editor {
     }
 
     undo(isRedo) {
+        if (this.machine) this.machine.picks = [];
         this.session.next(async () => this.#answered(await this.session.step(isRedo ? "redo" : "undo")));
     }
 
@@ -292,11 +295,17 @@ export class Editor {
 
     // ---- clicks
 
+    // Return from where lengths count, null without such a place.
+    get base() {
+        const { tool, picks } = this.machine;
+        return tool in OF_PICTURE ? picks[picks.length - 1]?.at ?? null : baseOf(this.machine);
+    }
+
     // Return the target of a click at what the pointer or cursor is.
     #target(here = this.here) {
         const { machine } = this;
         const tool = toolOf(machine.tool);
-        const options = { reach: here.reach, step: this.step, base: baseOf2(machine), isFree: here.isFree || machine.tool in OF_PICTURE, isAngled: here.isAngled, hasMembers: tool?.hasMembers || (machine.tool === "move" && !machine.picks.length) };
+        const options = { reach: here.reach, step: this.step, base: this.base, isFree: here.isFree || machine.tool in OF_PICTURE, isAngled: here.isAngled, hasMembers: tool?.hasMembers || (machine.tool === "move" && !machine.picks.length) };
         return snapped(this.sketch, here.p, options);
     }
 
@@ -305,7 +314,8 @@ export class Editor {
         return this.session.next(async () => {
             if (!this.machine) return;
             const target = this.#target(here);
-            if (this.machine.tool === "move" && !this.machine.picks.length && !here.isKey) this.select(target);
+            const isSelecting = this.machine.tool === "move" && !this.machine.picks.length && (!here.isKey || target.kind !== "point");
+            if (isSelecting) this.select(target);
             else await this.#use(target);
         });
     }
@@ -328,7 +338,6 @@ export class Editor {
         this.#changed();
         if (refusal) this.#bar(refusal);
         if (!operations.length) return;
-        this.isDrawn = true;
         this.page.view.isFitted = false; // what is drawn stays where it is, also when the window has other parts
         const isMade = await this.#operate(operations);
         if (!this.#isInView(target.at)) this.page.fit();
@@ -353,7 +362,7 @@ export class Editor {
     typed(text) {
         const { machine } = this;
         const { picks, tool } = machine;
-        const base = baseOf2(machine);
+        const base = this.base;
         const found = typed(text, tool === "scale" ? null : base, this.here?.p || base);
         if (found.problem) return found.problem;
         if (tool === "scale" && picks.length === 2) {
@@ -411,9 +420,12 @@ export class Editor {
         draw(pen, nothing, view, theme, { grid: true }, extra, this.spots);
         this.spots.begin(page.now, sketch.pose, view);
         const shown = this.#dragged() || sketch;
-        const layer = this.session.answer.badge.isComplete ? null : new OffscreenCanvas(context.canvas.width, context.canvas.height);
+        const layer = this.session.answer.badge.isComplete ? null : this.layer;
         const target = layer ? layer.getContext("2d") : context;
-        if (layer) target.setTransform(context.getTransform());
+        if (layer) {
+            [layer.width, layer.height] = [context.canvas.width, context.canvas.height]; // and without what was drawn before
+            target.setTransform(context.getTransform());
+        }
         draw(new CanvasPen(target), shown, view, theme, show, extra, this.spots);
         this.#marks(new CanvasPen(target), shown);
         if (layer) {
@@ -448,8 +460,8 @@ export class Editor {
         const own = new Set(sketch.movingWith(number));
         const over = snapped({ ...sketch, pins: sketch.pins.filter((one) => !one.points.some((k) => own.has(k))), lines: [], areas: [], nameOf: (k) => sketch.nameOf(k), heldWith: (k) => sketch.heldWith(k) }, here.p, { reach: here.reach, step: this.step, isFree: here.isFree });
         const to = kept(sketch.point(number), over.at, sketch.placesKept(number, this.locked));
-        const joins = over.kind === "point" && distance(to, over.at) === 0 ? [{ do: "pin", points: [pin.point, over.point] }] : [];
-        return { number, to, operations: [{ do: "move", point: pin.point, to }, ...joins] };
+        const target = distance(to, over.at) ? { kind: "free", at: to } : over;
+        return { number, to, operations: toolOf("move").make([pin, target]) };
     }
 
     // Draw points that no joint holds, places on the ground without a joint, motors and locks.
@@ -652,7 +664,7 @@ export class Editor {
     #moveCursor(dx, dy) {
         const { view } = this.page;
         const { step } = this;
-        const from = this.here?.p || baseOf2(this.machine) || [view.x, view.y];
+        const from = this.here?.p || this.base || [view.x, view.y];
         const p = [from[0] + dx * step, from[1] + dy * step].map((x) => clean(x, step));
         this.here = { p, isKey: true, isFree: false, isAngled: false, reach: 0.5 * step };
         const at = view.pixel(p);
@@ -677,7 +689,8 @@ export class Editor {
         const isInBar = Boolean(isTouch && isWaiting);
         if (isInBar !== (field.parentElement === $("draw-bar"))) (isInBar ? $("draw-bar") : $("stage")).append(field);
         if (document.activeElement !== field && !field.value) field.hidden = !isInBar;
-        field.placeholder = machine && baseOf2(machine) ? "length < angle" : "x, y";
+        const isOfLength = machine && (machine.tool === "scale" || (machine.tool === "move" && this.selection?.kind === "body"));
+        field.placeholder = isOfLength ? "length" : machine && this.base ? "length < angle" : "x, y";
         if (isInBar || field.hidden) return;
         const { view } = this.page;
         const [x, y] = here ? view.pixel(here.p) : [0.5 * view.width, 0.5 * view.height];
@@ -788,11 +801,6 @@ export class Editor {
         }
         for (const kind of ["click", "input"]) $("transport").addEventListener(kind, () => this.leave(), true);
     }
-}
-
-// Return from where lengths count, also for the tools of the picture.
-function baseOf2(machine) {
-    return machine.tool in OF_PICTURE ? machine.picks[machine.picks.length - 1]?.at ?? null : baseOf(machine);
 }
 
 function lock(pen, [x, y], theme) {

@@ -52,7 +52,8 @@ function pointTarget(sketch, { at, points }) {
     const held = points.map((k) => sketch.heldWith(k));
     const open = names.flatMap((a, i) => names.slice(i + 1).map((b, j) => [i, i + 1 + j])).filter(([i, j]) => held[i] !== held[j] && own[i] !== own[j]).map((pair) => pair.map((k) => names[k]));
     const first = Math.max(own.indexOf(GROUND), 0);
-    return { kind: "point", at: [...at], point: names[first], points: names, body: own[first], bodies: [...new Set([...own, ...through])], joints: joints.map(({ name }) => name), open };
+    const isEnd = own[first] !== GROUND && data.points.filter((one) => one.body === own[first]).length <= 2; // without it no link is left
+    return { kind: "point", at: [...at], point: names[first], points: names, body: own[first], bodies: [...new Set([...own, ...through])], joints: joints.map(({ name }) => name), open, isEnd };
 }
 
 function bodyTarget(bars, p, reach) {

@@ -28,7 +28,7 @@ const vector = (from, to) => [to.at[0] - from.at[0], to.at[1] - from.at[1]];
 // Of each tool: accepts: for each click a function that returns why a target is refused; make: the operations of all clicks.
 export const TOOLS = [
     { id: "move", key: "v", label: "Move", hints: ["Drag a pin. Click a link or pin to select it.", "Choose the new place."], accepts: [(target) => (target.kind === "point" ? "" : "Choose a pin."), anywhere],
-        make: ([from, to]) => [{ do: "move", point: from.point, to: to.at }] },
+        make: ([from, to]) => [{ do: "move", point: from.point, to: to.at }, ...(to.kind === "point" && !from.points.includes(to.point) ? [{ do: "pin", points: [from.point, to.point] }] : [])] },
     { id: "link", key: "l", label: "Link", hints: ["Click one end of the link.", "Click its other end, or type length, length < angle, or x, y. Esc, or a second click there, stops."], accepts: [anywhere, anywhere], isChain: true, make: two("bar") },
     { id: "pin", key: "p", label: "Pin", hints: ["Click where two links meet, or the pin of one link.", "Click the pin of the other link."], accepts: [onLink, (target, picks) => (target.kind === "point" && picks[0].kind === "point" ? onOther(target, picks) : "Click the pins of two links, or where they cross.")], make: pinned, isEarly: (target) => target.bodies.length > 1 && (target.kind === "body" || target.open.length > 0 || target.bodies.length > target.points.length) },
     { id: "ground", key: "g", label: "Ground", hints: ["Click a pin or a place to fix it to the ground."], accepts: [anywhere], make: ([at]) => [{ do: "ground", at: placeOf(at) }] },
@@ -88,7 +88,7 @@ export function deletions(target) {
     if (target.kind === "body") return [{ do: "delete", place: ["bodies", target.body] }];
     if (target.joints.length) return target.joints.map((name) => ({ do: "delete", place: ["joints", name] }));
     const [body, point] = target.point.split(".");
-    return [{ do: "delete", place: ["bodies", body, "points", point] }];
+    return [{ do: "delete", place: ["bodies", body, ...(target.isEnd ? [] : ["points", point])] }];
 }
 
 // Return the state of a tool that was just chosen.

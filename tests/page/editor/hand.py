@@ -101,9 +101,9 @@ class DrawingHand:
         self.wait()
 
     def plays(self) -> bool:
-        """Return whether the mechanism is complete and begins to move."""
-        self.page.tab.wait_for_function("window.kinfmu.isPlaying || !window.kinfmu.editor.session.answer.isViewComing")
-        return bool(self.get("k.isPlaying"))
+        """Return whether the mechanism is complete and begins to move; a limit may stop it soon."""
+        self.page.tab.wait_for_function("!window.kinfmu.editor.machine")
+        return bool(self.get("k.linkage && k.linkage.t >= 0"))
 
     def save(self) -> Path:
         """Write the file, and return its path."""

@@ -193,6 +193,7 @@ def test_tools_make_their_operations() -> None:
     assert made("interest", crank, free(50, 50), option="corner") == [{"do": "point", **corner}]
     assert made("delete", pin("a.P", "b.Q")) == [{"do": "delete", "place": ["joints", "J"]}]
     assert made("delete", pin("a.P")) == [{"do": "delete", "place": ["bodies", "a", "points", "P"]}]
+    assert made("delete", pin("a.P") | {"isEnd": True}) == [{"do": "delete", "place": ["bodies", "a"]}]
     assert made("delete", crank) == [{"do": "delete", "place": ["bodies", "crank"]}]
     member = {"kind": "member", "at": [0, 0], "bodies": [], "table": "loads", "name": "spring_1"}
     assert made("delete", member) == [{"do": "delete", "place": ["loads", "spring_1"]}]
