@@ -735,7 +735,7 @@ export class Editor {
             const [file] = event.clipboardData.files;
             const text = event.clipboardData.getData("text");
             if (file) this.takeFile(file);
-            else if (text.includes("\n")) this.#import(text, "");
+            else if (/\n|^https?:/.test(text)) this.#import(text, "");
         });
     }
 

@@ -142,6 +142,6 @@ export class DrawPanel {
         const choose = element("button", { textContent: "Import a file in its place" });
         choose.addEventListener("click", () => file.click());
         const text = element("details", { open: Boolean(isOpen) }, element("summary", { textContent: "Its text (TOML)" }), element("pre", { textContent: answer.text, tabIndex: 0 }));
-        this.parts.file.replaceChildren(element("h2", { textContent: "File" }), element("p", { className: "quiet", textContent: "A mechanism file can also be dropped on the drawing, or its text pasted." }), file, choose, text);
+        this.parts.file.replaceChildren(element("h2", { textContent: "File" }), element("p", { className: "quiet", textContent: "A mechanism file, or one of Linkage, PMKS+ or DXF, can also be dropped on the drawing; text and links can be pasted." }), file, choose, text);
     }
 }
