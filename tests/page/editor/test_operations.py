@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from kinfmu.analysis import check
 from kinfmu.errors import KinfmuError, MechanismError
 from kinfmu.mechanism import gallery
 from kinfmu.mechanism.gallery.load import folder
@@ -114,6 +115,22 @@ def test_points_in_one_place_that_are_not_joined_are_pinned_by_a_finding() -> No
     assert note["text"] == "a.B and b.C are in one place and not joined"
     after = changed(drawing, note["edits"][0]["operations"])
     assert [joint.between for joint in after.mechanism.joints] == [("ground.A", "a.A"), ("a.B", "b.C")]
+
+
+@pytest.mark.parametrize("kind", ["roller", "flat_face"])
+@pytest.mark.parametrize("follower", ["lever", "tappet"])
+def test_a_cam_as_it_is_drawn_can_be_made(kind: str, follower: str) -> None:
+    lever = (bar(("ground", 90, 0), (25, 45), "lever"),)
+    slider = {"do": "slider", "point": "tappet.C", "along": [0, 1], "block": True}
+    tappet = (bar((0, 50), (0, 90), "tappet"), slider)
+    drawing = drawn(
+        bar(("ground", 0, 0), (20, 0), "cam"),
+        *(lever if follower == "lever" else tappet),
+        {"do": "cam", "body": "cam", "follower": "lever.D" if follower == "lever" else "tappet.C", "kind": kind},
+        {"do": "motor", "body": "cam"},
+    )
+    assert check(drawing.mechanism).problem is None
+    assert "cam" in {shape["kind"] for shape in answer(drawing)["sketch"]["shapes"]}
 
 
 @pytest.mark.parametrize("name", gallery.names())
