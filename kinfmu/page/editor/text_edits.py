@@ -5,16 +5,23 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
-from tomlkit.items import InlineTable
+from tomlkit.items import Array, InlineTable
 
 from kinfmu.errors import MechanismError
-from kinfmu.mechanism.edits import Edit, Place, Put, apply, edited
+from kinfmu.mechanism.edits import Edit, Place, Put, Remove, apply, edited
 
-_OF_TABLES = ("bodies", "drivers", "loads", "measures")  # a member of these is a table of its own
+_STYLES = (  # tables whose members are tables of their own; that of kinfmu first
+    ("bodies", "drivers", "loads", "measures"),
+    ("bodies", "drivers", "loads", "measures", "joints"),  # after [joints.A] there is no line of [joints]
+    (),  # after dotted keys, and inside braces, there is no table
+)
+_NOT_WRITTEN = "this change cannot be written into the file as it is written; change its text"
 _COMMENTED = re.compile(r"^(?P<comments>(?:#[^\n]*\n)+)(?P<header>\[[^\n]*)$", re.MULTILINE)
 _CLOSE = re.compile(r"^(?P<above>[^\n#]*[^\n\s#][^\n]*\n)(?=\[)", re.MULTILINE)  # a line above a header
 
@@ -36,13 +43,15 @@ def edited_text(text: str, document: Mapping[str, Any], edits: Iterable[Edit]) -
 
     def edit(written: Any, of_tables: tuple[str, ...]) -> None:
         for one in edits:
+            if isinstance(one, Put) and _replaced_in_list(written, one):
+                continue
             apply(written, Put(one.place, _item(one.place, one.value, of_tables)) if isinstance(one, Put) else one)
             _space(written, one.place[:-1])
 
-    try:
-        return _rewritten(text, wanted, lambda written: edit(written, _OF_TABLES))
-    except MechanismError:  # a file may have tables such as [joints.A], after which no line of [joints] can be
-        return _rewritten(text, wanted, lambda written: edit(written, (*_OF_TABLES, "joints")))
+    for of_tables in _STYLES:
+        with suppress(MechanismError):
+            return _rewritten(text, wanted, partial(edit, of_tables=of_tables))
+    raise MechanismError(_NOT_WRITTEN)
 
 
 def renamed_text(text: str, document: Mapping[str, Any], place: Place, name: str) -> str:
@@ -69,7 +78,15 @@ def renamed_text(text: str, document: Mapping[str, Any], place: Place, name: str
         table.value._replace(last, tomlkit.key(name), item)  # no other way keeps the place
         _space(written, tuple(tables))
 
-    return _rewritten(text, wanted, rename)
+    full = re.compile(rf"^([ \t]*\[?){re.escape('.'.join(place))}(?=[ \t]*[.\]=])", re.MULTILINE)
+    renamed = full.sub(rf"\g<1>{'.'.join((*tables, name))}", text)  # in headers and dotted keys
+    with suppress(ValueError):
+        if renamed != text and tomllib.loads(renamed) == wanted:
+            return renamed
+    try:
+        return _rewritten(text, wanted, rename)
+    except MechanismError:  # at its place it is not possible
+        return edited_text(text, document, [Put((*tables, name), inner[name]), Remove(place)])
 
 
 def _rewritten(text: str, wanted: Mapping[str, Any], edit: Callable[[Any], None]) -> str:
@@ -86,7 +103,22 @@ def _rewritten(text: str, wanted: Mapping[str, Any], edit: Callable[[Any], None]
                 return one
     except (TOMLKitError, ValueError, TypeError, LookupError, AttributeError, RecursionError):
         pass
-    raise MechanismError("this change cannot be written into the file as it is written; change its text")
+    raise MechanismError(_NOT_WRITTEN)
+
+
+def _replaced_in_list(written: Any, edit: Put) -> bool:
+    """Put new entries into a list of the same length, with its comments; return whether it is one."""
+    found = written
+    for key in edit.place:
+        if not isinstance(found, Mapping) or key not in found:
+            return False
+        found = found[key]
+    if not isinstance(found, Array) or not isinstance(edit.value, list) or len(found) != len(edit.value):
+        return False
+    for k, (old, new) in enumerate(zip(found.unwrap(), edit.value, strict=True)):
+        if old != new or type(old) is not type(new):
+            found[k] = tomlkit.value(_line(new))
+    return True
 
 
 def _without_empty(document: Mapping[str, Any]) -> dict[str, Any]:
