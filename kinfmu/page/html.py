@@ -44,7 +44,10 @@ _SCRIPTS = (
     "hand",
     "main",
 )
-_EDITOR = tuple(f"editor{name}" for name in ("_places", "_tools", "_sketch", "_session", "_picture", "_panel", ""))
+_EDITOR = tuple(
+    f"editor{name}"
+    for name in ("_places", "_tools", "_sketch", "_session", "_picture", "_panel", "_paint", "_hand", "_parts", "")
+)
 MOST_NUMBERS = 400  # of a file that its page can change: the code of more is too long for a small page
 _IMPORT = re.compile(r"^import .*\n", re.MULTILINE)
 _NAMES = re.compile(r'^import \{ (.*) \} from "\./(\w+)\.js";$', re.MULTILINE)

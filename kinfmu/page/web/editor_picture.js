@@ -2,6 +2,9 @@
 
 import { distance } from "./geometry.js";
 
+// Tools of the picture, with what they wait for.
+export const OF_PICTURE = { scale: ["Click one end of a known length in the picture.", "Click its other end.", "Type this length."], shift: ["Click a place of the picture.", "Click where it belongs."] };
+
 export class Picture {
     constructor() {
         Object.assign(this, { image: null, at: [0, 0], size: 1, alpha: 0.5 }); // at: its upper left corner; size: of a pixel, in the unit
