@@ -25,7 +25,7 @@ from kinfmu.mechanism.toml_file import mechanism_of
 from kinfmu.mechanism.valid import quoted
 from kinfmu.page.editor.text_edits import edited_text
 from kinfmu.plan import localized
-from kinfmu.plan.equations.assembly import closed_start
+from kinfmu.plan.equations.assembly import MOST_DENSE, closed_start
 from kinfmu.plan.equations.closing import CLOSED, close, followed
 from kinfmu.plan.equations.part import Part
 from kinfmu.plan.equations.redundancy import Redundancy, find_redundancy
@@ -143,7 +143,7 @@ class Drawing:
     @cached_property
     def redundancy(self) -> Redundancy | KinfmuError:
         """The mobility, of the start pose if it is closed, else assembled; or why it is not known."""
-        if self._start is None:
+        if self._start is None or len(self._start) > MOST_DENSE:
             return self.assembled
         return find_redundancy(self.system, closed_start(self.system, self._start, law_targets(self.system)))
 
