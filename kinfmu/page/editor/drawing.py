@@ -145,7 +145,10 @@ class Drawing:
         """The mobility, of the start pose if it is closed, else assembled; or why it is not known."""
         if self._start is None or len(self._start) > MOST_DENSE:
             return self.assembled
-        return find_redundancy(self.system, closed_start(self.system, self._start, law_targets(self.system)))
+        try:
+            return find_redundancy(self.system, closed_start(self.system, self._start, law_targets(self.system)))
+        except KinfmuError as problem:
+            return problem
 
     @cached_property
     def assembled(self) -> Redundancy | KinfmuError:
@@ -210,7 +213,7 @@ class Drawing:
                 groups |= dict.fromkeys(whole, whole)
         return groups
 
-    @property
+    @cached_property
     def size(self) -> float:
         """The extent of all points as drawn, at least that of a system without any [length]."""
         places = np.array([self.at(point) for point in self.mechanism.body_points]).reshape(-1, 2)
