@@ -18,7 +18,7 @@ from kinfmu.mechanism.valid import LARGEST_NUMBER, check_name, quoted
 from kinfmu.page.editor.drawing import Drawing
 from kinfmu.page.editor.pen import TABLES, Arguments, Pen
 from kinfmu.page.editor.text_edits import edited_text, renamed_text
-from kinfmu.page.opened import place_text
+from kinfmu.mechanism.opened import place_text
 from kinfmu.units import Quantity
 
 _DEEPEST = 8  # levels of a value
