@@ -12,6 +12,7 @@ import { OF_PICTURE, Picture } from "./editor_picture.js";
 import { Session } from "./editor_session.js";
 import { Sketch } from "./editor_sketch.js";
 
+const PATIENT = 400; // [ms] before the badge states that an answer takes longer
 const PICTURES = ["image/png", "image/jpeg"];
 
 export class Editor {
@@ -152,7 +153,13 @@ export class Editor {
 
     async #operate(operations) {
         this.isDrawn = true;
-        return this.#answered(await this.session.operate(operations));
+        const badge = $("badge");
+        const before = badge.textContent;
+        const waiting = setTimeout(() => (badge.textContent = "working\u2026"), PATIENT);
+        const isMade = this.#answered(await this.session.operate(operations));
+        clearTimeout(waiting);
+        if (!isMade) badge.textContent = before;
+        return isMade;
     }
 
     // Return whether a step of the drawing, not of values, is the next to undo or to redo.
