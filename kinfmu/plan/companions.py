@@ -27,6 +27,7 @@ _IN_SPAN = 1e-7  # part of a gradient outside the span of the others, or weight 
 _CLOSED = 1e-9  # residual relative to the size up to which a sampled pose counts as closed
 _SINGULAR = 1e-6  # singular value over the largest below which rows count as dependent
 _REGULAR = 0.02  # least singular value, as a part of its largest, above which a block counts as regular
+_SPARSE = 8  # of so many poses one tells how large singular values become
 _REFINEMENTS = 2  # of a singular pose between two sampled ones, by secants
 _ITERATIONS = 12
 _CARRIES = 0.1  # a row carries a block where its least singular value is below this part of that with the row
@@ -223,11 +224,11 @@ class _Loop:
 
     def _is_carried_on(self, walk: int, index: int, blocks: Sequence[BlockStructure]) -> bool:
         """Return True if a redundant row carries one of some blocks where this is singular on one walk."""
-        largest, found = [], []
+        poses, found = [], []
         last: list[tuple[FloatArray, list[float]]] = []
         for q in _motion(self._part, self._start, self._rank, _POSES, walk):
             determinants = [self._determinant(q, block) for block in blocks]
-            largest.append(self._singular_values(q, index, blocks))
+            poses.append(q)
             for other, values in last:
                 for block, a, b in zip(blocks, values, determinants, strict=True):
                     between = self._singular_pose(block, (other, a), (q, b)) if a * b < 0.0 else None
@@ -235,7 +236,8 @@ class _Loop:
             last = [(q, determinants)]
         if not found:
             return False
-        alone, carried, leads = np.moveaxis(np.array(found) / np.max(largest, axis=0), 2, 0)
+        largest = np.max([self._singular_values(q, index, blocks) for q in poses[::_SPARSE]], axis=0)
+        alone, carried, leads = np.moveaxis(np.array(found) / largest, 2, 0)
         with_row = np.minimum(carried, leads)
         return bool(((alone < _CARRIES * with_row) & (with_row > _REGULAR)).any())
 
@@ -278,7 +280,7 @@ class _Loop:
             over = left[:, len(block.coordinates) :].T @ together[:, :before]
         return found
 
-    def _jacobian(self, q: FloatArray, rows: Sequence[int], names: Iterable[str]) -> FloatArray:
+    def _jacobian(self, q: FloatArray, rows: Sequence[int], names: Iterable[CoordinateName]) -> FloatArray:
         """Return the Jacobian of rows over coordinates, scaled to pure numbers."""
         columns, pose = [self._place[name] for name in names], self._part.whole(q)
         return Part(self._part.system, rows, columns, pose).jacobian(pose[columns])
