@@ -242,7 +242,7 @@ def _best(
         worst = sorted(cost for cost, *_ in found)[MOST - 1 : MOST]
         if (worst and worst[0] <= remedy.cost) or trials == 0:
             break
-        changed = _changed(case, tables, remedy)
+        changed = _changed(case, tables, remedy, meets=only_if is _meets_at_start)
         if changed is None:
             continue
         trials -= 1
@@ -263,14 +263,19 @@ def _unlike(remedies: Iterable[Remedy]) -> Iterator[Remedy]:
             yield remedy
 
 
-def _changed(case: Case, document: Mapping[str, Any], remedy: Remedy) -> Mechanism | None:
-    """Return the changed mechanism if its rows close near its start pose and determine all coordinates; else None."""
+def _changed(case: Case, document: Mapping[str, Any], remedy: Remedy, meets: bool) -> Mechanism | None:
+    """Return the changed mechanism if its rows close near its start pose and determine all coordinates; else None.
+
+    meets: Whether the start poses must nearly close its joints, which is tested first.
+    """
     try:
         mechanism = mechanism_of(edited(document, remedy.edits), None)
     except KinfmuError:
         return None
     system = System(localized(mechanism)[0])
     if not mechanism.drivers or len(system.rows) < len(system.coordinates):
+        return None
+    if meets and open_at_start(system) > ROUGH:
         return None
     start = start_from_poses(system)
     is_open = [value is None for body in mechanism.moving_bodies for value in body.start]
