@@ -323,7 +323,6 @@ def test_the_readme_leads_to_every_page() -> None:
         "docs/howto.md",
         "docs/method.md",
         "docs/reference.md",
-        "docs/accuracy-settings.md",
     }
     pages = {f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")} - for_the_site
     assert pages <= set(re.findall(r"\((docs/[\w-]+\.md)\)", README))
