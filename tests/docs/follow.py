@@ -59,7 +59,7 @@ OPTIONS = {  # options that tests add, by the beginning of the command
 
 FILES = {  # the file of each block of TOML, where the text above does not announce it
     "fitting.md": ["flat.toml"],
-    "forces.md": ["pump.toml", "pump.toml"],
+    "forces.md": ["pump.toml"],
     "measures.md": ["hoeken.toml", "hoeken.toml"],
 }
 BEFORE = {  # commands for the files that a page takes as given
