@@ -60,7 +60,7 @@ OPTIONS = {  # options that tests add, by the beginning of the command
 FILES = {  # the file of each block of TOML, where the text above does not announce it
     "fitting.md": ["flat.toml"],
     "forces.md": ["pump.toml"],
-    "measures.md": ["hoeken.toml", "hoeken.toml"],
+    "measures.md": ["hoeken.toml"],
 }
 BEFORE = {  # commands for the files that a page takes as given
     "commands.md": ["kinfmu solve crank_rocker -o host.csv", "python examples/dc_motor/build.py ."],
