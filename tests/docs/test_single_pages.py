@@ -24,6 +24,7 @@ from kinfmu.log import McapLog, read
 from kinfmu.mechanism import gallery
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.run.channels import absent_columns
+from tests.docs import follow
 from tests.docs.blocks import blocks, commands, executed
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -81,6 +82,8 @@ def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def typed(line: str, folder: Path) -> str:
     """Return what a command of the page prints. The viewer does not open: its recording is written to a file."""
+    if line.startswith("kinfmu play"):
+        return follow.typed(line)
     program, *words = shlex.split(line)
     if program == "python":
         done = subprocess.run([sys.executable, *words], cwd=folder, capture_output=True, text=True, check=False)
