@@ -23,9 +23,11 @@ SHAPES = {
     "segments": "list of tables",
     "measure": "a measured quantity",
     "measured": "a coordinate, a rate or a quantity",
-    "law": "a law, with its keys",
+    "law": "law",
 }
+VECTOR = "d = r_j + A_j s_b - r_i - A_i s_a"  # in notation.md, and once on the page
 SHARED = 4  # types with the same key, from which it is in one table for all of them
+CLEAR = ("the two points", "the two points 'body.point'", "the point", "the point 'body.point'", "the body")  # from the value
 REFERRED = {
     "point": ('`"body.point"`', 'two `"body.point"`'),
     "body": ("a body", "two bodies"),
@@ -118,7 +120,8 @@ def _item(key: Key) -> str:
     default = _default(key)
     end = f", {default}" if default == "required" else f", default {default}" if default else ", optional"
     facts = _value(key) + (end if default or "default:" not in key.meaning else "")
-    meaning = "" if key.refers and key.refers.kind == "choice" and " or " in key.meaning[:20] else f": {key.meaning}"
+    is_clear = key.meaning in CLEAR or (key.refers and key.refers.kind == "choice" and " or " in key.meaning[:20])
+    meaning = "" if is_clear else f": {key.meaning}"
     return f"* `{key.name}` ({facts}){meaning}"
 
 
@@ -127,7 +130,7 @@ def _equation(cls: Any) -> list[str]:
     for base in cls.__mro__:
         lines = [line.strip() for line in (base.__doc__ or "").splitlines() if line.startswith(" " * 8)]
         if lines:
-            return [re.sub(r"\s{2,}", "    ", line) for line in lines]
+            return [re.sub(r"\s{2,}", "    ", line.replace(f",   {VECTOR}", "")) for line in lines]
     return []
 
 
