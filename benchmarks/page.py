@@ -13,7 +13,7 @@ from pathlib import Path
 from benchmarks.accuracy import Measured
 from benchmarks.engine import PREDICTORS, EngineSetting
 from benchmarks.engines import ENGINES
-from benchmarks.singular import DISTANCES, Near
+from benchmarks.singular import Near
 from kinfmu.errors import KinfmuError
 from kinfmu.mechanism import gallery
 
@@ -23,7 +23,6 @@ SETTINGS_COLUMNS = (
     *("us_a_sample", "lower_quartile", "upper_quartile", "q", "qd", "qdd"),
 )
 PARTS = ("conditions", "engines", "singular points")
-SHOWN = (1e-1, 1e-3)  # [rad], of DISTANCES; the chart has all
 
 
 def begin(name: str) -> str:
@@ -138,18 +137,13 @@ def row_head(case: str, engine: str, setting: EngineSetting, *, is_usual: bool) 
 
 
 def singular_table(near: Sequence[Near]) -> str:
-    """Return tables of the errors of q, qd, qdd toward a singular point, at it and beyond, one line an engine."""
-    shown = [min(range(len(DISTANCES)), key=lambda k: abs(math.log(DISTANCES[k] / d))) for d in SHOWN]
-    heads = [*(f"{d:.0e}" for d in SHOWN), "at it", f"{SHOWN[0]:.0e} beyond"]
-    parts = []
-    for point in dict.fromkeys(one.point for one in near):
-        lines = [f"| {point} | {' | '.join(heads)} |", f"|{'---|' * (len(heads) + 1)}"]
-        for one in (one for one in near if one.point == point):
-            samples = [*(one.before[k] for k in shown), one.at, one.beyond[shown[0]]]
-            cells = [", ".join(number(float(error)) for error in sample) for sample in samples]
-            lines.append(f"| {one.engine} | {' | '.join(cells)} |")
-        parts.append("\n".join(lines))
-    return "\n\n".join(parts)
+    """Return a table of the errors of q, qd, qdd at each singular point, one line an engine."""
+    points = list(dict.fromkeys(one.point for one in near))
+    errors = {(one.engine, one.point): ", ".join(number(float(error)) for error in one.at) for one in near}
+    lines = [f"| | {' | '.join(points)} |", f"|---|{'---|' * len(points)}"]
+    for engine in dict.fromkeys(one.engine for one in near):
+        lines.append(f"| {engine} | {' | '.join(errors.get((engine, point), '') for point in points)} |")
+    return "\n".join(lines)
 
 
 def duration(microseconds: float) -> str:

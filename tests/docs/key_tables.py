@@ -27,7 +27,13 @@ SHAPES = {
 }
 VECTOR = "d = r_j + A_j s_b - r_i - A_i s_a"  # in notation.md, and once on the page
 SHARED = 4  # types with the same key, from which it is in one table for all of them
-CLEAR = ("the two points", "the two points 'body.point'", "the point", "the point 'body.point'", "the body")  # from the value
+CLEAR = (
+    "the two points",
+    "the two points 'body.point'",
+    "the point",
+    "the point 'body.point'",
+    "the body",
+)  # from the value
 REFERRED = {
     "point": ('`"body.point"`', 'two `"body.point"`'),
     "body": ("a body", "two bodies"),
