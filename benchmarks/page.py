@@ -141,8 +141,8 @@ def singular_table(near: Sequence[Near]) -> str:
     points = list(dict.fromkeys(one.point for one in near))
     errors = {(one.engine, one.point): ", ".join(number(float(error)) for error in one.at) for one in near}
     lines = [f"| | {' | '.join(points)} |", f"|---|{'---|' * len(points)}"]
-    for engine in dict.fromkeys(one.engine for one in near):
-        lines.append(f"| {engine} | {' | '.join(errors.get((engine, point), '') for point in points)} |")
+    engines = dict.fromkeys(one.engine for one in near)
+    lines += [f"| {engine} | {' | '.join(errors.get((engine, point), '') for point in points)} |" for engine in engines]
     return "\n".join(lines)
 
 

@@ -16,7 +16,6 @@ from benchmarks.engines import ENGINES
 from benchmarks.page import PARTS, SETTINGS, SETTINGS_COLUMNS, begin, end, row_head
 from benchmarks.singular_points import POINTS
 from kinfmu.cli import main
-from kinfmu.mechanism.gallery import load
 from kinfmu.solver.python import Status
 
 DOCS = Path(__file__).parents[2] / "docs"
