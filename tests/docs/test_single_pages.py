@@ -313,6 +313,14 @@ def test_the_commands_page_explains_every_line_of_the_report() -> None:
     assert subjects <= set(explained)
 
 
+def test_messages_of_mechanisms_that_do_not_move_are_those_of_the_code() -> None:
+    page = (ROOT / "docs" / "why-not.md").read_text(encoding="utf-8")
+    messages = re.findall(r"^\| `([^`]+)` \|", page, re.MULTILINE)
+    code = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "kinfmu").rglob("*.py"))
+    assert len(messages) > 10
+    assert [message for message in messages if message not in code] == []
+
+
 def test_every_link_between_the_pages_leads_to_a_file() -> None:
     made = ("reference/",)  # while the site is built; scripts/docs checks links to them
     for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
