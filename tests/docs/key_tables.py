@@ -25,7 +25,8 @@ SHAPES = {
     "measured": "a coordinate, a rate or a quantity",
     "law": "law",
 }
-VECTOR = "d = r_j + A_j s_b - r_i - A_i s_a"  # in notation.md, and once on the page
+VECTOR = "d = r_j + A_j s_b - r_i - A_i s_a"  # once on the page, as RISE
+RISE = "u = start + rise N(s),   s = (x - begin) / duration"
 SHARED = 4  # types with the same key, from which it is in one table for all of them
 CLEAR = (
     "the two points",
@@ -136,7 +137,8 @@ def _equation(cls: Any) -> list[str]:
     for base in cls.__mro__:
         lines = [line.strip() for line in (base.__doc__ or "").splitlines() if line.startswith(" " * 8)]
         if lines:
-            return [re.sub(r"\s{2,}", "    ", line.replace(f",   {VECTOR}", "")) for line in lines]
+            lines = [line.replace(f",   {VECTOR}", "") for line in lines if line != RISE]
+            return [re.sub(r"\s{2,}", "    ", line) for line in lines]
     return []
 
 
