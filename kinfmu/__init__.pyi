@@ -3,8 +3,10 @@
 from kinfmu import design as design
 from kinfmu import draw as draw
 from kinfmu import log as log
+from kinfmu.analysis import Certificate as Certificate
 from kinfmu.analysis import Report as Report
 from kinfmu.analysis import cam_profile as cam_profile
+from kinfmu.analysis import certify as certify
 from kinfmu.analysis import check as check
 from kinfmu.design.fit import FitProblem as FitProblem
 from kinfmu.design.fit import FitResult as FitResult

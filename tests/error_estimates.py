@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import kinfmu
-from kinfmu import AngleDriver, ConstantSpeed, Mechanism, SlideDriver
+from kinfmu import AngleDriver, ConstantSpeed, Mechanism
 from kinfmu.mechanism.drivers import Driver
 from kinfmu.plan import compile_plan
 from kinfmu.run import Run
@@ -34,6 +34,7 @@ from tests.test_random_mechanisms import (
     OnFloats,
     Pose,
     UnreachableError,
+    driver_of,
     fourbar,
     slider_crank,
     stephenson,
@@ -236,7 +237,7 @@ def _driven(linkage: Linkage, rng: Rng, draw: Sequence[str], place: str, size: f
         return
     angles = max(stretches, key=len)
     chosen = sorted(rng.choice(angles, 6, replace=False).tolist())
-    driver = _driver(coordinate, 0.0)
+    driver = driver_of(coordinate, 0.0)
     turns = int(rng.choice([0, 0, 0, 1, 30])) if len(angles) > 225 and coordinate.endswith(".phi") else 0
     exact, inputs = [], {name: [] for name in driver.inputs()}  # type: dict[str, list[float]]
     previous = None
@@ -249,7 +250,7 @@ def _driven(linkage: Linkage, rng: Rng, draw: Sequence[str], place: str, size: f
         exact.append(_at(linkage, angle, coordinate, numbers))
         for column, number in zip(inputs, numbers, strict=True):
             inputs[column].append(number)
-    mechanism = _closed(linkage, chosen[0], _driver(coordinate, inputs[driver.inputs()[0]][0]))
+    mechanism = _closed(linkage, chosen[0], driver_of(coordinate, inputs[driver.inputs()[0]][0]))
     yield from _solved(mechanism, inputs, exact, f"{place} {coordinate} driven, {turns} turns")
 
 
@@ -268,13 +269,6 @@ def _at(linkage: Linkage, angle: float, coordinate: str, wanted: tuple[float, fl
         if max(abs(x) for x in (gap / slope).c) < mp.mpf(10) ** -60 * (1 + max(abs(x) for x in target.c)):
             break
     return linkage.exact(crank)
-
-
-def _driver(driven: str, start: float) -> Driver:
-    law = ConstantSpeed(start, 1.0)
-    if driven == "block.x":
-        return SlideDriver("drive", ("ground.way", "block.S"), law=law)
-    return AngleDriver("drive", driven.partition(".")[0], law)
 
 
 @family
@@ -493,7 +487,7 @@ def _crank_turned(
     """A linkage driven at its crank, at given angles, from a start angle on."""
     asked = [(float(angle), *_rates(rng)) for angle in angles]
     moves = [(exact or linkage.exact)(Series([u, v, mp.mpf(w) / 2])) for u, v, w in asked]
-    driver = _driver("crank.phi", start)
+    driver = driver_of("crank.phi", start)
     inputs = dict(zip(driver.inputs(), map(list, zip(*asked, strict=True)), strict=True))
     yield from _solved(_closed(linkage, start, driver), inputs, moves, place)
 

@@ -403,7 +403,7 @@ def assert_moves_exactly(linkage: Linkage, start: float, driven: str, rates: tup
     moves = [linkage.exact(Series([angle, rates[0], rates[1] / 2])) for angle in along]
     inputs = [_unrolled([move[driven].c[0] for move in moves], driven)]
     inputs += [[float(mp.factorial(k) * move[driven].c[k]) for move in moves] for k in (1, 2)]
-    driver = _driver(driven, inputs[0][0])
+    driver = driver_of(driven, inputs[0][0])
     mechanism = linkage.mechanism(along[0], driver)
     run = kinfmu.solve(mechanism, **dict(zip(driver.inputs(), inputs, strict=True)))
     assert run.good.all(), run.mechanism_text
@@ -437,7 +437,7 @@ def _unrolled(values: list[Any], driven: str) -> list[float]:
     return [float(value) for value in unrolled]
 
 
-def _driver(driven: str, start: float) -> Driver:
+def driver_of(driven: str, start: float) -> Driver:
     law = ConstantSpeed(start, 1.0)
     if driven == "block.x":
         return SlideDriver("drive", ("ground.way", "block.S"), law=law)

@@ -28,6 +28,9 @@ FIGURES = (".svg", ".png", ".pdf")
 @mechanism_argument
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON, for programs.")
 @click.option("--matrices", is_flag=True, help="Also print the Jacobians at the assembled pose and at singular points.")
+@click.option(
+    "--certify", "is_certified", is_flag=True, help="Prove the motion between samples, by interval arithmetic."
+)
 @click.option("--assemblies", is_flag=True, help="List the ways to assemble the mechanism, and how to choose one.")
 @click.option(
     "--figure", "picture", type=OutputFile(*FIGURES), help="Draw the mechanism with its names: .svg, .png or .pdf."
@@ -40,6 +43,7 @@ def check(
     as_json: bool,
     matrices: bool,
     assemblies: bool,
+    is_certified: bool,
     picture: Path | None,
     at: str | None,
     over: str | None,
@@ -50,6 +54,7 @@ def check(
     Mobility, redundant and inconsistent constraints, the solving order, ranges of the drivers, singular points, and the
     measures of the file. With masses or loads also efforts of the drivers, reduced inertia and the largest reaction.
     """
+    from kinfmu.analysis import certify as certified
     from kinfmu.analysis import check as checked
 
     try:
@@ -71,9 +76,13 @@ def check(
         if assemblies:
             found = _assemblies(report)
             findings["assemblies"] = None if found is None else found.as_json()
+        if is_certified and report.problem is None:
+            findings["certificate"] = certified(mech).as_json()
         click.echo(json.dumps(findings, indent=2))
     else:
         click.echo(_text(report))
+        if is_certified and report.problem is None:
+            click.echo(str(certified(mech)))
         if assemblies and (found := _assemblies(report)) is not None:
             click.echo(str(found))
         if matrices and (report.problem is None or report.has_cut_cam):

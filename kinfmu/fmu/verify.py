@@ -26,7 +26,7 @@ from kinfmu.units import Quantity, every_unit, spelled
 _SAME_TIME = 1e-6  # of a step: hosts sum up time
 _UNIT = re.compile(r"\s*\[([^]]*)\]\s*$")
 _LARGEST_TABLE = 2**28  # [bytes] of a host's results
-_COARSEST = 0.01  # tolerance that is recommended; results of fewer than three digits show nothing
+_FEWEST_DIGITS = 3  # results of fewer digits show nothing
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,8 @@ class Verification:
         difference: The difference, relative.
         is_a_step_late: True if the row after each sample equals the reference of that sample, within the tolerance.
         ends: Times [s] of the first and the last row of a host's table; None for an FMU that kinfmu steps itself.
-        digits: Digits of the numbers in a host's table, at most; None for an FMU that kinfmu steps itself.
+        rounding: Tolerance for the digits of the numbers in a host's table; 0 for fewer than three digits, and for an
+            FMU that kinfmu steps itself.
         unit_notes: Notes on outputs that differ throughout by the factor between two units.
 
     """
@@ -63,7 +64,7 @@ class Verification:
     difference: float
     is_a_step_late: bool
     ends: tuple[float, float] | None = None
-    digits: int | None = None
+    rounding: float = 0.0
     unit_notes: tuple[str, ...] = ()
 
     @property
@@ -94,34 +95,17 @@ class Verification:
         if self.left_out:
             lines.append(f"not in the results: {listed(self.left_out)}")
         if self.missing:
-            lines.append(f"no results at t = {listed(f'{t:g}' for t in self.missing)} [s]{self._reason_of_missing()}")
+            rows = "" if self.ends is None else f"; the rows are from {self.ends[0]:.10g} s to {self.ends[1]:.10g} s"
+            lines.append(f"no results at t = {listed(f'{t:g}' for t in self.missing)} [s]{rows}")
         if self.is_shorter and self.ok:
             there = self.samples - len(self.missing)
             lines.append(f"the results agree at the {there} of {self.samples} samples that they have")
         if self.is_a_step_late:
             lines.append("the row after each sample equals its reference: this host records outputs a step late")
-        elif self.digits is not None and self.tolerance < self.difference <= self._rounding <= _COARSEST:
-            lines.append(
-                f"the results have {self.digits} digits, which may be the difference: compare with --tolerance "
-                f"{self._rounding:g}"
-            )
+        elif self.tolerance < self.difference <= self.rounding:
+            text = "the digits of the results may be the difference: compare with --tolerance"
+            lines.append(f"{text} {self.rounding:g}")
         return "\n".join([*lines, *self.unit_notes])
-
-    @property
-    def _rounding(self) -> float:
-        """A tolerance for numbers that are rounded to the digits of the table."""
-        return _rounding(self.digits or 0)
-
-    def _reason_of_missing(self) -> str:
-        """Return what to change where a host's table has no row at some samples; '' if kinfmu made the results."""
-        if self.ends is None:
-            return ""
-        first, last = self.ends
-        if min(self.missing) > last:
-            return f": they end at t = {last:.10g} s"
-        if max(self.missing) < first:
-            return f": they begin at t = {first:.10g} s"
-        return "; a host needs rows at the samples of the reference: choose its steps and its stop time by them"
 
 
 def verify(
@@ -202,14 +186,14 @@ class _Table(NamedTuple):
     """Results to compare.
 
     names: outputs (k,); values: (n, k) at the samples of the reference; after: (n, k) one row later; both NaN where
-    there are none; ends: first and last time; digits: of the numbers, at most. The last two are those of a file.
+    there are none; ends: first and last time, and rounding: as in Verification, both of a file.
     """
 
     names: tuple[str, ...]
     values: FloatArray
     after: FloatArray
     ends: tuple[float, float] | None = None
-    digits: int | None = None
+    rounding: float = 0.0
 
 
 def _stepped(path: Path, wanted: ReferenceResults) -> FloatArray:
@@ -238,7 +222,7 @@ def _table_of_host(path: Path, wanted: ReferenceResults, units: dict[str, str], 
     delimiter = max(",;\t", key=lines[0].count) if lines else ","
     header, *rows = [row for row in csv.reader(io.StringIO(text), delimiter=delimiter) if row] or [[]]
     titles = [_UNIT.sub("", one.strip()) for one in header]
-    times = [k for k, one in enumerate(titles) if one.lower() in ("time", "t")]
+    times = [k for k, one in enumerate(titles) if one.lower() == "time"]
     if not times:
         raise FmuError(f"{path}: has no column time; columns: {listed(titles)}")
     places = {name: k for name in wanted.names if (k := _place(path, name, titles, header)) is not None}
@@ -262,13 +246,13 @@ def _table_of_host(path: Path, wanted: ReferenceResults, units: dict[str, str], 
                 after[k] = table[np.flatnonzero(np.abs(times_of_host - later.min()) <= same)[-1], 1:]
     ends = (float(table[:, 0].min()), float(table[:, 0].max())) if len(table) else None
     digits = max((_digits(row[k]) for row in rows for k in columns[1:]), default=0)
-    return _Table(tuple(places), found, after, ends, digits)
+    return _Table(tuple(places), found, after, ends, 10.0 ** (1 - digits) if digits >= _FEWEST_DIGITS else 0.0)
 
 
 def _place(path: Path, name: str, titles: list[str], header: list[str]) -> int | None:
     """Return the place of an output among the titles of columns, by its name alone or behind that of an instance."""
     found = [k for k, title in enumerate(titles) if title == name]
-    found = found or [k for k, title in enumerate(titles) if title.endswith((f"::{name}", f".{name}", f"/{name}"))]
+    found = found or [k for k, title in enumerate(titles) if title.endswith((f"::{name}", f".{name}"))]
     if len(found) > 1:
         columns = " and ".join(f"{k + 1}, {quoted(header[k].strip())}" for k in found[:2])
         raise FmuError(f"{path}: output {name} is in columns {columns}; leave only one of them in the table")
@@ -286,11 +270,10 @@ def _number(path: Path, number: int, row: list[str], header: list[str], place: i
     if place >= len(row):
         raise FmuError(f"{where} has {len(row)} values, the header {len(header)}")
     try:
-        value = float({"true": "1", "false": "0"}.get(row[place].strip().lower(), row[place]))
+        return float(row[place])
     except ValueError:
         text = f"{where}, column {quoted(header[place].strip())}: {quoted(row[place])}"
         raise FmuError(f"{text}; valid are numbers with a decimal point, such as 1234.5") from None
-    return value
 
 
 def _factor(path: Path, title: str, unit: str, length_unit: str) -> float:
@@ -318,7 +301,6 @@ def _compared(
     row, column = (int(one) for one in np.unravel_index(int(np.argmax(relative)), relative.shape))
     difference = float(relative[row, column])
     late = (np.abs(table.after - values) / scale)[~np.isnan(table.after).all(axis=1)]
-    limit = tolerance if table.digits is None else max(tolerance, min(_rounding(table.digits), _COARSEST))
     rows = ~is_missing
     notes = _unit_notes(
         {
@@ -327,7 +309,7 @@ def _compared(
             if relative[:, k].max() > tolerance
         },
         every_unit(length_unit),
-        limit,
+        max(tolerance, table.rounding),
     )
     return Verification(
         tolerance=tolerance,
@@ -342,7 +324,7 @@ def _compared(
         difference=difference if difference >= 0.0 else float("nan"),
         is_a_step_late=difference > tolerance and len(late) > 0 and bool((late <= tolerance).all()),
         ends=table.ends,
-        digits=table.digits,
+        rounding=table.rounding,
         unit_notes=tuple(notes),
     )
 
@@ -355,23 +337,16 @@ def _unit_notes(
     differing: unit, results and reference results by output, both relative to the size of the numbers with this unit;
     known: quantity and factor of all units; limit: largest valid difference.
     """
-    grouped: dict[tuple[str, str], list[str]] = {}
+    grouped: dict[str, list[str]] = {}
     for name, (unit, found, values) in differing.items():
         quantity, factor = known.get(unit, (None, 1.0))
         for other, (kind, other_factor) in known.items():
             ratio = factor / other_factor
             if kind == quantity and ratio != 1.0 and (np.abs(found / ratio - values) <= limit).all():
-                grouped.setdefault((f"{ratio:.6g}", f"{other} in place of {unit}"), []).append(name)
+                grouped.setdefault(f"{other} in place of {unit}, {ratio:.6g} times the reference", []).append(name)
                 break
-    for shown in dict.fromkeys(one for one, _ in grouped):
-        names = [name for (one, _), found_names in grouped.items() if one == shown for name in found_names]
-        pairs = [pair for one, pair in grouped if one == shown]
-        yield f"units? {listed(names)} are {shown} of the reference throughout: {listed(pairs)}"
-
-
-def _rounding(digits: int) -> float:
-    """Return a tolerance for numbers that are rounded to so many digits."""
-    return 10.0 ** (1 - digits)
+    for pair, names in grouped.items():
+        yield f"units? {listed(names)}: {pair} throughout"
 
 
 def _sizes(wanted: ReferenceResults, units: dict[str, str]) -> dict[str, float]:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import combinations, pairwise
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from kinfmu.errors import MechanismError, valid_names
 from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.quantities.arithmetic import Value, sqrt
 from kinfmu.mechanism.valid import check_number, is_number, quoted
-from kinfmu.units import METRES
+from kinfmu.units import METRES, Quantity
 
 FLAT = 1e-12  # area of corners on a line, of the square of their distance
 
@@ -103,9 +103,6 @@ def crossing(corners: Sequence[tuple[float, float]]) -> tuple[int, int] | None:
 
 
 GROUND_NAME = "ground"
-MASS_KEYS = (  # of a body's table
-    "mass", "center_of_mass", "inertia", "rod", "plate", "density", "areal_density", "thickness", "width",
-)  # fmt: skip
 _POSITIVE = ("density", "areal_density", "thickness", "width")  # where they are given
 
 
@@ -119,16 +116,16 @@ class Point(NamedTuple):
 class Start(NamedTuple):
     """A rough pose from which assembly starts; None: found by assembly."""
 
-    x: float | None = None
-    y: float | None = None
-    phi: float | None = None  # [rad]
+    x: Annotated[float | None, Quantity("length"), "Of the frame's origin, in the world"] = None
+    y: Annotated[float | None, Quantity("length"), "Of the frame's origin, in the world"] = None
+    phi: Annotated[float | None, Quantity("angle"), "Angle of the frame; bare numbers are radians"] = None
 
 
 class Gravity(NamedTuple):
     """The acceleration of free fall in the world (x, y) [length/s2], such as (0, -9.81)."""
 
-    x: float
-    y: float
+    x: Annotated[float, Quantity("length", 2), "Acceleration of free fall along x, in the world"]
+    y: Annotated[float, Quantity("length", 2), "Acceleration of free fall along y, in the world"]
 
 
 def read_gravity(given: Iterable[float] | None) -> Gravity | None:
@@ -167,17 +164,23 @@ class Body:
     """
 
     name: str
-    points: Mapping[str, Point] = field(default_factory=dict)
-    start: Start = Start()
-    mass: float = 0.0
-    center_of_mass: Point = Point(0.0, 0.0)
-    inertia: float = 0.0
-    rod: tuple[str, str] | None = None
-    plate: tuple[str, ...] | None = None
-    density: float = 0.0
-    areal_density: float = 0.0
-    thickness: float = 0.0
-    width: float = 0.0
+    points: Mapping[str, Point] = field(default_factory=dict, metadata={"internal": True})  # a table of its own
+    start: Start = field(default=Start(), metadata={"internal": True})  # the same
+    mass: Annotated[float, Quantity("mass"), "Mass [kg]; default: 0"] = 0.0
+    center_of_mass: Annotated[Point, "Centre of mass [x, y] in the body's own frame; default: its origin"] = Point(
+        0.0, 0.0
+    )
+    inertia: Annotated[float, Quantity("inertia"), "Moment of inertia about the centre of mass [kg m2]; default: 0"] = (
+        0.0
+    )
+    rod: Annotated[tuple[str, str] | None, "Two points of the body between which its mass is a uniform rod"] = None
+    plate: Annotated[tuple[str, ...] | None, "Points of the body: the corners of a uniform plate, in order"] = None
+    density: Annotated[
+        float, Quantity("density"), "Of the rod or plate [kg/m3], with its thickness, in place of a mass"
+    ] = 0.0
+    areal_density: Annotated[float, Quantity("areal_density"), "Mass by area of the rod or plate [kg/m2]"] = 0.0
+    thickness: Annotated[float, Quantity("length"), "Of the rod or plate, across the plane"] = 0.0
+    width: Annotated[float, Quantity("length"), "Of the rod; default: 0, a slender rod"] = 0.0
 
     def __post_init__(self) -> None:
         points = {name: self._point(f"points.{name}", point) for name, point in self.points.items()}
@@ -329,12 +332,14 @@ class Body:
         return hash((self.name, tuple(self.points.items()), self.start, *masses))
 
 
+MASS_KEYS = tuple(entry.name for entry in fields(Body) if entry.name != "name" and not entry.metadata)
+
+
 def _is_computed(value: Any) -> bool:
     """Return True for the number of an expression, or a point with one."""
     return isinstance(value, Computed) or (isinstance(value, tuple) and any(isinstance(one, Computed) for one in value))
 
 
-RUN_TIMES = ("start", "stop", "step")
 MEASURED_OVER = ("run", "turn")
 
 
@@ -345,10 +350,10 @@ class RunSettings:
     over: The motion of which `check` reports measures and forces: 'run', 'turn' of the driver, '' for the default.
     """
 
-    start: float = 0.0
-    stop: float = 1.0
-    step: float = 0.01
-    over: str = ""
+    start: Annotated[float, Quantity("time"), "First sample [s]; default: 0"] = 0.0
+    stop: Annotated[float, Quantity("time"), "Last sample [s]; default: 1"] = 1.0
+    step: Annotated[float, Quantity("time"), "Communication step [s]; default: 0.01"] = 0.01
+    over: str = field(default="", metadata={"internal": True})
 
     def __post_init__(self) -> None:
         if self.over not in ("", *MEASURED_OVER):
@@ -362,3 +367,6 @@ class RunSettings:
             raise MechanismError(f"[run] step = {float(self.step)!r} must be positive")
         if self.stop < self.start:
             raise MechanismError(f"[run] stop = {float(self.stop)!r} lies before start = {float(self.start)!r}")
+
+
+RUN_TIMES = tuple(entry.name for entry in fields(RunSettings) if not entry.metadata)

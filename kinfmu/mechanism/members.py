@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from operator import is_
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from kinfmu.mechanism.body import RUN_TIMES, Body, Gravity, Point, Start
-from kinfmu.mechanism.declared import keys_of
+from kinfmu.mechanism.body import Body, Gravity, Point, RunSettings, Start
+from kinfmu.mechanism.declared import keys_of, quantities_of
 from kinfmu.mechanism.drivers import Driver
 from kinfmu.mechanism.joints import Joint
 from kinfmu.mechanism.laws import Law, LawQuantity
@@ -17,9 +17,6 @@ from kinfmu.mechanism.measures import Reading
 from kinfmu.mechanism.quantities import PoseQuantity
 from kinfmu.mechanism.quantities.arithmetic import Value
 from kinfmu.units import CoordinateName, Quantity, is_of_angle
-
-if TYPE_CHECKING:
-    from kinfmu.mechanism.body import RunSettings
 
 NumberPath = tuple[str | int, ...]
 """Path of a number: ("bodies", body, "points", point, 0 or 1), ("bodies", body, "start", "x" | "y" | "phi"),
@@ -30,15 +27,8 @@ NumberPath = tuple[str | int, ...]
 
 Bodies = Mapping[str, Body]  # by name
 Change = Callable[[NumberPath, Any, Quantity], Any]  # place, value and quantity -> new value
-LENGTH, ANGLE, TIME = Quantity("length"), Quantity("angle"), Quantity("time")
+LENGTH = Quantity("length")
 COORDINATES = ("x", "y", "phi")
-ACCELERATION = Quantity("length", 2)
-_MASSES = {
-    **{key: Quantity(key) for key in ("mass", "inertia", "density", "areal_density")},
-    "thickness": LENGTH,
-    "width": LENGTH,
-}
-_START = {"x": LENGTH, "y": LENGTH, "phi": ANGLE}
 
 
 class MechanismParts:
@@ -105,7 +95,8 @@ class Members(MechanismParts):
 
     def changed(self, change: Change) -> Members:
         """Return the members with each number replaced by change(path, value, quantity); equal parts stay identical."""
-        run = {key: change(("run", key), getattr(self.run, key), TIME) for key in RUN_TIMES}
+        times = quantities_of(RunSettings).items()
+        run = {key: change(("run", key), getattr(self.run, key), quantity) for key, quantity in times}
         return Members(
             tuple(_body(body, change) for body in self.bodies),
             tuple(_member(joint, ("joints", joint.name), change) for joint in self.joints),
@@ -140,9 +131,10 @@ def path_text(place: NumberPath) -> str:
 
 def _body(body: Body, change: Change) -> Body:
     points = {name: _point(point, ("bodies", body.name, "points", name), change) for name, point in body.points.items()}
+    starts = quantities_of(Start)
     start = Start(
         *(
-            None if value is None else change(("bodies", body.name, "start", key), value, _START[key])
+            None if value is None else change(("bodies", body.name, "start", key), value, starts[key])
             for key, value in body.start._asdict().items()
         )
     )
@@ -150,7 +142,10 @@ def _body(body: Body, change: Change) -> Body:
         "points": body.points if all(points[name] is point for name, point in body.points.items()) else points,
         "start": body.start if all(map(is_, start, body.start)) else start,
         "center_of_mass": _point(body.center_of_mass, ("bodies", body.name, "center_of_mass"), change),
-        **{key: change(("bodies", body.name, key), getattr(body, key), quantity) for key, quantity in _MASSES.items()},
+        **{
+            key: change(("bodies", body.name, key), getattr(body, key), quantity)
+            for key, quantity in quantities_of(Body).items()
+        },
     }
     return _replaced(body, values)  # type: ignore[no-any-return]  # of the same class
 
@@ -163,7 +158,8 @@ def _point(point: Point, place: NumberPath, change: Change) -> Point:
 def _gravity(gravity: Gravity | None, change: Change) -> Gravity | None:
     if gravity is None:
         return None
-    return Gravity(*(change(("gravity", key), value, ACCELERATION) for key, value in gravity._asdict().items()))
+    quantities = quantities_of(Gravity)
+    return Gravity(*(change(("gravity", key), value, quantities[key]) for key, value in gravity._asdict().items()))
 
 
 def _member(member: Any, place: NumberPath, change: Change) -> Any:

@@ -9,7 +9,7 @@ import json
 from collections.abc import Iterable
 from typing import Any
 
-from kinfmu.mechanism.body import GROUND_NAME, MEASURED_OVER
+from kinfmu.mechanism.body import GROUND_NAME, MEASURED_OVER, Body, Gravity, RunSettings, Start
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
 from kinfmu.mechanism.drivers import DRIVERS
 from kinfmu.mechanism.expression import LONGEST
@@ -47,9 +47,7 @@ def schema() -> Schema:
         "parameters": _named(_ref("parameter"), "Numbers that expressions refer to by name"),
         "run": _table(
             {
-                "start": _number(Quantity("time"), "First sample [s]; default: 0"),
-                "stop": _number(Quantity("time"), "Last sample [s]; default: 1"),
-                "step": _number(Quantity("time"), "Communication step [s]; default: 0.01"),
+                **_without_defaults(RunSettings),
                 "over": {
                     "enum": list(MEASURED_OVER),
                     "description": "Motion of which check reports measures and forces; default: a turn of a single "
@@ -60,13 +58,7 @@ def schema() -> Schema:
         "bodies": _named(_ref("body"), f"Bodies; '{GROUND_NAME}' does not move"),
         "joints": _named(_ref("joint"), "Joints between the bodies"),
         "drivers": _named(_ref("driver"), "What moves the mechanism"),
-        "gravity": _table(
-            {
-                axis: _number(Quantity("length", 2), f"Acceleration of free fall along {axis}, in the world")
-                for axis in ("x", "y")
-            },
-            required=("x", "y"),
-        ),
+        "gravity": _table(_without_defaults(Gravity), required=Gravity._fields),
         "loads": _named(_ref("load"), "Forces and torques on the bodies"),
         "points": _named(_ref("point"), "Points of interest, as 'body.point'"),
         "measures": _named(_ref("reading"), "What `kinfmu check` reads off a motion, such as a stroke"),
@@ -145,36 +137,16 @@ def _body() -> Schema:
             },
             "start": {
                 "description": "A rough pose from which assembly starts",
-                **_table(
-                    {
-                        "x": _number(Quantity("length"), "Of the frame's origin, in the world"),
-                        "y": _number(Quantity("length"), "Of the frame's origin, in the world"),
-                        "phi": _number(Quantity("angle"), "Angle of the frame; bare numbers are radians"),
-                    }
-                ),
+                **_table(_without_defaults(Start)),
             },
-            "mass": _number(Quantity("mass"), "Mass [kg]; default: 0"),
-            "center_of_mass": {
-                "description": "Centre of mass [x, y] in the body's own frame; default: its origin",
-                "allOf": [_ref("xy")],
-            },
-            "inertia": _number(Quantity("inertia"), "Moment of inertia about the centre of mass [kg m2]; default: 0"),
-            "rod": {
-                "description": "Two points of the body between which its mass is a uniform rod",
-                **_list(_ref("name"), 2, 2),
-            },
-            "plate": {
-                "description": "Points of the body: the corners of a uniform plate, in order",
-                **_list(_ref("name"), 3),
-            },
-            "density": _number(
-                Quantity("density"), "Of the rod or plate [kg/m3], with its thickness, in place of a mass"
-            ),
-            "areal_density": _number(Quantity("areal_density"), "Mass by area of the rod or plate [kg/m2]"),
-            "thickness": _number(Quantity("length"), "Of the rod or plate, across the plane"),
-            "width": _number(Quantity("length"), "Of the rod; default: 0, a slender rod"),
+            **_without_defaults(Body),
         }
     )
+
+
+def _without_defaults(cls: Any) -> Schema:
+    """Describe the keys of a class, whose meanings state the defaults."""
+    return {key.name: _value(key._replace(default=REQUIRED)) for key in keys_of(cls)}
 
 
 def _segment() -> Schema:
@@ -238,7 +210,10 @@ def _value(key: Key) -> Schema:
         "pair": _list(_text(key.refers), 2, 2),
         "truth": {"type": "boolean"},
         "numbers": _list(_ref("number"), 1),
+        "place": _ref("xy"),
         "points": _list(_ref("xy"), 2),
+        "ends": _list(_ref("name"), 2, 2),
+        "corners": _list(_ref("name"), 3),
         "segments": _list(_ref("segment"), 1),
         "measure": _ref("measure"),
         "measured": _ref("measured"),

@@ -34,12 +34,12 @@ from kinfmu.mechanism.joints.joint import Joint
 from kinfmu.mechanism.laws import ConstantValue
 from kinfmu.mechanism.loads import Following, ForceAlong, ForceAt
 from kinfmu.mechanism.members import NumberPath
+from kinfmu.mechanism.opened import AXES, dependent_points, number_data, parameters_of, place_text
 from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.quantities.placement import body_of, unit_vector
 from kinfmu.mechanism.toml_text import text
 from kinfmu.motion.cams.placed import members_of
 from kinfmu.page.module import PageModule
-from kinfmu.page.opened import AXES, dependent_points, number_data, parameters_of, place_text
 from kinfmu.plan.undetermined import undetermined_reactions
 from kinfmu.units import Quantity, unit_of
 from kinfmu.version import VERSION

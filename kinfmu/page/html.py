@@ -12,9 +12,9 @@ from typing import Any
 from kinfmu.analysis import Report, check
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
+from kinfmu.mechanism.opened import opened
 from kinfmu.page.describe import describe, module_data, written_file
 from kinfmu.page.module import packed, page_module, solver
-from kinfmu.page.opened import opened
 
 _WEB = Path(__file__).parent / "web"
 _SCRIPTS = (

@@ -1,4 +1,4 @@
-"""The command line, called in this process; the gallery's figures, each drawn once."""
+"""The command line, called in this process; the gallery's figures, each drawn once; runs of the four-bar."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from kinfmu.cli import main
 from kinfmu.draw import figure
 from kinfmu.mechanism import gallery
+from kinfmu.run import Run
+from tests.log.runs import fourbar, with_gap
 
 
 @pytest.fixture
@@ -39,3 +42,14 @@ def gallery_figure(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], 
         return path
 
     return draw
+
+
+@pytest.fixture
+def run() -> Run:
+    """0 to 180 s in steps of 1 s."""
+    return fourbar(np.arange(181.0))
+
+
+@pytest.fixture
+def run_with_gap(run: Run) -> Run:
+    return with_gap(run, 100, 120)

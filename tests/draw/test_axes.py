@@ -39,11 +39,6 @@ from tests.mechanisms import fourbar as general_fourbar
 
 
 @pytest.fixture
-def run() -> Run:
-    return fourbar(np.arange(181.0))
-
-
-@pytest.fixture
 def axes() -> Axes:
     return Figure().subplots()
 

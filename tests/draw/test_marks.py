@@ -18,7 +18,6 @@ from kinfmu import (
     DistanceDriver,
     Gear,
     Mechanism,
-    PointOnLine,
     RackAndPinion,
     Revolute,
     RunSettings,
@@ -40,7 +39,7 @@ from kinfmu.draw.scene.shapes import shapes
 from kinfmu.draw.sheet import Sheet, ink
 from tests.draw.picture import picture
 from tests.gallery_members import every_member
-from tests.mechanism.joints.test_mechanisms import crank_and_slider
+from tests.mechanism.joints.test_mechanisms import crank_and_slider, quick_return
 from tests.mechanism.loads.every_load import every_load
 from tests.mechanism.loads.every_load import fourbar as loaded_fourbar
 from tests.mechanisms import fourbar
@@ -108,22 +107,7 @@ def test_a_rail_is_as_long_as_the_path_of_its_block() -> None:
 
 
 def test_a_pin_runs_in_a_slot_of_its_link() -> None:
-    lever = Mechanism(
-        "quick_return",
-        [
-            Body("ground", {"O": (0, 1), "C": (0, -1)}),
-            Body("crank", {"O": (0, 0), "P": (0.5, 0)}, (0, 1, 0.4)),
-            Body("lever", {"C": (0, 0)}, (0, -1, 1.4)),
-        ],
-        [
-            Revolute("O", ("ground.O", "crank.O")),
-            Revolute("C", ("ground.C", "lever.C")),
-            PointOnLine("slot", ("lever.C", "crank.P")),
-        ],
-        [AngleDriver("crank", "crank", ConstantSpeed(0.5 * math.pi, 1.0))],
-        run=TURN,
-    )
-    shown = instant(lever)
+    shown = instant(replace(quick_return(0.5 * math.pi), run=TURN))
     (slot,) = drawn(shown, "slot", "block", "die")
     lengths = [np.hypot(*(end - shown.point("lever.C"))) for end in slot.points]
     np.testing.assert_allclose(sorted(lengths), [1.5, 2.5], atol=1e-9)

@@ -33,11 +33,6 @@ from tests.motion.cams import followers
 from tests.run.test_forces import loaded
 
 
-@pytest.fixture
-def run() -> Run:
-    return fourbar(np.arange(181.0))
-
-
 def test_each_coordinate_is_three_panels_with_its_numbers_and_units(run: Run) -> None:
     panels = _sheet([run], stacks_of(run, ["coupler.x", "rocker.phi"])).axes
     assert [panel.get_ylabel() for panel in panels] == [

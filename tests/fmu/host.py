@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
@@ -178,3 +179,14 @@ def answer(call: Callable[..., object], *arguments: object) -> int:
     except FMICallException as failure:
         return int(failure.status)
     return OK
+
+
+def turned(host: Host, steps: range) -> list[list[float]]:
+    """Rows of all outputs of a four-bar's FMU while the crank is turned unevenly."""
+    rows = []
+    for k in steps:
+        host.set({"crank_angle": 0.1 * k + 0.02 * math.sin(k)})
+        rows.append(host.outputs())
+        assert host.step(0.01 * k, 0.01) == OK
+        rows.append(host.outputs())
+    return rows

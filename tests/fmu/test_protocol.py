@@ -10,7 +10,7 @@ import pytest
 from kinfmu.fmu.interface import Drive
 from kinfmu.solver.python import Status
 from tests.fmu.conftest import Build, Start
-from tests.fmu.host import DISCARD, ERROR, LAST_SUCCESSFUL_TIME, OK, TERMINATED, WARNING, Host, answer
+from tests.fmu.host import DISCARD, ERROR, LAST_SUCCESSFUL_TIME, OK, TERMINATED, WARNING, Host, answer, turned
 
 FLAVOURS = ("python", "native 2", "native 3")
 COUPLER = ("coupler.x", "coupler.vx", "coupler.ax")
@@ -202,38 +202,27 @@ def test_tolerance_must_be_positive(start: Start) -> None:
     assert host.step(0.0, 0.1) == OK
 
 
-def _drive(host: Host, steps: range) -> list[list[float]]:
-    """Rows of all outputs while the crank is turned unevenly."""
-    rows = []
-    for k in steps:
-        host.set({"crank_angle": 0.1 * k + 0.02 * math.sin(k)})
-        rows.append(host.outputs())
-        assert host.step(0.01 * k, 0.01) == OK
-        rows.append(host.outputs())
-    return rows
-
-
 @pytest.mark.parametrize("serialized", [False, True])
 def test_restored_state_gives_the_same_bits_even_in_another_instance(start: Start, serialized: bool) -> None:
     host, other = start(), start()
-    _drive(host, range(1, 28))
+    turned(host, range(1, 28))
     host.set({"crank_angle": 3.1})
     state = host.state()
-    expected = [host.outputs(), *_drive(host, range(28, 70))]
+    expected = [host.outputs(), *turned(host, range(28, 70))]
     target = other if serialized else host
     restored = target.deserialize(host.serialize(state)) if serialized else state
     target.restore(restored)
-    assert [target.outputs(), *_drive(target, range(28, 70))] == expected
+    assert [target.outputs(), *turned(target, range(28, 70))] == expected
     target.free_state(restored)
 
 
 def test_reset_instance_equals_a_fresh_one(start: Start) -> None:
     host, fresh = start(), start()
-    _drive(host, range(1, 9))
+    turned(host, range(1, 9))
     host.fmu.reset()
     host.initialize(0.0)
     assert host.outputs() == fresh.outputs()
-    assert _drive(host, range(1, 9)) == _drive(fresh, range(1, 9))
+    assert turned(host, range(1, 9)) == turned(fresh, range(1, 9))
 
 
 def test_instances_of_one_fmu_and_of_two_in_one_process_share_nothing(start: Start) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from kinfmu.errors import RequestError
 from kinfmu.fmu import simulate
 from kinfmu.fmu.host.samples import PIECE
-from kinfmu.fmu.host.slaves import Slave2
+from kinfmu.fmu.host.slaves import LoadedSlave
 from kinfmu.run import Run
 from kinfmu.solver.python.pose import Status
 
@@ -21,19 +21,18 @@ from kinfmu.solver.python.pose import Status
 def asked(monkeypatch: pytest.MonkeyPatch) -> list[set[str]]:
     """The names of the variables that each sample asks for, in turn."""
     calls: list[set[str]] = []
-    reader = Slave2.reader
+    reader = LoadedSlave.row_reader
 
-    def recorded(slave: Slave2, references: Sequence[int], rows: NDArray[np.float64]) -> Callable[[int], None]:
-        names = {reference: name for name, reference in slave.references.items()}
-        read = reader(slave, references, rows)
+    def recorded(slave: LoadedSlave, names: Sequence[str], rows: NDArray[np.float64]) -> Callable[[int], None]:
+        read = reader(slave, names, rows)
 
         def read_row(row: int) -> None:
-            calls.append({names[reference] for reference in references})
+            calls.append({*names})
             read(row)
 
         return read_row
 
-    monkeypatch.setattr(Slave2, "reader", recorded)
+    monkeypatch.setattr(LoadedSlave, "row_reader", recorded)
     return calls
 
 
@@ -125,7 +124,7 @@ def test_a_sink_gets_the_reason_why_a_run_ends(fourbar: Path, monkeypatch: pytes
     def fails(*_: object) -> bool:
         raise RuntimeError("the FMU is gone")
 
-    monkeypatch.setattr(Slave2, "step", fails)
+    monkeypatch.setattr(LoadedSlave, "step", fails)
     sink = Listing()
     with pytest.raises(RuntimeError):
         simulate(fourbar, sink=sink)

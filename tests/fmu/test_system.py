@@ -15,6 +15,7 @@ from kinfmu.draw.scene.completed import component_runs
 from kinfmu.draw.scene.forces import arrows
 from kinfmu.draw.scene.scene import drawable
 from kinfmu.errors import FmuError, KinfmuError, RequestError
+from kinfmu.fmu.host.slaves import LoadedSlave
 from kinfmu.log import LiveView, McapLog, read, write_mcap, write_rrd
 from kinfmu.log.viewer.card import card
 from kinfmu.units import SignalName
@@ -55,6 +56,20 @@ def test_the_ordered_exchange_is_the_loop_of_the_example(fmus: Mapping[str, Path
     assert run.info["title"] == "DC motor and toggle press, coupled by bias torque and reduced inertia"
     assert run.mechanism is not None
     assert not run.events
+
+
+def test_a_system_reads_only_the_chosen_channels(fmus: Mapping[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: F811
+    asked: list[str] = []
+    reader = LoadedSlave.row_reader
+    monkeypatch.setattr(
+        LoadedSlave, "row_reader", lambda one, names, rows: asked.extend(names) or reader(one, names, rows)
+    )
+    run = kinfmu.simulate(fmus["press_drive"], stop=0.1, step=0.01, channels=["ram.y", "motor.speed"])
+    assert [place.name for place in run.places()] == ["time", "ram.y", "motor.speed", "solver.status"]
+    assert asked == ["ram.y"]
+    whole = kinfmu.simulate(fmus["press_drive"], stop=0.1, step=0.01)
+    for name in ("ram.y", "motor.speed"):
+        np.testing.assert_array_equal(run[name], whole[name])
 
 
 def test_the_jacobi_exchange_has_the_numbers_of_another_host(fmus: Mapping[str, Path], tmp_path: Path) -> None:  # noqa: F811

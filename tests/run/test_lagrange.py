@@ -13,6 +13,8 @@ import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, SlideDriver, Spring, Translational
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text
+from kinfmu.run import Run
+from tests.motion.torque import andrews
 from tests.run.lagrange import ACCELERATIONS, GRAVITY, LENGTHS, MASSES, SPEEDS, TABLE
 
 SAMPLES = json.loads(TABLE.read_text("utf-8"))
@@ -179,6 +181,21 @@ def squeezer() -> Mechanism:
         [Revolute(name, between) for name, between in pins.items()],
         [AngleDriver("crank", "k1", ConstantSpeed(BETA, 1.0))],
         loads=[Spring("spring", ("ground.C", "k3.D"), 4530.0, 0.07785)],
+    )
+
+
+def squeezed(method: str, tolerance: float) -> Run:
+    """Return the published motion of Andrews' squeezer, integrated."""
+    return kinfmu.simulate(
+        squeezer(),
+        drive="torque",
+        start=0.0,
+        stop=andrews.END,
+        step=andrews.END,
+        inputs={"crank_torque": TORQUE},
+        state={"crank_speed": 0.0},
+        tolerance=tolerance,
+        method=method,
     )
 
 

@@ -10,8 +10,8 @@ import pytest
 import kinfmu
 from kinfmu import Status
 from kinfmu.mechanism import gallery
+from kinfmu.mechanism.opened import Opened, opened
 from kinfmu.page.module import page_module
-from kinfmu.page.opened import Opened, opened
 from tests.page import test_lengths
 from tests.page.engines import (
     StepByStep,

@@ -12,7 +12,7 @@ from itertools import accumulate
 from pkgutil import iter_modules
 
 from kinfmu.codegen.c.functions import Parts, bind, drive, readers, stages
-from kinfmu.codegen.c.text import array, booleans, string
+from kinfmu.codegen.c.text import array, booleans, defines, header, string
 from kinfmu.codegen.c.units import rows_of
 from kinfmu.codegen.lists import distance_rows
 from kinfmu.plan import Block, SolvePlan
@@ -75,35 +75,17 @@ def _sizes(parts: Parts) -> str:
         "TALL": int(any(len(block.residuals) > len(block.unknowns) for block in solved)),
         "LARGEST_BLOCK": max((len(block.residuals) * len(block.unknowns) for block in solved), default=0),
     }
-    lines = [
-        "/* Sizes of a model: generated from its mechanism, not to be edited. */",
-        "#ifndef KF_SIZES_H",
-        "#define KF_SIZES_H",
-        "",
-        *(f"#define KF_{name} {count}" for name, count in counts.items()),
-        "",
-        "#endif",
-    ]
-    return "\n".join(lines) + "\n"
+    comment = "Sizes of a model: generated from its mechanism, not to be edited."
+    return header("sizes", comment, [f"#define KF_{name} {count}" for name, count in counts.items()])
 
 
 @cache
 def constants() -> str:
-    """Return constants.h: statuses and numbers of the solver in Python. A name with two values does not compile."""
+    """Return constants.h: statuses and numbers of the solver in Python."""
     modules = [import_module(f"{python.__name__}.{one.name}") for one in iter_modules(python.__path__) if not one.ispkg]
-    numbers = {(k.strip("_"), x) for each in modules for k, x in vars(each).items() if type(x) in (int, float)}
-    lines = [
-        "/* Statuses and constants of the solver: generated from kinfmu/solver/python, not to be edited. */",
-        "#ifndef KF_CONSTANTS_H",
-        "#define KF_CONSTANTS_H",
-        "",
-        f"typedef enum {{ {', '.join(f'KF_{status.name}' for status in python.Status)} }} kf_status;",
-        "",
-        *(f"#define KF_{name} ({number!r})" for name, number in sorted(numbers) if name.isupper()),
-        "",
-        "#endif",
-    ]
-    return "\n".join(lines) + "\n"
+    statuses = f"typedef enum {{ {', '.join(f'KF_{status.name}' for status in python.Status)} }} kf_status;"
+    comment = "Statuses and constants of the solver: generated from kinfmu/solver/python, not to be edited."
+    return header("constants", comment, [statuses, "", *defines("KF_", modules)])
 
 
 def tables(plan: SolvePlan, solved: Sequence[Block], labels: Mapping[str, str]) -> list[str]:

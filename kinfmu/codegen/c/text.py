@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
+from types import ModuleType
 
 from kinfmu.codegen.lists import Lists
 from kinfmu.codegen.writer import Names
@@ -38,6 +39,18 @@ def array(declaration: str, items: Iterable[object]) -> list[str]:
     storage = "static const" if declaration.startswith("static ") else "const"
     declaration = declaration.removeprefix("static ")
     return wrapped(f"{storage} {declaration}[{max(len(texts), 1)}] = {{", texts or ["0"], "};")
+
+
+def defines(prefix: str, modules: Iterable[ModuleType]) -> list[str]:
+    """Return the constants of modules that are one number, by name. A name with two values does not compile."""
+    numbers = {(k.strip("_"), x) for each in modules for k, x in vars(each).items() if type(x) in (int, float)}
+    return [f"#define {prefix}{name} ({number!r})" for name, number in sorted(numbers) if name.isupper()]
+
+
+def header(name: str, comment: str, lines: Iterable[str]) -> str:
+    """Return a header, with a guard of its name."""
+    guard = f"KF_{name.upper()}_H"
+    return "\n".join([f"/* {comment} */", f"#ifndef {guard}", f"#define {guard}", "", *lines, "", "#endif", ""])
 
 
 def booleans(values: Iterable[object]) -> list[str]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby
 
 from kinfmu.errors import RequestError, listed
-from kinfmu.fmu.host.any_slave import AnySlave
+from kinfmu.fmu.host.slaves import LoadedSlave
 from kinfmu.fmu.host.structure import Connection
 from kinfmu.mechanism.valid import quoted
 
@@ -21,7 +21,7 @@ def check_exchange(kind: str) -> None:
         raise RequestError(f"exchange = {quoted(kind)} must be one of {listed(EXCHANGES)}")
 
 
-def exchange_of(kind: str, connections: Sequence[Connection], slaves: Mapping[str, AnySlave]) -> Exchange:
+def exchange_of(kind: str, connections: Sequence[Connection], slaves: Mapping[str, LoadedSlave]) -> Exchange:
     """Return a call that passes the values of all connections.
 
     Args:
@@ -53,7 +53,7 @@ def exchange_of(kind: str, connections: Sequence[Connection], slaves: Mapping[st
     return at_once
 
 
-def _reader(group: Sequence[Connection], slaves: Mapping[str, AnySlave]) -> Callable[[], list[float]]:
+def _reader(group: Sequence[Connection], slaves: Mapping[str, LoadedSlave]) -> Callable[[], list[float]]:
     """Return a call that returns the values for the inputs of connections of one source."""
     get = slaves[group[0].source.name].getter([one.output for one in group])
     if all(one.factor == 1.0 and one.offset == 0.0 for one in group):
@@ -61,7 +61,7 @@ def _reader(group: Sequence[Connection], slaves: Mapping[str, AnySlave]) -> Call
     return lambda: [one.factor * value + one.offset for one, value in zip(group, get(), strict=True)]
 
 
-def _writer(group: Sequence[Connection], slaves: Mapping[str, AnySlave]) -> Callable[[Sequence[float]], None]:
+def _writer(group: Sequence[Connection], slaves: Mapping[str, LoadedSlave]) -> Callable[[Sequence[float]], None]:
     return slaves[group[0].target.name].setter([one.input for one in group])
 
 

@@ -11,11 +11,11 @@ import numpy as np
 from kinfmu.errors import FmuError, RequestError, listed
 from kinfmu.fmu import description
 from kinfmu.fmu.host.input_table import InputTable, input_notes, input_table, times, undriven
-from kinfmu.fmu.host.interruption import Interruption
-from kinfmu.fmu.host.samples import Samples
+from kinfmu.fmu.host.ports import Port
+from kinfmu.fmu.host.samples import Samples, own_info
 from kinfmu.fmu.host.settings import as_set, fmu_settings
 from kinfmu.fmu.host.slaves import LoadedSlave, slave
-from kinfmu.fmu.host.stepping import step_through
+from kinfmu.fmu.host.stepping import Interruption, step_through
 from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.slave.estimated_rates import Rates
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, MECHANISM, text_in, unpacked
@@ -76,22 +76,22 @@ def simulate_own(
             except RequestError as error:
                 raise RequestError(f"{path}: {error}") from None
             mechanism = as_set(mechanism, settings)
-            samples = Samples(about, len(kept), settings=settings, mechanism=mechanism, model_description=xml)
+            info = own_info(about, settings)
+            samples = Samples(len(kept), info, interface=interface, mechanism=mechanism, model_description=xml)
             if interface.part("inputs") and not _time_drives(interface, settings):
                 samples.extend(undriven(interface, table, float(t[0])))
             if table is not None:
                 samples.extend(input_notes(interface, table, start, stop))
             with interrupted:
                 with slave(about, folder, samples.log) as loaded:
-                    _initialize(loaded, settings, t, samples.first_error)
+                    _initialize(loaded, interface, settings, t, samples.first_error)
                     samples.read_fixed(loaded)
                     if interrupted:
                         raise KeyboardInterrupt
                     computes = _computes_estimates(interface, settings, table, rows[0])
                     samples.begin(loaded, channels, sink, computes_estimates=computes)
                     try:
-                        driven = [] if table is None else [loaded.references[name] for name in table.names]
-                        set_inputs = loaded.setter(driven, rows) if driven else None
+                        set_inputs = loaded.row_setter(table.names, rows) if table and table.names else None
                         step_through(samples, t, kept, set_inputs, loaded.step, progress, interrupted.came)
                     except BaseException as failure:
                         samples.end(str(failure) or type(failure).__name__)
@@ -109,6 +109,7 @@ def _time_drives(interface: Interface, parameters: Mapping[str, float | bool | s
 
 def _initialize(
     slave: LoadedSlave,
+    interface: Interface,
     parameters: Mapping[str, float | bool | str],
     t: NDArray[np.float64],
     complaint: Callable[[], str],
@@ -117,20 +118,13 @@ def _initialize(
 
     FMUs of the python flavour cannot return Error here: their messages of level error count.
     """
-    from fmpy.fmi1 import FMICallException
-
+    ports = {v.name: Port(v.name, slave.references[v.name], v.type, v.causality) for v in interface}
+    values = [Rates[value.upper()] if isinstance(value, str) else value for value in parameters.values()]
     try:
-        for name, value in parameters.items():
-            if isinstance(value, bool):
-                slave.set_boolean(slave.references[name], value)
-            elif isinstance(value, str):
-                slave.set_enumeration(slave.references[name], Rates[value.upper()])
-            elif isinstance(value, int):
-                slave.set_integer(slave.references[name], value)
-            else:
-                slave.set([slave.references[name]], [value])
-        slave.initialize(float(t[0]))
-    except FMICallException as failure:
+        slave.setter([ports[name] for name in parameters])(values)
+        slave.enter(float(t[0]))
+        slave.exit()
+    except FmuError as failure:
         raise FmuError(complaint() or str(failure)) from None
     if complaint():
         raise FmuError(complaint())

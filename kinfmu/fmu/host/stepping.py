@@ -1,38 +1,66 @@
-"""The loop that steps an FMU or a system of FMUs: set at t_k, record, step."""
+"""The loop that steps an FMU or a system of FMUs: set at t_k, record, step; and what interrupts it."""
 
 from __future__ import annotations
 
+import signal
+import threading
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Protocol
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinfmu.fmu.host.samples import DISCARD, ERROR
+from kinfmu.fmu.host.samples import DISCARD, ERROR, Samples
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-class Recorded(Protocol):
-    """The samples of what is stepped; now: time of its messages [s]."""
+ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))  # no SIGHUP on Windows
 
-    now: float
 
-    def log(self, status: int, text: str) -> None:
-        """Store a message at the current time."""
+class Interruption:
+    """Record of Ctrl-C, SIGTERM and SIGHUP during a `with` block; true once one came.
 
-    def read(self, t: float, *, is_kept: bool) -> bool:
-        """Read a sample, if it is to be kept; return False if it holds no numbers."""
+    A KeyboardInterrupt inside an FMU's Python would reach the host as fmi2Fatal. Ignored signals stay ignored. Outside
+    the main thread, where Python does not deliver signals, it has no effect.
+    """
 
-    def is_unreachable(self) -> bool:
-        """Return whether the mechanism is asked for an unreachable pose."""
+    def __init__(self) -> None:
+        self.came: list[int] = []  # signals, in order
+        self._before: dict[int, Any] = {}
 
-    def message(self) -> str:
-        """Return why it is unreachable."""
+    def __bool__(self) -> bool:
+        return bool(self.came)
+
+    def __enter__(self) -> Interruption:
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, *ENDING):
+                before = signal.getsignal(number)
+                if number == signal.SIGINT or before not in (signal.SIG_IGN, None):
+                    self._before[number] = before
+                    signal.signal(number, self._note)
+        return self
+
+    def __exit__(
+        self, _kind: type[BaseException] | None, _error: BaseException | None, _traceback: TracebackType | None
+    ) -> None:
+        for number, before in self._before.items():
+            signal.signal(number, before)
+        self._before = {}
+
+    def _note(self, number: int, _frame: Any) -> None:
+        self.came.append(number)
+
+    def deliver(self) -> None:
+        """Raise SIGTERM or SIGHUP again, if one came: by default it ends the process."""
+        for number in self.came:
+            if number in ENDING:
+                signal.raise_signal(number)
 
 
 def step_through(
-    samples: Recorded,
+    samples: Samples,
     t: NDArray[np.float64],
     kept: NDArray[np.int64],
     set_inputs: Callable[[int], None] | None,

@@ -10,18 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinfmu.errors import FmuError, MissingPackageError, RequestError, valid_names
-from kinfmu.fmu.host.any_slave import AnySlave, foreign_slave
+from kinfmu.errors import FmuError, RequestError, valid_names
 from kinfmu.fmu.host.exchange import check_exchange, exchange_of, ordered
 from kinfmu.fmu.host.input_table import InputTable, table_of, times
-from kinfmu.fmu.host.interruption import Interruption
 from kinfmu.fmu.host.ports import Port
-from kinfmu.fmu.host.samples import DISCARD, ERROR, Samples
+from kinfmu.fmu.host.samples import DISCARD, ERROR, Samples, own_info
 from kinfmu.fmu.host.settings import as_set
-from kinfmu.fmu.host.slaves import LoadedSlave, slave
-from kinfmu.fmu.host.stepping import step_through
+from kinfmu.fmu.host.slaves import require_fmpy, slave
+from kinfmu.fmu.host.stepping import Interruption, step_through
 from kinfmu.fmu.host.structure import STRUCTURE, Component, SystemStructure, of_fmu, of_ssp
-from kinfmu.fmu.host.system_samples import SystemSamples
 from kinfmu.fmu.unpacked import unpacked
 from kinfmu.mechanism import Mechanism, toml_file, toml_text
 from kinfmu.run import Event, Run
@@ -64,10 +61,7 @@ def _simulate(
     exchange: str,
 ) -> Run:
     check_exchange(exchange)
-    try:
-        import fmpy  # noqa: F401  # only to see if it is installed
-    except ImportError:
-        raise MissingPackageError("stepping an FMU needs fmpy; pip install fmpy") from None
+    require_fmpy()
     interrupted = Interruption()
     try:
         with ExitStack() as opened:
@@ -148,21 +142,13 @@ def _run(
     names = [SignalName(_column(one, port), port.unit) for one in others for port in one.of("output")]
     driven = [name for name in (table.names if table else ()) if all(end is not main for end, _ in system.inputs[name])]
     names += [SignalName(name, system.inputs[name][0][1].unit) for name in driven]
-    own = _samples_of(main, len(kept), values) if main else None
-    samples = SystemSamples(names, len(kept), _info(system, values, main), own)
+    samples = _samples(main, len(kept), values, _info(system, values, main), names)
     samples.extend([Event(float(t[0]), "info", note) for note in system.notes])
     samples.now = float(t[0])
-    slaves: dict[str, AnySlave] = {}
-    loaded: LoadedSlave | None = None
-    for one in system.components:
-        if one.own is not None:
-            made = opened.enter_context(slave(one.own, one.folder, samples.log))
-            slaves[one.name] = AnySlave(one.name or one.path.stem, made.fmpy, one.own.version == "3.0")
-            loaded = made if one is main else loaded
-        else:
-            slaves[one.name] = opened.enter_context(
-                foreign_slave(one.name or one.path.stem, one.about, one.folder, samples.log)
-            )
+    slaves = {
+        one.name: opened.enter_context(slave(one.own or one.about, one.folder, samples.log, one.name or one.path.stem))
+        for one in system.components
+    }
     exchanged = exchange_of(exchange, system.connections, slaves)
     set_inputs = [
         (column, slaves[end.name].setter([port]))
@@ -189,10 +175,11 @@ def _run(
             slaves[one.name].exit()
     except FmuError as error:
         raise FmuError(f"{error} {samples.first_error()}".strip()) from None
-    if own is not None and loaded is not None:
-        if own.first_error():  # FMUs in Python cannot return Error here: their messages count
-            raise FmuError(own.first_error())
-        own.read_fixed(loaded)
+    loaded = slaves[main.name] if main else None
+    if loaded:
+        if samples.first_error():  # FMUs in Python cannot return Error here: their messages count
+            raise FmuError(samples.first_error())
+        samples.read_fixed(loaded)
     for loop in ordered(system.connections)[1]:
         text = f"algebraic loop: {', '.join(map(str, loop))}; its first value is a step late, which may be unstable"
         samples.extend([Event(float(t[0]), "warning", text)])
@@ -201,7 +188,7 @@ def _run(
     readers = [slaves[one.name].getter(one.of("output")) for one in others]
     columns = [] if table is None else [table.names.index(name) for name in driven]
     readers.append(lambda: [float(rows[place, column]) for column in columns])
-    samples.begin(readers, loaded, channels, sink)
+    samples.begin(loaded, channels, sink, read_signals=readers)
 
     def step(time: float, size: float) -> bool:
         for one in slaves.values():
@@ -232,12 +219,24 @@ def _mechanism_of(one: Component, values: Mapping[str, Mapping[str, float]]) -> 
     return as_set(toml_file.parse(one.mechanism, f"{one.path}: mechanism.toml"), values[one.name])
 
 
-def _samples_of(one: Component, count: int, values: Mapping[str, Mapping[str, float]]) -> Samples:
-    """Return the samples of kinfmu's FMU in the system."""
-    assert one.own is not None  # noqa: S101  # for the type
-    mechanism = _mechanism_of(one, values)
-    text = (one.folder / "modelDescription.xml").read_text("utf-8")
-    return Samples(one.own, count, settings=values[one.name], mechanism=mechanism, model_description=text)
+def _samples(
+    main: Component | None,
+    count: int,
+    values: Mapping[str, Mapping[str, float]],
+    info: Mapping[str, str],
+    signals: Sequence[SignalName],
+) -> Samples:
+    """Return the samples of the system, with those of kinfmu's FMU that is drawn, if there is one."""
+    if main is None or main.own is None:
+        return Samples(count, info, signals=signals)
+    return Samples(
+        count,
+        own_info(main.own, values[main.name]) | dict(info),
+        interface=main.own.interface,
+        mechanism=_mechanism_of(main, values),
+        model_description=(main.folder / "modelDescription.xml").read_text("utf-8"),
+        signals=signals,
+    )
 
 
 def _info(system: SystemStructure, values: Mapping[str, Mapping[str, float]], main: Component | None) -> dict[str, str]:

@@ -10,11 +10,12 @@ from pathlib import Path
 from types import MappingProxyType
 
 from kinfmu.codegen.c import compiler, emit
-from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
+from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, defines, function, header, string
 from kinfmu.codegen.forces import STAGES, emit_c_forces, places_of_symbols, solves
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.errors import MissingPackageError
 from kinfmu.fmu.interface import Interface, Variable
+from kinfmu.fmu.slave import estimated_rates
 from kinfmu.fmu.slave.estimated_rates import Rates
 from kinfmu.fmu.slave.layout import UNKNOWN_ERROR
 from kinfmu.plan import SolvePlan
@@ -23,6 +24,7 @@ from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.plan.undetermined import distance_steps, meeting_messages
 from kinfmu.solver.python.torque import dormand_prince as pair
+from kinfmu.solver.python.torque import equation_of_motion, law_breaks, limits, steps
 
 RUNTIME = Path(__file__).with_name("runtime")
 _NO_VARIABLE = "0xfffffffeu"
@@ -89,7 +91,7 @@ def sources(
             [emit_c_forces(plan, inertia, "inertia"), *array("double kf_in_si", units_in_si(plan)), ""]
         )
         counts = laws.counts if laws else ()
-        instance["laws.h"] = _laws_header(counts)
+        instance["efforts.h"] = _efforts_header(counts)
         if laws and counts:
             instance["laws.c"] = emit_c_forces(plan, laws.steps, "laws")
         instance["dormand_prince.h"] = _dormand_prince()
@@ -108,36 +110,33 @@ def sources(
     return dict(sorted(_prefixed(files, version).items()))
 
 
-def _laws_header(counts: Sequence[int]) -> str:
-    """Return laws.h: how many laws over quantities have breaks, and how many each has."""
+def _efforts_header(counts: Sequence[int]) -> str:
+    """Return efforts.h: constants of the motion under efforts, and the number of breaks of each law over a quantity."""
+    modules = (equation_of_motion, law_breaks, limits, pair, steps)
+    beyond = ", ".join(map(repr, limits.BEYOND))
     lines = [
-        "/* Laws over quantities with breaks: generated from the mechanism, not to be edited. */",
-        "#ifndef KF_LAWS_H",
-        "#define KF_LAWS_H",
-        "",
+        *defines("KF_TORQUE_", modules),
+        f"#define KF_TORQUE_BEYOND {{{beyond}}}",
         f"#define KF_LAWS {len(counts)}",
     ]
     if counts:
         lines.append(f"#define KF_LAW_NUMBERS {sum(counts) + 4 * len(counts)}")
         lines += array("static int kf_law_breaks", counts)
-    return "\n".join([*lines, "", "#endif", ""])
+    return header("efforts", "Constants of kinfmu/solver/python/torque, and laws with breaks: generated.", lines)
 
 
 def _dormand_prince() -> str:
     """Return dormand_prince.h: the coefficients of the integrator."""
     count = len(pair.C)
     lines = [
-        "/* Dormand and Prince, order 8 with error estimates of orders 5 and 3: generated from a table. */",
-        "#ifndef KF_DORMAND_PRINCE_H",
-        "#define KF_DORMAND_PRINCE_H",
-        "",
         f"#define KF_STAGES {count} /* the derivatives at the end of the step follow */",
         *array("static double kf_dp_c", pair.C),
         *array("static double kf_dp_a", [value for row in pair.A for value in (*row, *(0.0,) * (count - len(row)))]),
     ]
     for name, row in {"b": pair.B, "e3": pair.E3, "e5": pair.E5}.items():
         lines += array(f"static double kf_dp_{name}", row[:count])
-    return "\n".join([*lines, "", "#endif", ""])
+    comment = "Dormand and Prince, order 8 with error estimates of orders 5 and 3: generated from a table."
+    return header("dormand_prince", comment, lines)
 
 
 def _step(version: str, motion: Sequence[str]) -> str:
@@ -182,10 +181,6 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
     meeting = len(distance_steps(plan).results) if any(counts[stage] for stage in STAGES) else 0
     words = _WORDS[version]
     lines = [
-        f"/* Variables of the FMU of {variables.name}: generated from its mechanism, not to be edited. */",
-        "#ifndef KF_INTERFACE_H",
-        "#define KF_INTERFACE_H",
-        "",
         "#include <stdbool.h>",
         "",
         f"#define KF_TOKEN {string(token)}",
@@ -217,6 +212,8 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
         f"#define KF_MESSAGE_TEXT {references['solver.message']}",
         f"#define KF_TIME {references.get('time', '0xffffffffu /* FMI 2.0 has no such variable */')}",
         f"#define KF_UNKNOWN_ERROR {UNKNOWN_ERROR!r} /* of solver.error_q, _qd, _qdd: there is no estimate */",
+        f"#define KF_JUST_AFTER {steps.JUST_AFTER!r} /* relative to the numbers from which a jump is computed */",
+        *defines("KF_", [estimated_rates]),
         f"#define KF_JUMPS {len(plan.jumps)} /* of what drives over time */",
         f'#define KF_REAL_WORD "{words[0]}"',
         f'#define KF_ENUMERATION_WORD "{words[1]}"',
@@ -232,10 +229,9 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
         "extern const bool kf_driven_by_time_start;",
         "extern const int kf_rates_start;",
         "extern const double kf_start_time;",
-        "",
-        "#endif",
     ]
-    return "\n".join(lines) + "\n"
+    comment = f"Variables of the FMU of {variables.name}: generated from its mechanism, not to be edited."
+    return header("interface", comment, lines)
 
 
 def _tables(variables: Interface) -> str:
@@ -307,18 +303,13 @@ def _prefixed(sources: Mapping[str, str], version: str) -> dict[str, str]:
     """
     names = sorted({name for text in sources.values() for name in re.findall(r"\bkf_\w+", text)})
     prefix = f"FMI{version[0]}_FUNCTION_PREFIX"
-    header = [
-        f"/* With {prefix} every name begins with it, so that several FMUs can be linked into one program. */",
-        "#ifndef KF_NAMES_H",
-        "#define KF_NAMES_H",
-        "",
+    lines = [
         f"#ifdef {prefix}",
         "#define KF_PASTE(a, b) a##b",
         "#define KF_JOIN(a, b) KF_PASTE(a, b)",
         *(f"#define {name} KF_JOIN({prefix}, {name})" for name in names),
         "#endif",
-        "",
-        "#endif",
     ]
+    comment = f"With {prefix} every name begins with it, so that several FMUs can be linked into one program."
     files = {name: f'#include "kf_names.h"\n{text}' for name, text in sources.items()}
-    return files | {"kf_names.h": "\n".join(header) + "\n"}
+    return files | {"kf_names.h": header("names", comment, lines)}

@@ -8,9 +8,13 @@ from math import inf
 
 from .layout import Numbers
 
-KEPT = 4  # samples that a slave remembers: the last one, two for the estimates and one more for their errors
+# C has these numbers too, in interface.h.
+SAMPLES = 4  # that a slave remembers: the last one, two for the estimates and one more for their errors
 LARGEST = 1e100  # of rates and of values that a host sets: squares of larger numbers overflow
 EPS = 2.220446049250313e-16
+SAME_TIME = 1e-9  # of a step: rounding errors of times that hosts add up, which move no pose
+LATE = 1e-3  # of a step: a sum of a million steps may end this late
+ROUNDING = 2.0 * EPS  # of a time: its last digits
 UNSURE = 2.0  # safety factor: the next term may change by this much over the step
 Sample = tuple[float, tuple[float, ...]]  # a communication point t [s] and the driver values u there
 

@@ -11,11 +11,10 @@ from typing import Any, Protocol
 
 from ...solver.python import Pose, Solver, Status
 from .base import Fmi2Status
-from .estimated_rates import LARGEST, Sample, errors_of_estimated_rates, estimated_rate, estimated_rates
+from .estimated_rates import LARGEST, SAME_TIME, Sample, errors_of_estimated_rates, estimated_rate, estimated_rates
 from .layout import NOT_A_NUMBER, Numbers
 
 LAST_GOOD = int(Status.BRIDGED)  # compared in every read: faster than `Pose.good`
-SAME_TIME = 1e-9  # of a step: rounding errors of times that hosts add up
 Drive = tuple[Numbers, Numbers, Numbers]  # u, ud, udd of the drivers
 
 

@@ -19,13 +19,10 @@ from typing import Any
 
 from ...solver.python import Pose, UnsolvableModel, with_parameters
 from .base import Fmi2Status
-from .estimated_rates import KEPT
+from .estimated_rates import LATE, ROUNDING, SAME_TIME, SAMPLES
 from .layout import Numbers
-from .motion import SAME_TIME
 from .variables import SlaveVariables
 
-LATE = 1e-3  # of a step: a sum of a million steps may end this late
-ROUNDING = 4.44e-16  # of a time: its last digits
 DIGEST = 32  # bytes of a SHA-256
 PLAIN = (  # attributes that are a number or a truth value: a state has them as they are
     *("driven_by_time", "rates", "initialized", "running", "touched", "stray_reported"),
@@ -107,7 +104,7 @@ class MechanismSlave(SlaveVariables):
             return f"doStep from t = {t:g} s by {h:g} s: they must be finite, the step at least 0"
         if t < self.start_time - SAME_TIME * h:
             return f"doStep from t = {t!r} s: that is before the start at {self.start_time!r} s"
-        if t + h - self.stop_time > LATE * h + ROUNDING * abs(self.stop_time):
+        if t + h - self.stop_time > LATE * h + 2.0 * ROUNDING * abs(self.stop_time):
             past = f"past the stop time of the experiment, {self.stop_time:.12g} s"
             return f"doStep from t = {t:.12g} s by {h:.12g} s: {past}"
         return ""
@@ -170,7 +167,7 @@ class MechanismSlave(SlaveVariables):
         self.committed = self.solver.restore(state["committed"])
         self.committed_inputs = as_numbers(state["committed_inputs"], self.inputs)
         self.committed_loads = as_numbers(state["committed_loads"], self.committed_loads)
-        self.history = deque([(t, tuple(u)) for t, u in state["history"]], KEPT)
+        self.history = deque([(t, tuple(u)) for t, u in state["history"]], SAMPLES)
         self.motion = self.new_motion()
         self.forget()
         self.motion.restore(state["motion"])

@@ -14,7 +14,7 @@ from ...solver.python import Pose, Status, UnsolvableModel, with_parameters
 from ...solver.python.solver import LEAST_TOLERANCE, MOST_TOLERANCE
 from ...solver.python.tracks import sample_rates
 from .base import Fmi2Slave, Fmi2Status
-from .estimated_rates import KEPT, LARGEST, Rates, Sample
+from .estimated_rates import LARGEST, SAMPLES, Rates, Sample
 from .layout import MOTION, NOT_A_NUMBER, UNKNOWN_ERROR, Computer, Fetch, Layout, Numbers, Places, plan_fetch
 from .motion import LAST_GOOD, ByInputs, ByLaw, Drive
 
@@ -81,7 +81,7 @@ class SlaveVariables(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self.committed: Pose = self.solver.anchor
         self.committed_inputs: Numbers = tuple(self.inputs)
         self.committed_loads = self.settings["loads"]
-        self.history: deque[Sample] = deque(maxlen=KEPT)  # the last commits, oldest first
+        self.history: deque[Sample] = deque(maxlen=SAMPLES)  # the last commits, oldest first
         self.motion = self.new_motion()
         self.forget()
         self.rows: dict[str, Numbers] = {}  # what has been computed at the shown pose so far, by part

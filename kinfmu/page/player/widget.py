@@ -9,11 +9,11 @@ from typing import Any
 from kinfmu.errors import MissingPackageError, listed, suggestion
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
+from kinfmu.mechanism.opened import opened
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.page import page
 from kinfmu.page.html import MOST_NUMBERS
 from kinfmu.page.module import page_module
-from kinfmu.page.opened import opened
 
 _SCRIPT = Path(__file__).with_name("widget.js")
 _HOOK = "started.then((page) => { page.file = () => mechanismFile(page.linkage, page.design); });"

@@ -13,6 +13,9 @@ import pytest
 from kinfmu.fmu.slave.estimated_rates import Rates
 from tests.fmu.conftest import Build
 from tests.fmu.host import DISCARD, OK, Host
+from tests.fmu.test_estimated_rates import (  # with native FMUs
+    test_point_that_is_stepped_again_replaces_its_sample as test_point_that_is_stepped_again_replaces_its_sample,
+)
 
 H = 0.01  # [s]
 QUANTITIES = ("length", "speed", "acceleration")
@@ -208,18 +211,6 @@ def test_step_past_a_limit_is_discard_and_a_smaller_one_follows_the_same_derivat
     host.set({"crank_angle": 9.0})  # out of reach: what is shown is the last good pose, with its own rates
     assert host.status() != 0
     assert host.step(0.45, 0.1) == DISCARD
-
-
-@pytest.mark.parametrize("again", [0.4, math.nextafter(0.4, 0.0), math.nextafter(0.4, 1.0)])
-def test_point_that_is_stepped_again_replaces_its_sample(start: Callable[..., Host], again: float) -> None:
-    host = start()
-    for k, t in enumerate((0.0, 0.1, 0.2, 0.3, 0.4)):
-        host.set({"crank_angle": 0.5 + 0.1 * k})
-        assert host.step(t, 0.1) == OK
-    host.set({"crank_angle": 0.9001})
-    assert host.step(again, 0.1) == OK
-    assert host.get("crank.omega") == pytest.approx([1.0], abs=2e-3)
-    assert host.get("crank.alpha") == pytest.approx([0.0], abs=0.02)
 
 
 # Masters

@@ -18,24 +18,13 @@ from kinfmu.fmu.slave.layout import UNKNOWN_ERROR
 from kinfmu.solver.python.pose import Status
 from tests import oracle
 from tests.fmu.conftest import Build, Start
-from tests.fmu.host import DISCARD, ERROR, LAST_SUCCESSFUL_TIME, OK, TERMINATED, WARNING, Host, answer
+from tests.fmu.host import DISCARD, ERROR, LAST_SUCCESSFUL_TIME, OK, TERMINATED, WARNING, Host, answer, turned
 from tests.fmu.test_parameters import LENGTHS, OTHERS, linkage
 from tests.oracle import Motion, mp
 from tests.run.test_sensitivities import Form, exact_derivative
 
 COUPLER = ("coupler.x", "coupler.vx", "coupler.ax")
 UNIT_INPUTS = ("crank_angle", "crank_speed", "crank_acceleration")
-
-
-def _drive(host: Host, steps: range) -> list[list[float]]:
-    """Rows of all outputs while the crank is turned unevenly."""
-    rows = []
-    for k in steps:
-        host.set({"crank_angle": 0.1 * k + 0.02 * math.sin(k)})
-        rows.append(host.outputs())
-        assert host.step(0.01 * k, 0.01) == OK
-        rows.append(host.outputs())
-    return rows
 
 
 def test_freed_state_is_null(start: Start) -> None:
@@ -130,12 +119,12 @@ def test_directional_derivatives_of_the_parallelogram_are_those_of_its_formulas(
 def test_every_real_output_has_directional_derivatives_which_do_not_change_the_state(start: Start) -> None:
     host, untouched = start(), start()
     for one in (host, untouched):
-        _drive(one, range(1, 6))
+        turned(one, range(1, 6))
         one.set({"crank_angle": 0.65})
     names = host.real_outputs()
     assert all(map(math.isfinite, host.slopes([n for n in names if "error" not in n], ["crank_angle"], [1.0])))
     assert host.outputs() == untouched.outputs()
-    assert _drive(host, range(7, 12)) == _drive(untouched, range(7, 12))
+    assert turned(host, range(7, 12)) == turned(untouched, range(7, 12))
 
 
 @pytest.mark.parametrize("parameter", ["ground", "coupler"])

@@ -30,6 +30,24 @@ from kinfmu import (
 from tests.oracle import largest_error, slider_crank
 
 
+def quick_return(start: float = 0.0) -> Mechanism:
+    """Return a crank whose pin runs in a slot of a lever."""
+    return Mechanism(
+        "quick_return",
+        [
+            Body("ground", {"O": (0, 1), "C": (0, -1)}),
+            Body("crank", {"O": (0, 0), "P": (0.5, 0)}, (0, 1, 0.4)),
+            Body("lever", {"C": (0, 0)}, (0, -1, 1.4)),
+        ],
+        [
+            Revolute("O", ("ground.O", "crank.O")),
+            Revolute("C", ("ground.C", "lever.C")),
+            PointOnLine("slot", ("lever.C", "crank.P")),
+        ],
+        [AngleDriver("crank", "crank", ConstantSpeed(start, 1.0))],
+    )
+
+
 def crank_and_slider(*, offset: float = 0.25, drivers: tuple[object, ...] = ()) -> Mechanism:
     """Crank 1, rod 3, and a block that slides along y = offset."""
     start = 0.7
@@ -102,20 +120,7 @@ def test_a_cylinder_lifts_an_arm_by_the_law_of_cosines() -> None:
 
 
 def test_a_pin_in_a_slot_gives_a_quick_return_mechanism() -> None:
-    lever = Mechanism(
-        "quick_return",
-        [
-            Body("ground", {"O": (0, 1), "C": (0, -1)}),
-            Body("crank", {"O": (0, 0), "P": (0.5, 0)}, (0, 1, 0.4)),
-            Body("lever", {"C": (0, 0)}, (0, -1, 1.4)),
-        ],
-        [
-            Revolute("O", ("ground.O", "crank.O")),
-            Revolute("C", ("ground.C", "lever.C")),
-            PointOnLine("slot", ("lever.C", "crank.P")),
-        ],
-        [AngleDriver("crank", "crank")],
-    )
+    lever = quick_return()
     u = np.linspace(0.0, 7.0, 50)
     run = kinfmu.solve(lever, crank_angle=u)
     np.testing.assert_allclose(run["lever.phi"], np.arctan2(2 + 0.5 * np.sin(u), 0.5 * np.cos(u)), atol=1e-14)

@@ -11,11 +11,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-import kinfmu
 from kinfmu.draw.chart import dress
 from kinfmu.draw.writing import write
 from tests.motion.torque import andrews
-from tests.run.test_lagrange import TORQUE, squeezer
+from tests.run.test_lagrange import squeezed
 
 TOLERANCES = {"DOP853": 10.0 ** np.arange(-4.0, -13.5, -1.0), "Radau": 10.0 ** np.arange(-4.0, -10.5, -1.0)}
 COLOURS = {"DOP853": "#1d4ed8", "Radau": "#b45309"}
@@ -25,17 +24,7 @@ ORDERS = (("phi", "angles", "-"), ("omega", "speeds", "--"))
 
 def errors(method: str, tolerance: float) -> tuple[float, float]:
     """Return the largest errors of angles and of speeds at the end, relative to the largest of each."""
-    run = kinfmu.simulate(
-        squeezer(),
-        drive="torque",
-        start=0.0,
-        stop=andrews.END,
-        step=andrews.END,
-        inputs={"crank_torque": TORQUE},
-        state={"crank_speed": 0.0},
-        tolerance=tolerance,
-        method=method,
-    )
+    run = squeezed(method, tolerance)
     found = []
     for order, (column, _, _) in enumerate(ORDERS):
         exact = np.array([sum(andrews.AT_END[name][order] for name in names) for names in andrews.BODIES.values()])

@@ -34,7 +34,7 @@ from kinfmu.solver.python.pose import Status
 from tests.mechanisms import five_bar, fourbar
 from tests.motion.test_breaks import tappet
 from tests.motion.torque import andrews
-from tests.run.test_lagrange import TORQUE, squeezer
+from tests.run.test_lagrange import squeezed
 
 G = 9.81  # [m/s2]
 
@@ -112,17 +112,7 @@ def test_a_pendulum_follows_the_elliptic_functions() -> None:
 )
 @pytest.mark.few(2)
 def test_andrews_squeezer_converges_to_the_published_solution(method: str, tolerance: float, error: float) -> None:
-    run = kinfmu.simulate(
-        squeezer(),
-        drive="torque",
-        start=0.0,
-        stop=andrews.END,
-        step=andrews.END,
-        inputs={"crank_torque": TORQUE},
-        state={"crank_speed": 0.0},
-        tolerance=tolerance,
-        method=method,
-    )
+    run = squeezed(method, tolerance)
     for column, order in (("phi", 0), ("omega", 1)):
         exact = [sum(andrews.AT_END[name][order] for name in names) for names in andrews.BODIES.values()]
         found = [run[f"{body}.{column}"][-1] for body in andrews.BODIES]

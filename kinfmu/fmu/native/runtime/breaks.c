@@ -13,13 +13,6 @@
 #include <stddef.h>
 
 #if KF_LAWS
-#define WINDOW 1e-6   /* [rad, sizes] before a break, from which the short step starts */
-#define PAST 1e-12    /* [rad, sizes] beyond it, where that step ends */
-#define ROUNDED_G 1e-15 /* of g: it is known so well */
-#define LONGEST 1e-4  /* [rad, sizes] that a driver moves in the short step at most: g does not rest there */
-#define CUTS 12       /* times that a step is shortened, until it ends before a break */
-#define TRIALS 60
-#define HEAD 4        /* numbers of a law before its breaks: g, its turn (0: none), the unit of WINDOW, the period (0: none) */
 
 /* The first break in a step: where its law's numbers begin, the change of g to it, and that in the whole step. */
 typedef struct {
@@ -49,7 +42,7 @@ static bool first_crossing(const double *before, const double *after, crossing *
     for (law = 0; law < KF_LAWS; ++law) {
         const double moved = moved_by(before, after, place), unit = before[place + 2], period = before[place + 3];
         for (k = 0; k < kf_law_breaks[law] && moved != 0.0; ++k) {
-            double away = before[place + HEAD + k] - before[place], share;
+            double away = before[place + KF_TORQUE_HEAD + k] - before[place], share;
             if (period > 0.0) {
                 away -= period * (moved > 0.0 ? floor(away / period) : ceil(away / period));
             }
@@ -59,11 +52,11 @@ static bool first_crossing(const double *before, const double *after, crossing *
                 found->place = place;
                 found->away = away;
                 found->moved = moved;
-                found->window = WINDOW * unit;
-                found->past = PAST * unit + ROUNDED_G * fabs(before[place]);
+                found->window = KF_TORQUE_WINDOW * unit;
+                found->past = KF_TORQUE_PAST * unit + KF_TORQUE_ROUNDED_G * fabs(before[place]);
             }
         }
-        place += HEAD + kf_law_breaks[law];
+        place += KF_TORQUE_HEAD + kf_law_breaks[law];
     }
     return least < INFINITY;
 }
@@ -90,7 +83,7 @@ static bool landing(kf_course *course, const crossing *at, const kf_end *before,
     double low = before->t, high = after->t, of_low = -target, of_high = at->moved - target;
     double u[KF_DRIVERS], rates[KF_DRIVERS], error;
     int k, stayed = 0;
-    for (k = 0; k < TRIALS; ++k) {
+    for (k = 0; k < KF_TORQUE_TRIALS; ++k) {
         *t = high - of_high * (high - low) / (of_high - of_low);
         kf_within(before, after, *t, u, rates);
         if (!moved_to(course, before, at->place, u, &error)) {
@@ -135,9 +128,9 @@ static bool hop(kf_course *course, const crossing *at, const kf_end *from, doubl
     for (k = 0; k < KF_DRIVERS; ++k) {
         fastest = fmax(fastest, fabs(from->y[KF_DRIVERS + k]) / kf_unit(k));
     }
-    longest = fastest > 0.0 ? fmin(LONGEST / fastest, last - from->t) : 0.0;
+    longest = fastest > 0.0 ? fmin(KF_TORQUE_LONGEST / fastest, last - from->t) : 0.0;
     h = 0.1 * longest;
-    for (k = 0; k < TRIALS && h > 0.0 && h <= longest; ++k) {
+    for (k = 0; k < KF_TORQUE_TRIALS && h > 0.0 && h <= longest; ++k) {
         double y[KF_NUMBERS], moved, past;
         leap(from, h, y);
         if (!moved_to(course, from, at->place, y, &moved) || !(side * moved > 0.0)) {
@@ -169,7 +162,7 @@ kf_verdict kf_search_break(kf_course *course, const kf_end *before, kf_end *afte
             course->cuts = 0;
             return KF_HOPS;
         }
-    } else if (course->cuts < CUTS && landing(course, &at, before, after, &t)) {
+    } else if (course->cuts < KF_TORQUE_CUTS && landing(course, &at, before, after, &t)) {
         course->uncut = course->cuts++ ? course->uncut : after->t - before->t;
         course->size = t - before->t;
         kf_follow(course, before->y);

@@ -10,8 +10,6 @@
 #include <math.h>
 #include <string.h>
 
-#define UNSURE 2.0 /* factor by which the next term may change over the step */
-
 /* A rate beyond KF_LARGEST, from samples at almost the same time, is no estimate. */
 static double usable(double rate)
 {
@@ -78,8 +76,8 @@ static void errors_of_estimated_rates(const kf_sample *samples, int count, doubl
             const double e2 = h2 + ahead, e1 = h1 + ahead;
             of_ud[k] = fabs(leading[2]) * (e2 + ahead);
             if (known > 2) { /* derivatives of c (x - t) (x - t1) (x - t2) at x = t + ahead */
-                of_ud[k] = UNSURE * fabs(leading[3]) * (e2 * e1 + ahead * (e2 + e1));
-                of_udd[k] = 2.0 * UNSURE * fabs(leading[3]) * (e2 + e1 + ahead) + 4.0 * rounding / (h2 * h1);
+                of_ud[k] = KF_UNSURE * fabs(leading[3]) * (e2 * e1 + ahead * (e2 + e1));
+                of_udd[k] = 2.0 * KF_UNSURE * fabs(leading[3]) * (e2 + e1 + ahead) + 4.0 * rounding / (h2 * h1);
             }
             of_ud[k] += 2.0 * rounding / h2 * (1.0 + 2.0 * ahead / h1);
             of_ud[k] = of_ud[k] < INFINITY ? of_ud[k] : INFINITY; /* NaN counts as unknown */

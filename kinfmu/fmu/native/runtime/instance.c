@@ -5,8 +5,6 @@
 #include <math.h>
 #include <string.h>
 
-#define JUST_AFTER 4e-15 /* relative to the numbers from which a jump is computed */
-
 bool kf_token_fits(const char *token)
 {
     return token != NULL && strcmp(token, KF_TOKEN) == 0;
@@ -184,7 +182,7 @@ kf_answer kf_complete_integrator_step(kf_instance *instance, bool *wants_event)
 static double just_after(double jump, double period, double times)
 {
     const double at = jump + times * period;
-    return at + JUST_AFTER * (fabs(jump) + fabs(at) + period);
+    return at + KF_JUST_AFTER * (fabs(jump) + fabs(at) + period);
 }
 
 /* Return the next time at which a driver's value, speed or acceleration jumps. */

@@ -10,9 +10,6 @@
 #include "interface.h"
 #include "solver.h"
 
-#define KF_SAMPLES 4      /* committed ones: two for rates estimated with the current one, one more for their errors */
-#define KF_LARGEST 1e100  /* of what a host sets and of rates: the squares of larger numbers are infinite */
-#define KF_SAME_TIME 1e-9 /* of a step: hosts add up time with rounding errors, which move no pose */
 #define KF_INPUT_ORDERS 3 /* derivatives of an input that a step may follow */
 #define KF_NO_STATES "there are no continuous states and no event indicators"
 

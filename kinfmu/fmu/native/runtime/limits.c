@@ -10,20 +10,8 @@
 #include <math.h>
 #include <string.h>
 
-#define NEAR 0.5       /* determinant below which steps of several drivers are searched */
-#define DIPS 0.3       /* of the determinants at both ends of a step: a smaller one between may be a limit */
-#define SUSPECT 0.3    /* determinant at a turning point that may be a limit */
-#define REFINED 2      /* times that a suspect step is divided by SHARE, until its interpolation is good enough */
-#define SHARE 4.0
-#define PLACES 8       /* of a step at which the search begins */
-#define HALVINGS 60    /* of the time of a turning point: to its last digit */
-#define SECTIONS 40    /* golden ones, of the time of the smallest determinant */
-#define GOLDEN 0.6180339887498949
-#define TOUCHING 1e-3  /* determinant at the turning point that counts as a limit: about 1e-6 rad from it */
-#define ARRIVED 1e-4   /* determinant within about 1e-8 rad of a limit: nearer poses lose digits of the accelerations */
-#define ERRORS 10.0    /* tolerances by which the turning point may miss the limit */
 
-static const double beyond[4] = {1e-6, 1e-4, 1e-2, 0.3}; /* [rad, sizes] past a limit, where the solver states why it is one */
+static const double beyond[] = KF_TORQUE_BEYOND; /* [rad, sizes] past a limit, where the solver states why it is one */
 
 /* 1 rad, or the size of the mechanism. */
 double kf_unit(int driver)
@@ -93,7 +81,7 @@ static double critical_time(kf_course *course, const kf_end *before, const kf_en
     double low = before->t, high = after->t, u, rate;
     int k;
     (void)course, (void)low_enough;
-    for (k = 0; k < HALVINGS; ++k) {
+    for (k = 0; k < KF_TORQUE_HALVINGS; ++k) {
         const double middle = 0.5 * (low + high);
         kf_within(before, after, middle, &u, &rate);
         if (rate * before->y[1] > 0.0) {
@@ -117,34 +105,34 @@ static double margin_within(kf_course *course, const kf_end *before, const kf_en
 static double critical_time(kf_course *course, const kf_end *before, const kf_end *after, double low_enough)
 {
     const double length = after->t - before->t;
-    double margins[PLACES + 1], low, high, near, far, of_near, of_far;
+    double margins[KF_TORQUE_PLACES + 1], low, high, near, far, of_near, of_far;
     int k, place = 0, inner;
-    for (k = 0; k <= PLACES; ++k) {
-        margins[k] = margin_within(course, before, after, before->t + length * k / PLACES);
+    for (k = 0; k <= KF_TORQUE_PLACES; ++k) {
+        margins[k] = margin_within(course, before, after, before->t + length * k / KF_TORQUE_PLACES);
         place = margins[k] < margins[place] ? k : place;
     }
-    inner = place < 1 ? 1 : place < PLACES ? place : PLACES - 1;
+    inner = place < 1 ? 1 : place < KF_TORQUE_PLACES ? place : KF_TORQUE_PLACES - 1;
     if (2.0 * margins[inner] - fmax(margins[inner - 1], margins[inner + 1]) > low_enough) {
         return NAN;
     }
-    low = before->t + length * (place > 0 ? place - 1 : 0) / PLACES;
-    high = before->t + length * (place < PLACES ? place + 1 : PLACES) / PLACES;
-    near = high - GOLDEN * (high - low);
-    far = low + GOLDEN * (high - low);
+    low = before->t + length * (place > 0 ? place - 1 : 0) / KF_TORQUE_PLACES;
+    high = before->t + length * (place < KF_TORQUE_PLACES ? place + 1 : KF_TORQUE_PLACES) / KF_TORQUE_PLACES;
+    near = high - KF_TORQUE_GOLDEN * (high - low);
+    far = low + KF_TORQUE_GOLDEN * (high - low);
     of_near = margin_within(course, before, after, near);
     of_far = margin_within(course, before, after, far);
-    for (k = 0; k < SECTIONS; ++k) {
+    for (k = 0; k < KF_TORQUE_SECTIONS; ++k) {
         if (of_near < of_far) {
             high = far;
             far = near;
             of_far = of_near;
-            near = high - GOLDEN * (high - low);
+            near = high - KF_TORQUE_GOLDEN * (high - low);
             of_near = margin_within(course, before, after, near);
         } else {
             low = near;
             near = far;
             of_near = of_far;
-            far = low + GOLDEN * (high - low);
+            far = low + KF_TORQUE_GOLDEN * (high - low);
             of_far = margin_within(course, before, after, far);
         }
     }
@@ -169,16 +157,16 @@ kf_verdict kf_search_limit(kf_course *course, const kf_end *before, const kf_end
     if (course->refined && before->t >= course->suspect_until) { /* it had none */
         take_long_steps(course);
     }
-    if (after->margin < ARRIVED && !after->is_bridged) {
+    if (after->margin < KF_TORQUE_ARRIVED && !after->is_bridged) {
         return kf_ends_at(course, after->t + time_to_rest(after), after->y, ud) ? KF_ENDS : KF_GOES_ON;
     }
     for (k = 0; k < KF_DRIVERS; ++k) {
         turns = turns || (ud[k] != 0.0 && ud[k] * after->y[KF_DRIVERS + k] <= 0.0);
     }
-    if (!turns && (KF_DRIVERS == 1 || least >= NEAR)) {
+    if (!turns && (KF_DRIVERS == 1 || least >= KF_TORQUE_NEAR)) {
         return KF_GOES_ON;
     }
-    t = critical_time(course, before, after, DIPS * least);
+    t = critical_time(course, before, after, KF_TORQUE_DIPS * least);
     if (isnan(t)) {
         kf_follow(course, after->y);
         return KF_GOES_ON;
@@ -186,15 +174,16 @@ kf_verdict kf_search_limit(kf_course *course, const kf_end *before, const kf_end
     kf_within(before, after, t, u, rates);
     is_reached = kf_follow(course, u);
     margin = is_reached ? course->here->found.margin : 0.0;
-    is_suspect = !is_reached || !(course->here->status == KF_BRIDGED || margin > (KF_DRIVERS == 1 ? SUSPECT : DIPS * least));
-    if (is_suspect && course->refined < REFINED) {
+    is_suspect = !is_reached || !(course->here->status == KF_BRIDGED ||
+                                  margin > (KF_DRIVERS == 1 ? KF_TORQUE_SUSPECT : KF_TORQUE_DIPS * least));
+    if (is_suspect && course->refined < KF_TORQUE_REFINED) {
         ++course->refined;
         course->suspect_until = after->t;
-        course->longest = course->size = (after->t - before->t) / SHARE;
+        course->longest = course->size = (after->t - before->t) / KF_TORQUE_SHARE;
         kf_follow(course, before->y);
         return KF_REPEATS;
     }
-    if (is_suspect && margin <= sqrt(fmax(TOUCHING * TOUCHING, ERRORS * course->tolerance))) {
+    if (is_suspect && margin <= sqrt(fmax(KF_TORQUE_TOUCHING * KF_TORQUE_TOUCHING, KF_TORQUE_ERRORS * course->tolerance))) {
         return kf_ends_at(course, t, is_reached ? u : before->y, ud) ? KF_ENDS : KF_GOES_ON;
     }
     if (is_suspect) {

@@ -35,7 +35,7 @@ kf_answer kf_begin_motion(kf_instance *instance)
 void kf_set_tolerance(kf_instance *instance, double tolerance)
 {
     if (!instance->now.model_exchange && tolerance > 0.0) {
-        KF_REAL(&instance->now, KF_PART_TOLERANCE)[1] = fmin(fmax(tolerance, 1e-13), 1e-4);
+        KF_REAL(&instance->now, KF_PART_TOLERANCE)[1] = fmin(fmax(tolerance, KF_LEAST_TOLERANCE), KF_MOST_TOLERANCE);
     }
 }
 

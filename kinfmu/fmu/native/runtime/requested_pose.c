@@ -1,7 +1,6 @@
 /* Poses: the one that is requested, and the one that is committed, from which all others are followed. */
 #include "instance.h"
 
-#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -95,7 +94,7 @@ void kf_commit(kf_state *s, double t, double step)
 {
     kf_sample *sample;
     const double *const u = KF_POSE_U(&s->poses[s->asked]);
-    const double same = t - KF_SAME_TIME * step - 2.0 * DBL_EPSILON * fabs(t);
+    const double same = t - KF_SAME_TIME * step - KF_ROUNDING * fabs(t);
     while (s->samples && s->history[s->samples - 1].t >= same) { /* the host went back, or stayed */
         --s->samples;
     }

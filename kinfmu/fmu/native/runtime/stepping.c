@@ -1,16 +1,13 @@
 /* Steps of co-simulation: which are possible, and what becomes of those that fail. motion.h takes them. */
 #include "instance.h"
 
-#include <float.h>
 #include <math.h>
 #include <string.h>
-
-#define LATE 1e-3 /* of a step: a sum of a million steps may end this late */
 
 /* Answer a step past the stop time of the experiment by more than rounding. */
 bool kf_is_past_stop(const kf_state *s, double time, double step)
 {
-    return time + step - s->stop_time > LATE * step + 4.0 * DBL_EPSILON * fabs(s->stop_time);
+    return time + step - s->stop_time > KF_LATE * step + 2.0 * KF_ROUNDING * fabs(s->stop_time);
 }
 
 KF_RARE kf_answer kf_past_stop(const kf_instance *instance, const char *function, double time, double step)

@@ -9,21 +9,10 @@
 #include "dormand_prince.h"
 #include "internal.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-#define SAFETY 0.9       /* of the step size that the error estimate allows */
-#define SHRINKS 0.2      /* least size of a step, relative to the refused one */
-#define GROWS 10.0       /* largest size of a step, relative to the one before */
-#define ORDER 8.0
-#define STEEP 1.0        /* most that a driver moves in a step, in units of kf_reach, so that no limit is passed in it */
-#define FIRST 0.01       /* the same in the first step */
-#define DETERMINED 1e-12 /* of a span between jumps: laws are read so far inside it */
-#define ROUNDED 2e-14    /* of the times at its ends: rounding of the time of a jump */
-#define LEAST 10.0       /* shortest step, in roundings of the time */
-#define MOST 1000000     /* steps of the integrator in one step of the host */
 
 /* Follow the last good pose to u; if it is not reached, that one stays. */
 bool kf_follow(kf_course *course, const double *u)
@@ -153,12 +142,12 @@ static bool fail(kf_course *course, const kf_end *at)
 static bool advance(kf_course *course, kf_end *at, double last)
 {
     while (at->t < last) {
-        const double least = LEAST * DBL_EPSILON * fmax(fabs(at->t), fabs(last));
-        const double asked = fmin(fmin(course->size, course->longest), size_for(at, STEEP));
+        const double least = KF_TORQUE_LEAST * fmax(fabs(at->t), fabs(last));
+        const double asked = fmin(fmin(course->size, course->longest), size_for(at, KF_TORQUE_STEEP));
         double h = asked, error, grown;
         bool refused = false, is_last;
         kf_end to;
-        if (++course->steps > MOST) {
+        if (++course->steps > KF_TORQUE_MOST) {
             return fail(course, at);
         }
         for (;;) {
@@ -170,12 +159,12 @@ static bool advance(kf_course *course, kf_end *at, double last)
                 break;
             }
             refused = true;
-            h *= error < INFINITY ? fmax(SHRINKS, SAFETY * pow(error, -1.0 / ORDER)) : SHRINKS;
+            h *= error < INFINITY ? fmax(KF_TORQUE_SHRINKS, KF_TORQUE_SAFETY * pow(error, -1.0 / KF_TORQUE_ORDER)) : KF_TORQUE_SHRINKS;
             if (!(h > least)) {
                 return fail(course, at);
             }
         }
-        grown = h * (error > 0.0 ? fmin(GROWS, SAFETY * pow(error, -1.0 / ORDER)) : GROWS);
+        grown = h * (error > 0.0 ? fmin(KF_TORQUE_GROWS, KF_TORQUE_SAFETY * pow(error, -1.0 / KF_TORQUE_ORDER)) : KF_TORQUE_GROWS);
         course->size = refused ? fmin(h, grown) : is_last ? fmax(grown, course->size) : grown;
 #if KF_LAWS
         switch (kf_search_break(course, at, &to, last)) {
@@ -206,10 +195,10 @@ static bool advance(kf_course *course, kf_end *at, double last)
 static void explain(kf_state *s, const kf_course *course)
 {
     const char *const why = course->is_limit ? "the motion ends at a limit"
-                            : course->steps > MOST ? "the motion needs too many steps; take a larger integrator.tolerance"
+                            : course->steps > KF_TORQUE_MOST ? "the motion needs too many steps; take a larger integrator.tolerance"
                                                    : "the motion cannot be integrated";
     const char *const reason = course->is_limit ? s->solver.message : "the reduced inertia is singular, or a number is not finite";
-    if (course->steps > MOST) {
+    if (course->steps > KF_TORQUE_MOST) {
         snprintf(s->message, sizeof s->message, "%s", why);
     } else {
         snprintf(s->message, sizeof s->message, "%s: %.*s", why, (int)(sizeof s->message - 80), reason);
@@ -250,14 +239,14 @@ bool kf_integrate(kf_instance *instance, double end, double *reached)
         if (kf_next_event(instance, &jump)) {
             last = fmin(last, jump);
         }
-        inside = fmin(DETERMINED * (last - at.t) + ROUNDED * (fabs(at.t) + fabs(last)), 0.25 * (last - at.t));
+        inside = fmin(KF_TORQUE_DETERMINED * (last - at.t) + KF_TORQUE_ROUNDED * (fabs(at.t) + fabs(last)), 0.25 * (last - at.t));
         course.low = at.t + inside;
         course.high = last - inside;
         course.longest = course.span = last - at.t;
         course.refined = 0;
         done = complete(&course, &at);
         if (done) {
-            course.size = course.size > 0.0 ? course.size : size_for(&at, FIRST);
+            course.size = course.size > 0.0 ? course.size : size_for(&at, KF_TORQUE_FIRST);
             done = advance(&course, &at, last);
         } else {
             fail(&course, &at);

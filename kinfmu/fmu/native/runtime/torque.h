@@ -3,7 +3,7 @@
 #define KF_TORQUE_H
 
 #include "instance.h"
-#include "laws.h"
+#include "efforts.h"
 
 #define KF_NUMBERS (2 * KF_DRIVERS) /* values, then speeds */
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 WINDOW = 1e-6  # [rad, sizes] before a break, from which the short step starts
 PAST = 1e-12  # [rad, sizes] beyond it, where that step ends
-ROUNDED = 1e-15  # of g: it is known so well
+ROUNDED_G = 1e-15  # of g: it is known so well
 LONGEST = 1e-4  # [rad, sizes] that a driver moves in the short step at most: g does not rest there
 CUTS = 12  # times that a step is shortened, until it ends before a break
 _TRIALS = 60
@@ -69,7 +69,7 @@ def first_crossing(counts: Sequence[int], before: Sequence[float], after: Sequen
             share = away / moved
             if 0.0 < share <= 1.0 and share < least:
                 least = share
-                past = PAST * unit + ROUNDED * abs(before[place])
+                past = PAST * unit + ROUNDED_G * abs(before[place])
                 found = Crossing(place, away, moved, WINDOW * unit, past)
         place += _HEAD + count
     return found

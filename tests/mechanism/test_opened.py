@@ -14,9 +14,9 @@ import pytest
 import kinfmu
 from kinfmu import Mechanism, Parameter, Run, Status
 from kinfmu.mechanism.members import NumberPath
+from kinfmu.mechanism.opened import Opened, opened, place_text
 from kinfmu.page.describe import written_file
 from kinfmu.page.module import page_module
-from kinfmu.page.opened import Opened, opened, place_text
 from tests.page.engines import answers, driven_of, needs_node, rows_of, sweep_call, table
 
 CLOSE = 1e-12  # of the size, or of a radian

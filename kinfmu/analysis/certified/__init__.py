@@ -1,0 +1,1 @@
+"""Proofs over whole ranges of a driver, by interval arithmetic."""

@@ -1,0 +1,135 @@
+"""Certificates of random mechanisms against closed forms: `python -m tests.stress.certified`.
+
+Poses that a certificate encloses must be those of the branch, to a turn; the range that it states must be that of the
+branch; and no driver value beyond the range may be certified.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from kinfmu.analysis.certified.certificate import Certificate, certify
+from kinfmu.errors import KinfmuError
+from tests.stress.branch import INSIDE, OUTSIDE, TURN, Interval
+from tests.stress.comparisons import all_compared, command_line
+from tests.stress.jets import DIGITS
+from tests.stress.trial import trial
+
+FAMILIES = ("four-bars", "slider-cranks", "pins in slots", "watt six-bars", "stephenson six-bars", "geared five-bars")
+SAMPLES = 200  # of each mechanism
+ROUNDED = 1e-11  # of the size: lengths are given as doubles, which poses near singular ones amplify
+
+
+@dataclass
+class Certified:
+    """What one certificate showed."""
+
+    seed: int
+    family: str
+    share: float = 0.0
+    seconds: float = 0.0
+    checked: int = 0
+    refused: str = ""
+    gaps: list[str] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+
+
+def compared(task: tuple[int, str]) -> Certified:
+    """Compare the certificate of a mechanism with closed forms."""
+    seed, family = task
+    drawn_trial = trial(seed, family)
+    branch, drawn = drawn_trial.branch, drawn_trial.drawn
+    found = Certified(seed, family)
+    if not isinstance(branch, Interval):
+        found.refused = "several drivers"
+        return found
+    begun = time.perf_counter()
+    try:
+        certificate = certify(drawn.mechanism)
+    except KinfmuError as error:
+        found.refused = str(error)
+        return found
+    found.seconds, found.share = time.perf_counter() - begun, certificate.share
+    found.gaps = [gap.reason for gap in certificate.gaps]
+    _check_range(branch, certificate, found)
+    _check_poses(seed, branch, certificate, found)
+    return found
+
+
+def _check_range(branch: Interval, certificate: Certificate, found: Certified) -> None:
+    unit = 1.0 if branch.drawn.sketch.kinds == ("angle",) else float(branch.drawn.frame.scale)
+    for centre in certificate.dead_centres:
+        end, is_limit = (branch.high, branch.high_is_limit) if centre.is_high else (branch.low, branch.low_is_limit)
+        if not is_limit or not centre.low - 1e-9 * unit <= end <= centre.high + 1e-9 * unit:
+            found.faults.append(f"dead centre {centre}, not {end!r}")
+
+
+def _check_poses(seed: int, branch: Interval, certificate: Certificate, found: Certified) -> None:
+    generator = np.random.default_rng(seed)
+    cells = certificate.cover.cells
+    if not len(cells):
+        return
+    which = generator.integers(0, len(cells), SAMPLES)
+    u = cells.low[which] + generator.random(SAMPLES) * (cells.high - cells.low)[which]
+    expected = branch.expected(u[:, None], np.ones(SAMPLES, dtype=bool))
+    found.faults += [f"certified at {x!r}, where there is no pose" for x in u[expected.side == OUTSIDE]]
+    inside = expected.side == INSIDE
+    u, scale = u[inside], float(branch.drawn.frame.scale)
+    if not len(u):
+        return
+    zero = np.zeros((len(u), 1))
+    columns = branch.drawn.exactly(DIGITS, u[:, None], zero + 1.0, zero).columns
+    found.checked = len(u)
+    for name in certificate.prover.formulas.plan.outputs:
+        if name not in columns:
+            continue
+        for order, exact in enumerate((columns[name].d0, columns[name].d1)):
+            values = np.broadcast_to(np.asarray(exact, dtype=float), u.shape)
+            if order == 0 and name.endswith(".phi"):
+                values = values + TURN * np.rint((expected.angles[name][inside] - values) / TURN)
+            low, high = certificate.enclosed(name, u, order)
+            slack = (
+                ROUNDED
+                * np.maximum(1.0 if name.endswith(".phi") else scale, abs(values))
+                * (1.0 if order == 0 else 1e4)
+            )
+            wrong = np.flatnonzero((values < low - slack) | (values > high + slack))
+            found.faults += [
+                f"{name} order {order} at {u[k]!r}: {values[k]!r}, not {low[k]!r} to {high[k]!r}" for k in wrong[:1]
+            ]
+
+
+def main() -> int:
+    """Compare many mechanisms and print what is found; 1 if anything is wrong."""
+    parser = command_line("Certificates of random mechanisms against closed forms.", 600)
+    given = parser.parse_args()
+    tasks = [(seed, FAMILIES[seed % len(FAMILIES)]) for seed in range(given.seed, given.seed + given.count)]
+    found = all_compared(compared, tasks, given.jobs)
+    for family in FAMILIES:
+        of = [one for one in found if one.family == family]
+        done = [one for one in of if not one.refused]
+        shares = np.array([one.share for one in done] or [0.0])
+        poses, whole = sum(one.checked for one in of), sum(not one.gaps for one in done)
+        seconds = np.median([one.seconds for one in done] or [0.0])
+        print(
+            f"{family}: {len(done)} of {len(of)}, {poses} poses, certified {shares.mean():.5f} of the range, "
+            f"least {shares.min():.4f}, whole {whole}, median {seconds:.2f} s"
+        )
+        for reason in sorted({gap for one in done for gap in one.gaps}):
+            print(f"    {sum(reason in one.gaps for one in done)} with: {reason}")
+        for reason in sorted({one.refused.partition(":")[2][:60] for one in of if one.refused}):
+            print(f"    refused: {reason}")
+    for one in found:
+        for fault in one.faults[:2]:
+            print(f"seed {one.seed}, {one.family}: {fault}")
+    faulty = sum(bool(one.faults) for one in found)
+    print(f"{len(found)} mechanisms, {faulty} wrong")
+    return 1 if faulty else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
