@@ -185,7 +185,8 @@ def run_in_host(code: str) -> str:
 def _played(words: list[str]) -> str:
     """Start the server of a page, load the page, and end the server with Ctrl-C."""
     arguments = [sys.executable, "-m", "kinfmu", *words, "--no-browser"]
-    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as play:
+    states = {**os.environ, "KINFMU_STATES": str(Path("states").absolute())}  # of drawings
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True, env=states) as play:
         try:
             assert play.stdout is not None
             address = play.stdout.readline().strip()
