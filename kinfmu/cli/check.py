@@ -124,8 +124,9 @@ def _print_part(path: str, problem: MechanismError, *, as_json: bool) -> None:
         return
     reason = type(problem)(str(problem).removeprefix(f"{path}: "), **problem.data)
     lacks_driver = any(name.startswith("[drivers") for name in part.left_out)  # then none is missing in the file
-    advice = None if lacks_driver else report.advice
-    report = leaving_out(replace(report, notes=(), advice=advice), reason, part.left_out)
+    if lacks_driver:
+        report = replace(report, mismatch=None, advice=())
+    report = leaving_out(replace(report, notes=()), reason, part.left_out)
     click.echo(json.dumps(report.as_json(), indent=2) if as_json else _text(report))
 
 
