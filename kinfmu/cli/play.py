@@ -22,8 +22,8 @@ def play(mechanism: str | None, new: Path | None, port: int, no_browser: bool) -
     The page follows the file while you edit it; errors in the file are shown in the page. The page saves FMUs, tables,
     drawings and mechanism files with the lengths as set. Only this machine can open the address. Ctrl-C ends it.
 
-    Edit in the page of a file draws it further: bars, joints, motors, cylinders, gears, cams, loads. Every step can be
-    undone, also after the program has ended; the file is written when you save it.
+    The button Draw in the page of a file draws it further: bars, joints, motors, cylinders, gears, cams, loads. Every
+    step can be undone, also after the program has ended; the file is written when you save it.
     """
     import webbrowser
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from kinfmu.analysis import check
 from kinfmu.draw.scene.instant import Instant
@@ -118,9 +119,9 @@ def _unpinned(drawing: Drawing) -> list[dict[str, Any]]:
     held = {frozenset(map(body_of, joint.between)) for joint in drawing.mechanism.joints if hasattr(joint, "between")}
     points = [*drawing.mechanism.body_points]
     places = np.array([drawing.at(point) for point in points]).reshape(-1, 2)
-    near = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1)) <= AS_DRAWN * drawing.size
+    near = cKDTree(places).query_pairs(AS_DRAWN * drawing.size) if points else ()
     found = []
-    for k, j in np.argwhere(np.triu(near, 1)).tolist():
+    for k, j in sorted(near):
         a, b = points[k], points[j]
         if body_of(a) != body_of(b) and b not in drawing.pins[a] and frozenset((body_of(a), body_of(b))) not in held:
             pin = {"text": f"pin {a} and {b}", "operations": [{"do": "pin", "points": [a, b]}]}

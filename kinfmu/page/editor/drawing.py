@@ -25,7 +25,7 @@ from kinfmu.mechanism.toml_file import mechanism_of
 from kinfmu.mechanism.valid import quoted
 from kinfmu.page.editor.text_edits import edited_text
 from kinfmu.plan import localized
-from kinfmu.plan.equations.assembly import closed_start
+from kinfmu.plan.equations.assembly import MOST_DENSE, closed_start
 from kinfmu.plan.equations.closing import CLOSED, close, followed
 from kinfmu.plan.equations.part import Part
 from kinfmu.plan.equations.redundancy import Redundancy, find_redundancy
@@ -143,9 +143,12 @@ class Drawing:
     @cached_property
     def redundancy(self) -> Redundancy | KinfmuError:
         """The mobility, of the start pose if it is closed, else assembled; or why it is not known."""
-        if self._start is None:
+        if self._start is None or len(self._start) > MOST_DENSE:
             return self.assembled
-        return find_redundancy(self.system, closed_start(self.system, self._start, law_targets(self.system)))
+        try:
+            return find_redundancy(self.system, closed_start(self.system, self._start, law_targets(self.system)))
+        except KinfmuError as problem:
+            return problem
 
     @cached_property
     def assembled(self) -> Redundancy | KinfmuError:
@@ -210,7 +213,7 @@ class Drawing:
                 groups |= dict.fromkeys(whole, whole)
         return groups
 
-    @property
+    @cached_property
     def size(self) -> float:
         """The extent of all points as drawn, at least that of a system without any [length]."""
         places = np.array([self.at(point) for point in self.mechanism.body_points]).reshape(-1, 2)

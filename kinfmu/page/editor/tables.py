@@ -12,13 +12,13 @@ from kinfmu.mechanism.checks import coordinate_orders
 from kinfmu.mechanism.declared import keys_of
 from kinfmu.mechanism.edits import Place, Remove, edited
 from kinfmu.mechanism.members import NumberPath
+from kinfmu.mechanism.opened import place_text
 from kinfmu.mechanism.quantities import PoseQuantity
 from kinfmu.mechanism.toml_document import document_of
 from kinfmu.mechanism.valid import LARGEST_NUMBER, check_name, quoted
 from kinfmu.page.editor.drawing import Drawing
 from kinfmu.page.editor.pen import TABLES, Arguments, Pen
 from kinfmu.page.editor.text_edits import edited_text, renamed_text
-from kinfmu.mechanism.opened import place_text
 from kinfmu.units import Quantity
 
 _DEEPEST = 8  # levels of a value

@@ -13,6 +13,7 @@ from kinfmu.analysis import check
 from kinfmu.errors import KinfmuError, MechanismError
 from kinfmu.mechanism import gallery
 from kinfmu.mechanism.gallery.load import folder
+from kinfmu.mechanism.toml_text import text
 from kinfmu.page.editor import Drawing, answer, changed
 from kinfmu.page.editor.tables import references
 from tests.page.editor.drawn import FOURBAR, Operation, bar, drawn, empty, ground, interest, put
@@ -131,6 +132,13 @@ def test_a_cam_as_it_is_drawn_can_be_made(kind: str, follower: str) -> None:
     )
     assert check(drawing.mechanism).problem is None
     assert "cam" in {shape["kind"] for shape in answer(drawing)["sketch"]["shapes"]}
+
+
+def test_a_large_mechanism_is_answered_too() -> None:
+    large = Drawing.of(text(gallery.load("fourbar_chain:150"), as_written=True), Path())
+    assert answer(large)["badge"]["isComplete"]
+    badge = answer(changed(large, [bar((1, 2), (3, 4))]))["badge"]
+    assert (badge["text"], badge["isComplete"]) == ("cannot be solved", False)
 
 
 @pytest.mark.parametrize("name", gallery.names())
