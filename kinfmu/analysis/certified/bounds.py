@@ -1,4 +1,4 @@
-"""Bounds of quantities of the pose over proved cells."""
+"""ExtremeBounds of quantities of the pose over proved cells."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kinfmu.analysis.certified.cells import Cells, Prover, Tubes
-from kinfmu.analysis.certified.intervals import Interval, enclosed
+from kinfmu.analysis.certified.intervals import Intervals, enclosed
 from kinfmu.plan.equations.graph import Node
 
 _CLOSE = 1e-5  # of the largest value; a bound is not sought closer
@@ -15,7 +15,7 @@ _MOST_PARTS = 5000  # of cells that may contain an extreme
 _NARROWEST = 1e-9  # of the driver
 
 
-class Bounds(NamedTuple):
+class ExtremeBounds(NamedTuple):
     """What a quantity is at least and at most; each as an interval that contains the exact extreme.
 
     Attributes:
@@ -28,7 +28,7 @@ class Bounds(NamedTuple):
     most: tuple[float, float]
 
 
-def bounds(prover: Prover, cells: Cells, tubes: Tubes, node: Node, order: int) -> Bounds:
+def bounds(prover: Prover, cells: Cells, tubes: Tubes, node: Node, order: int) -> ExtremeBounds:
     """Return the bounds of a quantity (order 0), of its rate (1) or acceleration (2) over cells.
 
     Cells that may contain an extreme are halved and proved again, until its bounds are close.
@@ -41,17 +41,17 @@ def bounds(prover: Prover, cells: Cells, tubes: Tubes, node: Node, order: int) -
         order: Of the derivative with respect to the driver, or to time.
 
     """
-    quantity = Quantity(prover, node, order)
+    quantity = EnclosedQuantity(prover, node, order)
     most = _most(quantity, cells, tubes, 1.0)
     least = _most(quantity, cells, tubes, -1.0)
-    return Bounds((-least[1], -least[0]), most)
+    return ExtremeBounds((-least[1], -least[0]), most)
 
 
-def _most(quantity: Quantity, cells: Cells, tubes: Tubes, sign: float) -> tuple[float, float]:
+def _most(quantity: EnclosedQuantity, cells: Cells, tubes: Tubes, sign: float) -> tuple[float, float]:
     """Return an interval that contains the largest value of a quantity times a sign."""
     best = sure = -np.inf  # a known lower bound of the maximum, and an upper one of it over the cells given up
     while True:
-        places = [quantity.at(cells, tubes, Interval(at)) * sign for at in (cells.s.low, 0.0 * cells.u, cells.s.high)]
+        places = [quantity.at(cells, tubes, Intervals(at)) * sign for at in (cells.s.low, 0.0 * cells.u, cells.s.high)]
         best = max(best, *(float(place.low.max()) for place in places))
         high = (quantity.at(cells, tubes, cells.s) * sign).high
         rest = float(high.max())
@@ -76,10 +76,10 @@ def _halved(prover: Prover, cells: Cells, tubes: Tubes) -> tuple[Cells, Tubes, A
     failed = cells.high - cells.low <= _NARROWEST * (1.0 + abs(cells.u))
     for low, high in ends:
         middle = 0.5 * (low + high)
-        part, converged = prover.cells(low, high, cells.at(Interval(middle) - cells.u).middle)
+        part, converged = prover.cells(low, high, cells.at(Intervals(middle) - cells.u).middle)
         tube = prover.prove(part)
-        pose = part.at(Interval(np.zeros_like(part.u))) + tube.narrow
-        inside = (pose - cells.at(Interval(part.u) - cells.u)).is_inside(tubes.wide)
+        pose = part.at(Intervals(np.zeros_like(part.u))) + tube.narrow
+        inside = (pose - cells.at(Intervals(part.u) - cells.u)).is_inside(tubes.wide)
         failed = failed | ~(converged & tube.is_proved & inside.all(axis=0))
         halves.append((part, tube))
     return (
@@ -89,7 +89,7 @@ def _halved(prover: Prover, cells: Cells, tubes: Tubes) -> tuple[Cells, Tubes, A
     )
 
 
-class Quantity:
+class EnclosedQuantity:
     """A quantity or its derivative, evaluated by its series in each cell with what the tube adds."""
 
     def __init__(self, prover: Prover, node: Node, order: int) -> None:
@@ -100,11 +100,11 @@ class Quantity:
         self.slopes = [formulas.gradient([self.series[0]], name)[0] for name in formulas.unknowns]
         self.first = [formulas.gradient([node], name)[0] for name in formulas.unknowns]
 
-    def at(self, cells: Cells, tubes: Tubes, s: Interval) -> Interval:
+    def at(self, cells: Cells, tubes: Tubes, s: Intervals) -> Intervals:
         """Return the quantity at driver values s from the centres, an interval for each cell."""
         shape = (len(cells),)
         thin, _, _ = self.prover.enclosures(cells)
-        broad = self.prover.over(cells, s.hull(Interval(np.zeros_like(s.low))))  # from the centre to s
+        broad = self.prover.over(cells, s.hull(Intervals(np.zeros_like(s.low))))  # from the centre to s
         if self.order:
             tubes = self.prover.closer(cells, tubes, s)
         moving = self.prover.deviated(self.prover.over(cells, s), tubes)

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from kinfmu.analysis.certified.formulas import BlockFormulas, Formulas
-from kinfmu.analysis.certified.intervals import Interval, approximate, around, enclosed, interval, joined_intervals
+from kinfmu.analysis.certified.intervals import Intervals, approximate, around, enclosed, interval, joined_intervals
 from kinfmu.arrays import FloatArray
 from kinfmu.plan.equations.graph import Node
 
@@ -65,15 +65,15 @@ class Cells:
         return cls(*(np.concatenate([getattr(part, field.name) for part in parts], -1) for field in fields(cls)))
 
     @property
-    def s(self) -> Interval:
+    def s(self) -> Intervals:
         """The driver from the centre."""
-        return Interval((Interval(self.low) - self.u).low, (Interval(self.high) - self.u).high)
+        return Intervals((Intervals(self.low) - self.u).low, (Intervals(self.high) - self.u).high)
 
-    def at(self, s: Any) -> Interval:
+    def at(self, s: Any) -> Intervals:
         """Return the predicted unknowns at driver values from the centre, (n, cells)."""
         s = interval(s)
         z, rate, acceleration = self.path
-        found: Interval = Interval(z) + Interval(rate) * s + Interval(0.5 * acceleration) * s.square()
+        found: Intervals = Intervals(z) + Intervals(rate) * s + Intervals(0.5 * acceleration) * s.square()
         return found
 
 
@@ -93,10 +93,10 @@ class Tubes:
     """
 
     is_proved: Any
-    wide: Interval
-    narrow: Interval
-    rates: Interval
-    accelerations: Interval
+    wide: Intervals
+    narrow: Intervals
+    rates: Intervals
+    accelerations: Intervals
     contraction: FloatArray
     sign: FloatArray
 
@@ -108,7 +108,7 @@ class Tubes:
         """Return the tubes of several parts."""
         columns: list[Any] = [[getattr(part, field.name) for part in parts] for field in fields(cls)]
         found: list[Any] = [
-            joined_intervals(c) if isinstance(c[0], Interval) else np.concatenate(c, -1) for c in columns
+            joined_intervals(c) if isinstance(c[0], Intervals) else np.concatenate(c, -1) for c in columns
         ]
         return cls(*found)
 
@@ -122,7 +122,7 @@ class Prover:
 
     """
 
-    def __init__(self, formulas: Formulas, box: Mapping[str, Interval] | None = None) -> None:
+    def __init__(self, formulas: Formulas, box: Mapping[str, Intervals] | None = None) -> None:
         self.formulas = formulas
         self.box = {name: interval(value) for name, value in formulas.constants.items()} | dict(box or {})
         self.middle = {name: float(value.middle) for name, value in self.box.items()}
@@ -173,7 +173,7 @@ class Prover:
     def prove(self, cells: Cells) -> Tubes:
         """Return the tubes of cells, block after block."""
         n, count = len(self.formulas.unknowns), len(cells)
-        wide, narrow, rates, accelerations = (Interval(np.zeros((n, count)), np.zeros((n, count))) for _ in range(4))
+        wide, narrow, rates, accelerations = (Intervals(np.zeros((n, count)), np.zeros((n, count))) for _ in range(4))
         motion = (narrow, rates, accelerations)
         proved = np.ones(count, dtype=bool)
         contractions, signs = [], []
@@ -198,12 +198,12 @@ class Prover:
             proved, wide, narrow, rates, accelerations, np.reshape(contractions, shape), np.reshape(signs, shape)
         )
 
-    def closer(self, cells: Cells, tubes: Tubes, s: Interval) -> Tubes:
+    def closer(self, cells: Cells, tubes: Tubes, s: Intervals) -> Tubes:
         """Return the tubes with closer enclosures of rates and accelerations at driver values s from the centres."""
         count, n = len(cells), len(self.formulas.unknowns)
         plain = self.enclosures(cells)[2]
         symbols = self.over(cells, s)
-        motion = [tubes.narrow, *(Interval(np.zeros((n, count)), np.zeros((n, count))) for _ in range(2))]
+        motion = [tubes.narrow, *(Intervals(np.zeros((n, count)), np.zeros((n, count))) for _ in range(2))]
         for number, block in enumerate(self.formulas.blocks):
             own = slice(block.place, block.place + block.size)
             y = _inverse(np.array(approximate(block.jacobian, plain, (count,))), block.size)
@@ -216,8 +216,8 @@ class Prover:
         return replace(tubes, rates=motion[1], accelerations=motion[2])
 
     def _moving_at(
-        self, symbols: Mapping[str, Interval], motion: Sequence[Interval], block: BlockFormulas, order: int
-    ) -> dict[str, Interval]:
+        self, symbols: Mapping[str, Intervals], motion: Sequence[Intervals], block: BlockFormulas, order: int
+    ) -> dict[str, Intervals]:
         """Return the symbols of a block's rows of an order, its own derivative of this order as predicted."""
         until = block.place + block.size
         narrow, rates, accelerations = motion
@@ -234,11 +234,11 @@ class Prover:
         self,
         cells: Cells,
         block: BlockFormulas,
-        thin: Mapping[str, Interval],
-        broad: Mapping[str, Interval],
-        motion: Sequence[Interval],
+        thin: Mapping[str, Intervals],
+        broad: Mapping[str, Intervals],
+        motion: Sequence[Intervals],
         order: int,
-    ) -> list[Interval]:
+    ) -> list[Intervals]:
         """Return what the rates (order 1) or accelerations (2) of the predicted path leave of the rows' derivatives.
 
         The derivative of order n of r(z(x)) is 0, and linear in that of z: J w_n = -rest, w_n its deviation.
@@ -252,7 +252,7 @@ class Prover:
         last = enclosed([*block.rows[2], *block.rows[3]], broad, shape)
         half = s.square() * 0.5
         rest = [(flat[i] + last[i] * s).intersection(flat[i] + flat[k + i] * s + last[k + i] * half) for i in range(k)]
-        slopes: list[tuple[Mapping[Any, tuple[Node, ...]], Interval]] = [(block.earlier, rates), (block.rates, narrow)]
+        slopes: list[tuple[Mapping[Any, tuple[Node, ...]], Intervals]] = [(block.earlier, rates), (block.rates, narrow)]
         for gradients, deviations in slopes:
             for place, nodes in gradients.items():
                 off = deviations[place] if isinstance(place, int) else broad[place] - self.middle[place]
@@ -261,27 +261,27 @@ class Prover:
                         rest[i] = rest[i] + slope * off
         return rest
 
-    def enclosures(self, cells: Cells) -> tuple[dict[str, Interval], dict[str, Interval], dict[str, FloatArray]]:
+    def enclosures(self, cells: Cells) -> tuple[dict[str, Intervals], dict[str, Intervals], dict[str, FloatArray]]:
         """Return the symbols on the predicted path: at the centres, over the cells, and at the centres as numbers."""
         plain = self._values(cells.u, *cells.path)
-        return {name: Interval(value) for name, value in plain.items()}, self.over(cells, cells.s), plain
+        return {name: Intervals(value) for name, value in plain.items()}, self.over(cells, cells.s), plain
 
-    def over(self, cells: Cells, s: Interval) -> dict[str, Interval]:
+    def over(self, cells: Cells, s: Intervals) -> dict[str, Intervals]:
         """Return the symbols on the predicted path at driver values s from the centres, and the box of constants."""
-        symbols = {self.formulas.x: Interval(cells.u) + s}
+        symbols = {self.formulas.x: Intervals(cells.u) + s}
         predicted = cells.at(s)
         for k, name in enumerate(self.formulas.unknowns):
             rate, acceleration = cells.path[1:, k]
             symbols[name] = predicted[k]
             names = self.formulas.names[name]
-            symbols[names[0]] = Interval(rate) + Interval(acceleration) * s
-            symbols[names[1]] = Interval(acceleration)
+            symbols[names[0]] = Intervals(rate) + Intervals(acceleration) * s
+            symbols[names[1]] = Intervals(acceleration)
         count = len(cells)
         return symbols | {
-            name: Interval(np.full(count, value.low), np.full(count, value.high)) for name, value in self.box.items()
+            name: Intervals(np.full(count, value.low), np.full(count, value.high)) for name, value in self.box.items()
         }
 
-    def deviated(self, symbols: Mapping[str, Interval], tubes: Tubes) -> dict[str, Interval]:
+    def deviated(self, symbols: Mapping[str, Intervals], tubes: Tubes) -> dict[str, Intervals]:
         """Return symbols on the predicted path moved by all deviations: those of the poses."""
         found = dict(symbols)
         for k, name in enumerate(self.formulas.unknowns):
@@ -295,10 +295,10 @@ class Prover:
         self,
         cells: Cells,
         block: BlockFormulas,
-        thin: Mapping[str, Interval],
-        broad: Mapping[str, Interval],
-        narrow: Interval,
-    ) -> list[Interval]:
+        thin: Mapping[str, Intervals],
+        broad: Mapping[str, Intervals],
+        narrow: Intervals,
+    ) -> list[Intervals]:
         """Return the residuals of a block along the predicted path, with what earlier blocks and parameters may add."""
         shape, s = (len(cells),), cells.s
         squared = s.square() * 0.5
@@ -324,7 +324,7 @@ class Prover:
                     rest[i] = rest[i] + slope * off
         return rest
 
-    def _tubes_at(self, broad: Mapping[str, Interval], deviations: Interval, until: int) -> dict[str, Interval]:
+    def _tubes_at(self, broad: Mapping[str, Intervals], deviations: Intervals, until: int) -> dict[str, Intervals]:
         """Return the symbols over cells with deviations of the unknowns before a place."""
         names = self.formulas.unknowns[:until]
         return {**broad, **{name: broad[name] + deviations[k] for k, name in enumerate(names)}}
@@ -333,11 +333,11 @@ class Prover:
         self,
         cells: Cells,
         block: BlockFormulas,
-        broad: Mapping[str, Interval],
-        narrow: Interval,
+        broad: Mapping[str, Intervals],
+        narrow: Intervals,
         y: FloatArray,
-        moved: list[Interval],
-    ) -> tuple[Any, Interval, Interval, FloatArray]:
+        moved: list[Intervals],
+    ) -> tuple[Any, Intervals, Intervals, FloatArray]:
         """Return where a block is proved, its wide and narrow tubes, and its contraction."""
         count = len(cells)
         unit = self.unit[block.place : block.place + block.size, None]
@@ -345,7 +345,7 @@ class Prover:
         radius = np.where(np.isfinite(needed), np.maximum(WIDEST_TUBE, 1.5 * needed), WIDEST_TUBE)
         proved = np.zeros(count, dtype=bool)
         shape = (block.size, count)
-        wide, narrow_own = Interval(np.zeros(shape), np.zeros(shape)), Interval(np.zeros(shape), np.zeros(shape))
+        wide, narrow_own = Intervals(np.zeros(shape), np.zeros(shape)), Intervals(np.zeros(shape), np.zeros(shape))
         contraction = np.full(count, np.inf)
         todo = np.flatnonzero(np.isfinite(needed) & np.isfinite(y).all(axis=(1, 2)))
         for _ in range(_TRIES):
@@ -361,7 +361,9 @@ class Prover:
             short = around(np.zeros_like(least.low), 2.0 * np.array([part.magnitude[done] for part in moved]) + 1e-300)
             again, _ = self._image(block, broad, narrow, y, moved, short, done)
             holds = again.is_inside(short).all(axis=0)  # the only pose lies in it, too
-            least = _with_zero(Interval(np.where(holds, again.low, least.low), np.where(holds, again.high, least.high)))
+            least = _with_zero(
+                Intervals(np.where(holds, again.low, least.low), np.where(holds, again.high, least.high))
+            )
             for _ in range(_CONTRACTIONS):
                 again, contraction[done] = self._image(block, broad, narrow, y, moved, least, done)
                 least = _with_zero(least.intersection(again))
@@ -375,13 +377,13 @@ class Prover:
     def _image(
         self,
         block: BlockFormulas,
-        broad: Mapping[str, Interval],
-        narrow: Interval,
+        broad: Mapping[str, Intervals],
+        narrow: Intervals,
         y: FloatArray,
-        moved: list[Interval],
-        w: Interval,
+        moved: list[Intervals],
+        w: Intervals,
         which: Any,
-    ) -> tuple[Interval, FloatArray]:
+    ) -> tuple[Intervals, FloatArray]:
         """Return K(W) for some cells, and the largest row sum of |1 - Y J|, lengths in sizes."""
         values = {name: value[which] for name, value in self._tubes_at(broad, narrow, block.place).items()}
         for k, name in enumerate(block.names):
@@ -396,12 +398,12 @@ class Prover:
             for j in range(block.size):
                 product = interval(1.0 if i == j else 0.0)
                 for k in range(block.size):
-                    product = product - Interval(y[which, i, k]) * entries[k * block.size + j]
+                    product = product - Intervals(y[which, i, k]) * entries[k * block.size + j]
                 row = row + product * w[j]
                 total = total + product.magnitude * (unit[j] / unit[i])
             off = np.maximum(off, total)
             rows.append(row)
-        return Interval(np.array([row.low for row in rows]), np.array([row.high for row in rows])), off
+        return Intervals(np.array([row.low for row in rows]), np.array([row.high for row in rows])), off
 
 
 def _inverse(entries: FloatArray, size: int) -> FloatArray:
@@ -414,28 +416,28 @@ def _inverse(entries: FloatArray, size: int) -> FloatArray:
         return np.asarray(np.linalg.pinv(np.nan_to_num(safe)))
 
 
-def _with_zero(w: Interval) -> Interval:
+def _with_zero(w: Intervals) -> Intervals:
     """Return deviations with 0 among them: slopes between the predicted path and a pose are those of all between."""
-    return Interval(np.minimum(w.low, 0.0), np.maximum(w.high, 0.0))
+    return Intervals(np.minimum(w.low, 0.0), np.maximum(w.high, 0.0))
 
 
-def _within(image: list[Interval], contraction: FloatArray, unit: FloatArray) -> Interval:
+def _within(image: list[Intervals], contraction: FloatArray, unit: FloatArray) -> Intervals:
     """Return the solutions w of (Y J) w = -image, if |1 - Y J| <= contraction < 1 in units of the unknowns."""
     largest = np.max([part.magnitude / of for part, of in zip(image, unit, strict=True)], axis=0)
     contracts = contraction < _LARGEST_CONTRACTION
     largest, contraction = np.where(contracts, largest, np.inf), np.where(contracts, contraction, 0.5)
-    solution = Interval(largest) / (interval(1.0) - Interval(contraction))
-    spread = (solution * Interval(contraction)).magnitude * _SLACK * unit
+    solution = Intervals(largest) / (interval(1.0) - Intervals(contraction))
+    spread = (solution * Intervals(contraction)).magnitude * _SLACK * unit
     within = [-part + around(np.zeros_like(of), of) for part, of in zip(image, spread, strict=True)]
-    return Interval(np.array([part.low for part in within]), np.array([part.high for part in within]))
+    return Intervals(np.array([part.low for part in within]), np.array([part.high for part in within]))
 
 
-def _times(y: FloatArray, rows: list[Interval]) -> list[Interval]:
+def _times(y: FloatArray, rows: list[Intervals]) -> list[Intervals]:
     """Return Y times a column of intervals."""
     found = []
     for i in range(y.shape[1]):
         total = interval(0.0)
         for j, row in enumerate(rows):
-            total = total + Interval(y[:, i, j]) * row
+            total = total + Intervals(y[:, i, j]) * row
         found.append(total)
     return found

@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kinfmu.analysis.certified.bounds import Bounds, Quantity, bounds
+from kinfmu.analysis.certified.bounds import EnclosedQuantity, ExtremeBounds, bounds
 from kinfmu.analysis.certified.cells import Prover
 from kinfmu.analysis.certified.cover import Cover, Guess, cover
 from kinfmu.analysis.certified.formulas import Formulas
-from kinfmu.analysis.certified.intervals import Interval, around
+from kinfmu.analysis.certified.intervals import Intervals, around
 from kinfmu.analysis.driver_path import DriverPath, follow, place_text
 from kinfmu.arrays import FloatArray
 from kinfmu.codegen.python import load_model
@@ -143,10 +143,14 @@ class Certificate:
             "not_proved": [gap._asdict() for gap in self.gaps],
         }
 
-    def bounds(self, output: str, order: int = 0) -> Bounds:
+    def bounds(self, output: str, order: int = 0) -> ExtremeBounds:
         """Return the bounds of an output (order 0), its rate (1) or acceleration (2) over all that is proved.
 
         Rates are per unit of the driver, over a run per second.
+
+        Args:
+            output: The output.
+            order: Of the derivative.
 
         Raises:
             RequestError: There is no such output.
@@ -173,7 +177,9 @@ class Certificate:
         k = np.clip(np.searchsorted(cells.low, x, "right") - 1, 0, max(len(cells) - 1, 0))
         known = np.flatnonzero((cells.low[k] <= x) & (x <= cells.high[k])) if len(cells) else np.array([], dtype=int)
         k, low, high = k[known], np.full_like(x, np.nan), np.full_like(x, np.nan)
-        value = Quantity(self.prover, node, order).at(cells[k], self.cover.tubes[k], Interval(x[known]) - cells.u[k])
+        value = EnclosedQuantity(self.prover, node, order).at(
+            cells[k], self.cover.tubes[k], Intervals(x[known]) - cells.u[k]
+        )
         low[known], high[known] = value.low, value.high
         return low, high
 
@@ -213,7 +219,7 @@ def certify(
     mechanism = replace(mechanism, coordinates="all")
     made, varied = (mechanism, {}) if tolerances is None else _varied(mechanism, tolerances)
     plan = compile_plan(made)
-    box: dict[str, Interval] = {
+    box: dict[str, Intervals] = {
         parameter_symbol(one.name): around(np.array(one.value), np.array(varied[one.name]))
         for one in plan.parameters
         if one.name in varied
@@ -244,7 +250,7 @@ def _varied(mechanism: Mechanism, tolerances: float | Mapping[str, float]) -> tu
     return made.mechanism, {name: abs(tolerances * float(one.value)) for name, one in lengths.items()}
 
 
-def _over_range(path: DriverPath, width: float, box: Mapping[str, Interval]) -> Certificate:
+def _over_range(path: DriverPath, width: float, box: Mapping[str, Intervals]) -> Certificate:
     plan = path.plan
     prover = Prover(_formulas(plan, varied=box), box)
     unit = 1.0 if path.kind == "angle" else plan.size
@@ -269,7 +275,7 @@ def _over_range(path: DriverPath, width: float, box: Mapping[str, Interval]) -> 
     return Certificate(plan.mechanism, path.name, low, high, turns, found, tuple(centres), tuple(gaps), prover)
 
 
-def _over_run(plan: SolvePlan, box: Mapping[str, Interval]) -> Certificate:
+def _over_run(plan: SolvePlan, box: Mapping[str, Intervals]) -> Certificate:
     run = plan.mechanism.run
     prover = Prover(_formulas(plan, over_time=True, varied=box), box)
     solver = Solver(load_model(plan))
@@ -342,9 +348,9 @@ def _guess(solver: Solver, poses: Mapping[float, Pose], values: Any) -> Guess:
 def _closes(found: Cover, turns: int) -> bool:
     """Return whether the pose at the end of whole turns is the one at their begin, angles moved by whole turns."""
     first, last = found.cells[:1], found.cells[-1:]
-    begin, end = first.at(Interval(first.low) - first.u), last.at(Interval(last.high) - last.u)
+    begin, end = first.at(Intervals(first.low) - first.u), last.at(Intervals(last.high) - last.u)
     whole = np.rint((end - begin).middle / math.tau) * math.tau
-    inside = end + found.tubes[-1:].narrow - Interval(whole, np.nextafter(whole, np.inf)) - begin
+    inside = end + found.tubes[-1:].narrow - Intervals(whole, np.nextafter(whole, np.inf)) - begin
     return turns > 0 and bool(inside.is_inside(found.tubes[:1].wide).all())
 
 
@@ -444,30 +450,30 @@ def _dead_centre(prover: Prover, found: Cover, limit: Limit, within: float, *, i
     window = cover(turned, edges, guess, 0.01 * small)
     if window.pieces != [(0, len(window.cells) - 1)] or window.cells.low[0] != 0.0:
         return "a dead centre: the path through it is not proved"
-    bend = (Interval(window.cells.path[2, 0]) + window.tubes.accelerations[0]) * -toward
+    bend = (Intervals(window.cells.path[2, 0]) + window.tubes.accelerations[0]) * -toward
     begins = turned_rate(window, window.cells.low) * toward
     ends = turned_rate(window, window.cells.high) * toward
     inner = int(np.searchsorted(window.cells.low, top, "right")) - 1
     if not ((bend.low > 0.0).all() and begins.low[inner] > 0.0 and ends.high[inner] < 0.0):
         return "a dead centre: its curvature is not proved"
-    pose = window.cells.at(Interval(window.cells.low) - window.cells.u) + window.tubes.narrow
+    pose = window.cells.at(Intervals(window.cells.low) - window.cells.u) + window.tubes.narrow
     if not _lies_in(pose[:, :1], found, k, places):
         return "a dead centre: the path to it is not joined to the cells"
     value = window.cells.at(window.cells.s) + window.tubes.narrow
     return DeadCentre(float(value.low[0, inner]), float(value.high[0, inner]), is_high)
 
 
-def turned_rate(window: Cover, x: FloatArray) -> Interval:
+def turned_rate(window: Cover, x: FloatArray) -> Intervals:
     """Return the driver's rate along the way, at one place of each cell."""
     cells = window.cells
-    return Interval(cells.path[1, 0]) + Interval(cells.path[2, 0]) * (Interval(x) - cells.u) + window.tubes.rates[0]
+    return Intervals(cells.path[1, 0]) + Intervals(cells.path[2, 0]) * (Intervals(x) - cells.u) + window.tubes.rates[0]
 
 
 def _turns_text(turns: int) -> str:
     return "a turn" if turns == 1 else f"{turns} turns"
 
 
-def _lies_in(pose: Interval, found: Cover, k: int, places: Sequence[int]) -> bool:
+def _lies_in(pose: Intervals, found: Cover, k: int, places: Sequence[int]) -> bool:
     """Return whether a driver value with its unknowns lies in the tube of a cell."""
     cell = found.cells[k : k + 1]
     u = pose[0]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kinfmu.analysis.certified.cells import Cells, Prover, Tubes
-from kinfmu.analysis.certified.intervals import Interval
+from kinfmu.analysis.certified.intervals import Intervals
 from kinfmu.arrays import FloatArray
 
 _GENERATIONS = 60  # of halved cells
@@ -50,7 +50,7 @@ class Cover:
         for first, last in self.pieces:
             which = np.flatnonzero((x >= cells.low[first]) & (x <= cells.high[last]))
             k = np.clip(np.searchsorted(cells.low[first : last + 1], x[which], "right") - 1, 0, None) + first
-            off = Interval(z[:, which]) - cells[k].at(Interval(x[which]) - cells.u[k])
+            off = Intervals(z[:, which]) - cells[k].at(Intervals(x[which]) - cells.u[k])
             kept[first : last + 1] = len(which) and off.is_inside(self.tubes[k].wide).all()
         return _joined([(cells[kept], self.tubes[kept])])
 
@@ -118,8 +118,8 @@ def _joined(found: list[tuple[Cells, Tubes]]) -> Cover:
     return Cover(cells, tubes, meet & (ahead | back))
 
 
-def meets(cells: Cells, narrow: Interval, others: Cells, wide: Interval, u: FloatArray) -> Any:
+def meets(cells: Cells, narrow: Intervals, others: Cells, wide: Intervals, u: FloatArray) -> Any:
     """Return where the poses of cells at driver values lie in the tubes of others, in which there is only one pose."""
-    inside = cells.at(Interval(u) - cells.u) + narrow
-    outside = others.at(Interval(u) - others.u)
+    inside = cells.at(Intervals(u) - cells.u) + narrow
+    outside = others.at(Intervals(u) - others.u)
     return (inside - outside).is_inside(wide).all(axis=0)

@@ -26,7 +26,7 @@ _SINE = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(9))
 _COSINE = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(10))
 
 
-class Interval:
+class Intervals:
     """Closed intervals [low, high], one for each place of two arrays.
 
     Args:
@@ -43,10 +43,10 @@ class Interval:
         self.high: FloatArray = self.low if high is None else np.asarray(high, dtype=float)
 
     def __repr__(self) -> str:
-        return f"Interval({self.low!r}, {self.high!r})"
+        return f"Intervals({self.low!r}, {self.high!r})"
 
-    def __getitem__(self, place: Any) -> Interval:
-        return Interval(self.low[place], self.high[place])
+    def __getitem__(self, place: Any) -> Intervals:
+        return Intervals(self.low[place], self.high[place])
 
     @property
     def middle(self) -> FloatArray:
@@ -69,33 +69,33 @@ class Interval:
         """The smallest absolute value: 0 where an interval contains 0."""
         return np.maximum(np.maximum(self.low, -self.high), 0.0)
 
-    def is_inside(self, other: Interval) -> Any:
+    def is_inside(self, other: Intervals) -> Any:
         """Return where each interval lies in the interior of the other one."""
         return (other.low < self.low) & (self.high < other.high)
 
-    def hull(self, other: Interval) -> Interval:
+    def hull(self, other: Intervals) -> Intervals:
         """Return the smallest intervals that contain both."""
-        return Interval(np.minimum(self.low, other.low), np.maximum(self.high, other.high))
+        return Intervals(np.minimum(self.low, other.low), np.maximum(self.high, other.high))
 
-    def intersection(self, other: Interval) -> Interval:
+    def intersection(self, other: Intervals) -> Intervals:
         """Return what two enclosures of the same numbers have in common."""
-        return Interval(np.maximum(self.low, other.low), np.minimum(self.high, other.high))
+        return Intervals(np.maximum(self.low, other.low), np.minimum(self.high, other.high))
 
-    def __neg__(self) -> Interval:
-        return Interval(-self.high, -self.low)
+    def __neg__(self) -> Intervals:
+        return Intervals(-self.high, -self.low)
 
-    def __add__(self, other: Any) -> Interval:
+    def __add__(self, other: Any) -> Intervals:
         other = interval(other)
         return _known(_down(self.low + other.low), _up(self.high + other.high))
 
-    def __sub__(self, other: Any) -> Interval:
+    def __sub__(self, other: Any) -> Intervals:
         other = interval(other)
         return _known(_down(self.low - other.high), _up(self.high - other.low))
 
-    def __rsub__(self, other: Any) -> Interval:
+    def __rsub__(self, other: Any) -> Intervals:
         return interval(other) - self
 
-    def __mul__(self, other: Any) -> Interval:
+    def __mul__(self, other: Any) -> Intervals:
         other = interval(other)
         a, b, c, d = self.low * other.low, self.low * other.high, self.high * other.low, self.high * other.high
         low = np.minimum(np.minimum(a, b), np.minimum(c, d))
@@ -105,7 +105,7 @@ class Interval:
     __radd__ = __add__
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Any) -> Interval:
+    def __truediv__(self, other: Any) -> Intervals:
         other = interval(other)
         with np.errstate(divide="ignore", invalid="ignore"):
             a, b, c, d = self.low / other.low, self.low / other.high, self.high / other.low, self.high / other.high
@@ -114,28 +114,28 @@ class Interval:
         has_zero = (other.low <= 0.0) & (other.high >= 0.0)
         return _known(np.where(has_zero, -np.inf, _down(low)), np.where(has_zero, np.inf, _up(high)))
 
-    def __rtruediv__(self, other: Any) -> Interval:
+    def __rtruediv__(self, other: Any) -> Intervals:
         return interval(other) / self
 
-    def square(self) -> Interval:
+    def square(self) -> Intervals:
         """Return the squares."""
         small, large = self.mignitude, self.magnitude
         return _known(np.maximum(_down(small * small), 0.0), _up(large * large))
 
 
-def interval(x: Any) -> Interval:
+def interval(x: Any) -> Intervals:
     """Return numbers as intervals; intervals as they are."""
-    return x if isinstance(x, Interval) else Interval(x)
+    return x if isinstance(x, Intervals) else Intervals(x)
 
 
-def joined_intervals(parts: Sequence[Interval]) -> Interval:
+def joined_intervals(parts: Sequence[Intervals]) -> Intervals:
     """Return the intervals of several parts, along the last axis."""
-    return Interval(*(np.concatenate([getattr(part, end) for part in parts], -1) for end in ("low", "high")))
+    return Intervals(*(np.concatenate([getattr(part, end) for part in parts], -1) for end in ("low", "high")))
 
 
-def around(middle: FloatArray, radius: FloatArray) -> Interval:
+def around(middle: FloatArray, radius: FloatArray) -> Intervals:
     """Return the intervals within a radius of numbers."""
-    return Interval(_down(middle - radius), _up(middle + radius))
+    return Intervals(_down(middle - radius), _up(middle + radius))
 
 
 def _down(x: Any) -> Any:
@@ -146,29 +146,29 @@ def _up(x: Any) -> Any:
     return np.nextafter(x, np.inf)
 
 
-def _known(low: Any, high: Any) -> Interval:
+def _known(low: Any, high: Any) -> Intervals:
     """Return intervals from bounds; where one is no number (infinite minus infinite), nothing is known."""
-    return Interval(np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high))
+    return Intervals(np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high))
 
 
-def _everything(like: FloatArray) -> Interval:
-    return Interval(np.full_like(like, -np.inf), np.full_like(like, np.inf))
+def _everything(like: FloatArray) -> Intervals:
+    return Intervals(np.full_like(like, -np.inf), np.full_like(like, np.inf))
 
 
 # ---- functions
 
 
-def sine(x: Interval) -> Interval:
+def sine(x: Intervals) -> Intervals:
     """Return the sine of angles [rad]."""
     return _wave(x, 0, 0.5)
 
 
-def cosine(x: Interval) -> Interval:
+def cosine(x: Intervals) -> Intervals:
     """Return the cosine of angles [rad]."""
     return _wave(x, 1, 0.0)
 
 
-def _wave(x: Interval, which: int, highest: float) -> Interval:
+def _wave(x: Intervals, which: int, highest: float) -> Intervals:
     """Return the sine (which = 0) or cosine (1), whose largest values are at highest + 2 k half turns.
 
     Extremes are at whole numbers of half turns from there. A margin covers the rounding of t: taking one that lies just
@@ -186,7 +186,7 @@ def _wave(x: Interval, which: int, highest: float) -> Interval:
     has_high = has_two | (has_one & is_even)
     has_low = has_two | (has_one & ~is_even)
     large = ~(x.magnitude <= _LARGEST_ANGLE)
-    return Interval(np.where(has_low | large, -1.0, low), np.where(has_high | large, 1.0, high))
+    return Intervals(np.where(has_low | large, -1.0, low), np.where(has_high | large, 1.0, high))
 
 
 def _sine_and_cosine(x: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -218,81 +218,81 @@ def _sine_and_cosine(x: FloatArray) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def root(x: Interval) -> Interval:
+def root(x: Intervals) -> Intervals:
     """Return the square roots of the parts that are not negative; nothing is known where there is none."""
     with np.errstate(invalid="ignore"):
         low, high = np.maximum(_down(np.sqrt(np.maximum(x.low, 0.0))), 0.0), _up(np.sqrt(x.high))
     return _known(np.where(x.low < 0.0, -np.inf, low), np.where(x.low < 0.0, np.inf, high))
 
 
-def whole(x: Interval) -> Interval:
+def whole(x: Intervals) -> Intervals:
     """Return the largest whole number not above x; nothing is known where it changes: it jumps."""
     low, high = np.floor(x.low), np.floor(x.high)
     jumps = ~(low == high)
-    return Interval(np.where(jumps, -np.inf, low), np.where(jumps, np.inf, high))
+    return Intervals(np.where(jumps, -np.inf, low), np.where(jumps, np.inf, high))
 
 
-def angle(y: Interval, x: Interval) -> Interval:
+def angle(y: Intervals, x: Intervals) -> Intervals:
     """Return the angle of vectors (x, y) in [-pi, pi]; nothing is known where it jumps: at the negative x axis."""
     corners = [_angle_at(b, a) for a in (x.low, x.high) for b in (y.low, y.high)]
     low = np.minimum.reduce([corner.low for corner in corners])
     high = np.maximum.reduce([corner.high for corner in corners])
     jumps = ~((x.low > 0.0) | (y.low > 0.0) | (y.high < 0.0))
-    return Interval(np.where(jumps, -np.inf, low), np.where(jumps, np.inf, high))
+    return Intervals(np.where(jumps, -np.inf, low), np.where(jumps, np.inf, high))
 
 
-def _angle_at(y: FloatArray, x: FloatArray) -> Interval:
+def _angle_at(y: FloatArray, x: FloatArray) -> Intervals:
     """Return the angles of single vectors: t of a library, and how far the vector is turned from it.
 
     The vector turned by -t is (p, q); its angle is asin(q / |(p, q)|), which is at most 2 |q| / p.
     """
     t = np.arctan2(y, x)
-    s, c = sine(Interval(t)), cosine(Interval(t))
+    s, c = sine(Intervals(t)), cosine(Intervals(t))
     ahead, across = c * x + s * y, c * y - s * x
-    off = (2.0 * Interval(across.magnitude) / ahead).magnitude
+    off = (2.0 * Intervals(across.magnitude) / ahead).magnitude
     return around(t, off)
 
 
-def curve(x: Interval, data: CurveData, order: int = 0) -> Interval:
+def curve(x: Intervals, data: CurveData, order: int = 0) -> Intervals:
     """Return a derivative (0: the value) of a piecewise function.
 
     Nothing is known where an interval contains a break at which a lower derivative jumps: there is no derivative.
     """
     breaks, pieces = data
     ends = (-np.inf, *breaks, np.inf)
-    found = Interval(np.full_like(x.low, np.inf), np.full_like(x.low, -np.inf))
+    found = Intervals(np.full_like(x.low, np.inf), np.full_like(x.low, -np.inf))
     for piece, begin, end in zip(pieces, ends[:-1], ends[1:], strict=True):
         meets = (x.low <= end) & (x.high >= begin)
         if not meets.any():
             continue
-        part = Interval(np.clip(x.low, begin, end), np.clip(x.high, begin, end))
-        safe = Interval(np.where(meets, part.low, 0.0), np.where(meets, part.high, 0.0))
+        part = Intervals(np.clip(x.low, begin, end), np.clip(x.high, begin, end))
+        safe = Intervals(np.where(meets, part.low, 0.0), np.where(meets, part.high, 0.0))
         value = _piece(piece, order, safe)
         more = found.hull(value)
-        found = Interval(np.where(meets, more.low, found.low), np.where(meets, more.high, found.high))
+        found = Intervals(np.where(meets, more.low, found.low), np.where(meets, more.high, found.high))
     if order:
         jumps = np.zeros(x.low.shape, dtype=bool)
         for at in jumping_breaks(data, order - 1):
             jumps |= (x.low <= at) & (x.high >= at)
-        found = Interval(np.where(jumps, -np.inf, found.low), np.where(jumps, np.inf, found.high))
+        found = Intervals(np.where(jumps, -np.inf, found.low), np.where(jumps, np.inf, found.high))
     return found
 
 
-def _piece(piece: Piece, order: int, x: Interval) -> Interval:
+def _piece(piece: Piece, order: int, x: Intervals) -> Intervals:
     """Return a derivative of one piece: within the first-order bound around the middle, and within the plain one."""
     middle = x.middle
     plain = _plain_piece(piece, order, x)
-    centred = _plain_piece(piece, order, Interval(middle)) + _plain_piece(piece, order + 1, x) * (x - middle)
+    centred = _plain_piece(piece, order, Intervals(middle)) + _plain_piece(piece, order + 1, x) * (x - middle)
     return plain.intersection(centred)
 
 
-def _plain_piece(piece: Piece, order: int, x: Interval) -> Interval:
+def _plain_piece(piece: Piece, order: int, x: Intervals) -> Intervals:
     origin, coefficients, a, w, p = piece
     s = x - origin
-    value = Interval(np.zeros_like(x.low))
+    value = Intervals(np.zeros_like(x.low))
     degree = len(coefficients) - 1
     for k, c in enumerate(coefficients[: degree - order + 1] if degree >= order else ()):
-        value = value * s + Interval(c) * float(math.perm(degree - k, order))
+        value = value * s + Intervals(c) * float(math.perm(degree - k, order))
     if a:
         phase = s * w + p
         wave = cosine(phase) if order % 2 else sine(phase)
@@ -306,7 +306,7 @@ def _plain_piece(piece: Piece, order: int, x: Interval) -> Interval:
 # ---- the graph
 
 
-_OPERATIONS: dict[str, Callable[..., Interval]] = {
+_OPERATIONS: dict[str, Callable[..., Intervals]] = {
     "+": lambda a, b: a + b,
     "-": lambda a, b: a - b,
     "*": lambda a, b: a.square() if a is b else a * b,
@@ -320,7 +320,7 @@ _OPERATIONS: dict[str, Callable[..., Interval]] = {
 }
 
 
-def enclosed(targets: Sequence[Node], values: Mapping[str, Interval], shape: tuple[int, ...]) -> list[Interval]:
+def enclosed(targets: Sequence[Node], values: Mapping[str, Intervals], shape: tuple[int, ...]) -> list[Intervals]:
     """Return enclosures of the targets, given intervals for each symbol by name.
 
     Args:
@@ -329,10 +329,10 @@ def enclosed(targets: Sequence[Node], values: Mapping[str, Interval], shape: tup
         shape: Of all results.
 
     """
-    at: dict[Node, Interval] = {}
+    at: dict[Node, Intervals] = {}
     for node in reachable(targets):
         if node.constant is not None:
-            at[node] = Interval(np.full(shape, node.constant))
+            at[node] = Intervals(np.full(shape, node.constant))
         elif node.op == "symbol":
             at[node] = values[node.name]
         elif node.op == "curve":
@@ -365,7 +365,7 @@ def approximate(targets: Sequence[Node], values: Mapping[str, FloatArray], shape
         elif node.op == "symbol":
             at[node] = values[node.name]
         elif node.op == "curve":
-            at[node] = curve(Interval(at[node.args[0]]), *node.curve).middle
+            at[node] = curve(Intervals(at[node.args[0]]), *node.curve).middle
         else:
             at[node] = _NUMBERS[node.op](*(at[arg] for arg in node.args))
     return [at[target] for target in targets]

@@ -13,7 +13,7 @@ import kinfmu
 from kinfmu import Certificate
 from kinfmu.analysis.certified import cells
 from kinfmu.analysis.certified.cover import Cover
-from kinfmu.analysis.certified.intervals import Interval
+from kinfmu.analysis.certified.intervals import Intervals
 from kinfmu.cli import main
 from kinfmu.errors import RequestError
 from kinfmu.mechanism.gallery import load, names
@@ -167,5 +167,5 @@ def test_check_prints_the_certificate() -> None:
 
 
 def test_intervals_of_a_cell_are_ordered(crank_rocker: Certificate) -> None:
-    tube: Interval = crank_rocker.cover.tubes.narrow
+    tube: Intervals = crank_rocker.cover.tubes.narrow
     assert (tube.low <= tube.high).all()

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from kinfmu.analysis.certified import intervals
-from kinfmu.analysis.certified.intervals import Interval, angle, cosine, curve, root, sine, whole
+from kinfmu.analysis.certified.intervals import Intervals, angle, cosine, curve, root, sine, whole
 from kinfmu.mechanism.laws.rise import RISES, SimpleHarmonic
 from kinfmu.solver.python.curve import curve as curve_value
 
@@ -39,7 +39,7 @@ BINARY: dict[str, tuple[Callable[[Any, Any], Any], Callable[[Any, Any], Any]]] =
     "/": (lambda a, b: a / b, lambda a, b: a / b),
     "angle": (angle, lambda y, x: mp.atan2(y, x)),
 }
-UNARY: dict[str, tuple[Callable[[Interval], Interval], Callable[[Any], Any]]] = {
+UNARY: dict[str, tuple[Callable[[Intervals], Intervals], Callable[[Any], Any]]] = {
     "sine": (sine, mp.sin),
     "cosine": (cosine, mp.cos),
     "root": (root, mp.sqrt),
@@ -48,7 +48,7 @@ UNARY: dict[str, tuple[Callable[[Interval], Interval], Callable[[Any], Any]]] = 
 }
 
 
-def drawn(seed: int) -> Interval:
+def drawn(seed: int) -> Intervals:
     """Random and hostile intervals: of all sizes, of one number, across zero, next to hostile numbers."""
     random = np.random.default_rng(seed)
     middle = random.choice((1.0, -1.0), COUNT) * 10.0 ** random.uniform(-12, 4, COUNT)
@@ -56,16 +56,16 @@ def drawn(seed: int) -> Interval:
     width = np.where(random.random(COUNT) < 0.3, 0.0, 10.0 ** random.uniform(-14, 1, COUNT)) * np.maximum(
         abs(middle), 1e-3
     )
-    return Interval(middle - width, middle + width)
+    return Intervals(middle - width, middle + width)
 
 
-def inside(x: Interval, random: np.random.Generator) -> np.ndarray:
+def inside(x: Intervals, random: np.random.Generator) -> np.ndarray:
     """Numbers from intervals, often an end."""
     part = random.choice((0.0, 1.0, 0.5, random.random()), len(x.low))
     return np.clip(x.low + part * (x.high - x.low), x.low, x.high)
 
 
-def encloses(found: Interval, k: int, exact: Any) -> bool:
+def encloses(found: Intervals, k: int, exact: Any) -> bool:
     return bool(mp.mpf(float(found.low[k])) <= exact <= mp.mpf(float(found.high[k])))
 
 
@@ -94,7 +94,7 @@ def test_functions_of_an_interval_enclose_100_digits(name: str) -> None:
 
 
 def test_bounds_of_waves_and_quotients_are_close() -> None:
-    x = Interval(np.array([0.1, 1.0, 3.0]), np.array([0.2, 2.0, 4.0]))
+    x = Intervals(np.array([0.1, 1.0, 3.0]), np.array([0.2, 2.0, 4.0]))
     found = sine(x)
     assert found.low == pytest.approx([math.sin(0.1), math.sin(1.0), math.sin(4.0)], abs=1e-14)
     assert found.high == pytest.approx([math.sin(0.2), 1.0, math.sin(3.0)], abs=1e-14)
@@ -102,7 +102,7 @@ def test_bounds_of_waves_and_quotients_are_close() -> None:
 
 
 def test_nothing_is_known_where_a_function_jumps() -> None:
-    x = Interval(np.array([0.9]), np.array([1.1]))
+    x = Intervals(np.array([0.9]), np.array([1.1]))
     assert not np.isfinite(whole(x).low)[0]
     assert not np.isfinite(angle(x - 1.0, -x).low)[0]
     assert not np.isfinite((1.0 / (x - 1.0)).low)[0]
@@ -113,7 +113,7 @@ def test_nothing_is_known_where_a_function_jumps() -> None:
 def test_rises_stay_within_their_bounds(rise: type, order: int) -> None:
     random = np.random.default_rng(6)
     low = random.uniform(-0.2, 1.1, 300)
-    x = Interval(low, low + 10.0 ** random.uniform(-9, -0.3, 300))
+    x = Intervals(low, low + 10.0 ** random.uniform(-9, -0.3, 300))
     found = curve(x, rise.shape, order)
     for part in (0.0, 0.3, 0.9, 1.0):
         values = np.array([curve_value(rise.shape, order, at) for at in (x.low + part * (x.high - x.low)).tolist()])
@@ -123,7 +123,7 @@ def test_rises_stay_within_their_bounds(rise: type, order: int) -> None:
 
 
 def test_a_derivative_is_not_known_across_a_jump_of_the_one_before() -> None:
-    across = Interval(np.array([-0.1]), np.array([0.1]))
+    across = Intervals(np.array([-0.1]), np.array([0.1]))
     assert np.isfinite(curve(across, SimpleHarmonic.shape, 2).high)[0]
     assert not np.isfinite(curve(across, SimpleHarmonic.shape, 3).high)[0]
 
