@@ -65,6 +65,20 @@ def test_lengths_and_places_are_typed_for_what_is_selected(hand: DrawingHand) ->
     assert places(hand)["rocker.D"] == [110, 75]
 
 
+def test_members_at_a_pin_are_deleted_one_by_one(hand: DrawingHand) -> None:
+    hand.tool("interest")
+    hand.click((120, 80))
+    hand.tool("move")
+    hand.click((120, 80))
+    members = hand.page.tab.locator("#draw-panel .selected span.wide")
+    assert members.all_inner_texts() == ["D (revolute)", "D_2 (of interest)"]
+    hand.button("[aria-label='Delete D_2 (of interest)']")
+    assert members.all_inner_texts() == ["D (revolute)"]
+    hand.button("[aria-label='Delete D (revolute)']")
+    assert members.all_inner_texts() == []
+    assert hand.page.errors == []
+
+
 def test_all_is_undone_and_made_again(chromium: Browser, tmp_path: Path) -> None:
     with drawing_hand(chromium, tmp_path) as hand:
         empty = hand.get("e.session.answer.text")
