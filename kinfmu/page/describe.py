@@ -58,7 +58,7 @@ def describe(mechanism: Mechanism, report: Report) -> dict[str, Any]:
         report: Its report, without a problem.
 
     """
-    return drawn(instant(mechanism), report)
+    return drawn(instant(mechanism, plan=report.plan), report)
 
 
 def drawn(shown: Instant, report: Report | None = None) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import html
 import json
 import re
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.mechanism.opened import opened
 from kinfmu.page.describe import describe, module_data, written_file
-from kinfmu.page.module import packed, page_module, solver
+from kinfmu.page.module import packed, page_module, require_page_size, solver
 
 _WEB = Path(__file__).parent / "web"
 _SCRIPTS = (
@@ -83,7 +84,7 @@ def page(
 
     Raises:
         KinfmuError: The mechanism cannot be solved.
-        RequestError: It is too large for a page, such as one of more than 512 unknowns.
+        TooLargeError: It is too large for a page, such as one of more than 512 unknowns.
 
     """
     require_mechanism(mechanism, "page")
@@ -107,19 +108,20 @@ def page_data(
 
     Raises:
         KinfmuError: The mechanism cannot be solved.
-        RequestError: It is too large for a page.
+        TooLargeError: It is too large for a page.
 
     """
+    require_page_size(mechanism)
     report = report or check(mechanism)
     if report.problem is not None and report.plan is None:
         raise report.problem
-    as_written = page_module(mechanism)
+    as_written = page_module(mechanism, report=report)
     change = opened(mechanism)
     is_large = len(change.places) > MOST_NUMBERS
     places = {} if is_large else change.places
     modules = {
         "written": module_data(as_written, {}),
-        "opened": module_data(page_module(change.mechanism, change.labels), places) if places else None,
+        "opened": module_data(page_module(change.mechanism, change.labels, report), places) if places else None,
     }
     drivers = [driver.name for driver in mechanism.drivers]
     data = describe(mechanism, report) | {
@@ -171,6 +173,7 @@ def editor_script() -> str:
     return f'const EDITOR = ["{text}", {{ {names} }}];\n'
 
 
+@cache
 def _script(name: str) -> str:
     """Return a module of web/ as a part of one script: without comments, indentation, imports, and the word export."""
     text = _COMMENT.sub("", (_WEB / f"{name}.js").read_text("utf-8"))

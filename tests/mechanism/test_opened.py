@@ -13,6 +13,7 @@ import pytest
 
 import kinfmu
 from kinfmu import Mechanism, Parameter, Run, Status
+from kinfmu.draw.instant import instant
 from kinfmu.mechanism.members import NumberPath
 from kinfmu.mechanism.opened import Opened, opened, place_text
 from kinfmu.page.describe import written_file
@@ -151,3 +152,22 @@ def test_file_of_a_page_has_a_place_for_each_mass_and_load() -> None:
     text = written_file(mechanism, page_module(mechanism), found.places)
     slots = set(re.findall(r"\{\{([\w.]+)\}\}", text))
     assert {"bodies.ram.mass", "loads.balance.stiffness", "loads.work.law.rise_1"} <= slots
+
+
+def far_crank_rocker() -> Mechanism:
+    """Return a mechanism so far away that its plan has an origin of its own, where parameters are rounded otherwise."""
+    mechanism = kinfmu.load("crank_rocker")
+    for label, x in (("bodies.ground.points.O.x", 1e7), ("bodies.ground.points.C.x", 1e7 + 40.0)):
+        mechanism = with_number(mechanism, label, x)
+    return mechanism
+
+
+@pytest.mark.parametrize("name", ["parallel_jaw", "toggle_press", "double_pendulum", "far"])
+def test_what_a_report_has_found_gives_the_same_modules_and_the_same_drawing(name: str) -> None:
+    mechanism = far_crank_rocker() if name == "far" else kinfmu.load(name)
+    report, change = kinfmu.check(mechanism), opened(mechanism)
+    assert page_module(mechanism, report=report).text == page_module(mechanism).text
+    of_opened = page_module(change.mechanism, change.labels)
+    assert page_module(change.mechanism, change.labels, report).text == of_opened.text
+    drawn, alone = instant(mechanism, plan=report.plan), instant(mechanism)
+    assert all(np.array_equal(drawn.poses[body], pose, equal_nan=True) for body, pose in alone.poses.items())
