@@ -11,7 +11,7 @@ from kinfmu.cli.arguments import MechanismName, OutputFile
 from kinfmu.cli.group import main, note, patience
 
 
-@main.command(epilog="Examples: kinfmu play mine.toml; kinfmu play --new mine.toml")
+@main.command(epilog="Example: kinfmu play mine.toml; kinfmu play --new mine.toml")
 @click.argument("mechanism", type=MechanismName(), metavar="MECH", required=False)
 @click.option("--new", type=OutputFile(".toml"), metavar="FILE", help="Draw a mechanism; FILE must not be there yet.")
 @click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port on this machine. Default: a free one.")

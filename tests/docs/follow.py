@@ -59,11 +59,11 @@ OPTIONS = {  # options that tests add, by the beginning of the command
 
 FILES = {  # the file of each block of TOML, where the text above does not announce it
     "fitting.md": ["flat.toml"],
-    "forces.md": ["pump.toml", "pump.toml"],
-    "measures.md": ["hoeken.toml", "hoeken.toml"],
+    "forces.md": ["pump.toml"],
+    "measures.md": ["hoeken.toml"],
 }
 BEFORE = {  # commands for the files that a page takes as given
-    "commands.md": ["kinfmu solve crank_rocker -o host.csv", "python examples/dc_motor/build.py ."],
+    "commands.md": ["kinfmu solve crank_rocker -o host.csv"],
     "fmu.md": ["kinfmu solve fourbar -o host.csv", "kinfmu new toggle_press press.toml"],
     "host-omsimulator.md": ["kinfmu solve fourbar -o fourbar_res.csv"],
     "host-openmodelica.md": ["kinfmu solve fourbar -o fourbar_res.csv"],

@@ -101,7 +101,7 @@ class Certificate:
 
     @cached_property
     def tube(self) -> float:
-        """Around each pose no other one is nearer than this [rad, sizes]: the narrowest tube of all cells."""
+        """The narrowest tube of all cells [rad, sizes], within which no other pose is near a pose of the run."""
         wide = self.cover.tubes.wide
         return float((wide.high / self.prover.unit[:, None]).min(initial=math.inf))
 

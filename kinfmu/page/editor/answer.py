@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import tomllib
 from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from kinfmu.analysis import check
+from kinfmu.analysis.doctor import advice
 from kinfmu.draw.scene.instant import Instant
 from kinfmu.errors import KinfmuError, MobilityError
 from kinfmu.mechanism.quantities.placement import body_of
@@ -145,14 +146,25 @@ def _help(drawing: Drawing) -> list[dict[str, Any]]:
 def view(drawing: Drawing) -> dict[str, Any]:
     """Return the data of the page of a drawing and the findings of its check.
 
+    A drawing that cannot be solved has no such data; its problem comes with changes that were tried.
+
     Raises:
-        KinfmuError: It cannot be solved, or is too large for a page.
+        KinfmuError: It is too large for a page.
 
     """
     report = check(drawing.mechanism)
-    if report.problem is not None and report.plan is None:
-        raise report.problem
-    lines: Sequence[str] = report.notes
-    problem = [{"kind": "problem", "text": str(report.problem), "edits": []}] if report.problem else []
-    findings = problem + [{"kind": "note", "text": line, "edits": []} for line in lines]
-    return {"view": page_data(drawing.mechanism, report), "findings": findings}
+    notes = [{"kind": "note", "text": line, "edits": []} for line in report.notes]
+    problem = []
+    if report.problem is not None:
+        problem = [{"kind": "problem", "text": str(report.problem), "edits": _advised(drawing)}]
+        if report.plan is None:
+            return {"view": None, "findings": problem + notes}
+    return {"view": page_data(drawing.mechanism, report), "findings": problem + notes}
+
+
+def _advised(drawing: Drawing) -> list[dict[str, Any]]:
+    """Return changes after which a drawing moves, as operations."""
+    return [
+        {"text": f"{one.text}: {one.leads_to}", "operations": [{"do": "edit", "edits": one.as_json()["edits"]}]}
+        for one in advice(tomllib.loads(drawing.text))
+    ]

@@ -270,9 +270,21 @@ def test_the_view_is_the_page_of_the_drawing(server: PlayServer, fourbar: dict[s
     assert answer["view"]["points"] == [
         {key: point[key] for key in ("body", "name", "x", "y")} for point in fourbar["sketch"]["points"]
     ]
+
+
+def test_the_problem_of_a_drawing_comes_with_changes_that_help(server: PlayServer, fourbar: dict[str, Any]) -> None:
+    meant = fourbar["text"]
     without = draw(server, {"do": "delete", "place": ["joints", "D"]})
-    status, text, _ = ask(server, f"editor/view?state={without['state']}")
-    assert (status, text.count("\n")) == (HTTPStatus.UNPROCESSABLE_ENTITY, 0)
+    status, _, answer = ask(server, f"editor/view?state={without['state']}")
+    assert status == HTTPStatus.OK
+    assert answer["view"] is None
+    problem, *_ = answer["findings"]
+    assert problem["kind"] == "problem"
+    assert "mobility is 3 but there is 1 driver" in problem["text"]
+    first, *_ = problem["edits"]
+    helped = draw(server, *first["operations"])
+    assert helped["badge"]["isComplete"]
+    assert helped["text"].count("revolute") == meant.count("revolute")
 
 
 def test_saving_over_another_program_needs_force(server: PlayServer, fourbar: dict[str, Any]) -> None:
