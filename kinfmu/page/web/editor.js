@@ -178,9 +178,13 @@ export class Editor {
     save(more = {}) {
         this.session.next(async () => {
             const { status, message } = await this.session.step("save", more);
-            if (status === 409) this.tell(message, [["Overwrite the file", () => this.save({ force: true })], ["Take the file instead", () => this.operate([{ do: "reload" }])]]);
+            if (status === 409 && this.session.answer.isFileChanged) this.#tellOfFile(message);
             else this.tell(message);
         });
+    }
+
+    #tellOfFile(text) {
+        this.tell(text, [["Overwrite the file", () => this.save({ force: true })], ["Take the file instead", () => this.operate([{ do: "reload" }])]]);
     }
 
     #answered({ status, message }) {
@@ -227,7 +231,7 @@ export class Editor {
         $("save").disabled = answer.isSaved;
         $("save").textContent = answer.isSaved ? "Saved" : "Save";
         $("save").hidden = false;
-        if (answer.isFileChanged) this.tell("Another program wrote the file while changes here are not saved.", [["Take the file", () => this.operate([{ do: "reload" }])]]);
+        if (answer.isFileChanged) this.#tellOfFile("The file was changed by another program, and the drawing is not saved.");
         this.panel.update();
         this.#changed();
         if (isFirst) page.fit();

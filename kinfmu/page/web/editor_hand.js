@@ -137,6 +137,9 @@ export class EditorHand {
         const tool = TOOLS.find((one) => one.key === letter);
         if (tool) return () => editor.choose(tool.id);
         if (key === "Home") return () => page.fit();
+        if (key === "?") return () => $("keys").showModal();
+        if (["+", "="].includes(key)) return () => page.zoom(1.2);
+        if (key === "e") return () => {}; // lengths are changed by the tool for moving
         if (!machine) return null;
         if (key in arrows) return () => this.#moveCursor(...arrows[key].map((x) => x * far));
         if (key === "Enter" && !isButton) return () => this.here && editor.click(this.here);

@@ -84,13 +84,13 @@ export class DrawPanel {
         return [...rows, element("label", { className: "check" }, box, element("span", { textContent: "Keep its lengths while pins are dragged" }))];
     }
 
-    // Return the joints, drivers and loads of what is selected: { name, place }.
+    // Return the joints, drivers, loads and points of interest of what is selected: { name, place }.
     #members(target, bodies) {
         const { data } = this.editor.sketch;
         const numbers = target.kind === "point" ? target.points.map((name) => this.editor.sketch.numberOfPoint(name)) : [];
         const isHere = (one) => one.points?.some((k) => numbers.includes(k)) || (target.kind === "body" && (one.body === target.body || one.frame === target.body));
         const drivers = data.drivers.filter((one) => isHere(one) || (target.kind === "point" && bodies.includes(one.body)));
-        return [["joints", data.joints.filter(isHere)], ["drivers", drivers], ["loads", data.loads.filter(isHere)]].flatMap(([table, all]) => all.map(({ name, type }) => ({ name: `${name} (${type.replaceAll("_", " ")})`, place: [table, name] })));
+        return [["joints", data.joints.filter(isHere)], ["drivers", drivers], ["loads", data.loads.filter(isHere)], ["points", data.interest.filter(({ point }) => numbers.includes(point)).map(({ name }) => ({ name, type: "of interest" }))]].flatMap(([table, all]) => all.map(({ name, type }) => ({ name: `${name} (${type.replaceAll("_", " ")})`, place: [table, name] })));
     }
 
     #member(name, place) {

@@ -288,3 +288,24 @@ def test_fingers_draw_a_four_bar_on_a_phone(chromium: Browser, tmp_path: Path) -
         assert hand.page.tab.evaluate("document.documentElement.scrollWidth") == 390
         assert_moves_as(reference, columns, hand.save(), {"P": (0, 40), "Q": (120, 80)})
         assert hand.page.errors == []
+
+
+@pytest.mark.long
+def test_two_fingers_zoom_and_one_draws_a_link(chromium: Browser, tmp_path: Path) -> None:
+    with drawing_hand(chromium, tmp_path, has_touch=True, is_mobile=True) as hand:
+        hand.page.resize({"width": 390, "height": 844})
+        scale = hand.get("k.view.scale")
+        x, y = hand.at((60, 40))
+        hand.page.touch([(x - 20 - 4 * k, y) for k in range(8)], [(x + 20 + 4 * k, y) for k in range(8)])
+        assert hand.get("k.view.scale") > 1.5 * scale
+        assert hand.get("[e.machine.picks.length, e.sketch.data.points.length]") == [0, 0]
+        begin, end = hand.at((50, 20)), hand.at((70, 60))
+        hand.page.touch(
+            [
+                (begin[0] + part * (end[0] - begin[0]), begin[1] + part * (end[1] - begin[1]))
+                for part in (0, 0.4, 0.8, 1)
+            ]
+        )
+        hand.wait()
+        assert hand.get("e.sketch.data.points.map((p) => p.at)") == [[50, 20], [70, 60]]
+        assert hand.page.errors == []

@@ -60,6 +60,7 @@ def states(server: PlayServer) -> Iterator[dict[str, Any]]:
         line = answer.readline().decode()
         if line.startswith("data: "):
             state = json.loads(line.removeprefix("data: "))
+            assert state.pop("editor") == 0  # without a drawing
             if not state.pop("isBusy"):
                 yield state
 
