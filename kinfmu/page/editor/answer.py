@@ -17,8 +17,10 @@ from kinfmu.page.describe import drawn
 from kinfmu.page.editor.drawing import AS_DRAWN, PLACEHOLDER, Drawing
 from kinfmu.page.html import page_data
 from kinfmu.plan import plan_from
+from kinfmu.plan.equations.assembly import SINGULAR
 from kinfmu.plan.equations.redundancy import Redundancy
 
+_LARGE = 60  # coordinates
 _MOST_NOTES = 5  # of one kind in an answer
 
 
@@ -63,12 +65,23 @@ def sketch(drawing: Drawing) -> dict[str, Any]:
 
 
 def _problem(drawing: Drawing) -> KinfmuError | None:
-    """Return why a drawing cannot be solved; None if it can."""
+    """Return why a drawing cannot be solved; None if it can, and if only `view` can say it in time."""
+    if _is_singular(drawing):
+        return None
     problem = _problem_with(drawing, drawing.redundancy)
     if problem is None or not isinstance(drawing.redundancy, Redundancy):
         return problem
     is_matched = drawing.redundancy.mobility == len(drawing.mechanism.drivers)
     return _problem_with(drawing, drawing.assembled) if is_matched else problem  # a start pose may be singular
+
+
+def _is_singular(drawing: Drawing) -> bool:
+    """Return whether a large drawing is drawn in a singular pose: looking for a way out of it takes long."""
+    redundancy = drawing.redundancy
+    if not isinstance(redundancy, Redundancy) or len(drawing.system.coordinates) <= _LARGE:
+        return False
+    pose = redundancy.assembly.pose
+    return redundancy.mobility == len(drawing.mechanism.drivers) > 0 and pose is not None and pose.margin <= SINGULAR
 
 
 def _problem_with(drawing: Drawing, redundancy: Redundancy | KinfmuError) -> KinfmuError | None:
@@ -97,6 +110,8 @@ def _badge(drawing: Drawing, problem: KinfmuError | None) -> dict[str, Any]:
         text = f"{-missing} driver{'s'[: missing < -1]} too many"
     elif not drivers:
         text = "a structure: nothing moves"
+    elif _is_singular(drawing):
+        text = "complete, in a singular pose"
     elif problem is None:
         text = "complete"
     else:

@@ -272,6 +272,21 @@ def test_the_view_is_the_page_of_the_drawing(server: PlayServer, fourbar: dict[s
     ]
 
 
+def test_a_large_drawing_in_a_singular_pose_is_answered_at_once(tmp_path: Path) -> None:
+    text = new_text("chain")
+    drawing = Drawing.of(text, tmp_path)
+    bars = [{"do": "bar", "from": {"body": "ground", "at": [40 * k, 0]}, "to": {"at": [40 * k, 20]}} for k in range(13)]
+    drawing = changed(drawing, bars)
+    tips = [f"{body.name}.{[*body.points][1]}" for body in drawing.mechanism.moving_bodies]
+    for first, second in itertools.pairwise(tips):
+        drawing = changed(drawing, [{"do": "bar", "from": {"point": first}, "to": {"point": second}}])
+    drawing = changed(drawing, [{"do": "motor", "body": drawing.mechanism.moving_bodies[0].name}])
+    assert len(drawing.system.coordinates) == 75
+    assert answer(drawing)["badge"]["text"] in ("complete", "complete, in a singular pose")
+    moved = changed(drawing, [{"do": "move", "point": tips[0], "to": [0, -20]}])
+    assert answer(moved)["badge"]["mobility"] == 1
+
+
 def test_the_problem_of_a_drawing_comes_with_changes_that_help(server: PlayServer, fourbar: dict[str, Any]) -> None:
     meant = fourbar["text"]
     without = draw(server, {"do": "delete", "place": ["joints", "D"]})
