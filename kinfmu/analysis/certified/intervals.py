@@ -442,7 +442,7 @@ def _solved_for(node: Node, at: Mapping[Node, Intervals]) -> list[tuple[Node, In
     if node.op == "sin":
         return [(a, _angles_of_sine(whole, x))]
     if node.op == "cos":
-        quarter = Intervals(_QUARTER[0], _up(_QUARTER[0] + _QUARTER[1]))
+        quarter = Intervals(0.5 * math.pi, _up(0.5 * math.pi))
         return [(a, _angles_of_sine(whole, x + quarter) - quarter)]
     return []
 

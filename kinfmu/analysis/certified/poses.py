@@ -40,8 +40,9 @@ _STARTS, _MOST_STARTS = (
     100,
     20000,
 )  # of Newton's method: times the square of the unknowns, for each earlier pose; of all
-_NEWTON = 20
+_NEWTON = 12
 _WIDEST, _SHRINK, _TRIES = 0.5, 0.4, 10  # of boxes about a pose: the first one; contraction aimed at; narrower ones
+_CLOSE = 1e-7  # [rad, units] of a pose from that of Newton's method
 _CONTRACTIONS = 40  # of a proved box
 _ROUNDING = 2.0**-52
 _TURN = Intervals(6.283185307179586, 6.283185307179587)
@@ -243,7 +244,7 @@ class _BlockSearch:
             domain = self._domain()
             boxes, owner = self._first_boxes(domain)
             boxes, owner = self._contracted(boxes, owner)
-            self._prove(*self._candidates(domain, boxes, owner))
+            self._prove(*self._newton(*self._starts(boxes, owner)))
             stack = [(boxes, owner)]
             undecided: list[FloatArray] = []
             while stack:
@@ -266,6 +267,8 @@ class _BlockSearch:
                     stack.append((boxes, owner))
             if undecided:
                 self._give_up(f"not decided near {self._place(undecided[0])}, where it is close to singular")
+            if self.reasons:
+                self._prove(*self._newton(*self._random_starts(domain)))
         return self.roots
 
     def _give_up(self, why: str) -> None:
@@ -306,9 +309,9 @@ class _BlockSearch:
                 break
         turned = self.is_angle[:, None]
         domain = Intervals(np.where(turned, low, domain.low), np.where(turned, high, domain.high))
-        is_bounded = np.isfinite(domain.low) & np.isfinite(domain.high)
+        is_bounded: NDArray[np.bool_] = np.isfinite(domain.radius)
         if not is_bounded.all():
-            names = [name for name, bounded in zip(self.names, is_bounded.all(axis=1), strict=True) if not bounded]
+            names = [name for name, bounded in zip(self.names, is_bounded.min(axis=1), strict=True) if not bounded]
             self._give_up(f"its rows give no bounds of {listed(names)}")
             near = np.array([[self.at[name]] for name in self.names])
             near_by = around(near, np.full_like(near, 10.0 * self.plan.size))
@@ -351,7 +354,7 @@ class _BlockSearch:
         boxes, owner = boxes[:, ~is_empty], owner[~is_empty]
         image, contraction = self._krawczyk(boxes, owner)
         inside = image.is_inside(boxes).all(axis=0)
-        self._add(boxes[:, inside], image[:, inside], owner[inside])
+        self._add(boxes[:, inside], image[:, inside], owner[inside], image.middle[:, inside])
         boxes = boxes.intersection(image)
         keep = ~inside & (boxes.low <= boxes.high).all(axis=0)
         boxes, owner, is_regular = boxes[:, keep], owner[keep], contraction[keep] < 1.0
@@ -405,8 +408,8 @@ class _BlockSearch:
         entries = enclosed(self.jacobian, self._values(boxes, owner), (1,))
         whole = _together(entries, count)
         centre, spread = (np.moveaxis(part.reshape(n, n, count), -1, 0) for part in (whole.middle, whole.radius))
-        is_known = np.isfinite(spread).all(axis=(1, 2)) & np.isfinite(centre).all(axis=(1, 2))
-        y = _inverses(np.where(is_known[:, None, None], centre, 0.0))
+        is_known = np.asarray(np.isfinite(spread + centre).all(axis=(1, 2), keepdims=True))
+        y = _inverses(np.where(is_known, centre, 0.0))
         rest = _together(enclosed(self.rows, self._values(Intervals(c), owner), (1,)), count)
         middle, off = rest.middle.T[..., None], rest.radius.T[..., None]
         one, error, size = np.eye(n), (n + 2) * _ROUNDING, abs(y)
@@ -416,23 +419,21 @@ class _BlockSearch:
         radius = reach @ boxes.radius.T[..., None] + size @ off + error * (size @ abs(middle))
         radius = radius[..., 0].T * (1.0 + 2.0 * error) + _ROUNDING * (abs(c) + abs(step)) + 1e-300
         image = around(c - step, radius)
-        is_known = is_known & np.isfinite(radius).all(axis=0) & np.isfinite(step).all(axis=0)
+        is_known = is_known[:, 0, 0] & np.isfinite(radius + step).all(axis=0)
         contraction = np.where(is_known, (reach * self.unit / self.unit[:, None]).sum(axis=2).max(axis=1), np.inf)
         return Intervals(np.where(is_known, image.low, -np.inf), np.where(is_known, image.high, np.inf)), contraction
 
-    def _candidates(self, domain: Intervals, boxes: Intervals, owner: Any) -> tuple[FloatArray, Any]:
-        """Return poses of Newton's method from boxes, and of more than two unknowns also from random places."""
-        starts, owners = [boxes.middle], [owner]
-        if self.n > 2:  # boxes are many enough for two
-            each = max(1, min(_STARTS * self.n**2, _MOST_STARTS // max(1, self.count)))
-            which = np.repeat(np.arange(self.count), each)
-            random = np.random.default_rng(_SEED).uniform(-1.0, 1.0, (self.n, len(which)))
-            starts.append(domain.middle[:, which] + domain.radius[:, which] * random)
-            owners.append(which)
+    def _starts(self, boxes: Intervals, owner: Any) -> tuple[FloatArray, Any]:
+        """Return the middles of boxes, and the closed pose after each earlier pose, as starts of Newton's method."""
         near = np.array([[self.at[name]] for name in self.names])
-        starts.append(np.repeat(near, self.count, axis=1))
-        owners.append(np.arange(self.count))
-        return self._newton(np.concatenate(starts, axis=1), np.concatenate(owners))
+        starts = np.concatenate([boxes.middle, np.repeat(near, self.count, axis=1)], axis=1)
+        return starts, np.concatenate([owner, np.arange(self.count)])
+
+    def _random_starts(self, domain: Intervals) -> tuple[FloatArray, Any]:
+        each = max(1, min(_STARTS * self.n**2, _MOST_STARTS // max(1, self.count)))
+        owner = np.repeat(np.arange(self.count), each)
+        random = np.random.default_rng(_SEED).uniform(-1.0, 1.0, (self.n, len(owner)))
+        return domain.middle[:, owner] + domain.radius[:, owner] * random, owner
 
     def _newton(self, z: FloatArray, owner: Any) -> tuple[FloatArray, Any]:
         """Return distinct poses near places, with their earlier poses."""
@@ -466,15 +467,19 @@ class _BlockSearch:
             box = around(z, radius * self.unit[:, None])
             image, contraction = self._krawczyk(box, owner)
             inside = image.is_inside(box).all(axis=0)
-            self._add(box[:, inside], image[:, inside], owner[inside])
+            self._add(box[:, inside], image[:, inside], owner[inside], z[:, inside])
             factor = np.clip(_SHRINK / np.maximum(contraction, 1e-300), 0.05, 0.6)[~inside]
             z, owner, radius = z[:, ~inside], owner[~inside], (radius[~inside] * factor)
 
-    def _add(self, wide: Intervals, image: Intervals, owner: Any) -> None:
-        """Add poses that are the only ones in boxes, and in their images; each once."""
+    def _add(self, wide: Intervals, image: Intervals, owner: Any, near: FloatArray) -> None:
+        """Add poses that are the only ones in boxes, and in their images, and probably near some places; each once."""
         if not len(owner):
             return
         narrow = image.intersection(wide)
+        close = around(near, np.full_like(near, _CLOSE) * self.unit[:, None])
+        image, _ = self._krawczyk(close, owner)
+        is_close = image.is_inside(close).all(axis=0) & _is_within(close, wide)
+        narrow = Intervals(np.where(is_close, image.low, narrow.low), np.where(is_close, image.high, narrow.high))
         for _ in range(_CONTRACTIONS):
             last, narrow = narrow, narrow.intersection(self._krawczyk(narrow, owner)[0])
             if not (narrow.radius < 0.95 * last.radius).any():
@@ -534,11 +539,11 @@ def _inverses(matrices: FloatArray) -> FloatArray:
     if n == 2:  # the usual size
         (a, b), (c, d) = np.moveaxis(matrices, 0, -1)
         return np.asarray(np.moveaxis(np.array([[d, -b], [-c, a]]) / (a * d - b * c), -1, 0))
-    bad = ~np.isfinite(matrices).all(axis=(1, 2))
-    safe = np.where(bad[:, None, None], np.eye(n), matrices)
+    good = np.isfinite(matrices).all(axis=(1, 2), keepdims=True)
+    safe = np.where(good, matrices, np.eye(n))
     try:
         found = np.linalg.inv(safe)
     except np.linalg.LinAlgError:  # one of them is singular to the bit
         noise = 1e-13 * np.random.default_rng(_SEED).random((n, n))
         found = np.linalg.inv(safe + noise * (1.0 + abs(safe).max(axis=(1, 2), keepdims=True)))
-    return np.asarray(np.where(bad[:, None, None], np.nan, found))
+    return np.asarray(np.where(good, found, np.nan))
