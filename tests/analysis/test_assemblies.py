@@ -159,6 +159,9 @@ def test_assemblies_are_plain_data_too() -> None:
 
 @pytest.mark.long
 def test_a_search_that_finds_very_many_reports_it() -> None:
+    every = found_for(chain(7))
+    assert every.complete
+    assert len(every.found) == 128
     assemblies = found_for(chain(9))
     assert len(assemblies.found) == 256
     assert "assemblies  256 found at crank" in str(assemblies)

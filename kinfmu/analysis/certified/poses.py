@@ -104,7 +104,8 @@ def closed_poses(plan: SolvePlan, limit: float = LIMIT) -> ClosedPoses:
         poses = _closing(companions, {}, constants, (names, poses), reasons)
         if poses.low.shape[1] > MOST:
             reasons.append(f"the search ended at {MOST} assemblies")
-            poses = poses[:, :MOST]
+            off = abs(np.sin(0.5 * (poses.middle - np.array([[at[name]] for name in names])))).max(axis=0)
+            poses = poses[:, np.argsort(off, kind="stable")[:MOST]]  # that of the anchor is among them
     poses = _closing(watches, steps, constants, (names, poses), reasons)
     count = poses.low.shape[1]
     values = {name: value.middle for name, value in constants.items()} | dict(zip(names, poses.middle, strict=True))
@@ -259,7 +260,7 @@ class _BlockSearch:
                 is_small = (boxes.radius / self.unit[:, None]).max(axis=0, initial=0.0) <= 0.5 * _LEAST
                 undecided += list(boxes.middle[:, is_small].T)
                 if len(undecided) > _UNDECIDED:
-                    self._give_up(f"its poses are not isolated near {self._place(undecided[0])}")
+                    self._give_up(f"poses are not isolated, or close to singular, near {self._place(undecided[0])}")
                     undecided = []
                     break
                 boxes, owner = self._halved(boxes[:, ~is_small], owner[~is_small])
