@@ -104,6 +104,7 @@ def test_a_six_bar_goes_together_as_often_as_circles_say() -> None:
         (slider_crank(), 2),
         (pushed_crank(), 2),
         (digger(), 4),
+        (kinfmu.load("parallel_jaw"), 8),  # a redundant gear, in some of them a turn away
         (chain(3), 8),
         (fourbar(4, 1, 3.5, 3, at=(300.0, -200.0)), 2),
     ],

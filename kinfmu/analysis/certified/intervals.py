@@ -17,6 +17,7 @@ from kinfmu.arrays import FloatArray
 from kinfmu.mechanism.laws.law import jumping_breaks
 from kinfmu.plan.equations.graph import Node, reachable
 from kinfmu.solver.python.curve import CurveData, Piece
+from kinfmu.solver.python.curve import curve as curve_value
 
 _LARGEST_ANGLE = 1e6  # [rad]; of larger ones sine and cosine are only known to be in [-1, 1]
 _ARC_MARGIN = 1e-12  # [rad]
@@ -366,7 +367,10 @@ def approximate(targets: Sequence[Node], values: Mapping[str, FloatArray], shape
         elif node.op == "symbol":
             at[node] = values[node.name]
         elif node.op == "curve":
-            at[node] = curve(Intervals(at[node.args[0]]), *node.curve).middle
+            data, derivative = node.curve
+            x = np.asarray(at[node.args[0]])
+            numbers = (curve_value(data, derivative, value) if math.isfinite(value) else math.nan for value in x.flat)
+            at[node] = np.fromiter(numbers, float, x.size).reshape(x.shape)
         else:
             at[node] = _NUMBERS[node.op](*(at[arg] for arg in node.args))
     return [at[target] for target in targets]
