@@ -1,40 +1,33 @@
-"""Assemblies: the distinct closed poses of a mechanism at its start driver values, and the search for them."""
+"""Assemblies: the distinct closed poses of a mechanism at its start driver values, and whether there may be others."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from itertools import islice
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.analysis.certified.poses import LIMIT, closed_poses
 from kinfmu.analysis.driver_path import degrees, driver_text, place_text, started
-from kinfmu.analysis.loops import Place
 from kinfmu.arrays import FloatArray
-from kinfmu.codegen.python import load_model
 from kinfmu.errors import AmbiguousStartError, AssemblyError, KinfmuError, listed
 from kinfmu.mechanism import Mechanism, Start
-from kinfmu.mechanism.drivers import Driver
-from kinfmu.mechanism.joints import Joint
-from kinfmu.mechanism.members import texts_of
-from kinfmu.mechanism.quantities.placement import body_of
-from kinfmu.plan import Block, SolvePlan, compile_plan, localized
+from kinfmu.plan import SolvePlan, compile_plan, localized
 from kinfmu.plan.anchor import find_anchor
-from kinfmu.plan.equations.assembly import SINGULAR, Assembled, find_assembly, start_values
+from kinfmu.plan.equations.assembly import Assembled, find_assembly, start_values
 from kinfmu.plan.equations.closing import CLOSED, close
 from kinfmu.plan.equations.system import System
 from kinfmu.plan.origin import in_world, relative_to
 from kinfmu.units import CoordinateName
 
-MOST = 64  # assemblies after which the search ends
+SEED = 1989
 _STARTS = 60  # random poses from which a mechanism without a plan is assembled
 _SPREAD = 2.0  # [sizes] to either side, range of random positions
 _LARGE = 150  # coordinates; more take minutes
-_SAME = 1e-6  # [rad, sizes of the mechanism or of a block]; poses and solutions closer than this count as one
+_SAME = 1e-6  # [rad, sizes]; poses closer than this count as one
 _APART = 1e-3  # [rad, sizes]; smallest difference that distinguishes assemblies in the report
 _STEPS = 4  # in which a pose is moved to nearby driver values
 _ADVISED = 8  # assemblies for which few start poses are searched
@@ -59,19 +52,30 @@ class Assemblies:
     """The assemblies found at these driver values, the file's first.
 
     drivers: values by name [rad or length]; distinguished_by: coordinates of which at least one differs between
-    any two; ended: how the search ended, as text.
+    any two; reasons: why there may be others; none: it is proved by interval arithmetic that there are no others.
     """
 
     mechanism: Mechanism
     drivers: Mapping[str, float] = field(hash=False)
     found: tuple[Assembly, ...]
     distinguished_by: tuple[CoordinateName, ...]
-    ended: str
+    reasons: tuple[str, ...]
+
+    @property
+    def complete(self) -> bool:
+        """True if it is proved that there are no other assemblies."""
+        return not self.reasons
+
+    @property
+    def ended(self) -> str:
+        """How the search ended, as text."""
+        return "; ".join(self.reasons) or "with the proof that there are no others"
 
     def as_json(self) -> dict[str, Any]:
-        """Return plain data: drivers, ended, distinguished_by, found (chosen, coordinates, start by body)."""
+        """Return plain data: drivers, complete, ended, distinguished_by, found (chosen, coordinates, start by body)."""
         return {
             "drivers": dict(self.drivers),
+            "complete": self.complete,
             "ended": self.ended,
             "distinguished_by": list(self.distinguished_by),
             "found": [
@@ -91,13 +95,13 @@ class Assemblies:
         return "\n".join(_lines(self))
 
 
-def find_assemblies(mechanism: Mechanism, plan: SolvePlan | None = None) -> Assemblies:
+def find_assemblies(mechanism: Mechanism, plan: SolvePlan | None = None, limit: float = LIMIT) -> Assemblies:
     """Return the assemblies found of a mechanism at its start driver values, independent of its start poses.
 
     Raise a KinfmuError if the mechanism cannot be planned, an AssemblyError if no assembly is found.
 
     plan: that of the mechanism; None if its start poses do not close or leave several branches. Poses that differ by
-    whole turns count as one.
+    whole turns count as one. limit: most time for a block of equations [s].
     """
     whole = replace(mechanism, coordinates="all")
     chosen = None
@@ -105,11 +109,15 @@ def find_assemblies(mechanism: Mechanism, plan: SolvePlan | None = None) -> Asse
         chosen, planned = plan.anchor.q, plan if plan.mechanism.coordinates == "all" else compile_plan(whole)
     else:
         planned = compile_plan(started(whole, _some_pose(whole)))
-    poses, ended = _search(planned)
+    closed = closed_poses(planned, limit)
+    names, reasons = planned.mechanism.coordinate_names, closed.reasons
+    at = [{**planned.fixed, **dict(zip(planned.outputs, pose, strict=True))} for pose in closed.outputs.tolist()]
+    poses = [relative_to(planned.origin, names, pose) for pose in at]
     if chosen is not None and all(_distance(planned, chosen, pose) > _SAME for pose in poses):
         poses.insert(0, chosen)
+        reasons = reasons or ("the pose of the file is not among those proved",)
     is_chosen = [chosen is not None and _distance(planned, chosen, pose) <= _SAME for pose in poses]
-    order = sorted(range(len(poses)), key=lambda k: (not is_chosen[k], [round(c, 6) for c in poses[k].tolist()]))
+    order = sorted(range(len(poses)), key=lambda k: (not is_chosen[k], _reduced(names, poses[k]).round(6).tolist()))
     poses, is_chosen = [poses[k] for k in order], [is_chosen[k] for k in order]
     apart = _distinguishing(planned, poses)
     targets = start_values(System(localized(mechanism)[0])).u  # where the start poses or the laws put the drivers
@@ -122,16 +130,7 @@ def find_assemblies(mechanism: Mechanism, plan: SolvePlan | None = None) -> Asse
         start = {} if is_chosen[k] else _choice(mechanism, planned, pose, chosen, undecided, is_advised=is_advised)
         found.append(Assembly(_named(planned, pose), is_chosen[k], start))
     drivers = {driver.name: float(u) for driver, u in zip(mechanism.drivers, planned.anchor.u, strict=True)}
-    return Assemblies(mechanism, drivers, tuple(found), apart, ended)
-
-
-def _search(plan: SolvePlan) -> tuple[list[FloatArray], str]:
-    """Return poses of all coordinates relative to the plan's origin, and how the search ended."""
-    names = plan.mechanism.coordinate_names
-    poses = [_reduced(names, pose) for pose in islice(AssemblySearch(plan).poses(), MOST)]
-    if len(poses) == MOST:
-        return poses, f"at {MOST} assemblies"
-    return poses, f"after {IN_VAIN} n^2 known solutions in a row, or {TRIES} n^2 tries, of each block of n unknowns"
+    return Assemblies(mechanism, drivers, tuple(found), apart, reasons)
 
 
 def _reduced(names: Sequence[CoordinateName], q: FloatArray) -> FloatArray:
@@ -193,7 +192,8 @@ def _choice(
     instead_of: the pose that the file's start poses lead to; undecided: whether start poses influence x, y, phi of
     each moving body, (bodies, 3). Others stay as in the file.
     """
-    named = _named(plan, pose)
+    world = in_world(plan.origin, pose)  # angles as they are: a redundant gear may count turns
+    named = dict(zip(plan.mechanism.coordinate_names, world.tolist(), strict=True))
     moved = undecided
     if instead_of is not None:
         moved = moved & (_apart(plan, instead_of, pose).reshape(-1, 3) > _APART)
@@ -310,7 +310,10 @@ def _lines(assemblies: Assemblies) -> Iterator[str]:
     given = {body.name: body.start for body in mechanism.bodies}
     apart = f", distinguished by {listed(assemblies.distinguished_by)}" if assemblies.distinguished_by else ""
     yield f"  assemblies  {len(assemblies.found)} found at {at}{apart}"
-    yield f"              there may be more: the search ended {assemblies.ended}"
+    if assemblies.complete:
+        yield "              complete: it is proved that there are no others"
+    for reason in assemblies.reasons:
+        yield f"              there may be more: {reason}"
     for k, one in enumerate(assemblies.found, start=1):
         values = [
             f"{name} {place_text(one.coordinates[name], 'rad' if name.is_angle else mechanism.length_unit)}"
@@ -333,127 +336,3 @@ def _start(given: Start, start: Start) -> str:
         if start._replace(**{key: getattr(given, key)}) == given:
             return f".{key} = {value}"
     return f" = {{ {listed(f'{key} = {value}' for key, value in entries.items())} }}"
-
-
-IN_VAIN = 30  # times the square of the unknowns: known solutions in a row after which the search of a block ends
-TRIES = 300  # times the same: most runs of Newton's method for a block
-SEED = 1989
-
-Coordinates = Mapping[str, float]
-
-
-class AssemblySearch:
-    """The search for the assemblies of a plan with all coordinates as outputs.
-
-    Each solution of a block is followed by the search for those of the blocks after it.
-    """
-
-    def __init__(self, plan: SolvePlan) -> None:
-        self._plan, self._model, self._rng = plan, load_model(plan), np.random.default_rng(SEED)
-        self._u, self._anchor = self._model.ANCHOR
-        self._rest = (0.0,) * len(self._anchor)
-        self._found: tuple[Any, ...] = ()  # what the model returned for the latest solution
-        mechanism = localized(plan.mechanism)[0]
-        at = dict(zip(mechanism.coordinate_names, plan.anchor.q.tolist(), strict=True))
-        self._blocks = [_BlockSpace(plan, mechanism, block, at) for block in plan.blocks if block.unknowns]
-
-    def poses(self) -> Iterator[FloatArray]:
-        """Yield all coordinates of each assembly, relative to the plan's origin: the anchor's first, each once.
-
-        Those that differ from the anchor's in the last blocks alone are the next ones.
-        """
-        anchor = np.array(self._anchor, dtype=float)
-        if not self._blocks:
-            yield self._pose(self._position(anchor, 0))
-            return
-        searches = [self._solutions(0, anchor)]
-        while searches:
-            z = next(searches[-1], None)
-            if z is None:
-                searches.pop()
-            elif len(searches) < len(self._blocks):
-                searches.append(self._solutions(len(searches), z))
-            elif self._found[3] <= CLOSED and self._found[6] <= CLOSED:  # redundant rows close too
-                yield self._pose(self._found)
-
-    def _solutions(self, number: int, z: FloatArray) -> Iterator[FloatArray]:
-        """Yield all unknowns with each regular solution of a block; first with the one near `z`."""
-        block, (start, end) = self._blocks[number], self._model.BLOCKS[number]
-        before: Coordinates = {}
-        if block.has_lengths:
-            q = self._pose(self._position(z, number - 1)).tolist()
-            before = dict(zip(self._plan.mechanism.coordinate_names, q, strict=True))
-        known: list[FloatArray] = []
-        trial, in_vain, extent = z, 0, (end - start) ** 2
-        for _ in range(TRIES * extent):
-            with suppress(ArithmeticError, ValueError):  # singular, or diverged
-                found = self._position(trial, number)
-                own = np.array(found[0][start:end])
-                if abs(found[1][number]) > SINGULAR:  # elsewhere links may fold without end
-                    in_vain += 1
-                    if in_vain > IN_VAIN * extent:
-                        return
-                    if all(block.distance(own, other) > _SAME for other in known):
-                        known.append(own)
-                        self._found, in_vain = found, 0
-                        yield np.array([*found[0][:end], *self._anchor[end:]])
-            trial = np.concatenate([z[:start], block.drawn(self._rng, before), z[end:]])
-
-    def _position(self, z: FloatArray, number: int) -> tuple[Any, ...]:
-        """Return what the model finds near unknowns `z` for the blocks up to a number; those after it are held."""
-        held = (1 << len(self._blocks)) - (1 << (number + 1))
-        found: tuple[Any, ...] = self._model.position(self._u, tuple(z.tolist()), self._rest, self._rest, -0.0, held)
-        return found
-
-    def _pose(self, found: tuple[Any, ...]) -> FloatArray:
-        names, plan = self._plan.mechanism.coordinate_names, self._plan
-        at = {**plan.fixed, **dict(zip(plan.outputs, self._model.outputs(found[-1]), strict=True))}
-        return relative_to(plan.origin, names, at)
-
-
-class _BlockSpace:
-    """Where the unknowns of a block may be: angles anywhere, bodies about the points that hold them.
-
-    has_lengths: False if all unknowns are angles.
-    """
-
-    def __init__(self, plan: SolvePlan, mechanism: Mechanism, block: Block, at: Coordinates) -> None:
-        """Take the block's own size from the points that its rows name, in a closed pose `at`."""
-        owners = {row.owner for row in (*block.rows, *block.assigned_by)}
-        own = {name.owner for name in block.coordinates}
-        members: list[Joint | Driver] = [*mechanism.joints, *mechanism.drivers]
-        points = mechanism.body_points
-        texts = {str(text) for one in members if one.name in owners for text in texts_of(one)}
-        names = sorted(texts & {*points}) or list(points)
-        places = [Place(body_of(name), *map(float, points[name])) for name in names]
-        spans = np.ptp([place.world(at) for place in places], axis=0) if places else (plan.size,)
-        self._unknowns = block.unknowns
-        self._is_angle = np.array([name.is_angle for name in block.unknowns])
-        self._scales = np.where(self._is_angle, 1.0, math.hypot(*spans) or plan.size)
-        self._holding = [place for place in places if place.body not in own] or places
-        self._middles = {body: _middle(body, places) for body in own}
-        self.has_lengths = not self._is_angle.all()
-
-    def drawn(self, rng: np.random.Generator, before: Coordinates) -> FloatArray:
-        """Return random unknowns; before: coordinates, of which those of the blocks before this one count."""
-        reach = np.where(self._is_angle, math.pi, rng.uniform())  # near the centre other solutions attract less
-        z = self._scales * reach * rng.uniform(-1.0, 1.0, len(self._unknowns))
-        if self.has_lengths:
-            at = {**before, **dict(zip(self._unknowns, z.tolist(), strict=True))}
-            centre = np.mean([place.world(before) for place in self._holding] or [(0.0, 0.0)], axis=0)
-            for k, name in enumerate(self._unknowns):
-                if not name.is_angle:  # the middle of the body's points is there, wherever its frame is
-                    at_rest = {**at, f"{name.owner}.x": 0.0, f"{name.owner}.y": 0.0}
-                    axis = ("x", "y").index(name.axis)
-                    z[k] += centre[axis] - self._middles[name.owner].world(at_rest)[axis]
-        return z
-
-    def distance(self, a: FloatArray, b: FloatArray) -> float:
-        """Return the largest difference of two solutions, modulo whole turns [rad, sizes of the block]."""
-        around = np.abs(np.remainder(b - a + math.pi, math.tau) - math.pi)
-        return float(np.where(self._is_angle, around, np.abs(b - a) / self._scales).max())
-
-
-def _middle(body: str, places: Sequence[Place]) -> Place:
-    own = [place for place in places if place.body == body] or [Place(body, 0.0, 0.0)]
-    return Place(body, sum(place.x for place in own) / len(own), sum(place.y for place in own) / len(own))

@@ -49,7 +49,49 @@ class BlockFormulas:
         return len(self.names)
 
 
-class Formulas:
+class PlanRows:
+    """The rows of a plan on one graph; coordinates that rows give outright are replaced by their formulas.
+
+    Args:
+        plan: The plan.
+
+    """
+
+    def __init__(self, plan: SolvePlan) -> None:
+        self.plan = plan
+        self.graph = Graph()
+        self._equals = _Equals(self.graph)
+        self._given: dict[str, Node] = {}
+        self._copies: dict[Node, Node] = {}
+
+    def inlined(self, nodes: Sequence[Node]) -> list[Node]:
+        """Return nodes of the plan as nodes of this graph."""
+        for node in reachable(nodes):
+            if node in self._copies:
+                continue
+            if node.op == "symbol":
+                copied = self._given.get(node.name) or self.graph.symbol(node.name)
+            else:
+                copied = self.graph.copy(node, *(self._copies[arg] for arg in node.args))
+            self._copies[node] = self._equals.first(copied)
+        return [self._copies[node] for node in nodes]
+
+    def gradient(self, nodes: Sequence[Node], name: str) -> tuple[Node, ...]:
+        """Return the derivatives of nodes with respect to a symbol."""
+        return tuple(self.graph.derivative(nodes, {self.graph.symbol(name): self.graph.constant(1.0)}))
+
+    def solved(self) -> Iterator[tuple[Block, int, list[Node]]]:
+        """Yield each block with unknowns, the place of its first unknown among all, and its residuals; once."""
+        place = 0
+        for block in self.plan.blocks:
+            for name, motion in block.assigned:
+                (self._given[name],) = self.inlined([motion[0]])
+            if block.unknowns:
+                yield block, place, self.inlined(block.residuals)
+                place += len(block.unknowns)
+
+
+class Formulas(PlanRows):
     """The formulas of a plan as functions of one number x: the value of its only driver, or the time of its run.
 
     Symbols are x and the unknowns by their contract names, the rates and accelerations of the predicted path by those
@@ -72,13 +114,9 @@ class Formulas:
     """
 
     def __init__(self, plan: SolvePlan, *, over_time: bool = False, varied: Collection[str] = ()) -> None:
-        self.plan = plan
+        super().__init__(plan)
         self.varied = varied
-        self.graph = Graph()
         self.constants = dict(plan.parameter_values)
-        self._equals = _Equals(self.graph)
-        self._given: dict[str, Node] = {}
-        self._copies: dict[Node, Node] = {}
         self._rates: dict[Node, Node] = {}
         if over_time:
             self.x = TIME
@@ -93,7 +131,7 @@ class Formulas:
             self._move(name, name.derivative(1), name.derivative(2))
         self.unknowns: tuple[str, ...] = plan.unknowns
         self.units = tuple(1.0 if name.is_angle else plan.size for name in plan.unknowns)
-        self.blocks = tuple(self._blocks(plan.blocks))
+        self.blocks = tuple(self._block(block.unknowns, place, rows) for block, place, rows in self.solved())
         self.outputs = tuple(self.along(self.inlined([motion.position for motion in plan.outputs_motion]), 2))
 
     def turned(self, number: int, direction: Sequence[float], at: Sequence[float]) -> Formulas:
@@ -140,37 +178,12 @@ class Formulas:
         self.names[name] = (rate, acceleration)
         self._rates |= {symbol(name): symbol(rate), symbol(rate): symbol(acceleration)}
 
-    def inlined(self, nodes: Sequence[Node]) -> list[Node]:
-        """Return nodes of the plan as nodes of this graph."""
-        for node in reachable(nodes):
-            if node in self._copies:
-                continue
-            if node.op == "symbol":
-                copied = self._given.get(node.name) or self.graph.symbol(node.name)
-            else:
-                copied = self.graph.copy(node, *(self._copies[arg] for arg in node.args))
-            self._copies[node] = self._equals.first(copied)
-        return [self._copies[node] for node in nodes]
-
     def along(self, nodes: Sequence[Node], orders: int = ORDERS) -> list[tuple[Node, ...]]:
         """Return each node with its derivatives along the predicted path."""
         rows = [tuple(nodes)]
         for _ in range(orders):
             rows.append(tuple(self.graph.derivative(rows[-1], self._rates)))
         return list(zip(*rows, strict=True))
-
-    def gradient(self, nodes: Sequence[Node], name: str) -> tuple[Node, ...]:
-        """Return the derivatives of nodes with respect to a symbol."""
-        return tuple(self.graph.derivative(nodes, {self.graph.symbol(name): self.graph.constant(1.0)}))
-
-    def _blocks(self, blocks: Sequence[Block]) -> Iterator[BlockFormulas]:
-        place = 0
-        for block in blocks:
-            for name, motion in block.assigned:
-                (self._given[name],) = self.inlined([motion[0]])
-            if block.unknowns:
-                yield self._block(block.unknowns, place, self.inlined(block.residuals))
-                place += len(block.unknowns)
 
     def _block(self, names: tuple[str, ...], place: int, residuals: Sequence[Node]) -> BlockFormulas:
         rows = tuple(zip(*self.along(residuals), strict=True))

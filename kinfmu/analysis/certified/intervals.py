@@ -17,8 +17,10 @@ from kinfmu.arrays import FloatArray
 from kinfmu.mechanism.laws.law import jumping_breaks
 from kinfmu.plan.equations.graph import Node, reachable
 from kinfmu.solver.python.curve import CurveData, Piece
+from kinfmu.solver.python.curve import curve as curve_value
 
 _LARGEST_ANGLE = 1e6  # [rad]; of larger ones sine and cosine are only known to be in [-1, 1]
+_ARC_MARGIN = 1e-12  # [rad]
 _SINE_ERROR = 2.0**-50  # of `_sine_and_cosine`
 # pi / 2 in four parts; whole numbers up to 2^20 times one of the first three are exact
 _QUARTER = (1.5707963267341256, 6.077100506303966e-11, 2.0222662487111665e-21, 8.4784276603689e-32)
@@ -365,7 +367,106 @@ def approximate(targets: Sequence[Node], values: Mapping[str, FloatArray], shape
         elif node.op == "symbol":
             at[node] = values[node.name]
         elif node.op == "curve":
-            at[node] = curve(Intervals(at[node.args[0]]), *node.curve).middle
+            data, derivative = node.curve
+            x = np.asarray(at[node.args[0]])
+            numbers = (curve_value(data, derivative, value) if math.isfinite(value) else math.nan for value in x.flat)
+            at[node] = np.fromiter(numbers, float, x.size).reshape(x.shape)
         else:
             at[node] = _NUMBERS[node.op](*(at[arg] for arg in node.args))
     return [at[target] for target in targets]
+
+
+# ---- contraction
+
+
+def contracted(
+    targets: Sequence[Node], values: Mapping[str, Intervals], names: Sequence[str]
+) -> tuple[list[Intervals], Any]:
+    """Return intervals of some symbols without parts in which no target can be 0, and where nothing is left.
+
+    Each operation is evaluated forward, then solved for its arguments backward (Benhamou et al., 1999, algorithm HC4).
+
+    Args:
+        targets: Nodes of one graph.
+        values: Intervals by the names of symbols; arrays that broadcast.
+        names: Of the symbols to contract.
+
+    Returns:
+        Their intervals; True where they are empty.
+
+    """
+    order = reachable(targets)
+    at: dict[Node, Intervals] = {}
+    moving: set[Node] = set()
+    for node in order:
+        if node.constant is not None:
+            at[node] = Intervals(np.full(1, node.constant))
+        elif node.op == "symbol":
+            at[node] = values[node.name]
+            if node.name in names:
+                moving.add(node)
+        elif node.op == "curve":
+            at[node] = curve(at[node.args[0]], *node.curve)
+        else:
+            at[node] = _OPERATIONS[node.op](*(at[arg] for arg in node.args))
+        if not moving.isdisjoint(node.args):
+            moving.add(node)
+    is_empty = np.zeros(1, dtype=bool)
+    for target in targets:
+        at[target] = at[target].intersection(interval(0.0))
+        is_empty = is_empty | (at[target].low > at[target].high)
+    for node in reversed(order):
+        for arg, solved in _solved_for(node, at) if node in moving and node.args else ():
+            if arg in moving:
+                at[arg] = at[arg].intersection(solved)
+                is_empty = is_empty | (at[arg].low > at[arg].high)
+    by_name = {node.name: at[node] for node in order if node.op == "symbol"}
+    return [by_name.get(name, values[name]) for name in names], is_empty
+
+
+def _solved_for(node: Node, at: Mapping[Node, Intervals]) -> list[tuple[Node, Intervals]]:
+    """Return enclosures of the arguments of an operation from its result and its other argument."""
+    whole, a, b = at[node], node.args[0], node.args[-1]
+    x, y = at[a], at[b]
+    if node.op == "+":
+        return [(a, whole - y), (b, whole - x)]
+    if node.op == "-":
+        return [(a, whole + y), (b, x - whole)]
+    if node.op == "neg":
+        return [(a, -whole)]
+    if node.op == "*" and a is b:
+        most = _up(np.sqrt(np.maximum(whole.high, 0.0)))
+        return [(a, Intervals(-most, most))]
+    if node.op == "*":
+        return [(a, whole / y), (b, whole / x)]
+    if node.op == "/":
+        return [(a, whole * y), (b, x / whole)]
+    if node.op == "sqrt":
+        return [(a, Intervals(np.maximum(whole.low, 0.0), np.maximum(whole.high, 0.0)).square())]
+    if node.op == "sin":
+        return [(a, _angles_of_sine(whole, x))]
+    if node.op == "cos":
+        quarter = Intervals(0.5 * math.pi, _up(0.5 * math.pi))
+        return [(a, _angles_of_sine(whole, x + quarter) - quarter)]
+    return []
+
+
+def _angles_of_sine(s: Intervals, x: Intervals) -> Intervals:
+    """Return the hull of the angles of intervals x whose sine is in s.
+
+    They are within [a, b] or [pi - b, pi - a], whole turns added, if sin(a) <= s <= sin(b) in [-pi/2, pi/2]. Of a
+    library's arc sine this is tested. Margins cover the rounding of turns.
+    """
+    quarter = 0.5 * math.pi
+    low = np.arcsin(np.clip(s.low, -1.0, 1.0)) - _ARC_MARGIN
+    high = np.arcsin(np.clip(s.high, -1.0, 1.0)) + _ARC_MARGIN
+    low = np.where((low > -quarter) & (sine(Intervals(low)).high <= s.low), low, -quarter) - _ARC_MARGIN
+    high = np.where((high < quarter) & (sine(Intervals(high)).low >= s.high), high, quarter) + _ARC_MARGIN
+    begin, end = np.full_like(x.low + low, np.inf), np.full_like(x.low + low, -np.inf)
+    for first, last in ((low, high), (math.pi - high - _ARC_MARGIN, math.pi - low + _ARC_MARGIN)):
+        margin = _ARC_MARGIN * (1.0 + x.magnitude)
+        before = np.ceil((x.low - margin - last) / math.tau) * math.tau + first - margin
+        after = np.floor((x.high + margin - first) / math.tau) * math.tau + last + margin
+        begin, end = np.minimum(begin, before), np.maximum(end, after)
+    is_plain = x.magnitude <= _LARGEST_ANGLE
+    return Intervals(np.where(is_plain, begin, -np.inf), np.where(is_plain, end, np.inf))
