@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import http.client
+import itertools
 import json
 import threading
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from kinfmu.page.editor import Drawing, answer, changed, new_text
 from kinfmu.page.editor.operations import MOST_OPERATIONS
 from kinfmu.page.player import PlayServer, PlaySource
 from kinfmu.page.player.server import LARGEST_BODY
