@@ -94,7 +94,9 @@ def with_open_numbers(mechanism: Mechanism, names: str | Sequence[str]) -> Mecha
     change = _opened(mechanism, chosen, _description)
     for name, those in used.items():
         if not those and name in GROUPS and name != "all":
-            raise RequestError(f"parameters: mechanism '{mechanism.name}' has no {name} that are not parameters already")
+            raise RequestError(
+                f"parameters: mechanism '{mechanism.name}' has no {name} that are not parameters already"
+            )
         if not those and name != "all":
             raise mechanism.settable.unknown(name, [*GROUPS, *numbers])
     return change.mechanism
