@@ -77,7 +77,8 @@ def build(
         Path of the file.
 
     Raises:
-        RequestError: If a choice or a number is unknown, or two choices exclude each other, or efforts do not determine the motion.
+        RequestError: If a choice or a number is unknown, or two choices exclude each other, or efforts do not determine
+            the motion.
         MechanismError: If the mechanism is not valid.
         AssemblyError: If the mechanism cannot be assembled.
         CompilerError: If no compiler is found.
