@@ -119,7 +119,7 @@ def _description(place: NumberPath) -> str:
     words = [*map(str, keys), AXES[last] if isinstance(last, int) else str(last)]
     if words[0] == "points":
         words[:2] = [f"point {words[1]}"]
-    owner = "Gravity" if table == "gravity" else f"{_MEMBERS[table]} {rest[0]}"
+    owner = "Gravity" if table == "gravity" else f"{_MEMBERS[str(table)]} {rest[0]}"
     return f"{owner}: {', '.join(words).replace('_', ' ')}"
 
 
