@@ -137,7 +137,7 @@ def _accuracy(mechanisms: tuple[str, ...], given: dict[str, int], folder: Path) 
         click.echo(f"left out: {line}", err=True)
     parts = page.parts(measured, near, rounds)
     click.echo("\n\n".join(parts.values()))
-    written = list(page.write(folder, parts, page.settings_page(measured, rounds)))
+    written = list(page.write(folder, parts, page.settings_table(measured)))
     try:
         written += charts.draw(folder, measured, near)
     except MissingPackageError as error:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from time import perf_counter, process_time
@@ -29,6 +29,7 @@ CHAIN_SAMPLES = 2000
 LENGTHS = (40.0, 20.0, 50.0, 50.0)  # ground, crank, coupler, rocker of the gallery's crank_rocker
 STEPS = (5, 15)  # [deg]
 CLOSED = "closed form by hand, vectorized"
+STORES = "as many numbers read and stored, without arithmetic"
 WHOLE = "crank-rocker, q, qd, qdd"
 ALONE = "the same, q alone"
 PYLINKAGE = "pylinkage, by numba: points, not angles"
@@ -46,6 +47,7 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES, loops: int = 1000) -> str:
     model = compiled_model(load("crank_rocker"), FOURBAR, engine="native")
     ways: dict[str, Callable[[], object]] = {
         CLOSED: closed_form(u, columns),
+        STORES: stores(u, columns),
         WHOLE: lambda: crank_rocker.sweep(driven, tables, reuse=result),
         "the same, tables by samples": lambda: crank_rocker.sweep(driven, by_samples, reuse=result),
         ALONE: lambda: crank_rocker.sweep(driven, (tables[0], None, None), reuse=result),
@@ -71,6 +73,10 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES, loops: int = 1000) -> str:
     lines = [f"{samples} samples of 1 degree, {rounds} rounds in turn; ns of processor time a sample"]
     lines += table(("", "median", "min", "max", "times closed form"), rows)
     medians = dict(zip(ways, (time.median for time in times), strict=True))
+    lines.append(
+        f"of the closed form {medians[STORES] / medians[CLOSED]:.2f}, and of the sweep "
+        f"{medians[STORES] / medians[WHOLE]:.2f}, is the time of reading and storing alone"
+    )
     lines.append(f"q alone takes {medians[ALONE] / medians[WHOLE]:.2f} of the time of q, qd, qdd")
     if PYLINKAGE in medians:
         lines.append(f"{PYLINKAGE}: {medians[PYLINKAGE] / medians[WHOLE]:.1f} times that time")
@@ -115,15 +121,25 @@ def _chain(rounds: int, count: int) -> list[str]:
 
 def closed_form(u: FloatArray, columns: FloatArray) -> Callable[[], object]:
     """Return a function that fills columns (15, n): FOURBAR at u (n,), rates and accelerations, by hand-written C."""
+    lengths = [ctypes.c_double(length) for length in LENGTHS]
+    return _by_hand("closed_form", u, columns, lengths)
+
+
+def stores(u: FloatArray, columns: FloatArray) -> Callable[[], object]:
+    """Return a function that fills columns (15, n) as fast as memory allows."""
+    return _by_hand("stores", u, columns)
+
+
+def _by_hand(name: str, u: FloatArray, columns: FloatArray, lengths: Sequence[object] = ()) -> Callable[[], object]:
+    """Return a function of closed_form.c that fills columns."""
     files = {"closed_form.c": Path(__file__).with_name("closed_form.c").read_text("utf-8")}
-    library = compiler.load(files | compiler.sources(("sincos.h",)), FLAGS)
+    function = getattr(compiler.load(files | compiler.sources(("sincos.h",)), FLAGS), name)
     ud, udd = np.ones(len(u)), np.zeros(len(u))
     pointers = [array.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for array in (u, ud, udd)]
     out = columns.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
-    lengths = [ctypes.c_double(length) for length in LENGTHS]
 
     def way() -> object:
-        library.closed_form(ctypes.c_int64(len(u)), *pointers, *lengths, out)
+        function(ctypes.c_int64(len(u)), *pointers, *lengths, out)
         return (u, ud, udd)  # to live as long as what points at them
 
     return way

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import csv
 import math
 import platform
 import re
 from collections.abc import Mapping, Sequence
+from io import StringIO
 from pathlib import Path
 
 from benchmarks.accuracy import Measured
 from benchmarks.engine import PREDICTORS, EngineSetting
 from benchmarks.engines import ENGINES
-from benchmarks.singular import DISTANCES, Near
+from benchmarks.singular import Near
 from kinfmu.errors import KinfmuError
 from kinfmu.mechanism import gallery
 
-PAGE, SETTINGS_PAGE = "accuracy.md", "accuracy-settings.md"
+PAGE, SETTINGS = "accuracy.md", "accuracy-settings.csv"
+SETTINGS_COLUMNS = (
+    *("mechanism", "engine", "usual", "predictor", "newton", "stops_at"),
+    *("us_a_sample", "lower_quartile", "upper_quartile", "q", "qd", "qdd"),
+)
 PARTS = ("conditions", "engines", "singular points")
-SHOWN = (1e-1, 1e-3, 1e-5, 1e-8)  # [rad], of DISTANCES
 
 
 def begin(name: str) -> str:
@@ -38,8 +43,8 @@ def check(folder: Path) -> None:
 
 
 def write(folder: Path, parts: Mapping[str, str], settings: str) -> tuple[Path, ...]:
-    """Fill the generated parts of PAGE in a folder, or make a page of them alone; also write SETTINGS_PAGE."""
-    page, other = folder / PAGE, folder / SETTINGS_PAGE
+    """Fill the generated parts of PAGE in a folder, or make a page of them alone; also write SETTINGS."""
+    page, other = folder / PAGE, folder / SETTINGS
     text = page.read_text(encoding="utf-8") if page.exists() else _bare()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -106,54 +111,39 @@ def _titled(case: str) -> str:
     return f"[`{case}`](../fmus/{case}/README.md)" if case in gallery.names() else case
 
 
-def settings_page(measured: Sequence[Measured], rounds: int) -> str:
-    """Return a page with every measurement."""
-    parts = [
-        "# Run time against error: every engine in every setting",
-        f"Written by `scripts/bench`; [accuracy.md](accuracy.md) explains it. {conditions(rounds)} Errors are "
-        "the largest over the samples of a mechanism's reference.csv, relative to each column's largest magnitude.",
-    ]
-    for case in dict.fromkeys(one.case for one in measured):
-        lines = [
-            "| engine | predictor | Newton | stops at | us a sample | quartiles | q | qd | qdd |",
-            f"|{'---|' * 9}",
-        ]
-        lines += [f"| {' | '.join(_row(one))} |" for one in measured if one.case == case]
-        parts += [f"## {gallery.load(case).title}", "\n".join(lines)]
-    return "\n\n".join(parts) + "\n"
+def settings_table(measured: Sequence[Measured]) -> str:
+    """Return every measurement as CSV."""
+    text = StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(SETTINGS_COLUMNS)
+    for one in measured:
+        of = one.microseconds
+        table.writerow(
+            (
+                *row_head(one.case, one.engine, one.setting, is_usual=one.is_usual),
+                *map(duration, (of.median, of.lower, of.upper)),
+                *map(number, one.errors),
+            )
+        )
+    return text.getvalue()
 
 
-def _row(one: Measured) -> tuple[str, ...]:
-    of = one.microseconds
-    return (
-        *row_head(one.engine, one.setting, is_usual=one.is_usual),
-        duration(of.median),
-        f"{duration(of.lower)} to {duration(of.upper)}",
-        *map(number, one.errors),
-    )
-
-
-def row_head(engine: str, setting: EngineSetting, *, is_usual: bool) -> tuple[str, str, str, str]:
-    """Return the cells that state what was measured: the usual setting of an engine is bold."""
-    name = f"**{engine}**" if is_usual else engine
+def row_head(case: str, engine: str, setting: EngineSetting, *, is_usual: bool) -> tuple[str, ...]:
+    """Return the cells that state what was measured."""
+    first = (case, engine, "yes" if is_usual else "")
     if engine == "pylinkage":
-        return name, "", "closed forms", ""
-    return name, PREDICTORS[setting.predictor], "chord" if setting.chord else "full", setting.stop
+        return (*first, "", "closed forms", "")
+    return (*first, PREDICTORS[setting.predictor], "chord" if setting.chord else "full", setting.stop)
 
 
 def singular_table(near: Sequence[Near]) -> str:
-    """Return tables of the errors of q, qd, qdd toward a singular point, at it and beyond, one line an engine."""
-    shown = [min(range(len(DISTANCES)), key=lambda k: abs(math.log(DISTANCES[k] / d))) for d in SHOWN]
-    heads = [*(f"{d:.0e}" for d in SHOWN), "at it", f"{SHOWN[-1]:.0e} beyond", f"{SHOWN[0]:.0e} beyond", "us a sample"]
-    parts = []
-    for point in dict.fromkeys(one.point for one in near):
-        lines = [f"| {point} | {' | '.join(heads)} |", f"|{'---|' * (len(heads) + 1)}"]
-        for one in (one for one in near if one.point == point):
-            samples = [*(one.before[k] for k in shown), one.at, one.beyond[shown[-1]], one.beyond[shown[0]]]
-            cells = [", ".join(number(float(error)) for error in sample) for sample in samples]
-            lines.append(f"| {one.engine} | {' | '.join(cells)} | {duration(one.microseconds.median)} |")
-        parts.append("\n".join(lines))
-    return "\n\n".join(parts)
+    """Return a table of the errors of q, qd, qdd at each singular point, one line an engine."""
+    points = list(dict.fromkeys(one.point for one in near))
+    errors = {(one.engine, one.point): ", ".join(number(float(error)) for error in one.at) for one in near}
+    lines = [f"| | {' | '.join(points)} |", f"|---|{'---|' * len(points)}"]
+    engines = dict.fromkeys(one.engine for one in near)
+    lines += [f"| {engine} | {' | '.join(errors.get((engine, point), '') for point in points)} |" for engine in engines]
+    return "\n".join(lines)
 
 
 def duration(microseconds: float) -> str:

@@ -2,6 +2,7 @@
 
     KinfmuError
     |-- RequestError            a request is invalid: an unknown name, a wrong value, a wrong time span
+    |   |-- TooLargeError       the mechanism is valid, but too large for what is requested
     |-- MechanismError          the mechanism as written is invalid: file, table, key and what would be valid
     |   |-- InconsistentError   a constraint contradicts the others, by `gap`
     |   |-- MobilityError       drivers and degrees of freedom do not match
@@ -39,6 +40,10 @@ class KinfmuError(Exception):
 
 class RequestError(KinfmuError):
     """An invalid request: an unknown name or a wrong value; on the command line: wrong usage."""
+
+
+class TooLargeError(RequestError):
+    """A valid mechanism that is too large for what is requested; on the command line no wrong usage."""
 
 
 class MechanismError(KinfmuError):

@@ -31,14 +31,21 @@ class BeingWrittenError(OSError):
         self.strerror = self.args[0]
 
 
-def write_whole(path: str | Path, data: bytes) -> None:
-    """Write a file; an OSError leaves an older file unchanged. A device such as /dev/stdout is written to directly."""
+def write_whole(path: str | Path, data: bytes, *, is_durable: bool = False) -> None:
+    """Write a file; an OSError leaves an older file unchanged. A device such as /dev/stdout is written to directly.
+
+    is_durable: True to return only when the file is on the disk, so that a power failure loses neither content.
+    """
     path = Path(path)
     if path.exists() and not path.is_file():
         path.write_bytes(data)
         return
-    with replacement(Path(os.path.realpath(path))) as temporary:  # a link stays a link
-        temporary.write_bytes(data)
+    target = Path(os.path.realpath(path))  # a link stays a link
+    with replacement(target) as temporary, temporary.open("wb") as file:
+        file.write(data)
+        if is_durable:
+            file.flush()
+            os.fsync(file.fileno())
 
 
 @contextmanager
@@ -67,7 +74,7 @@ def replacement(target: Path) -> Iterator[Path]:
         made = make_folder(target.parent)
         temporary.open("xb").close()  # not tempfile: its files are readable by their owner only
         yield temporary
-        with _alone_in(target.parent):
+        with lock_folder(target.parent):
             check_is_free(target)
             temporary.replace(target)
         made = []
@@ -123,7 +130,7 @@ def check_is_free(target: Path) -> None:
 
 
 @contextmanager
-def _alone_in(folder: Path) -> Iterator[None]:
+def lock_folder(folder: Path) -> Iterator[None]:
     """Lock a folder against other processes that replace files in it; after PATIENCE go on without the lock."""
     descriptor = -1
     if fcntl:

@@ -1,16 +1,21 @@
-"""Processes of this machine that work for this one, and how many of them are worth starting."""
+"""Threads and processes that work for this one, and how many of them are worth starting."""
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
-from concurrent.futures import Executor
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from kinfmu.errors import KinfmuError, RequestError
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+_Part = TypeVar("_Part")
+_Result = TypeVar("_Result")
 
 
 class WorkerLostError(KinfmuError):
@@ -26,6 +31,16 @@ def require_workers(workers: object) -> None:
     """Raise a RequestError for a number of workers that is no positive whole number."""
     if isinstance(workers, bool) or not (isinstance(workers, int) and workers > 0):
         raise RequestError(f"workers = {workers!r} must be a positive whole number")
+
+
+def in_threads(work: Callable[[_Part], _Result], parts: Sequence[_Part], threads: int) -> list[_Result]:
+    """Return the results of a function for some parts, computed by so many threads."""
+    if threads <= 1 or len(parts) <= 1:
+        return [work(part) for part in parts]
+    from concurrent.futures import ThreadPoolExecutor
+
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(work, parts))
 
 
 @contextmanager

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise
-from statistics import median_low
 from typing import Any, NamedTuple
 
 from kinfmu.analysis.driver_path import DriverPath, law_values
@@ -143,7 +142,9 @@ def _long_links(lengths: Mapping[str, float], unit: str) -> Iterator[str]:
     """Yield a line for moving bodies that are much longer between their joints than most."""
     if len(lengths) < _LEAST_LINKS:
         return
-    usual = median_low(lengths.values())  # of four links two may be in another unit
+    usual = sorted(lengths.values())[
+        (len(lengths) - 1) // 2
+    ]  # the lower median: of four links two may be in another unit
     for body, length in lengths.items():
         if body != GROUND_NAME and length > TOO_LONG * usual:
             yield (
@@ -161,13 +162,12 @@ def _still_bodies(mechanism: Mechanism, paths: Sequence[DriverPath]) -> Iterator
     size = size_of(mechanism)
     moves: set[str] = set()
     for path in paths:
-        first = path.coordinates(path.poses[0])
-        for pose in path.poses[1:]:
-            now = path.coordinates(pose)
+        first, *others = path.pose_coordinates
+        for now in others:
             moves |= {
                 name.owner
                 for name in path.plan.outputs
-                if abs(now[name] - first[name]) > _STILL * (1.0 if name.is_angle else size)
+                if name.owner not in moves and abs(now[name] - first[name]) > _STILL * (1.0 if name.is_angle else size)
             }
     welded = _welded(mechanism)
     resting = _resting(mechanism, moves)
@@ -227,7 +227,7 @@ def toggle_positions(
 
 def _in_line_at(path: DriverPath, toggle: _Toggle) -> Iterator[float]:
     """Yield the driver values on a path at which the sine of a toggle position is 0."""
-    sines = [_sine(toggle, path.coordinates(pose)) for pose in path.poses]
+    sines = [_sine(toggle, q) for q in path.pose_coordinates]
     for pose, sine in zip(path.poses, sines, strict=True):
         if abs(sine) <= _IN_LINE:
             yield pose.u[0]

@@ -80,6 +80,21 @@ class DriverPath:
         return low + (0.0 if period - ahead < _SAME_PLACE else ahead)
 
     @cached_property
+    def pose_coordinates(self) -> tuple[dict[str, float], ...]:
+        """`coordinates` of each of the poses."""
+        return tuple(map(self.coordinates, self.poses))
+
+    @cached_property
+    def fine_coordinates(self) -> tuple[dict[str, float], ...]:
+        """`coordinates` of each of the fine poses."""
+        return tuple(map(self.coordinates, self.fine_poses))
+
+    @cached_property
+    def fine_speeds(self) -> tuple[dict[str, float], ...]:
+        """`speeds` of each of the fine poses."""
+        return tuple(map(self.speeds, self.fine_poses))
+
+    @cached_property
     def fine_poses(self) -> tuple[Pose, ...]:
         """Poses close enough to find the extremes of a quantity between them, up to the limits, in the same order."""
         parts = math.ceil(_MANY / len(self.poses))
@@ -88,7 +103,7 @@ class DriverPath:
             a, b = before.u[0], after.u[0]
             between = (self.solver.solve(before, (a + (b - a) * k / parts,)) for k in range(1, parts))
             fine += [*(pose for pose in between if pose.good), after]
-        low, high = (() if limit is None else self._before(limit) for limit in (self.low, self.high))
+        low, high = (() if limit is None else self._before(limit) for limit in self._limits)
         return (*low[::-1], *fine, *high)
 
     def _before(self, limit: Limit) -> tuple[Pose, ...]:
@@ -97,7 +112,11 @@ class DriverPath:
         apart = start.u[0] - limit.u[0]
         parts = [(k / _NEAR_END) ** 2 for k in range(_NEAR_END - 1, 0, -1)]
         poses = [self.solver.solve(start, (limit.u[0] + part * apart,)) for part in parts]
-        last = [pose for pose in self._near(limit)[:1] if abs(pose.u[0] - limit.u[0]) < parts[-1] * abs(apart)]
+        last = [
+            pose
+            for pose in self._near_limits[limit is self.high][:1]
+            if abs(pose.u[0] - limit.u[0]) < parts[-1] * abs(apart)
+        ]
         return tuple(pose for pose in (*poses, *last) if pose.good)
 
     def zero(self, value: Callable[[Pose], float], low: Pose, high: Pose) -> Pose:
@@ -127,11 +146,21 @@ class DriverPath:
 
         They are a + b sqrt(s) + c s at a distance s from the limit; three poses near it give a.
         """
-        near = self._near(limit)
+        near = self._near_limits[limit is self.high]
         if len(near) < 3:
             return self.coordinates(self.poses[0 if limit is self.low else -1])
         first, second, third = map(self.coordinates, near)
         return {name: 3.0 * first[name] - 3.0 * second[name] + third[name] for name in first}
+
+    @property
+    def _limits(self) -> tuple[Limit | None, Limit | None]:
+        return self.low, self.high
+
+    @cached_property
+    def _near_limits(self) -> tuple[list[Pose], list[Pose]]:
+        """Poses near the lower and near the upper limit; none where none was met."""
+        low, high = ([] if limit is None else self._near(limit) for limit in self._limits)
+        return low, high
 
     def _near(self, limit: Limit) -> list[Pose]:
         """Return poses at s, 4 s and 9 s before a limit; fewer if they are unreachable."""

@@ -7,7 +7,8 @@ from typing import Any
 
 from kinfmu.analysis.cams import CamFindings
 from kinfmu.analysis.design_notes import TogglePosition
-from kinfmu.analysis.drivers import DriverAdvice
+from kinfmu.analysis.doctor import Advice
+from kinfmu.analysis.drivers import DriverMismatch
 from kinfmu.analysis.loading import Loading
 from kinfmu.analysis.measuring import Measurements
 from kinfmu.analysis.singular import DriverRange, SingularPoint
@@ -32,10 +33,11 @@ class Findings:
     """What a check finds.
 
     problem: the error that prevents solving or making a cam, None if there is none;
-    ranges: one per driver, in file order; loops: the four-bars and slider-cranks among the joints; advice: on drivers,
-    None where drivers and degrees of freedom match; notes: further findings, one line each;
+    ranges: one per driver, in file order; loops: the four-bars and slider-cranks among the joints; mismatch: of
+    drivers and degrees of freedom, None where they match; notes: further findings, one line each;
     measured: values of the measures, None without measures; loading: efforts and reactions, None without masses, loads;
     cams: one per cam joint; left_out: invalid entries of a file that is reported in part, such as '[drivers.crank]';
+    advice: changes of the file, each tried, where the mechanism does not move as meant;
     dyads: further pairs of links that have a transmission angle; toggles: toggle positions that the run crosses.
     """
 
@@ -45,7 +47,7 @@ class Findings:
     plan: SolvePlan | None
     ranges: tuple[DriverRange, ...] = ()
     loops: tuple[NamedLoop, ...] = ()
-    advice: DriverAdvice | None = None
+    mismatch: DriverMismatch | None = None
     notes: tuple[str, ...] = ()
     measured: Measurements | None = None
     loading: Loading | None = None
@@ -53,6 +55,7 @@ class Findings:
     left_out: tuple[str, ...] = ()
     dyads: tuple[NamedDyad, ...] = ()
     toggles: tuple[TogglePosition, ...] = ()
+    advice: tuple[Advice, ...] = ()
 
     @property
     def mobility(self) -> int:
@@ -116,8 +119,10 @@ class Findings:
         dyads (pairs of links in none of the loops that have a transmission angle): links (of a guided link, it and its
         slider or guiding joint), lengths, joint (where they meet, or null), between (bodies), transmission.
         toggles (positions of links in line that the run crosses): driver, value, position (text).
-        advice: null if drivers and degrees of freedom match, else missing (number), surplus (name, implied_by), loose
-        (coordinates), suggestions (name, and the keys of the driver's table).
+        mismatch: null if drivers and degrees of freedom match, else missing (number), surplus (name, implied_by), loose
+        (coordinates).
+        advice (none for a sound mechanism): text, edits of the file ({"put": keys of nested tables, "value"} or
+        {"remove": keys}), leads_to (what the changed mechanism does).
         measures: over (the motion, as text), values: name, type, value, unit, driver, at (driver values), at_unit,
         reason (why the value is null), refused: reason by name; null without measures.
         forces, only with masses or loads: over (the motion, as text), gravity ([x, y] in m/s2 or null), efforts,
@@ -167,7 +172,8 @@ class Findings:
             "loops": [loop.as_json() for loop in self.loops],
             "dyads": [dyad.as_json() for dyad in self.dyads],
             "toggles": [toggle.as_json() for toggle in self.toggles],
-            "advice": None if self.advice is None else self.advice.as_json(),
+            "mismatch": None if self.mismatch is None else self.mismatch.as_json(),
+            "advice": [one.as_json() for one in self.advice],
             "measures": None if self.measured is None else self.measured.as_json(),
             **({} if self.loading is None else {"forces": self.loading.as_json()}),
             **({"cams": [cam.as_json() for cam in self.cams]} if self.cams else {}),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 from kinfmu.mechanism import Mechanism
@@ -29,19 +30,29 @@ class Place(NamedTuple):
 
     def world(self, q: Mapping[str, float]) -> tuple[float, float]:
         """Return the world coordinates of the place; q: coordinates by name."""
-        if self.body == GROUND_NAME:
-            return self.x, self.y
-        x, y, phi = (q[f"{self.body}.{axis}"] for axis in ("x", "y", "phi"))
+        body, x, y = self
+        if body == GROUND_NAME:
+            return x, y
+        of_x, of_y, of_phi = _names_of(body)
+        phi = q[of_phi]
         c, s = math.cos(phi), math.sin(phi)
-        return x + c * self.x - s * self.y, y + s * self.x + c * self.y
+        return q[of_x] + c * x - s * y, q[of_y] + s * x + c * y
 
-    def velocity(self, q: Mapping[str, float], qd: Mapping[str, float]) -> tuple[float, float]:
-        """Return the rates of the world coordinates; qd: rates of the coordinates by name."""
-        if self.body == GROUND_NAME:
-            return 0.0, 0.0
+    def motion(self, q: Mapping[str, float], qd: Mapping[str, float]) -> tuple[float, float, float, float]:
+        """Return the world coordinates of the place and their rates; qd: rates of the coordinates by name."""
         x, y = self.world(q)
-        vx, vy, omega = (qd[f"{self.body}.{axis}"] for axis in ("x", "y", "phi"))
-        return vx - omega * (y - q[f"{self.body}.y"]), vy + omega * (x - q[f"{self.body}.x"])
+        body = self.body
+        if body == GROUND_NAME:
+            return x, y, 0.0, 0.0
+        of_x, of_y, of_phi = _names_of(body)
+        omega = qd[of_phi]
+        return x, y, qd[of_x] - omega * (y - q[of_y]), qd[of_y] + omega * (x - q[of_x])
+
+
+@lru_cache(maxsize=1024)
+def _names_of(body: str) -> tuple[str, str, str]:
+    """Return the names of a body's coordinates, which are looked up at every pose."""
+    return f"{body}.x", f"{body}.y", f"{body}.phi"
 
 
 class Link(NamedTuple):

@@ -7,8 +7,9 @@ from dataclasses import replace
 from kinfmu.analysis.assemblies import Assemblies, find_assemblies
 from kinfmu.analysis.cams import cam_findings
 from kinfmu.analysis.design_notes import motion_notes, near_pivots, part_notes, toggle_positions, unused_points
+from kinfmu.analysis.doctor import improvement, is_doubtful, treatment
 from kinfmu.analysis.driver_path import follow
-from kinfmu.analysis.drivers import INSTEAD, DriverAdvice, clearer_problem, driver_advice
+from kinfmu.analysis.drivers import DriverMismatch, clearer_problem, driver_mismatch
 from kinfmu.analysis.file_notes import file_notes, run_notes, start_notes
 from kinfmu.analysis.findings import Findings
 from kinfmu.analysis.loading import loading
@@ -88,10 +89,11 @@ def check(mechanism: Mechanism, *, written: Mechanism | None = None) -> Report:
         if (rest := _without_load(mechanism, problem.data.get("load"))) is not None:
             return leaving_out(check(rest[0], written=written), problem, rest[1])
         notes += near_pivots(mechanism) if isinstance(problem, AssemblyError) else ()
-        advice = driver_advice(system, redundancy)
+        mismatch = driver_mismatch(system, redundancy)
         loops = find_named_loops(mechanism, redundancy, ())
-        problem = _after_probable_cause(clearer_problem(problem, system, redundancy, advice), system, advice)
-        return Report(mechanism, redundancy, problem, None, (), loops, advice, tuple(notes))
+        advice = tuple(treatment(mechanism, system, redundancy, problem))
+        problem = _after_probable_cause(clearer_problem(problem, redundancy, mismatch), system, mismatch)
+        return Report(mechanism, redundancy, problem, None, (), loops, mismatch, tuple(notes), advice=advice)
     notes += start_notes(system, redundancy.assembly.start)
     paths = []
     for number, driver in enumerate(mechanism.drivers):
@@ -100,17 +102,20 @@ def check(mechanism: Mechanism, *, written: Mechanism | None = None) -> Report:
         except KinfmuError as reason:
             notes.append(f"{driver.name} cannot be followed alone: {reason}")
     ranges = tuple(driver_range(path) for path in paths)
-    notes += run_notes(plan, ranges)
+    of_motion = [*run_notes(plan, ranges), *motion_notes(mechanism, paths)]
     loops = find_named_loops(mechanism, redundancy, paths)
     further = find_dyads(mechanism, redundancy, paths, loops)
-    notes += motion_notes(mechanism, paths)
+    notes += of_motion
     cams = cam_findings(plan, paths)
     notes += [cam.note() for cam in cams if cam.note()]
     cut = next((problem for problem in (cam.problem() for cam in cams) if problem is not None), None)
     measured = measurements(mechanism, ranges)
     forces = loading(plan, ranges, cams)
     report = Report(mechanism, redundancy, cut, plan, ranges, loops, None, tuple(notes), measured, forces, cams)
-    return replace(report, dyads=further, toggles=toggle_positions(mechanism, paths, loops))
+    is_in_doubt = bool(of_motion) or is_doubtful(system, redundancy)
+    toggles = toggle_positions(mechanism, paths, loops)
+    advice = tuple(improvement(plan, system, redundancy)) if is_in_doubt else ()
+    return replace(report, dyads=further, toggles=toggles, advice=advice)
 
 
 def leaving_out(report: Report, problem: KinfmuError, left_out: tuple[str, ...]) -> Report:
@@ -136,16 +141,15 @@ def _without_load(mechanism: Mechanism, name: object) -> tuple[Mechanism, tuple[
     return replace(mechanism, loads=loads, measures=tuple(kept)), tuple(left_out)
 
 
-def _after_probable_cause(problem: KinfmuError, system: System, advice: DriverAdvice | None) -> KinfmuError:
+def _after_probable_cause(problem: KinfmuError, system: System, mismatch: DriverMismatch | None) -> KinfmuError:
     """Return an error of mobility after its probable cause: a joint at a wrong point, which leaves another unused."""
     if not isinstance(problem, MobilityError | InconsistentError):
         return problem
     opened = open_joints_text(system, start_from_poses(system).q)
-    is_held = advice is not None and any(not surplus.implied_by for surplus in advice.surplus)
+    is_held = mismatch is not None and any(not surplus.implied_by for surplus in mismatch.surplus)
     unused = unused_points(system.mechanism, of_joints=True) if opened or is_held else ""
     causes = [f"in the start poses of the file {opened}"] if opened else []
     causes += [unused] if unused else []
     if not causes:
         return problem
-    fault, _, _ = str(problem).partition(INSTEAD)  # another driver would hide the cause
-    return type(problem)("; ".join([*causes, fault]), **problem.data)
+    return type(problem)("; ".join([*causes, str(problem)]), **problem.data)

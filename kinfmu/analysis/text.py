@@ -39,7 +39,21 @@ class ReportLine(NamedTuple):
 def findings(report: Findings) -> list[ReportLine]:
     """Return the findings in order."""
     found: list[ReportLine] = []
-    for parts in (_count, _rows, _plan, _advice, _loops, _dyads, _motion, _toggles, _cams, _measures, _forces, _notes):
+    for parts in (
+        _count,
+        _rows,
+        _plan,
+        _mismatch,
+        _loops,
+        _dyads,
+        _motion,
+        _toggles,
+        _cams,
+        _measures,
+        _forces,
+        _notes,
+        _advice,
+    ):
         found += parts(report)
     if report.problem is not None:
         found.append(ReportLine("problem", str(report.problem)))
@@ -110,28 +124,25 @@ def _plan(report: Findings) -> Iterator[ReportLine]:
     yield from _rest(report.blocks, MOST_SHOWN, "blocks")
 
 
-def _advice(report: Findings) -> Iterator[ReportLine]:
-    advice = report.advice
-    if advice is None:
+def _mismatch(report: Findings) -> Iterator[ReportLine]:
+    mismatch = report.mismatch
+    if mismatch is None:
         return
-    for surplus in advice.surplus:
+    for surplus in mismatch.surplus:
         by = f"{listed(surplus.implied_by)} and the joints" if surplus.implied_by else "the joints alone"
-        cure = "drive another quantity" if advice.missing else "remove it"
-        yield ReportLine("surplus", f"driver {surplus.name}: {by} determine what it drives; {cure}")
-    if advice.missing:
-        needed = f"{advice.missing} more driver{'s' * (advice.missing > 1)} needed"
+        yield ReportLine("surplus", f"driver {surplus.name}: {by} determine what it drives")
+    if mismatch.missing:
+        needed = f"{mismatch.missing} more driver{'s' * (mismatch.missing > 1)} needed"
         more = needed if report.mobility else "nothing drives"
-        yield ReportLine("loose", f"{some(advice.loose)}: {more}")
-    for name in advice.stiff:
-        yield ReportLine("could be", f'[joints.{name}] type = "revolute" in place of "fixed", which leaves no motion')
-    if advice.idle:
-        yield ReportLine(
-            "could omit",
-            f"[bodies.{advice.idle}]: it moves alone and no other body follows, such as a roller on its pin; give its "
-            "joints the point of the body that carries it",
-        )
-    for suggestion in advice.suggestions:
-        yield ReportLine("could add", str(suggestion))
+        yield ReportLine("loose", f"{some(mismatch.loose)}: {more}")
+
+
+def _advice(report: Findings) -> Iterator[ReportLine]:
+    for one in report.advice:
+        yield ReportLine("advice", one.text)
+        yield ReportLine("", f"leads to: {one.leads_to}")
+        for line in one.toml_lines():
+            yield ReportLine("", f"    {line}")
 
 
 def _loops(report: Findings) -> Iterator[ReportLine]:

@@ -108,7 +108,7 @@ def dyad_angle(path: DriverPath, dyad: Dyad) -> tuple[TransmissionRange, tuple[P
     None if the driver does not move the links relative to each other, or if their other pins are not on bodies that
     are solved before both links.
     """
-    places = _block_of(path.plan)
+    places = path.plan.block_of
     own = {dyad.first.name, dyad.second.name}
     axes = ("phi",) if dyad.direction is None else ("x", "y")
     blocks = [places.get(f"{dyad.first.name}.phi"), *(places.get(f"{dyad.second.name}.{axis}") for axis in axes)]
@@ -174,7 +174,7 @@ def _led_four_bar(plan: SolvePlan, loop: FourBar) -> tuple[str, str, _Cosine, bo
 
 def is_led_by_last(plan: SolvePlan, loop: FourBar) -> bool:
     """Return True if the last link of a four-bar is solved before the others."""
-    places = _block_of(plan)
+    places = plan.block_of
     first, coupler, last = (places.get(f"{name}.phi") for name in loop.links)
     return _is_before(last, coupler, first)
 
@@ -184,7 +184,7 @@ def _led_slider_crank(plan: SolvePlan, loop: SliderCrank) -> tuple[str, str, _Co
 
     cos mu = n.(S - P) / l        n: normal of the slide
     """
-    places = _block_of(plan)
+    places = plan.block_of
     crank, rod = (places.get(f"{link.name}.phi") for link in (loop.crank, loop.rod))
     slider = None
     if loop.slider != loop.rod.name:
@@ -206,11 +206,6 @@ def _drives_end(plan: SolvePlan, loop: SliderCrank) -> bool:
     )
 
 
-def _block_of(plan: SolvePlan) -> dict[str, int]:
-    """Return the number of the block in which each coordinate is solved."""
-    return {name: k for k, block in enumerate(plan.blocks) for name in block.coordinates}
-
-
 def _is_before(leading: int | None, *others: int | None) -> bool:
     """Return True if a coordinate is solved in an earlier block than the others; None is no coordinate."""
     later = [other for other in others if other is not None]
@@ -225,8 +220,7 @@ def _opposite(b: float, c: float, p: Place, q: Place) -> _Cosine:
         return (b * b + c * c - (qx - px) ** 2 - (qy - py) ** 2) / (2.0 * b * c)
 
     def slope(at: Coordinates, rates: Coordinates) -> float:
-        (px, py), (qx, qy) = p.world(at), q.world(at)
-        (pu, pv), (qu, qv) = p.velocity(at, rates), q.velocity(at, rates)
+        (px, py, pu, pv), (qx, qy, qu, qv) = p.motion(at, rates), q.motion(at, rates)
         return -((qx - px) * (qu - pu) + (qy - py) * (qv - pv)) / (b * c)
 
     return _Cosine(value, slope)
@@ -241,7 +235,7 @@ def _against_normal(p: Place, s: Place, length: float, direction: float) -> _Cos
         return (n[0] * (sx - px) + n[1] * (sy - py)) / length
 
     def slope(q: Coordinates, qd: Coordinates) -> float:
-        vx, vy = p.velocity(q, qd)
+        _, _, vx, vy = p.motion(q, qd)
         return -(n[0] * vx + n[1] * vy) / length
 
     return _Cosine(value, slope)
@@ -259,7 +253,7 @@ def _extremes(
         return cosine.slope(path.coordinates(pose), path.speeds(pose))
 
     poses = path.fine_poses
-    slopes = [slope(pose) for pose in poses]
+    slopes = [cosine.slope(q, qd) for q, qd in zip(path.fine_coordinates, path.fine_speeds, strict=True)]
     if max(map(abs, slopes)) * (poses[-1].u[0] - poses[0].u[0]) < 1e-9:
         return None
     found = []
@@ -267,7 +261,7 @@ def _extremes(
         if a * b < 0.0:
             pose = path.zero(slope, before, after)
             found.append((cosine.value(path.coordinates(pose)), pose.u[0]))
-    found += [(cosine.value(path.coordinates(pose)), pose.u[0]) for pose in poses]
+    found += [(cosine.value(q), pose.u[0]) for q, pose in zip(path.fine_coordinates, poses, strict=True)]
     in_line = []
     for limit in (path.low, path.high):
         if limit is not None:

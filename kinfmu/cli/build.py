@@ -200,7 +200,7 @@ def _kept_numbers(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 @main.command(epilog="Example: kinfmu verify crank_rocker.fmu --results host.csv")
-@click.argument("fmu", type=InputFile(".fmu"), metavar="FMU")
+@click.argument("fmu", type=InputFile(".fmu", ".json"), metavar="FMU")
 @click.option(
     "--results",
     type=InputFile(),
@@ -222,7 +222,14 @@ def verify(fmu: Path, results: Path | None, tolerance: float | None, columns: st
 
     An FMU of kinfmu holds the outputs at about 20 samples, in extra/org.kinfmu, with the step that belongs to them. An
     FMU that torques drive has none.
+
+    A certificate (.json) of check --certificate, in place of an FMU, is proved again.
     """
+    if suffix_of(fmu) == ".json":
+        from kinfmu.analysis.certified.stored import proved_again
+
+        click.echo(str(proved_again(fmu)))
+        return
     from kinfmu.fmu import verify as verified
 
     found = verified(fmu, results, tolerance=tolerance, columns=names_in(columns))

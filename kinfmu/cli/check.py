@@ -31,6 +31,9 @@ FIGURES = (".svg", ".png", ".pdf")
 @click.option(
     "--certify", "is_certified", is_flag=True, help="Prove the motion between samples, by interval arithmetic."
 )
+@click.option(
+    "--certificate", "proof", type=OutputFile(".json"), help="Certify, and write the proof for kinfmu verify: .json."
+)
 @click.option("--assemblies", is_flag=True, help="List the ways to assemble the mechanism, and how to choose one.")
 @click.option(
     "--figure", "picture", type=OutputFile(*FIGURES), help="Draw the mechanism with its names: .svg, .png or .pdf."
@@ -44,6 +47,7 @@ def check(
     matrices: bool,
     assemblies: bool,
     is_certified: bool,
+    proof: Path | None,
     picture: Path | None,
     at: str | None,
     over: str | None,
@@ -69,6 +73,12 @@ def check(
     value = _value(mech, mechanism, at, picture)
     with errors_of(mechanism):
         report = checked(mech, written=loaded)
+    certificate = None
+    if (is_certified or proof) and report.problem is None:
+        with errors_of(mechanism):
+            certificate = certified(mech)
+        if proof:
+            certificate.write(proof)
     if as_json:
         findings = report.as_json()
         if matrices and (report.problem is None or report.has_cut_cam):
@@ -76,13 +86,13 @@ def check(
         if assemblies:
             found = _assemblies(report)
             findings["assemblies"] = None if found is None else found.as_json()
-        if is_certified and report.problem is None:
-            findings["certificate"] = certified(mech).as_json()
+        if certificate is not None:
+            findings["certificate"] = certificate.as_json()
         click.echo(json.dumps(findings, indent=2))
     else:
         click.echo(_text(report))
-        if is_certified and report.problem is None:
-            click.echo(str(certified(mech)))
+        if certificate is not None:
+            click.echo(str(certificate))
         if assemblies and (found := _assemblies(report)) is not None:
             click.echo(str(found))
         if matrices and (report.problem is None or report.has_cut_cam):
@@ -114,8 +124,9 @@ def _print_part(path: str, problem: MechanismError, *, as_json: bool) -> None:
         return
     reason = type(problem)(str(problem).removeprefix(f"{path}: "), **problem.data)
     lacks_driver = any(name.startswith("[drivers") for name in part.left_out)  # then none is missing in the file
-    advice = None if lacks_driver else report.advice
-    report = leaving_out(replace(report, notes=(), advice=advice), reason, part.left_out)
+    if lacks_driver:
+        report = replace(report, mismatch=None, advice=())
+    report = leaving_out(replace(report, notes=()), reason, part.left_out)
     click.echo(json.dumps(report.as_json(), indent=2) if as_json else _text(report))
 
 

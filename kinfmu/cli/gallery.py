@@ -42,7 +42,8 @@ def new(mechanism: str, file: Path) -> None:
             gallery.save(gallery.load(mechanism), file)
         else:
             write_whole(file, source.read_bytes())
-    click.echo(f"{file}: written; next: kinfmu check {quote(str(file))}")
+    name = quote(str(file))
+    click.echo(f"{file}: written; next: kinfmu check {name}; to see it move: kinfmu play {name}")
 
 
 @main.command(epilog="Example: kinfmu schema -o mechanism.schema.json")

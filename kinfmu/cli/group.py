@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from kinfmu.errors import AssemblyError, KinfmuError, MechanismError, RequestError
+from kinfmu.errors import AssemblyError, KinfmuError, MechanismError, RequestError, TooLargeError
 from kinfmu.version import VERSION
 
 if TYPE_CHECKING:
@@ -45,6 +45,8 @@ class _Command(click.Command):
     def invoke(self, ctx: click.Context) -> Any:
         try:
             return super().invoke(ctx)
+        except TooLargeError:
+            raise
         except RequestError as error:
             raise click.UsageError(one_line(error), ctx) from None
 
@@ -112,6 +114,7 @@ def main() -> None:
 
     \b
     A first tour:
+      kinfmu play jansen_leg               drag a mechanism in the browser
       kinfmu new crank_rocker mine.toml    write a commented mechanism file, to edit
       kinfmu check mine.toml               report its properties
       kinfmu simulate mine.toml            build and step its FMU, write logs

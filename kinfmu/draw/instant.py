@@ -39,17 +39,21 @@ _PIN = 0.05  # cost of a pin that covers a link of another joint
 _MOST_LINKS = 60  # with more links no pose is clearly better than the start
 
 
-def instant(mechanism: Mechanism, at: float | None = None, *, with_gap: bool = False) -> Instant:
+def instant(
+    mechanism: Mechanism, at: float | None = None, *, with_gap: bool = False, plan: SolvePlan | None = None
+) -> Instant:
     """Return the pose of a mechanism to draw, and its run.
 
     at: value of the only driver [rad or length]. Default: the start of the run, if links do not hide one another there;
     else the assembled pose, if it is near the run, or the sample of the run in which they hide one another least. A
     mechanism that closes but cannot be solved, for example without a driver, is shown at the start pose without a run.
     with_gap: a mechanism that does not close is shown with its loops closed up to the first open one, and its gap.
+    plan: of the mechanism, if it is compiled already; one of some coordinates or of another mechanism is not used.
     A KinfmuError is raised if `at` cannot be reached or, without `with_gap`, the mechanism does not close.
     """
     try:
-        plan = compile_plan(replace(mechanism, coordinates="all"))
+        if plan is None or plan.mechanism is not mechanism or not isinstance(mechanism.coordinates, str):
+            plan = compile_plan(replace(mechanism, coordinates="all"))
     except KinfmuError as problem:
         if at is not None:
             raise
@@ -160,8 +164,8 @@ def _is_clear(mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> bool:
 
 def _clearest_row(mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> int:
     """Return the row of poses (n, 3) by body in which links hide one another least, or the first clear one."""
-    rows = np.unique(np.linspace(0, len(poses[GROUND_NAME]) - 1, _CANDIDATES + 1).astype(int))
-    rows = np.array([row for row in rows if all(np.isfinite(pose[row]).all() for pose in poses.values())])
+    rows = list(dict.fromkeys(np.linspace(0, len(poses[GROUND_NAME]) - 1, _CANDIDATES + 1).astype(int).tolist()))
+    rows = [row for row in rows if all(np.isfinite(pose[row]).all() for pose in poses.values())]
     owners, links = _links(mechanism, {body: pose[rows] for body, pose in poses.items()})  # (r, links, 2, 2)
     if not 1 < len(owners) <= _MOST_LINKS:
         return int(rows[0])
@@ -211,7 +215,8 @@ def _covered(owners: list[str], ends: FloatArray) -> float:
     hidden = np.where(is_own, np.inf, _distances(dots, ends)).min(axis=1) < _NEAR_LINK * size
     pins = ends.reshape(-1, 2)
     apart = np.hypot(*(pins[:, None] - pins[None]).transpose(2, 0, 1)) > _SAME * size  # (pins, pins)
-    is_held = np.array([[not apart[k][np.repeat(names, 2) == name].all() for name in owners] for k in range(len(pins))])
+    meets = ~apart.reshape(len(pins), len(names), 2).all(axis=2)  # (pins, links)
+    is_held = meets @ (names[:, None] == names[None, :])  # by any link of the owner
     lies_on = np.where(is_held, np.inf, _distances(pins, ends)).min(axis=1) < _NEAR_LINK * size
     return float(hidden.mean() + _PIN * lies_on.sum())
 

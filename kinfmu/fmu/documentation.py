@@ -11,7 +11,9 @@ from kinfmu.analysis.singular import DriverRange
 from kinfmu.fmu.interface import Interface, Variable
 from kinfmu.fmu.reference import FOLDER, ReferenceResults
 from kinfmu.fmu.slave.layout import UNKNOWN_ERROR
+from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.drivers import Driver
+from kinfmu.mechanism.number import DisplayUnit, given_unit
 from kinfmu.plan import SolvePlan
 from kinfmu.solver.python.pose import Status
 from kinfmu.units import Quantity, unit_of
@@ -106,7 +108,7 @@ def page(
         unknown=UNKNOWN_ERROR,
         reference=_reference(interface.name, reference),
         about="".join(f"<p>{name.capitalize()}: {escape(text)}</p>\n" for name, text in _stated(metadata).items()),
-        rows="\n".join(_row(variable) for variable in interface),
+        rows="\n".join(_row(variable, plan.mechanism) for variable in interface),
     )
 
 
@@ -155,9 +157,15 @@ def _drivers(plan: SolvePlan, length_unit: str, reach: DriverRange | None) -> st
 
 
 def _law(plan: SolvePlan, driver: Driver) -> str:
-    """Return a law with its constants: 'constant_speed: start = 0 deg, speed = 180 deg/s'."""
+    """Return a law with its constants, in units of the file: 'constant_speed: start = 0 deg, speed = 3000 rpm'."""
+    settable = plan.mechanism.settable
     constants = ", ".join(
-        f"{constant.key} = {_value(constant.value, constant.quantity, plan.mechanism.length_unit)}"
+        f"{constant.key} = "
+        + (
+            _shown(float(constant.value), settable.display_unit(f"{constant.owner}.{constant.key}"))
+            if given_unit(constant.value)
+            else _value(constant.value, constant.quantity, plan.mechanism.length_unit)
+        )
         for constant in plan.law_constants
         if constant.owner == driver.name
     )
@@ -169,7 +177,11 @@ def _value(value: float, quantity: Quantity, length_unit: str) -> str:
     unit = unit_of(quantity, length_unit)
     if unit.startswith("rad"):
         value, unit = math.degrees(value), f"deg{unit.removeprefix('rad')}"
-    return f"{round(value, 9) + 0.0:.8g} {unit}".removesuffix(" 1")
+    return _shown(value, DisplayUnit(unit))
+
+
+def _shown(value: float, shown: DisplayUnit) -> str:
+    return f"{round(value / shown.factor, 9) + 0.0:.8g}{shown.suffix}"
 
 
 def _range(reach: DriverRange, length_unit: str) -> str:
@@ -215,7 +227,11 @@ def _reference(name: str, found: ReferenceResults | None) -> str:
     )
 
 
-def _row(variable: Variable) -> str:
+def _row(variable: Variable, mechanism: Mechanism) -> str:
+    """Return the row of a variable, with its start also in the unit of the file, if that is another one."""
     start = "" if variable.start is None else repr(variable.start)
+    if variable.name in mechanism.settable.names and variable.start is not None:
+        shown = mechanism.settable.display_unit(variable.name)
+        start += "" if shown.unit in ("1", variable.unit) else f" ({_shown(float(variable.start), shown)})"
     cells = (variable.name, variable.causality, variable.unit or "", start, variable.description)
     return "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>"

@@ -143,7 +143,8 @@ def terminals(plan: SolvePlan, variables: Interface) -> bytes:
     """Return terminalsAndIcons.xml of the FMU of a plan.
 
     A terminal is a bus: members connect by name, and need not all be connected. Its inputs are named by what they hold:
-    angle (position, length), speed, acceleration; its outputs as in the FMU: torque, bias_torque, reduced_inertia.
+    angle (position, length), speed, acceleration, torque; its outputs as in the FMU: torque, bias_torque,
+    reduced_inertia. Where the torque is an input, the output of that name is required_torque.
     """
     root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
     graphics = SubElement(root, "GraphicalRepresentation")
@@ -168,15 +169,17 @@ def terminals(plan: SolvePlan, variables: Interface) -> bytes:
 
 
 def _members(driver: str, variables: Interface) -> Iterator[tuple[str, str]]:
-    """Yield variables and the names of members."""
+    """Yield variables and the names of members, which are unique."""
+    inputs = set()
     for variable in (*variables.part("inputs"), *variables.part("states"), *variables.part("efforts")):
         owner, _, noun = variable.name.rpartition("_")
         if owner == driver:
+            inputs.add(noun)
             yield variable.name, noun
     for variable in variables.part("forces"):
         owner, _, noun = variable.name.partition(".")
         if owner == driver:
-            yield variable.name, noun
+            yield variable.name, f"required_{noun}" if noun in inputs else noun
 
 
 def attributes(metadata: Mapping[str, str]) -> dict[str, str]:

@@ -4,7 +4,8 @@
     documentation/index.html
     binaries/<platform>/<identifier>.so|dll       pythonfmu's, unchanged
     resources/slavemodule.txt                     names the module that holds the slave class
-    resources/<package>_slave.py                  the slave class, with its model and layout
+    resources/<package>_slave.py                  imports the slave class
+    resources/<package>/mechanism_slave.py        the slave class, with its model and layout
     resources/<package>/solver/python/            the solver, and the emitted model; forces, if they are outputs;
                                                   reduced inertia, if efforts drive
     resources/<package>/fmu/slave/                the base class of the slave
@@ -74,6 +75,8 @@ This FMU runs Python code in the process of its host. It needs:
 
 - a host process that holds Python 3.11 or newer, such as fmpy, libcosimpy or ecospy; other hosts cannot load it
 - Linux (glibc 2.32 or newer) or Windows, on x86-64
+- to be unpacked below folders named by the letters A to Z and a to z, digits, blanks, and - . _ ~ only: elsewhere
+  pythonfmu's library does not find its files, and ends the process of the host
 
 It needs no Python packages: what it imports is the standard library and the modules in resources/.
 An FMU of the same mechanism that needs none of this is the native one: kinfmu build MECH --flavour native
@@ -81,11 +84,9 @@ An FMU of the same mechanism that needs none of this is the native one: kinfmu b
 
 _ENTRY = '''"""The slave of the FMU '{name}'."""
 
-{imports}from {package}.fmu.slave.layout import Layout, PartLayout
-from {package}.fmu.slave.slave import MechanismSlave, hold
-from {package}.solver.python import {modules}
-
-hold(globals())
+{imports}from .fmu.slave.layout import Layout, PartLayout
+from .fmu.slave.slave import MechanismSlave
+from .solver.python import {modules}
 
 
 class Slave(MechanismSlave):
@@ -99,6 +100,14 @@ class Slave(MechanismSlave):
 {parts}
         ),
     )
+'''
+
+_MODULE = '''"""The module of the FMU '{name}' that pythonfmu's library runs for each instance."""
+
+from {package}.fmu.slave.library import hold
+from {package}.mechanism_slave import Slave
+
+hold(globals())
 '''
 
 _BY_EFFORTS = """\
@@ -162,7 +171,7 @@ def archive(
         contents["kinfmu/solver/python/roots.py"] = codegen.joinpath("roots.py").read_bytes()
     if any(map(solves, stages.values())):
         contents["kinfmu/solver/python/solutions.py"] = codegen.joinpath("solutions.py").read_bytes()
-    contents["kinfmu_slave.py"] = _entry(variables, "", in_si, meets=meets).encode()
+    contents["kinfmu/mechanism_slave.py"] = _entry(variables, "", in_si, meets=meets).encode()
     metadata = documents.metadata if documents else {}
     contents = dict(sorted(contents.items()))
     named = _named(contents, variables, version, digest(contents), in_si, metadata, meets=meets)
@@ -226,7 +235,7 @@ def _description(
     return description.write(about, {"CoSimulation": CAPABILITIES})
 
 
-def _entry(variables: Interface, token: str, in_si: Sequence[float], package: str = "kinfmu", *, meets: bool) -> str:
+def _entry(variables: Interface, token: str, in_si: Sequence[float], *, meets: bool) -> str:
     parts = [
         f"            PartLayout({part.name!r}, {part.type!r}, {part.names!r}, {part.starts!r}),"
         for part in variables.parts
@@ -240,7 +249,7 @@ def _entry(variables: Interface, token: str, in_si: Sequence[float], package: st
         attributes.append(f"stages = {{{', '.join(f'{one!r}: {one}.forces' for one in stages)}}}")
     if in_si:
         modules += ["inertia", "jumps", "laws"]
-        imports = f"from functools import partial\n\nfrom {package}.fmu.slave.efforts import ByEfforts\n"
+        imports = "from functools import partial\n\nfrom .fmu.slave.efforts import ByEfforts\n"
         attributes.append(_BY_EFFORTS.format(in_si=tuple(in_si)))
     if meets:
         modules.append("distances")
@@ -248,7 +257,6 @@ def _entry(variables: Interface, token: str, in_si: Sequence[float], package: st
     return _ENTRY.format(
         name=variables.name,
         imports=imports,
-        package=package,
         modules=", ".join(sorted(modules)),
         attributes="".join(f"    {line}\n" for line in attributes),
         title=repr(variables.title or variables.name)[1:-1].replace('"', "'"),
@@ -277,8 +285,8 @@ def _named(
             named[f"resources/{package}/{path.removeprefix('kinfmu/')}"] = data
         elif path != "modelDescription.xml":
             named[path] = data
-    del named["kinfmu_slave.py"]
-    named[f"resources/{package}_slave.py"] = _entry(variables, guid, in_si, package, meets=meets).encode()
+    named[f"resources/{package}/mechanism_slave.py"] = _entry(variables, guid, in_si, meets=meets).encode()
+    named[f"resources/{package}_slave.py"] = _MODULE.format(name=variables.name, package=package).encode()
     named["resources/slavemodule.txt"] = f"{package}_slave".encode()
     _check_imports(named, package)
     return named

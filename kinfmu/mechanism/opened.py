@@ -48,7 +48,7 @@ def opened(mechanism: Mechanism) -> Opened:
 
 
 GROUPS = {  # of numbers, by what they measure
-    "all": (),
+    "all": (),  # whatever it is
     "lengths": ("length",),
     "masses": ("mass", "inertia", "density", "areal_density"),
 }

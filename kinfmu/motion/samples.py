@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -25,6 +26,8 @@ _SAME_POSE = 1e-9  # [rad, sizes]; a motion whose first and last pose differ by 
 _SAME_RATE = 1e-6  # of the largest; the same for rates and accelerations
 _FEW = 5  # samples that show the least range of all
 _WIDE, _NARROW = 7, 5  # samples of a polynomial: of degree 6, and of degree 4 to judge it
+_WEIGHTS_KEPT = 32  # of polynomials, because many quantities are read at the same arguments
+_MOST_KEPT = 10_000  # arguments whose weights are kept
 _ROUGH = 1e-3  # of the range of 7 samples; where the rates of both polynomials differ by more in a step, it has a kink
 _PERIODIC = 1e-6  # of the range; a quantity whose first and last sample differ by less goes round
 Ranges = Callable[[FloatArray], tuple[FloatArray, FloatArray]]  # smallest and largest number of each row (..., n)
@@ -278,6 +281,16 @@ def _smooth_history(x: FloatArray, value: FloatArray, *, is_closed: bool) -> His
 
 def _rates(x: FloatArray, value: FloatArray, count: int, *, wraps: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return first and second derivative of the polynomials through `count` samples, and the range of these."""
+    weights_of = _kept_weights if len(x) <= _MOST_KEPT else _weights
+    samples, scale, weights = weights_of(x.tobytes(), count, wraps=wraps)
+    near = value[samples]
+    derivatives = np.einsum("nk,nkd->nd", near - value[:, None], weights)
+    return derivatives[:, 0] / scale, derivatives[:, 1] / scale**2, np.ptp(near, axis=1)
+
+
+def _weights(arguments: bytes, count: int, *, wraps: bool) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return for each of some arguments, as bytes, the samples of its polynomial (n, count), its scale, its weights."""
+    x = np.frombuffer(arguments)
     n, half = len(x), count // 2
     offsets = np.arange(-half, half + 1)
     samples: IntArray = np.arange(n)[:, None] + offsets
@@ -293,9 +306,10 @@ def _rates(x: FloatArray, value: FloatArray, count: int, *, wraps: bool) -> tupl
     orders = np.zeros((count, 2))
     orders[1, 0], orders[2, 1] = 1.0, 2.0
     weights = np.linalg.solve(powers, np.broadcast_to(orders, (n, count, 2)))
-    near = value[samples]
-    derivatives = np.einsum("nk,nkd->nd", near - value[:, None], weights)
-    return derivatives[:, 0] / scale[:, 0], derivatives[:, 1] / scale[:, 0] ** 2, np.ptp(near, axis=1)
+    return samples, scale[:, 0], weights
+
+
+_kept_weights = lru_cache(maxsize=_WEIGHTS_KEPT)(_weights)
 
 
 def lowest(

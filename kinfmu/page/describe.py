@@ -58,14 +58,26 @@ def describe(mechanism: Mechanism, report: Report) -> dict[str, Any]:
         report: Its report, without a problem.
 
     """
-    shown = instant(mechanism)
+    return drawn(instant(mechanism, plan=report.plan), report)
+
+
+def drawn(shown: Instant, report: Report | None = None) -> dict[str, Any]:
+    """Return the data of a page without its modules.
+
+    Args:
+        shown: The pose that is drawn.
+        report: The report of its mechanism, without a problem. Default: nothing that a report states, as of a mechanism
+            that is only drawn in part.
+
+    """
+    mechanism = shown.mechanism
     numbers = {name: k for k, name in enumerate(mechanism.body_points)}
     sliding = slides(shown)
     along = {body: iter([slide for slide in sliding if slide.holder == body]) for body in shown.poses}  # of rods
     lines = {slide.name: slide for slide in sliding}
     found = []
-    drawn = shapes(shown)
-    for shape in drawn:
+    every = shapes(shown)
+    for shape in every:
         if shape.strips:
             continue
         slide = next(along[shape.frame]) if shape.kind == "rod" else lines.get(shape.name)
@@ -89,10 +101,18 @@ def describe(mechanism: Mechanism, report: Report) -> dict[str, Any]:
             {"name": name, "point": numbers[point], "colour": list(palette.body(len(bodies) - 1 + k))}
             for k, (name, point) in enumerate(mechanism.points.items())
         ],
-        "loads": [_load(mechanism, shape, numbers) for shape in drawn if shape.strips],
+        "loads": [_load(mechanism, shape, numbers) for shape in every if shape.strips],
         "gravity": _gravity(mechanism),
         "cams": [cam_data(mechanism, joint, numbers) for joint in shown.joints if joint.name in cams],
         "shapes": [shape for shape in found if shape["kind"] not in _NOT_DRAWN],
+    } | _reported(report, numbers)
+
+
+def _reported(report: Report | None, numbers: Mapping[str, int]) -> dict[str, Any]:
+    """Return what a report states."""
+    if report is None:
+        return {"loops": [], "notes": [], "unknownContacts": [], "mobility": None, "redundant": []}
+    return {
         "loops": list(_loops(report, numbers)),
         "notes": list(report.notes),
         "unknownContacts": [*map(contact_text, report.loading.unknown_contacts)] if report.loading else [],
@@ -230,7 +250,7 @@ def _joint(mechanism: Mechanism, joint: Joint, numbers: Mapping[str, int]) -> di
     return found | ({"numbers": names} if names else {})
 
 
-def _driver(driver: Driver, shown: Instant, report: Report, numbers: Mapping[str, int]) -> dict[str, Any]:
+def _driver(driver: Driver, shown: Instant, report: Report | None, numbers: Mapping[str, int]) -> dict[str, Any]:
     kind = driver.quantity.kind
     found: dict[str, Any] = {
         "name": driver.name,
@@ -258,7 +278,7 @@ def _driver(driver: Driver, shown: Instant, report: Report, numbers: Mapping[str
         found |= {"body": body, "against": against, "pivot": numbers[pin] if pin else None}
     if isinstance(driver, SlideDriver):
         found["axis"] = float(driver.axis)
-    for reach in report.ranges:
+    for reach in report.ranges if report else ():
         if reach.driver == driver.name:
             found["turns"] = reach.turns and math.lcm(reach.turns, found["loadTurns"])
             found["reach"] = list(reach.reach)

@@ -6,6 +6,7 @@ import html
 import json
 import re
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.mechanism.opened import opened
 from kinfmu.page.describe import describe, module_data, written_file
-from kinfmu.page.module import packed, page_module, solver
+from kinfmu.page.module import packed, page_module, require_page_size, solver
 
 _WEB = Path(__file__).parent / "web"
 _SCRIPTS = (
@@ -44,8 +45,13 @@ _SCRIPTS = (
     "hand",
     "main",
 )
+_EDITOR = tuple(
+    f"editor{name}"
+    for name in ("_places", "_tools", "_sketch", "_session", "_picture", "_panel", "_paint", "_hand", "_parts", "")
+)
 MOST_NUMBERS = 400  # of a file that its page can change: the code of more is too long for a small page
 _IMPORT = re.compile(r"^import .*\n", re.MULTILINE)
+_NAMES = re.compile(r'^import \{ (.*) \} from "\./(\w+)\.js";$', re.MULTILINE)
 _EXPORT = re.compile(r"^export ", re.MULTILINE)
 _COMMENT = re.compile(r"^ *//.*\n", re.MULTILINE)  # a line of its own
 _INDENT = re.compile(r"^ +", re.MULTILINE)  # a tenth of a page; no text of the scripts goes over lines
@@ -78,27 +84,50 @@ def page(
 
     Raises:
         KinfmuError: The mechanism cannot be solved.
-        RequestError: It is too large for a page, such as one of more than 512 unknowns.
+        TooLargeError: It is too large for a page, such as one of more than 512 unknowns.
 
     """
     require_mechanism(mechanism, "page")
+    return page_of(page_data(mechanism, report, over=over, samples=samples), script)
+
+
+def page_data(
+    mechanism: Mechanism,
+    report: Report | None = None,
+    *,
+    over: tuple[str, float, float] | None = None,
+    samples: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """Return the data of the page of a mechanism, with the difference of its modules from the solver of all pages.
+
+    Args:
+        mechanism: The mechanism.
+        report: Its report, as for `page`.
+        over: A driver and its values, as for `page`.
+        samples: Driver values, as for `page`.
+
+    Raises:
+        KinfmuError: The mechanism cannot be solved.
+        TooLargeError: It is too large for a page.
+
+    """
+    require_page_size(mechanism)
     report = report or check(mechanism)
     if report.problem is not None and report.plan is None:
         raise report.problem
-    as_written = page_module(mechanism)
+    as_written = page_module(mechanism, report=report)
     change = opened(mechanism)
     is_large = len(change.places) > MOST_NUMBERS
     places = {} if is_large else change.places
     modules = {
         "written": module_data(as_written, {}),
-        "opened": module_data(page_module(change.mechanism, change.labels), places) if places else None,
+        "opened": module_data(page_module(change.mechanism, change.labels, report), places) if places else None,
     }
     drivers = [driver.name for driver in mechanism.drivers]
     data = describe(mechanism, report) | {
         "over": over and {"driver": drivers.index(over[0]), "from": over[1], "to": over[2]},
         "samples": samples,
         "size": as_written.plan.size,
-        "solver": solver(),
         "modules": modules,
         "closedNumbers": len(change.places) if is_large else 0,
         "file": written_file(mechanism, as_written, places),
@@ -106,17 +135,45 @@ def page(
     if samples:
         first, *_, last = samples["t"]
         data["run"] = {"from": first, "to": last, "step": (last - first) / (len(samples["t"]) - 1)}
+    return data
+
+
+def page_of(data: Mapping[str, Any], script: str = "") -> str:
+    """Return the HTML text of a page.
+
+    Args:
+        data: What `page_data` returns; or a name and `modules` None, for a page that is drawn on by its script.
+        script: JavaScript after that of the page. Default: none.
+
+    """
+    text = json.dumps({**data, "solver": solver()}, separators=(",", ":"), allow_nan=False)
     return _filled(
         (_WEB / "index.html").read_text("utf-8"),
         {
-            "title": html.escape(mechanism.name),
+            "title": html.escape(str(data["name"])),
             "style": (_WEB / "style.css").read_text("utf-8"),
-            "data": packed(json.dumps(data, separators=(",", ":"), allow_nan=False).encode()),
+            "data": packed(text.encode()),
             "script": "\n".join([*(_script(name) for name in _SCRIPTS), f"{{\n{script}\n}}"]),  # names of its own
         },
     )
 
 
+def editor_script() -> str:
+    """Return the JavaScript with which a mechanism is drawn in a page, to be part of the script of `page_of`.
+
+    It is EDITOR: packed text, which makes `window.kinfmuEditor` when it runs, and the names of the page that it needs.
+    """
+    modules = {name: (_WEB / f"{name}.js").read_text("utf-8") for name in _EDITOR}
+    imports = [(names, source) for text in modules.values() for names, source in _NAMES.findall(text)]
+    of_page = {name for found, source in imports if source not in modules for name in found.split(", ")}
+    names = ", ".join(sorted(of_page))
+    style = f"const EDITOR_STYLE = {json.dumps((_WEB / 'editor.css').read_text('utf-8'))};"
+    code = "\n".join([style, *map(_script, modules), "return Editor;"])
+    text = packed(f"window.kinfmuEditor = ({{ {names} }}) => {{\n{code}\n}};".encode())
+    return f'const EDITOR = ["{text}", {{ {names} }}];\n'
+
+
+@cache
 def _script(name: str) -> str:
     """Return a module of web/ as a part of one script: without comments, indentation, imports, and the word export."""
     text = _COMMENT.sub("", (_WEB / f"{name}.js").read_text("utf-8"))

@@ -13,22 +13,24 @@ import gzip
 import re
 import struct
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from kinfmu.analysis import Report
 from kinfmu.codegen.c import compiler, emit
 from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
 from kinfmu.codegen.forces import emit_c_forces
 from kinfmu.codegen.wasm import Binary, Translator
 from kinfmu.codegen.writer import Names, Writer, identifier
-from kinfmu.errors import RequestError
+from kinfmu.errors import KinfmuError, TooLargeError
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.force_names import reaction_names_of, shaking_names
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.efforts import load_inputs
-from kinfmu.plan.forces import ForceSteps, force_names, force_steps, loaded_coordinates
+from kinfmu.plan.forces import ForceSteps, force_names, force_steps
 from kinfmu.plan.reactions import reaction_steps, shaking_steps
 from kinfmu.plan.trace import Tracer, parameter_symbol
 from kinfmu.plan.undetermined import undetermined_reactions
@@ -106,21 +108,25 @@ def packed(data: bytes) -> str:
     return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
 
 
-def page_module(mechanism: Mechanism, labels: Mapping[str, str] | None = None) -> PageModule:
+def page_module(
+    mechanism: Mechanism, labels: Mapping[str, str] | None = None, report: Report | None = None
+) -> PageModule:
     """Return the module of a mechanism: the compiled solver with its model, which needs no compiler.
 
     Args:
         mechanism: The mechanism.
         labels: Names of parameters for messages and `PageModule.parameters`, such as `Opened.labels`. Default: none.
+        report: Of the mechanism, or of the one that `opened` has changed: what it has found is not found again.
+            Default: none.
 
     Raises:
         KinfmuError: The mechanism cannot be solved, as `compile_plan` reports it.
-        RequestError: It is larger than `solver/page_sizes.h` and `solver/instance.h` allow.
+        TooLargeError: It is larger than `solver/page_sizes.h` and `solver/instance.h` allow.
 
     """
     labels = labels or {}
     names = force_names(mechanism)
-    plan = compile_plan(replace(mechanism, coordinates="moving"), solved=loaded_coordinates(mechanism) if names else ())
+    plan = _planned(mechanism, report)
     points = tuple(mechanism.body_points)
     reactions = _reaction_stages(plan)
     counts = [len(steps.names) for steps in reactions.values()] or [0]
@@ -147,13 +153,44 @@ def page_module(mechanism: Mechanism, labels: Mapping[str, str] | None = None) -
     )
 
 
-def _binary(name: str, sizes: Mapping[str, int], texts: Iterable[str]) -> Binary:
-    """Return the compiled solver with the C texts of a model and its sizes."""
-    most, structures = _layout()
+def require_page_size(mechanism: Mechanism) -> None:
+    """Raise a TooLargeError for a mechanism that is too large for a page, as far as its plan shows it.
+
+    What a report and a module take seconds for is not begun then. Small mechanisms are not planned.
+    """
+    sizes = {"DRIVERS": len(mechanism.drivers), "POINTS": len(mechanism.body_points)}
+    _require_sizes(mechanism.name, sizes)
+    if len(mechanism.coordinate_names) <= _layout()[0]["UNKNOWNS"]:
+        return
+    with suppress(KinfmuError):  # the report states it better
+        plan = compile_plan(replace(mechanism, coordinates="moving"))
+        moving = sum(len(block.coordinates) for block in plan.blocks)
+        sizes = {"UNKNOWNS": len(plan.unknowns), "COORDINATES": moving + len(plan.drivers)}
+    _require_sizes(mechanism.name, sizes)
+
+
+def _require_sizes(name: str, sizes: Mapping[str, int]) -> None:
+    most, _ = _layout()
     for size, count in sizes.items():
         if count > most[size]:
             what = _SIZES.get(size, size.lower().replace("_", " "))
-            raise RequestError(f"'{name}' is too large for a page: it has {count} {what}, at most {most[size]} fit")
+            raise TooLargeError(f"'{name}' is too large for a page: it has {count} {what}, at most {most[size]} fit")
+
+
+def _planned(mechanism: Mechanism, report: Report | None) -> SolvePlan:
+    """Return the plan of all coordinates that move."""
+    known = report.plan if report else None
+    if known and known.mechanism is mechanism and mechanism.coordinates == "moving":
+        return known
+    # Numbers seen from an origin of the plan's own are rounded in other ways when they are parameters.
+    redundancy = report.redundancy if report and known and not any(known.origin) else None
+    return compile_plan(replace(mechanism, coordinates="moving"), redundancy=redundancy)
+
+
+def _binary(name: str, sizes: Mapping[str, int], texts: Iterable[str]) -> Binary:
+    """Return the compiled solver with the C texts of a model and its sizes."""
+    _require_sizes(name, sizes)
+    most, structures = _layout()
     made = Binary(_solver())
     for size, count in sizes.items():
         made.put(made.addresses[f"size_{size.lower()}"], struct.pack("<i", count))

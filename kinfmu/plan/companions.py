@@ -8,7 +8,7 @@ several blocks, these become one block.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,8 +26,11 @@ _LOOKS = 3  # poses at which the combination of rows is found that equals a redu
 _IN_SPAN = 1e-7  # part of a gradient outside the span of the others, or weight in a combination, that counts as zero
 _CLOSED = 1e-9  # residual relative to the size up to which a sampled pose counts as closed
 _SINGULAR = 1e-6  # singular value over the largest below which rows count as dependent
+_REGULAR = 0.02  # least singular value, as a part of its largest, above which a block counts as regular
+_SPARSE = 8  # of so many poses one shows how large singular values become
+_REFINEMENTS = 2  # of a singular pose between two sampled ones, by secants
 _ITERATIONS = 12
-_CARRIES = 0.1  # least singular value without a row, as a part of that with it, below which the row carries the block
+_CARRIES = 0.1  # a row carries a block where its least singular value is below this part of that with the row
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,7 @@ def with_companions(
         return list(blocks)
     found = list(blocks)
     owners = {system.rows[index].owner for index in redundancy.kept}
+    moving = {name for block in blocks for name in block.coordinates}
     implying = _combinations(system, redundancy, pose)
     for dependent in redundancy.redundant:
         index = dependent.index
@@ -86,22 +90,21 @@ def with_companions(
             continue
         own = {k for k, block in enumerate(found) if implying[index] & set(block.all_rows)}
         needs = _needs(found, home, meets)
-        members = {k for k in met | own if found[k].unknowns}
+        members = {k for k in own or met if found[k].unknowns}  # a row cannot carry rows that have no weight in it
         hull = _hull(members | {k for k in met if _behind({k}, needs) & members}, needs)
         last, carries = found[max(met)], False
+        solved = [found[k] for k in sorted({*hull, max(met)})]
+        rows = {index, *implying[index]}.union(*(block.all_rows for block in solved))
+        loop = _Loop(system, rows, moving, solved, pose)
         if last.unknowns:
-            joined = replace(last, companions=(*last.companions, index))
-            before = [found[k] for k in _behind(met, needs) - {max(met)}]
             is_axis = system.rows[index].owner in owners  # of a pin: the other alone is singular in places
-            carries = not is_axis and _regular_only_with(system, [last], [joined], before, pose)
+            carries = not is_axis and loop.is_carried(index, [last])
             if is_axis or carries:
-                found[max(met)] = joined
+                found[max(met)] = replace(last, companions=(*last.companions, index))
         if len(hull) > 1 or (hull and not last.unknowns):
-            whole = _whole([found[k] for k in hull], index)
-            before = [found[k] for k in _behind({*hull, *met}, needs) - set(hull)]
             walks = 1 if carries else _WALKS  # what carries the last block need not carry those before it
-            if _regular_only_with(system, [found[k] for k in hull], [whole], before, pose, walks):
-                found = _merged(found, hull, needs, whole)
+            if loop.is_carried(index, [found[k] for k in hull], walks):
+                found = _merged(found, hull, needs, _whole([found[k] for k in hull], index))
     return found
 
 
@@ -182,44 +185,105 @@ def _merged(
     return [*before, whole, *after]
 
 
-def _regular_only_with(
-    system: System,
-    without: Sequence[BlockStructure],
-    joined: Sequence[BlockStructure],
-    before: Sequence[BlockStructure],
-    pose: FloatArray,
-    walks: int = _WALKS,
-) -> bool:
-    """Return True if blocks are singular somewhere on the motion where one more companion makes them regular.
+class _Loop:
+    """Bodies that rows join, with all joints between them, moved about a closed pose.
 
-    Only the bodies that the blocks' joints join move, and all joints between them hold. There is no gain where a block
-    before them is singular too.
+    solved: blocks whose coordinates follow from the others of these bodies and from the drivers among their rows.
     """
-    rows = [row for block in joined for row in block.all_rows]
-    touched = {column for row in rows for column in system.members[system.member_of[row]].columns}
-    part = Part(
-        system, [row for row in range(system.joint_row_count) if _only(system, row, touched)], sorted(touched), pose
-    )
-    rank = int(np.linalg.matrix_rank(part.jacobian(pose[part.columns]), rtol=_SINGULAR))
-    if rank == len(part.columns):
-        return False
-    joined = [*joined, *(block for block in before if all(_only(system, row, touched) for row in block.all_rows))]
-    walks = min(len(part.columns) - rank, walks)
-    last: list[tuple[FloatArray, list[float]]] = []
-    for q in (q for seed in range(walks) for q in _motion(part, pose[part.columns], rank, _POSES, seed)):
-        poses = [q]
-        alone = _jacobians(system, without, part.whole(q))
-        determinants = [float(np.linalg.det(one)) for one in alone if one.shape[0] == one.shape[1]]
-        for other, values in last:
-            for a, b in zip(values, determinants, strict=True):
-                between = _closed(part, other + a / (a - b) * (q - other), rank) if a * b < 0.0 else None
-                poses += [] if between is None else [between]  # close to where a block is singular
-        for one in poses:
-            at = part.whole(one)
-            if _least(_jacobians(system, without, at)) < _CARRIES * _least(_jacobians(system, joined, at)):
-                return True
-        last = [(q, determinants)]
-    return False
+
+    def __init__(
+        self,
+        system: System,
+        rows: Iterable[int],
+        moving: Collection[str],
+        solved: Sequence[BlockStructure],
+        pose: FloatArray,
+    ) -> None:
+        self._place = {name: k for k, name in enumerate(system.coordinates) if name in moving}
+        touched = {column for row in rows for column in system.members[system.member_of[row]].columns}
+        columns = sorted(touched & set(self._place.values()))
+        still = set(range(len(system.coordinates))) - set(self._place.values())
+        joints = range(system.joint_row_count)
+        self._part = Part(system, [row for row in joints if _meets_only(system, row, still | touched)], columns, pose)
+        self._start = pose[columns]
+        self._rank = int(np.linalg.matrix_rank(self._part.jacobian(self._start), rtol=_SINGULAR))
+        follow = {self._place[name] for block in solved for name in block.coordinates}
+        self._leading = [k for k, column in enumerate(columns) if column not in follow]
+        self._drivers = Part(
+            system, [row for one in solved for row in one.all_rows if row not in joints], columns, pose
+        )
+
+    def is_carried(self, index: int, blocks: Sequence[BlockStructure], walks: int = _WALKS) -> bool:
+        """Return True if a redundant row carries one of some blocks, in the order of solving, somewhere on the motion.
+
+        It carries none that it is singular with, however long its lever. There is no gain where the motion turns back:
+        what leads it is at a limit there.
+        """
+        walks = min(len(self._part.columns) - self._rank, walks)
+        return any(self._is_carried_on(walk, index, blocks) for walk in range(walks))
+
+    def _is_carried_on(self, walk: int, index: int, blocks: Sequence[BlockStructure]) -> bool:
+        """Return True if a redundant row carries one of some blocks where this is singular on one walk."""
+        poses, found = [], []
+        last: list[tuple[FloatArray, list[float]]] = []
+        for q in _motion(self._part, self._start, self._rank, _POSES, walk):
+            determinants = [self._determinant(q, block) for block in blocks]
+            poses.append(q)
+            for other, values in last:
+                for block, a, b in zip(blocks, values, determinants, strict=True):
+                    between = self._singular_pose(block, (other, a), (q, b)) if a * b < 0.0 else None
+                    found += [] if between is None else [self._singular_values(between, index, blocks)]
+            last = [(q, determinants)]
+        if not found:
+            return False
+        largest = np.max([self._singular_values(q, index, blocks) for q in poses[::_SPARSE]], axis=0)
+        alone, carried, leads = np.moveaxis(np.array(found) / largest, 2, 0)
+        with_row = np.minimum(carried, leads)
+        return bool(((alone < _CARRIES * with_row) & (with_row > _REGULAR)).any())
+
+    def _determinant(self, q: FloatArray, block: BlockStructure) -> float:
+        """Return the determinant of a block without its companions."""
+        rows = block.all_rows[: len(block.coordinates)]
+        return float(np.linalg.det(self._jacobian(q, rows, block.coordinates)))
+
+    def _singular_pose(
+        self, block: BlockStructure, low: tuple[FloatArray, float], high: tuple[FloatArray, float]
+    ) -> FloatArray | None:
+        """Return a pose close to where a block is singular between two with its determinants of either sign."""
+        found = None
+        for _ in range(_REFINEMENTS):
+            (p, a), (q, b) = low, high
+            between = _closed(self._part, p + a / (a - b) * (q - p), self._rank)
+            if between is None:  # too close to where all rows are singular
+                break
+            found, c = between, self._determinant(between, block)
+            low, high = (low, (found, c)) if a * c < 0.0 else ((found, c), high)
+        return found
+
+    def _singular_values(
+        self, q: FloatArray, index: int, blocks: Sequence[BlockStructure]
+    ) -> list[tuple[float, float, float]]:
+        """Return for each block, from the last, its least singular value, that with a redundant row, that of the lead.
+
+        A block's coordinates take up all rows but as many combinations as there are rows to spare: what these have left
+        for the coordinates of an earlier block may carry it.
+        """
+        free = _free(self._part, q, self._rank)
+        leads = _least(np.vstack([free[self._leading], self._drivers.jacobian(q) @ free]))
+        names = [name for block in blocks for name in block.coordinates]
+        over, found = self._jacobian(q, [index], names), []
+        for block in reversed(blocks):
+            before = over.shape[1] - len(block.coordinates)
+            together = np.vstack([self._jacobian(q, block.all_rows, names)[:, : over.shape[1]], over])
+            left, singular, _ = np.linalg.svd(together[:, before:])
+            found.append((_least(together[: -len(over), before:]), float(singular[-1]), leads))
+            over = left[:, len(block.coordinates) :].T @ together[:, :before]
+        return found
+
+    def _jacobian(self, q: FloatArray, rows: Sequence[int], names: Iterable[CoordinateName]) -> FloatArray:
+        """Return the Jacobian of rows over coordinates, scaled to pure numbers."""
+        columns, pose = [self._place[name] for name in names], self._part.whole(q)
+        return Part(self._part.system, rows, columns, pose).jacobian(pose[columns])
 
 
 def _motion(part: Part, q: FloatArray, rank: int, count: int, seed: int = 0) -> Iterator[FloatArray]:
@@ -263,20 +327,11 @@ def _closed(part: Part, q: FloatArray, rank: int) -> FloatArray | None:
     return None
 
 
-def _jacobians(system: System, blocks: Sequence[BlockStructure], pose: FloatArray) -> list[FloatArray]:
-    """Return for each block the Jacobian of all its rows over its coordinates, scaled to pure numbers."""
-    place = {name: k for k, name in enumerate(system.coordinates)}
-    columns = [[place[name] for name in block.coordinates] for block in blocks]
-    return [
-        Part(system, block.all_rows, own, pose).jacobian(pose[own]) for block, own in zip(blocks, columns, strict=True)
-    ]
-
-
-def _only(system: System, row: int, columns: set[int]) -> bool:
+def _meets_only(system: System, row: int, columns: set[int]) -> bool:
     """Return True if a row meets no other columns."""
     return columns.issuperset(system.members[system.member_of[row]].columns)
 
 
-def _least(jacobians: Sequence[FloatArray]) -> float:
-    """Return the least singular value of all."""
-    return min(float(np.linalg.svd(jacobian, compute_uv=False)[-1]) for jacobian in jacobians)
+def _least(jacobian: FloatArray) -> float:
+    """Return the least singular value."""
+    return float(np.linalg.svd(jacobian, compute_uv=False)[-1])

@@ -33,6 +33,7 @@ def compile_plan(
     outputs: Sequence[str] | None = None,
     parameters: Sequence[str] | None = None,
     solved: Sequence[str] = (),
+    redundancy: Redundancy | None = None,
 ) -> SolvePlan:
     """Return the plan of a mechanism.
 
@@ -42,6 +43,8 @@ def compile_plan(
             Columns keep the order of the mechanism.
         parameters: Names of the parameters that are settable; default: all that are given as numbers.
         solved: Coordinates of bodies to solve for though they are no outputs: forces depend on them.
+        redundancy: Of the mechanism, or of one that differs only in what it asks for, not in bodies, joints and
+            drivers, nor in the values of their numbers. Default: it is found.
 
     Returns:
         The plan, with those parameters of the geometry and the constants of the laws settable.
@@ -56,7 +59,7 @@ def compile_plan(
     """
     local, origin = localized(mechanism)
     system = System(local)
-    return plan_from(mechanism, system, origin, find_redundancy(system), outputs, parameters, solved)
+    return plan_from(mechanism, system, origin, redundancy or find_redundancy(system), outputs, parameters, solved)
 
 
 def plan_from(

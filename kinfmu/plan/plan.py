@@ -117,7 +117,7 @@ class SolvePlan:
         """Distance of the mechanism from the world's origin, in sizes; 0 if it is near."""
         return max(self.row_offset, *(abs(part) / self.size for part in self.origin))
 
-    @property
+    @cached_property
     def outputs(self) -> tuple[CoordinateName, ...]:
         """Names of the outputs: q first, then points of interest."""
         return tuple(motion.name for motion in self.outputs_motion)
@@ -127,10 +127,15 @@ class SolvePlan:
         """Names of the generalized coordinates q."""
         return self.outputs[: self.coordinate_count]
 
-    @property
+    @cached_property
     def unknowns(self) -> tuple[CoordinateName, ...]:
         """Coordinates found by Newton, block after block."""
         return tuple(name for block in self.blocks for name in block.unknowns)
+
+    @cached_property
+    def block_of(self) -> Mapping[str, int]:
+        """The number of the block in which each coordinate is solved."""
+        return {name: k for k, block in enumerate(self.blocks) for name in block.coordinates}
 
     @property
     def watch_names(self) -> tuple[str, ...]:

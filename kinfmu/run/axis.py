@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from kinfmu.arrays import FloatArray
+from kinfmu.arrays import FloatArray, finite
 from kinfmu.errors import listed
 from kinfmu.units import ANGLES, InputName, unit_of
 
@@ -160,16 +160,17 @@ def shown_range(values: FloatArray, usual: float) -> tuple[float, float] | None:
     Curves that are only round-off, compared with a `usual` value, are shown as a line at 0. A few samples near a
     singular point, where speeds grow without bound, do not flatten all others. The data keep all values.
     """
-    known = values[np.isfinite(values)]
+    known = finite(values)
     if not len(known):
         return None
-    if np.abs(known).max() < ROUND_OFF * usual:
+    least, most = known.min(), known.max()
+    if max(-least, most) < ROUND_OFF * usual:
         return -usual, usual
     low, high = np.percentile(known, [OUTLIERS, 100.0 - OUTLIERS])
     with np.errstate(over="ignore"):  # the largest numbers lead to infinite ends; the default range is used then
         width = high - low
         shown = low - width / 2, high + width / 2
-        has_outliers = known.min() < low - width or known.max() > high + width
+        has_outliers = least < low - width or most > high + width
     if width > 0.0 and has_outliers and np.isfinite(shown).all():
         return float(shown[0]), float(shown[1])
     return None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
@@ -18,6 +17,7 @@ from kinfmu.mechanism import LawConstant
 from kinfmu.mechanism.valid import LARGEST_NUMBER
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.plan import PlanParameter
+from kinfmu.processes import in_threads
 from kinfmu.run import Run
 from kinfmu.run.arguments import Arguments, Settings
 from kinfmu.run.driving import driven_by_inputs, numbers_of, times_of
@@ -311,8 +311,7 @@ def solve_by_library(
 
     most = batch.count if reader is not None else max(1, SAMPLES_AT_ONCE // max(1, len(driving.times)))
     parts = parts_of(batch.count, most, threads)
-    with ThreadPoolExecutor(threads) as pool:
-        found = list(pool.map(piece, parts)) if threads > 1 else [piece(part) for part in parts]
+    found = in_threads(piece, parts, threads)
     alone: set[int] = set(np.flatnonzero(invalid).tolist())
     reasons: dict[int, str] = {}
     for part, (reached, why) in zip(parts, found, strict=True):

@@ -35,6 +35,7 @@ from kinfmu.solver.python.solver import TOLERANCE
 
 WORTH_COMPILING = 300_000  # samples times blocks: Python needs a second or more for them
 WORTH_LOADING = 10_000  # samples times blocks: Python needs as long for them as loading a compiled library takes
+_SMALL = 1e-40  # 1 and this are 1, unless numbers are rounded up, down or to zero
 _SOLVERS_KEPT = 8  # of the last parameters
 
 
@@ -342,11 +343,16 @@ class Model:
 
         Raises:
             CompilerError: The engine is "native", and the library cannot be compiled.
+            RequestError: The engine is "native", and the process does not round to nearest.
 
         """
         work = count * max(1, len(self.plan.blocks))
         is_ready = if_cached and work >= WORTH_LOADING and self.engine == "auto" and self._is_compiled()
         if self.engine == "python" or (self.engine == "auto" and work < WORTH_COMPILING and not is_ready):
+            return False
+        if 1.0 + _SMALL != 1.0 - _SMALL:  # the sines of C rely on it, those of Python do not
+            if self.engine == "native":
+                raise RequestError("engine 'native' needs rounding to nearest; call fesetround(FE_TONEAREST)")
             return False
         try:
             self.load_library()

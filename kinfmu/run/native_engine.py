@@ -430,8 +430,8 @@ class _Memory:
         if not self.sweep:
             raise KinfmuError(refusal)
         self._samples = np.zeros(MOST_FAILURES, dtype=np.int64)
-        self._texts = ctypes.create_string_buffer(MOST_FAILURES * MESSAGE)
-        self.failures, self.messages = _start(self._samples), ctypes.addressof(self._texts)
+        self._texts = np.empty(MOST_FAILURES * MESSAGE, dtype=np.uint8)
+        self.failures, self.messages = _start(self._samples), _start(self._texts)
         weakref.finalize(self, library.kf_sweep_free, self.sweep)
 
     def failed(self, count: int) -> list[tuple[int, str]]:

@@ -151,7 +151,7 @@ _PEAK = '[measures.peak]\ntype = "maximum"\nof = "crank.torque"\n'
             [
                 "mobility    1, no driver",
                 "loose       crank.phi, ",
-                'could add   [drivers] crank = { type = "angle", of',
+                "advice      drive crank: nothing drives the mechanism",
             ],
         ),
         (
@@ -232,7 +232,7 @@ def test_what_is_valid_of_a_file_is_reported_before_its_problem(
     for line in [*lines, f"note        this report leaves out {left_out}, because", f"problem     {problem}\n"]:
         assert line in result.stdout
     if "[drivers" in left_out:
-        assert "could add" not in result.stdout
+        assert "advice" not in result.stdout
     found = json.loads(command("check", path.name, "--json").stdout)
     assert (found["mobility"], found["problem"]) == (1, problem)
 
@@ -294,3 +294,11 @@ def test_the_message_on_a_fit_or_study_file_names_its_command(
     path = tmp_path / "design.toml"
     path.write_text(f'mechanism = "crank_rocker"\n{text}\n')
     assert f"this is a {kind} file, not a mechanism file; the command is 'kinfmu {kind}'" in fails("check", path)
+
+
+def test_advice_is_printed_before_the_problem(command: Command, fourbar_file: Callable[..., Path]) -> None:
+    path = fourbar_file("[points]", '[drivers.two]\ntype = "angle"\nof = "rocker"\nlaw = "constant_speed"\n[points]')
+    lines = command("check", path.name).stdout.splitlines()
+    subjects = [line[2:14].strip() for line in lines if line[2:14].strip()]
+    assert subjects[-2:] == ["advice", "problem"]
+    assert any(line.strip() == "# remove [drivers.two]" for line in lines)

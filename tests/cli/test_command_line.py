@@ -179,7 +179,7 @@ def test_suggested_commands_name_the_file_also_in_folders_with_blanks_and_quotes
     says("verify", driven, "--results", folder / "run.csv", status=1)
 
     assert {one: found for one, found in suggested.items() if found} == {
-        "new": {"check": [str(mine)]},
+        "new": {"check": [str(mine)], "play": [str(mine)]},
         "simulate": {"review": [str(run)]},
         "export": {"recover": [str(cut), "keeps", "what", "is", "left"]},
         "review": {"recover": [str(cut), "keeps", "what", "is", "left"]},

@@ -55,7 +55,9 @@ def test_list_names_the_gallery_with_titles(command: Command) -> None:
 def test_new_writes_a_commented_file_that_checks(name: str, command: Command, tmp_path: Path) -> None:
     result = command("new", name, "mine.toml")
     assert result.exit_code == 0
-    assert result.stdout == "mine.toml: written; next: kinfmu check mine.toml\n"
+    assert result.stdout == (
+        "mine.toml: written; next: kinfmu check mine.toml; to see it move: kinfmu play mine.toml\n"
+    )
     assert kinfmu.load(tmp_path / "mine.toml") == kinfmu.load(name)
     assert (tmp_path / "mine.toml").read_text(encoding="utf-8").startswith("# ")
     assert command("check", "mine.toml").exit_code == 0

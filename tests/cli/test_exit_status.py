@@ -121,6 +121,10 @@ WRONG_USAGE = [
     ("fit none.toml", "none.toml: there is no such file"),
     ("fit short.csv", "short.csv"),
     ("play forbar", "did you mean 'fourbar'?"),
+    ("play", "name a mechanism to play, or with --new the file of one to draw"),
+    ("play fourbar --new mine.toml", "name a mechanism to play, or with --new the file of one to draw"),
+    ("play --new mine.txt", "mine.txt: its name must end in .toml"),
+    ("play --new broken.toml", "broken.toml is there already; kinfmu play broken.toml opens it"),
     ("verify none.fmu", "none.fmu: there is no such file"),
     ("verify short.csv", "short.csv: its name must end in .fmu"),
 ]

@@ -59,11 +59,11 @@ OPTIONS = {  # options that tests add, by the beginning of the command
 
 FILES = {  # the file of each block of TOML, where the text above does not announce it
     "fitting.md": ["flat.toml"],
-    "forces.md": ["pump.toml", "pump.toml"],
-    "measures.md": ["hoeken.toml", "hoeken.toml"],
+    "forces.md": ["pump.toml"],
+    "measures.md": ["hoeken.toml"],
 }
 BEFORE = {  # commands for the files that a page takes as given
-    "commands.md": ["kinfmu solve crank_rocker -o host.csv", "python examples/dc_motor/build.py ."],
+    "commands.md": ["kinfmu solve crank_rocker -o host.csv"],
     "fmu.md": ["kinfmu solve fourbar -o host.csv", "kinfmu new toggle_press press.toml"],
     "host-omsimulator.md": ["kinfmu solve fourbar -o fourbar_res.csv"],
     "host-openmodelica.md": ["kinfmu solve fourbar -o fourbar_res.csv"],
@@ -185,7 +185,8 @@ def run_in_host(code: str) -> str:
 def _played(words: list[str]) -> str:
     """Start the server of a page, load the page, and end the server with Ctrl-C."""
     arguments = [sys.executable, "-m", "kinfmu", *words, "--no-browser"]
-    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as play:
+    states = {**os.environ, "KINFMU_STATES": str(Path("states").absolute())}  # of drawings
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True, env=states) as play:
         try:
             assert play.stdout is not None
             address = play.stdout.readline().strip()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable
 from typing import Any
 
@@ -22,8 +23,18 @@ SHAPES = {
     "segments": "list of tables",
     "measure": "a measured quantity",
     "measured": "a coordinate, a rate or a quantity",
-    "law": "a law, with its keys",
+    "law": "law",
 }
+VECTOR = "d = r_j + A_j s_b - r_i - A_i s_a"  # once on the page, as RISE
+RISE = "u = start + rise N(s),   s = (x - begin) / duration"
+SHARED = 4  # types with the same key, from which it is in one table for all of them
+CLEAR = (
+    "the two points",
+    "the two points 'body.point'",
+    "the point",
+    "the point 'body.point'",
+    "the body",
+)  # from the value
 REFERRED = {
     "point": ('`"body.point"`', 'two `"body.point"`'),
     "body": ("a body", "two bodies"),
@@ -33,14 +44,8 @@ REFERRED = {
 
 def sections() -> dict[str, str]:
     """Return the generated parts of the page by name, as Markdown."""
-    return {
-        "units": _units(),
-        "joints": "\n".join(_types(JOINTS, "type")),
-        "drivers": "\n".join(_types(DRIVERS, "type")),
-        "loads": "\n".join(_types(LOADS, "type")),
-        "measures": "\n".join(_types(POSE_QUANTITIES, "measure")),
-        "laws": "\n".join(_types(LAWS, "law")),
-    }
+    groups = {"joints": JOINTS, "drivers": DRIVERS, "loads": LOADS, "measures": POSE_QUANTITIES, "laws": LAWS}
+    return {"units": _units()} | {name: _types(classes) for name, classes in groups.items()}
 
 
 def filled(page: str) -> str:
@@ -50,8 +55,8 @@ def filled(page: str) -> str:
 
 def with_readings(page: str) -> str:
     """Return the page of measures with its generated part replaced."""
-    text = "\n".join(_types(READINGS, "type"))
-    words = {"| as u |": "| as the quantity |", "| as x |": "| as the driver |", "list of `[x, u]`": "list of `[x, y]`"}
+    text = _types(READINGS)
+    words = {"as u": "as the quantity", "as x": "as the driver", "list of `[x, u]`": "list of `[x, y]`"}
     for general, here in words.items():
         text = text.replace(general, here)
     return _with(page, {"readings": text})
@@ -94,19 +99,37 @@ def _listed(units: Iterable[str]) -> str:
     return ", ".join(f"`{unit}`" for unit in units)
 
 
-def _types(classes: Iterable[Any], word: str) -> Iterable[str]:
+def _types(classes: Iterable[Any]) -> str:
+    """Return a section a type, after a table of the keys that several types share."""
+    classes = list(classes)
+    counts = Counter(key for cls in classes for key in keys_of(cls))
+    shared = [key for key, count in counts.items() if count >= SHARED]
     blocks = []
-    for cls in classes:
-        lines = [f'### `{word} = "{cls.type}"`', "", f"{summary_of(cls)}.", ""]
-        equation = _equation(cls)
-        if equation:
-            lines += [*(f"    {line}" for line in equation), ""]
-        lines += ["| key | value | default | meaning |", "|---|---|---|---|"]
-        lines += [f"| `{key.name}` | {_value(key)} | {_default(key)} | {_cell(key.meaning)} |" for key in keys_of(cls)]
-        if cls.type == "spline":
-            lines.append("| `file` | name of a CSV file | | two columns, instead of `points` |")
+    if shared:
+        lines = ["| key of several types | value | default | meaning |", "|---|---|---|---|"]
+        lines += [f"| `{key.name}` | {_value(key)} | {_default(key)} | {_cell(key.meaning)} |" for key in shared]
         blocks.append("\n".join(lines))
-    return ["\n\n".join(blocks)]
+    for cls in classes:
+        keys = keys_of(cls)
+        common = ", ".join(f"`{key.name}`" for key in keys if key in shared)
+        summary = f"{summary_of(cls)}.{f' Keys: {common}.' if common else ''}"
+        equation = [f"    {line}" for line in _equation(cls)]
+        lines = [_item(key) for key in keys if key not in shared]
+        if cls.type == "spline":
+            lines.append("* `file` (name of a CSV file): two columns, instead of `points`")
+        blocks += [f"### `{cls.type}`", summary, *(["\n".join(equation)] if equation else [])]
+        blocks += ["\n".join(lines)] if lines else []
+    return "\n\n".join(blocks)
+
+
+def _item(key: Key) -> str:
+    """Return the line of a key: what it takes, its default, its meaning."""
+    default = _default(key)
+    end = f", {default}" if default == "required" else f", default {default}" if default else ", optional"
+    facts = _value(key) + (end if default or "default:" not in key.meaning else "")
+    is_clear = key.meaning in CLEAR or (key.refers and key.refers.kind == "choice" and " or " in key.meaning[:20])
+    meaning = "" if is_clear else f": {key.meaning}"
+    return f"* `{key.name}` ({facts}){meaning}"
 
 
 def _equation(cls: Any) -> list[str]:
@@ -114,6 +137,7 @@ def _equation(cls: Any) -> list[str]:
     for base in cls.__mro__:
         lines = [line.strip() for line in (base.__doc__ or "").splitlines() if line.startswith(" " * 8)]
         if lines:
+            lines = [line.replace(f",   {VECTOR}", "") for line in lines if line != RISE]
             return [re.sub(r"\s{2,}", "    ", line) for line in lines]
     return []
 

@@ -19,7 +19,8 @@ from kinfmu.cli import main
 from kinfmu.draw import figure
 from kinfmu.page import page
 from tests.mechanism.loads.every_load import every_load
-from tests.page.engines import DESKTOP, PHONE
+from tests.page.editor.hand import drawing_hand
+from tests.page.engines import DESKTOP, PHONE, browser
 
 DOCS = Path(__file__).parents[2] / "docs"
 COMMANDS = {  # of each page with files, and the pictures that they draw
@@ -108,17 +109,32 @@ def draw_pages() -> None:
 
     chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        program = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         for picture, (size, theme, name) in PAGES.items():
             path = Path(folder, f"{name}.html")
             path.write_text(page(kinfmu.load(name)), "utf-8")
-            tab = browser.new_page(viewport=size, color_scheme=theme, reduced_motion="reduce")
+            tab = program.new_page(viewport=size, color_scheme=theme, reduced_motion="reduce")
             tab.goto(path.as_uri())
             tab.wait_for_function("window.kinfmu && !window.kinfmu.isAsked")
             tab.evaluate("() => window.kinfmu.refresh(() => window.kinfmu.move(0, 2.2))")
             tab.wait_for_function("!window.kinfmu.isAsked")
             tab.screenshot(path=DOCS / picture)
-        browser.close()
+        program.close()
+
+
+def draw_editor() -> None:
+    """Draw the editor while the last link of a four-bar is drawn."""
+    with tempfile.TemporaryDirectory() as name, browser(Path(name)) as chromium:
+        os.environ["KINFMU_STATES"] = str(Path(name, "states"))
+        with drawing_hand(chromium, Path(name), color_scheme="light", reduced_motion="reduce") as hand:
+            hand.page.resize(DESKTOP)
+            hand.tool("ground")
+            hand.click((0, 0), (140, 0))
+            hand.tool("link")
+            hand.click((0, 0), (0, 40), (100, 90))
+            hand.page.tab.mouse.move(*hand.at((135, 5)))
+            hand.wait()
+            hand.page.tab.screenshot(path=DOCS / "draw.png")
 
 
 if __name__ == "__main__":
@@ -126,3 +142,4 @@ if __name__ == "__main__":
     draw_gap()
     draw_loads()
     draw_pages()
+    draw_editor()

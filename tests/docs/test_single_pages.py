@@ -24,6 +24,7 @@ from kinfmu.log import McapLog, read
 from kinfmu.mechanism import gallery
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.run.channels import absent_columns
+from tests.docs import follow
 from tests.docs.blocks import blocks, commands, executed
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -81,6 +82,8 @@ def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def typed(line: str, folder: Path) -> str:
     """Return what a command of the page prints. The viewer does not open: its recording is written to a file."""
+    if line.startswith("kinfmu play"):
+        return follow.typed(line)
     program, *words = shlex.split(line)
     if program == "python":
         done = subprocess.run([sys.executable, *words], cwd=folder, capture_output=True, text=True, check=False)
@@ -310,6 +313,14 @@ def test_the_commands_page_explains_every_line_of_the_report() -> None:
     assert subjects <= set(explained)
 
 
+def test_messages_of_mechanisms_that_do_not_move_are_those_of_the_code() -> None:
+    page = (ROOT / "docs" / "why-not.md").read_text(encoding="utf-8")
+    messages = re.findall(r"^\| `([^`]+)` \|", page, re.MULTILINE)
+    code = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "kinfmu").rglob("*.py"))
+    assert len(messages) > 10
+    assert [message for message in messages if message not in code] == []
+
+
 def test_every_link_between_the_pages_leads_to_a_file() -> None:
     made = ("reference/",)  # while the site is built; scripts/docs checks links to them
     for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
@@ -323,7 +334,6 @@ def test_the_readme_leads_to_every_page() -> None:
         "docs/howto.md",
         "docs/method.md",
         "docs/reference.md",
-        "docs/accuracy-settings.md",
     }
     pages = {f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")} - for_the_site
     assert pages <= set(re.findall(r"\((docs/[\w-]+\.md)\)", README))

@@ -13,7 +13,7 @@ from kinfmu.files import replacement, write_whole
 
 def test_a_failure_leaves_the_older_file_and_nothing_else(tmp_path: Path) -> None:
     path = tmp_path / "file.txt"
-    write_whole(path, b"older")
+    write_whole(path, b"older", is_durable=True)
 
     def fail() -> None:
         with replacement(path) as temporary:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -53,6 +54,33 @@ def arms(*laws: Law) -> Mechanism:
         tuple(AngleDriver(f"arm{k}", f"arm{k}", law) for k, law in enumerate(laws)),
         run=RunSettings(stop=3.0, step=0.125),
     )
+
+
+UNIX_TIME = 1764331200.0  # [s]
+of_each_flavour = pytest.mark.parametrize(("flavour", "fmi"), [("python", 2), ("native", 2), ("native", 3)])
+
+
+@of_each_flavour
+def test_a_law_that_begins_at_the_start_of_the_host_has_the_digits_of_one_that_begins_at_0(
+    flavour: str, fmi: int, fmu_of: Callable[..., Path]
+) -> None:
+    runs = []
+    for begin in (0.0, UNIX_TIME):
+        mechanism = arms(Polynomial4567(1.0, 2.0, begin=begin), replace(SEQUENCE, begin=begin))
+        mechanism = replace(mechanism, run=RunSettings(begin, begin + 3.0, 0.125))
+        runs.append(kinfmu.simulate(fmu_of(mechanism, flavour, fmi)))
+        assert runs[-1].good.all()
+    for one, other in zip((runs[0].q, runs[0].qd, runs[0].qdd), (runs[1].q, runs[1].qd, runs[1].qdd), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@of_each_flavour
+def test_a_start_that_is_too_far_for_a_law_is_refused_with_the_reason(
+    flavour: str, fmi: int, fmu_of: Callable[..., Path]
+) -> None:
+    reason = r"^initialization fails: at t = 1\.76433e\+09 s: crank = .* is too far .*; laws count from t = 0 s$"
+    with pytest.raises(KinfmuError, match=reason):
+        kinfmu.simulate(fmu_of("fourbar", flavour, fmi), start=UNIX_TIME, stop=UNIX_TIME + 1.0)
 
 
 @pytest.mark.parametrize("name", LAWS)

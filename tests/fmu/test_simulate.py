@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import subprocess
 import sys
 import tempfile
 import zipfile
@@ -201,7 +203,7 @@ def test_files_that_are_not_fmus_are_refused(tmp_path: Path) -> None:
 def test_nothing_is_left_in_temporary_folder_or_path_or_terminal(
     pendulum: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    folder = tmp_path / "ä +% b"  # pythonfmu's binary unquotes blanks only
+    folder = tmp_path / "kept"
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
     before = list(sys.path)
@@ -211,6 +213,53 @@ def test_nothing_is_left_in_temporary_folder_or_path_or_terminal(
     assert list(folder.iterdir()) == []
     assert sys.path == before
     assert capfd.readouterr() == ("", "")
+
+
+HOSTILE = ("a b", "a%20b", "a%b", "a%zz", "a#b", "ä", "日本", "a'b", "a;b", "a&b", "a+b", "[a]", "~", "a" * 200)
+IN_FOLDERS = """
+import sys, tempfile
+from pathlib import Path
+from kinfmu import KinfmuError, simulate
+for name in sys.argv[2:]:
+    tempfile.tempdir = str(Path(name).absolute())
+    try:
+        print(name, simulate(sys.argv[1], stop=0.1, step=0.1).status.tolist(), list(Path(name).iterdir()))
+    except KinfmuError as error:
+        print(name, error)
+"""
+THROUGH_FMPY = """
+import os, sys
+from fmpy import extract, simulate_fmu
+for name in sys.argv[2:]:
+    folder = extract(sys.argv[1], unzipdir=os.path.abspath(name))
+    rows = simulate_fmu(folder, stop_time=0.1, output_interval=0.1, output=["solver.ok"])
+    print(name, rows["solver.ok"].tolist())
+"""
+
+
+@pytest.mark.parametrize("flavour", ["python", "native 2", "native 3"])
+@pytest.mark.parametrize("program", [IN_FOLDERS, THROUGH_FMPY], ids=["kinfmu", "fmpy"])
+@pytest.mark.few(3)
+def test_fmus_load_below_folders_with_any_name(
+    program: str, flavour: str, fmu_of: Callable[..., Path], tmp_path: Path
+) -> None:
+    """In a process of its own, since pythonfmu's library crashes where it finds no file."""
+    kind, _, fmi = flavour.partition(" ")
+    names = HOSTILE
+    if flavour == "python" and program == THROUGH_FMPY:  # it unquotes blanks only, and URIs quote all the others
+        names = ("a b", "~", "a" * 200)
+    for name in names:
+        (tmp_path / name).mkdir()
+    path = fmu_of("double_pendulum", kind, int(fmi or 2))
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2]), "PYTHONIOENCODING": "utf-8"}
+    command = [sys.executable, "-c", program, str(path), *names]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr.decode()
+    lines = dict(zip(names, done.stdout.decode().splitlines(), strict=True))
+    if flavour == "python" and "a%20b" in names:
+        assert "a%20b' as a blank; let TMPDIR be another folder" in lines.pop("a%20b")
+    result = "[0, 0] []" if program == IN_FOLDERS else "[True, True]"
+    assert [line for name, line in lines.items() if line != f"{name} {result}"] == []
 
 
 def test_fmu_driven_by_inputs_stays_at_its_start_without_inputs_and_warns(built: Callable[..., Path]) -> None:

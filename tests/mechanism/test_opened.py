@@ -13,6 +13,7 @@ import pytest
 
 import kinfmu
 from kinfmu import Mechanism, Parameter, Run, Status
+from kinfmu.draw.instant import instant
 from kinfmu.errors import MechanismError, RequestError
 from kinfmu.mechanism import gallery
 from kinfmu.mechanism.members import NumberPath
@@ -217,3 +218,22 @@ def test_names_that_clash_are_refused() -> None:
     ):
         with pytest.raises(MechanismError, match=re.escape(f"[parameters] {message}")):
             parse(written.replace("[parameters]", f"[parameters]\n{own}"))
+
+
+def far_crank_rocker() -> Mechanism:
+    """Return a mechanism so far away that its plan has an origin of its own, where parameters are rounded otherwise."""
+    mechanism = kinfmu.load("crank_rocker")
+    for label, x in (("bodies.ground.points.O.x", 1e7), ("bodies.ground.points.C.x", 1e7 + 40.0)):
+        mechanism = with_number(mechanism, label, x)
+    return mechanism
+
+
+@pytest.mark.parametrize("name", ["parallel_jaw", "toggle_press", "double_pendulum", "far"])
+def test_what_a_report_has_found_gives_the_same_modules_and_the_same_drawing(name: str) -> None:
+    mechanism = far_crank_rocker() if name == "far" else kinfmu.load(name)
+    report, change = kinfmu.check(mechanism), opened(mechanism)
+    assert page_module(mechanism, report=report).text == page_module(mechanism).text
+    of_opened = page_module(change.mechanism, change.labels)
+    assert page_module(change.mechanism, change.labels, report).text == of_opened.text
+    drawn, alone = instant(mechanism, plan=report.plan), instant(mechanism)
+    assert all(np.array_equal(drawn.poses[body], pose, equal_nan=True) for body, pose in alone.poses.items())

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import math
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -415,3 +417,34 @@ def test_every_kind_of_measure_of_a_turning_angle_and_of_a_constant_has_a_value_
         found = kinfmu.measure_designs(model, {"crank_link": [14.0, 15.0]}, [reading], crank_angle=TURN)
         assert np.isfinite(found["m"]).all() == (not found.reasons)
         assert_as_measured(found, model, [reading], crank_angle=TURN)
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_later_calls_for_the_same_measures_have_their_own_designs_and_samples(engine: str) -> None:
+    model = kinfmu.compile(parse(CRANK_ROCKER, "crank_rocker"), engine=engine)
+    swing, high = Range("swing", "rocker.phi"), Maximum("high", "coupler.y", begin=0.5, end=2.0)
+    for lengths, stop, measures in [
+        ([14.0, 15.0], 2.0, [swing, high]),
+        ([16.0], 2.0, [swing, high]),
+        ([16.0], 1.0, [swing, high]),
+        ([16.0], 2.0, [swing, replace(high, begin=1.0)]),
+        ([14.0, 15.0], 2.0, [swing, high]),
+    ]:
+        angles = np.linspace(0.0, stop * math.pi, 121)
+        again = kinfmu.measure_designs(model, {"crank_link": lengths}, measures, crank_angle=angles)
+        fresh = kinfmu.compile(model.mechanism, engine=engine)
+        alone = kinfmu.measure_designs(fresh, {"crank_link": lengths}, measures, crank_angle=angles)
+        for name in ("swing", "high"):
+            assert np.array_equal(again[name], alone[name], equal_nan=True)
+            assert np.array_equal(again.at[name], alone.at[name], equal_nan=True)
+    kept = weakref.ref(model)
+    del model, again
+    gc.collect()
+    assert kept() is None
+
+
+def test_numbers_that_are_equal_but_invalid_are_refused_after_valid_ones() -> None:
+    model = kinfmu.compile(parse(CRANK_ROCKER, "crank_rocker"))
+    kinfmu.measure_designs(model, {}, [Maximum("high", "coupler.y", begin=1, end=2.0)], crank_angle=TURN)
+    with pytest.raises(KinfmuError, match="begin = true must be a number"):
+        kinfmu.measure_designs(model, {}, [Maximum("high", "coupler.y", begin=True, end=2.0)], crank_angle=TURN)

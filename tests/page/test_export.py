@@ -197,3 +197,11 @@ def test_an_fmu_of_a_mechanism_that_is_too_large_for_a_page(
 
 def _refused(*_arguments: object) -> None:
     raise RequestError("too large")
+
+
+def test_a_mechanism_that_is_too_large_is_refused_before_it_is_checked(
+    fails: Callable[..., str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("kinfmu.page.html.check", None)
+    message = fails("export", "fourbar_chain:260", "-o", "chain.html")
+    assert message == "fourbar_chain:260: 'fourbar_chain' is too large for a page: it has 520 unknowns, at most 512 fit"

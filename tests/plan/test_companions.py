@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import Mechanism
+from kinfmu import AngleDriver, Body, ConstantSpeed, Distance, Mechanism, Revolute
 from kinfmu.errors import InconsistentError
 from kinfmu.plan import SolvePlan, compile_plan
 from tests.mechanisms import reference_fourbar, wheels, with_open_lengths
@@ -178,7 +179,77 @@ def test_what_a_row_of_a_joined_block_meets_is_computed_before_it() -> None:
         np.testing.assert_allclose(run["bar.phi"], run["crank.phi"], atol=1e-12)
 
 
-@pytest.mark.parametrize("seed", [10111, 10113, 10615])
+class Stage(NamedTuple):
+    """A table on a driven crank and legs as long as it, with these pins: in capitals distances, the others bodies."""
+
+    crank: float
+    start: float
+    legs: dict[str, tuple[float, float]]
+
+
+def tables(*stages: Stage) -> Mechanism:
+    """Tables, each on the one below; none of them turns."""
+    points: dict[str, dict[str, tuple[float, float]]] = {"ground": {}}
+    poses, x, y = dict[str, tuple[float, float, float]](), 0.0, 0.0
+    pins, bars, drivers = list[Revolute](), list[Distance](), list[AngleDriver]()
+    for k, (crank, start, legs) in enumerate(stages):
+        below, table = f"table{k - 1}" if k else "ground", f"table{k}"
+        points[table] = {}
+        for name, pin in {"crank": (0.0, 0.0), **legs}.items():
+            leg = f"{name}{k}"
+            points[below][leg] = points[table][leg] = pin
+            if name.isupper():
+                bars.append(Distance(leg, (f"{below}.{leg}", f"{table}.{leg}"), crank))
+                continue
+            points[leg], poses[leg] = {"a": (0, 0), "b": (crank, 0)}, (x + pin[0], y + pin[1], start)
+            pins += [
+                Revolute(f"{leg}{end}", (f"{on}.{leg}", f"{leg}.{end}")) for end, on in (("a", below), ("b", table))
+            ]
+        x, y = x + crank * math.cos(start), y + crank * math.sin(start)
+        poses[table] = (x, y, 0.0)
+        drivers.append(AngleDriver(f"drive{k}", f"crank{k}", ConstantSpeed(start, 1.0)))
+    bodies = [Body(name, own, poses.get(name, (None, None, None))) for name, own in points.items()]
+    return Mechanism("tables", bodies, [*pins, *bars], drivers)
+
+
+STACKS = [
+    (Stage(0.258, 5.87, {"B": (-1.46, 0)}), Stage(0.262, 3.64, {"B": (-0.637, 0), "c": (-0.965, 1.657)})),
+    (Stage(0.23, 4.95, {"b": (1.609, 0)}), Stage(0.847, 0.92, {"B": (0.764, 0), "c": (1.402, 0.58)})),
+    (
+        Stage(0.641, 5.94, {"B": (0, 0.357), "C": (0, -0.1785)}),
+        Stage(0.211, 6.05, {"b": (0, 1.968), "C": (-0.833, -0.434)}),
+    ),
+]
+
+
+@pytest.mark.parametrize("stages", STACKS)
+def test_a_row_joins_no_block_whose_rows_have_no_part_in_it(stages: tuple[Stage, ...]) -> None:
+    """The table below is singular where its legs are in line, whatever carries the table on it."""
+    plan = compile_plan(tables(*stages))
+    assert _tall(plan) == [(3, 2)]
+    (alone,) = [block for block in plan.blocks if "table0.phi" in block.unknowns]
+    assert "table1.phi" not in alone.coordinates
+
+
+@pytest.mark.parametrize("stages", STACKS)
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_a_carried_table_passes_the_change_points_of_the_table_below(stages: tuple[Stage, ...], engine: str) -> None:
+    angles = np.concatenate([ANGLES, AT_ENDS])
+    run = kinfmu.solve(tables(*stages), engine=engine, drive0_angle=angles, drive1_angle=1.7 * angles)
+    assert set(run.status.tolist()) <= {0, 1, 2}
+    x = 0.0
+    for k, (stage, factor) in enumerate(zip(stages, (1.0, 1.7), strict=True)):
+        x = x + stage.crank * np.cos(factor * angles)
+        assert run[f"table{k}.phi"] == pytest.approx(0.0 * angles, abs=1e-12)
+        assert run[f"table{k}.x"] == pytest.approx(x, abs=1e-12)
+
+
+@pytest.mark.parametrize("far", [3.0, -12.0, 40.0])
+def test_a_row_that_is_singular_where_the_others_are_carries_nothing_however_long_its_lever(far: float) -> None:
+    assert _tall(compile_plan(tables(Stage(0.25, 5.87, {"b": (1.0, 0.0), "C": (far, 0.0)})))) == []
+
+
+@pytest.mark.parametrize("seed", [10111, 10113, 10213, 10615, 10689, 11072])
 def test_a_table_on_a_table_is_carried_through_the_whole_turn_of_its_crank(seed: int) -> None:
     """Its legs are singular in turn, far from the start poses."""
     assert trial(seed, "translating tables").judged().faults == []

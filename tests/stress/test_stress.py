@@ -131,11 +131,35 @@ def test_an_ok_sample_may_be_off_by_some_roundings_of_its_driver_values(
     assert verdict.blurred == 1 - faults
 
 
-def test_where_a_rise_ends_the_rounding_of_a_driver_value_counts_to_both_sides() -> None:
-    """A sample at the end of a rise of 0.06 within 3.5e-7 rad: all rests beyond it, before it not."""
-    verdict = trial(10077, "led by laws").judged()
+@pytest.mark.parametrize(
+    ("seed", "engine"),
+    [
+        (10077, "python"),
+        *(
+            pytest.param(seed, engine, marks=pytest.mark.long)
+            for seed in (10249, 10262)
+            for engine in ("python", "native")
+        ),
+    ],
+)
+def test_where_a_rise_ends_the_rounding_of_the_argument_of_a_law_counts_to_both_sides(
+    seed: int, engine: Literal["python", "native"], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Samples at the ends of rises within 3e-7 rad, some 2.1 roundings beyond: all rests there, before it not."""
+    monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
+    verdict = replace(trial(seed, "led by laws", "python" if seed == 10077 else "native"), engine=engine).judged()
     assert verdict.faults == []
     assert verdict.blurred >= 1
+
+
+@pytest.mark.long
+def test_a_small_driver_value_is_rounded_in_a_law_as_a_turn_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """At 0.017 rad begin and period of a law, of some radians, are rounded 256 times as far as the value is."""
+    monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
+    one = trial(10937, "led by laws", "native")
+    assert one.judged().faults == []
+    monkeypatch.setattr("tests.stress.trial.SUMS", 0.0)
+    assert len(one.judged().faults) == 17
 
 
 # --------------------------------------------------------------------------------------------------- the oracle

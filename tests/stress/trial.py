@@ -24,6 +24,7 @@ from tests.stress.patterns import Started, drawn_steps, started
 
 WRONG = 1e-9  # of the column's largest magnitude
 ROUNDINGS = 64.0  # of the driver values: what they change in the exact motion, an `ok` sample may be off by, too
+SUMS = 4.0  # roundings of the largest driver value, or of a turn: begin, periods and segments of a law are taken off it
 TIGHT = 4e-6  # where what must stay positive falls below on the way, `outside` is an answer too
 NARROW = 0.015  # [rad]; change points that turn in less are too narrow for a bridge: `outside` is accepted too
 NEAR_LIMIT = 4e-3  # [rad, lengths]; the same this close to a limit: four half widths of the narrowest bridge
@@ -233,15 +234,23 @@ class Trial:
         return large.qd[name] * drive if order == 1 else large.qdd[name] * drive * drive + large.qd[name] * more
 
     def _rounded(self, k: int, outputs: Iterable[str]) -> Floats:
-        """(3,) how much one rounding of each driver value changes q, qd, qdd of a sample, as errors are measured.
+        """(3,) how much rounding may change q, qd, qdd of a sample, as errors are measured.
 
-        Up or down, whatever changes more: where a rise ends, all rests on one side.
+        Roundings of its driver values, and those of the sums in which a law takes them, in which small values are
+        rounded as large ones. Where a rise ends, all rests beyond: a few roundings of the sums reach into the rise.
         """
-        drivers = self.inputs[0].shape[1]
+        turns = [TURN if kind == "angle" else 0.0 for kind in self.drawn.sketch.kinds]
+        largest = np.fmax(np.abs(self.inputs[0]).max(axis=0), turns)
+        of_sums = self._changes(k, outputs, SUMS * np.finfo(float).eps * largest)
+        return np.fmax(of_sums, ROUNDINGS * self._changes(k, outputs, np.spacing(self.inputs[0][k])))
+
+    def _changes(self, k: int, outputs: Iterable[str], shifts: Floats) -> Floats:
+        """(3,) how much shifts of the driver values change q, qd, qdd of a sample: up or down, what changes more."""
+        drivers = len(shifts)
         u, ud, udd = (np.repeat(table[[k]], 2 * drivers + 1, axis=0) for table in self.inputs)
-        for driver in range(drivers):
-            u[driver + 1, driver] = np.nextafter(u[0, driver], np.inf)
-            u[drivers + driver + 1, driver] = np.nextafter(u[0, driver], -np.inf)
+        for driver, shift in enumerate(shifts):
+            u[driver + 1, driver] += shift
+            u[drivers + driver + 1, driver] -= shift
         columns = self.drawn.exactly(DIGITS, u, ud, udd).columns
         changes = np.zeros(3)
         for name in outputs:
@@ -296,7 +305,7 @@ class Trial:
                 estimate = run.error[k, order]
                 finding = f"{name} wrong by {error:.2g} (estimate {estimate:.2g}, true {absolute:.2g})"
                 if run.status[k] == 0:
-                    if error <= ROUNDINGS * self._rounded(int(k), run.outputs)[order]:
+                    if error <= self._rounded(int(k), run.outputs)[order]:
                         verdict.blurred += 1
                     else:
                         verdict.faults.append(Fault("wrong with status ok", int(k), finding))

@@ -170,8 +170,14 @@ class Prover:
 
     # ---- proofs
 
-    def prove(self, cells: Cells) -> Tubes:
-        """Return the tubes of cells, block after block."""
+    def prove(self, cells: Cells, radii: FloatArray | None = None) -> Tubes:
+        """Return the tubes of cells, block after block.
+
+        Args:
+            cells: The cells.
+            radii: Of the wide tubes, for each block and cell [rad, sizes]. Default: as wide as possible.
+
+        """
         n, count = len(self.formulas.unknowns), len(cells)
         wide, narrow, rates, accelerations = (Intervals(np.zeros((n, count)), np.zeros((n, count))) for _ in range(4))
         motion = (narrow, rates, accelerations)
@@ -179,11 +185,12 @@ class Prover:
         contractions, signs = [], []
         with np.errstate(all="ignore"):
             thin, broad, plain = self.enclosures(cells)
-            for block in self.formulas.blocks:
+            for number, block in enumerate(self.formulas.blocks):
                 own = slice(block.place, block.place + block.size)
                 y = _inverse(np.array(approximate(block.jacobian, plain, (count,))), block.size)
                 moved = _times(y, self._rest(cells, block, thin, broad, narrow))
-                found = self._tube(cells, block, broad, narrow, y, moved)
+                given = None if radii is None else radii[number]
+                found = self._tube(cells, block, broad, narrow, y, moved, given)
                 proved &= found[0]
                 for tube, part in ((wide, found[1]), (narrow, found[2])):
                     tube.low[own], tube.high[own] = part.low, part.high
@@ -337,18 +344,20 @@ class Prover:
         narrow: Intervals,
         y: FloatArray,
         moved: list[Intervals],
+        given: FloatArray | None,
     ) -> tuple[Any, Intervals, Intervals, FloatArray]:
-        """Return where a block is proved, its wide and narrow tubes, and its contraction."""
+        """Return where a block is proved, its wide and narrow tubes, and its contraction; given: radii to prove."""
         count = len(cells)
         unit = self.unit[block.place : block.place + block.size, None]
         needed = np.max([part.magnitude / of for part, of in zip(moved, unit, strict=True)], axis=0) * _SLACK
         radius = np.where(np.isfinite(needed), np.maximum(WIDEST_TUBE, 1.5 * needed), WIDEST_TUBE)
+        radius = radius if given is None else given.copy()
         proved = np.zeros(count, dtype=bool)
         shape = (block.size, count)
         wide, narrow_own = Intervals(np.zeros(shape), np.zeros(shape)), Intervals(np.zeros(shape), np.zeros(shape))
         contraction = np.full(count, np.inf)
         todo = np.flatnonzero(np.isfinite(needed) & np.isfinite(y).all(axis=(1, 2)))
-        for _ in range(_TRIES):
+        for _ in range(_TRIES if given is None else 1):
             if not len(todo):
                 break
             w = around(np.zeros((block.size, len(todo))), radius[todo] * unit)
@@ -360,7 +369,7 @@ class Prover:
             least = image[:, inside]
             short = around(np.zeros_like(least.low), 2.0 * np.array([part.magnitude[done] for part in moved]) + 1e-300)
             again, _ = self._image(block, broad, narrow, y, moved, short, done)
-            holds = again.is_inside(short).all(axis=0)  # the only pose lies in it, too
+            holds = (again.is_inside(short) & short.is_inside(w[:, inside])).all(axis=0)  # the only pose lies in it
             least = _with_zero(
                 Intervals(np.where(holds, again.low, least.low), np.where(holds, again.high, least.high))
             )

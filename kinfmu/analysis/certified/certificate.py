@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +19,8 @@ from kinfmu.analysis.certified.intervals import Intervals, around
 from kinfmu.analysis.driver_path import DriverPath, follow, place_text
 from kinfmu.arrays import FloatArray
 from kinfmu.codegen.python import load_model
-from kinfmu.errors import RequestError, listed
+from kinfmu.errors import KinfmuError, RequestError, listed
+from kinfmu.files import errors_of_writing, write_whole
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.opened import opened
 from kinfmu.plan import SolvePlan, compile_plan
@@ -72,6 +74,7 @@ class Certificate:
         dead_centres: Ends of the range that are proved.
         gaps: What is not proved.
         prover: What has proved the cells.
+        tolerances: As given to `certify`.
 
     """
 
@@ -84,6 +87,7 @@ class Certificate:
     dead_centres: tuple[DeadCentre, ...]
     gaps: tuple[Gap, ...]
     prover: Prover
+    tolerances: float | Mapping[str, float] | None = None
 
     @property
     def is_complete(self) -> bool:
@@ -97,7 +101,7 @@ class Certificate:
 
     @cached_property
     def tube(self) -> float:
-        """Around each pose no other one is nearer than this [rad, sizes]: the narrowest tube of all cells."""
+        """The narrowest tube of all cells [rad, sizes], within which no other pose is near a pose of the run."""
         wide = self.cover.tubes.wide
         return float((wide.high / self.prover.unit[:, None]).min(initial=math.inf))
 
@@ -142,6 +146,21 @@ class Certificate:
             "dead_centres": [centre._asdict() for centre in self.dead_centres],
             "not_proved": [gap._asdict() for gap in self.gaps],
         }
+
+    def write(self, path: str | Path) -> None:
+        """Write the certificate as JSON, from which `kinfmu verify` proves it again.
+
+        Args:
+            path: The file.
+
+        Raises:
+            KinfmuError: It cannot be written.
+
+        """
+        from kinfmu.analysis.certified.stored import written
+
+        with errors_of_writing(path, KinfmuError):
+            write_whole(path, written(self))
 
     def bounds(self, output: str, order: int = 0) -> ExtremeBounds:
         """Return the bounds of an output (order 0), its rate (1) or acceleration (2) over all that is proved.
@@ -216,6 +235,20 @@ def certify(
         KinfmuError: The mechanism cannot be solved.
 
     """
+    over = over or ("range" if len(mechanism.drivers) == 1 else "run")
+    plan, box = prepared(mechanism, over, tolerances)
+    certificate = _over_run(plan, box) if over == "run" else _over_range(follow(plan, 0), width, box)
+    return replace(certificate, mechanism=mechanism, tolerances=tolerances)
+
+
+def prepared(
+    mechanism: Mechanism, over: str, tolerances: float | Mapping[str, float] | None
+) -> tuple[SolvePlan, dict[str, Intervals]]:
+    """Return the plan of all coordinates, and the box of its parameters; arguments as of `certify`."""
+    if over not in ("range", "run"):
+        raise RequestError(f"over = '{over}' is not known; known are 'range' and 'run'")
+    if over == "range" and len(mechanism.drivers) > 1:
+        raise RequestError("several drivers have no range in common; use over = 'run'")
     mechanism = replace(mechanism, coordinates="all")
     made, varied = (mechanism, {}) if tolerances is None else _varied(mechanism, tolerances)
     plan = compile_plan(made)
@@ -224,14 +257,7 @@ def certify(
         for one in plan.parameters
         if one.name in varied
     }
-    over = over or ("range" if len(plan.drivers) == 1 else "run")
-    if over not in ("range", "run"):
-        raise RequestError(f"over = '{over}' is not known; known are 'range' and 'run'")
-    if over == "run":
-        return _over_run(plan, box)
-    if len(plan.drivers) > 1:
-        raise RequestError("several drivers have no range in common; use over = 'run'")
-    return _over_range(follow(plan, 0), width, box)
+    return plan, box
 
 
 def _varied(mechanism: Mechanism, tolerances: float | Mapping[str, float]) -> tuple[Mechanism, dict[str, float]]:
@@ -252,13 +278,21 @@ def _varied(mechanism: Mechanism, tolerances: float | Mapping[str, float]) -> tu
 
 def _over_range(path: DriverPath, width: float, box: Mapping[str, Intervals]) -> Certificate:
     plan = path.plan
-    prover = Prover(_formulas(plan, varied=box), box)
+    prover = Prover(formulas_of(plan, varied=box), box)
     unit = 1.0 if path.kind == "angle" else plan.size
     low = path.low.u[0] if path.low else path.poses[0].u[0]
     high = path.high.u[0] if path.high else path.poses[-1].u[0]
     edges = np.linspace(low, high, max(2, math.ceil((high - low) / (width * unit)) + 1))
     poses = {pose.u[0]: pose for pose in path.poses}
-    found = _of_branch(cover(prover, edges, _guess(path.solver, poses, lambda u: (u,)), LEAST * unit), poses)
+    found = of_branch(cover(prover, edges, _guess(path.solver, poses, lambda u: (u,)), LEAST * unit), poses)
+    return of_range(path, prover, found)
+
+
+def of_range(path: DriverPath, prover: Prover, found: Cover) -> Certificate:
+    """Return the certificate of a range: with the dead centres at its ends, and what the cells leave unproved."""
+    unit = 1.0 if path.kind == "angle" else path.plan.size
+    low = path.low.u[0] if path.low else path.poses[0].u[0]
+    high = path.high.u[0] if path.high else path.poses[-1].u[0]
     centres, reasons = [], []
     for limit, is_high in ((path.low, False), (path.high, True)):
         if limit is None:
@@ -272,37 +306,51 @@ def _over_range(path: DriverPath, width: float, box: Mapping[str, Intervals]) ->
         low, high = (low, centre.high) if centre.is_high else (centre.low, high)
     gaps = _gaps(found, low, high, centres, reasons, _MEET * unit)
     turns = path.turns if path.turns is not None and not gaps and _closes(found, path.turns) else None
-    return Certificate(plan.mechanism, path.name, low, high, turns, found, tuple(centres), tuple(gaps), prover)
+    return Certificate(path.plan.mechanism, path.name, low, high, turns, found, tuple(centres), tuple(gaps), prover)
 
 
 def _over_run(plan: SolvePlan, box: Mapping[str, Intervals]) -> Certificate:
     run = plan.mechanism.run
-    prover = Prover(_formulas(plan, over_time=True, varied=box), box)
+    prover = Prover(formulas_of(plan, over_time=True, varied=box), box)
+    edges = np.unique([*np.arange(run.start, run.stop, run.step), run.stop, *_jumps(plan, run.start, run.stop)])
+    solver, poses, values = poses_at(plan, edges)
+    found = cover(prover, edges, _guess(solver, poses, values), LEAST * (run.stop - run.start))
+    return of_run(plan, prover, of_branch(found, poses))
+
+
+def of_run(plan: SolvePlan, prover: Prover, found: Cover) -> Certificate:
+    """Return the certificate of a run: with what the cells leave unproved."""
+    start, stop = float(plan.mechanism.run.start), float(plan.mechanism.run.stop)
+    gaps = _gaps(found, start, stop, [], [], 0.0)
+    return Certificate(plan.mechanism, "time", start, stop, None, found, (), tuple(gaps), prover)
+
+
+Values = Callable[[float], tuple[float, ...]]  # of the drivers
+
+
+def poses_at(plan: SolvePlan, times: FloatArray) -> tuple[Solver, dict[float, Pose], Values]:
+    """Return the solver, its good poses at times of the run, and the values of the drivers at a time."""
     solver = Solver(load_model(plan))
-    times = np.arange(run.start, run.stop, run.step)
-    edges = np.unique([*times, run.stop, *_jumps(plan, run.start, run.stop)])
 
     def values(t: float) -> tuple[float, ...]:
         return tuple(float(driver.law.at(t)) for driver in plan.mechanism.drivers)
 
     poses: dict[float, Pose] = {}
     pose = solver.anchor
-    for t in edges.tolist():
+    for t in times.tolist():
         arrived = solver.solve(pose, values(t))
         if arrived.good:
             pose = poses[t] = arrived
-    found = _of_branch(cover(prover, edges, _guess(solver, poses, values), LEAST * (run.stop - run.start)), poses)
-    gaps = _gaps(found, float(run.start), float(run.stop), [], [], 0.0)
-    return Certificate(plan.mechanism, "time", float(run.start), float(run.stop), None, found, (), tuple(gaps), prover)
+    return solver, poses, values
 
 
-def _of_branch(found: Cover, poses: Mapping[float, Pose]) -> Cover:
+def of_branch(found: Cover, poses: Mapping[float, Pose]) -> Cover:
     """Return the pieces of the branch that the solver follows."""
     known = {x: pose for x, pose in poses.items() if not pose.status}
     return found.with_poses(np.array(list(known)), np.array([pose.z for pose in known.values()]).T)
 
 
-def _formulas(plan: SolvePlan, *, over_time: bool = False, varied: Collection[str] = ()) -> Formulas:
+def formulas_of(plan: SolvePlan, *, over_time: bool = False, varied: Collection[str] = ()) -> Formulas:
     for block in plan.blocks:
         if len(block.residuals) > len(block.unknowns):
             raise RequestError(
@@ -329,7 +377,7 @@ def _jumps(plan: SolvePlan, start: float, stop: float) -> list[float]:
     return found
 
 
-def _guess(solver: Solver, poses: Mapping[float, Pose], values: Any) -> Guess:
+def _guess(solver: Solver, poses: Mapping[float, Pose], values: Values) -> Guess:
     """Return what finds poses by the solver, each followed from the nearest known one."""
     known = np.array(sorted(poses))
 

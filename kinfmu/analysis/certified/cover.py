@@ -52,7 +52,7 @@ class Cover:
             k = np.clip(np.searchsorted(cells.low[first : last + 1], x[which], "right") - 1, 0, None) + first
             off = Intervals(z[:, which]) - cells[k].at(Intervals(x[which]) - cells.u[k])
             kept[first : last + 1] = len(which) and off.is_inside(self.tubes[k].wide).all()
-        return _joined([(cells[kept], self.tubes[kept])])
+        return joined([(cells[kept], self.tubes[kept])])
 
 
 def cover(prover: Prover, edges: FloatArray, guess: Guess, least: float) -> Cover:
@@ -81,18 +81,18 @@ def cover(prover: Prover, edges: FloatArray, guess: Guess, least: float) -> Cove
         lost = ~converged[~good][parent]
         near[:, lost] = guess(at[lost])
         if not len(low):
-            joined = _joined(found)
-            apart = np.flatnonzero(~joined.is_joined & (joined.cells.high[:-1] == joined.cells.low[1:]))
+            whole = joined(found)
+            apart = np.flatnonzero(~whole.is_joined & (whole.cells.high[:-1] == whole.cells.low[1:]))
             apart = np.unique([*apart, *(apart + 1)]).astype(int)
-            apart = apart[joined.cells.high[apart] - joined.cells.low[apart] > 2.0 * least]
+            apart = apart[whole.cells.high[apart] - whole.cells.low[apart] > 2.0 * least]
             if not len(apart):
-                return joined
-            kept = np.ones(len(joined.cells), dtype=bool)
+                return whole
+            kept = np.ones(len(whole.cells), dtype=bool)
             kept[apart] = False
-            found = [(joined.cells[kept], joined.tubes[kept])]
-            low, high, _ = _halved(joined.cells.low[apart], joined.cells.high[apart], least)
+            found = [(whole.cells[kept], whole.tubes[kept])]
+            low, high, _ = _halved(whole.cells.low[apart], whole.cells.high[apart], least)
             near = guess(0.5 * (low + high))
-    return _joined(found)
+    return joined(found)
 
 
 def _halved(low: FloatArray, high: FloatArray, least: float) -> tuple[FloatArray, FloatArray, Any]:
@@ -103,7 +103,7 @@ def _halved(low: FloatArray, high: FloatArray, least: float) -> tuple[FloatArray
     return np.concatenate((low, middle)), np.concatenate((middle, high)), np.concatenate((large, large))
 
 
-def _joined(found: list[tuple[Cells, Tubes]]) -> Cover:
+def joined(found: list[tuple[Cells, Tubes]]) -> Cover:
     """Return all cells in order, and which are joined."""
     cells = Cells.joined([cells for cells, _ in found])
     tubes = Tubes.joined([tubes for _, tubes in found])

@@ -12,10 +12,8 @@ import os
 import platform
 import re
 import shutil
-import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.util import find_spec
@@ -253,6 +251,8 @@ def _included(text: str) -> set[str]:
 
 def _run(commands: Sequence[Sequence[str]], folder: Path) -> None:
     """Run compilers, as many at once as there are cores; raise a CompilerError with the first error if one fails."""
+    import subprocess
+    from concurrent.futures import ThreadPoolExecutor
 
     def run(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
         return subprocess.run(  # noqa: S603  a compiler that we looked up, on sources of our own
@@ -314,6 +314,8 @@ def _suffix(target: str | None) -> str:
 @cache
 def _version(compiler: tuple[str, ...]) -> tuple[str, ...]:
     """Return the command of a compiler and the version that it states."""
+    import subprocess
+
     with temporary_folder() as scratch:  # for some platforms zig leaves a file behind
         done = subprocess.run(  # noqa: S603  a compiler that we looked up
             [*compiler, "--version"], cwd=scratch, capture_output=True, text=True, check=False

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from kinfmu.codegen.wasm.binary import unsigned
 
+KEPT = 4096  # instructions of each kind that are kept, because they are written again and again
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, eq=False)
 class Scalar:
-    """A number; load, store: the instructions that read and write it, value: the machine's type."""
+    """A number; load, store: the instructions that read and write it, value: the machine's type.
+
+    There is one of each: types are compared often.
+    """
 
     name: str
     size: int
@@ -87,11 +93,13 @@ def aligned(place: int, align: int) -> int:
     return -(-place // align) * align
 
 
+@lru_cache(maxsize=KEPT)
 def loading(kind: Value, offset: int) -> bytes:
     """Return the instruction that reads a value at an offset from the address on the stack."""
     return bytes((kind.load, kind.align.bit_length() - 1)) + unsigned(offset)
 
 
+@lru_cache(maxsize=KEPT)
 def storing(kind: Value, offset: int) -> bytes:
     """Return the instruction that writes a value at an offset from the address before it on the stack."""
     return bytes((kind.store, kind.align.bit_length() - 1)) + unsigned(offset)

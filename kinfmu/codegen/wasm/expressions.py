@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 from kinfmu.codegen.wasm.binary import Binary, number_bytes, signed, unsigned
 from kinfmu.codegen.wasm.c_types import (
@@ -17,6 +18,7 @@ from kinfmu.codegen.wasm.c_types import (
     CHAR,
     DOUBLE,
     INT,
+    KEPT,
     VOID,
     Array,
     CType,
@@ -45,8 +47,7 @@ TO_DOUBLE, NEGATED, IS_ZERO, CALL = b"\xb7", b"\x9a", b"\x45", b"\x10"
 IF, ELSE, END, EMPTY = b"\x04", b"\x05", b"\x0b", b"\x40"
 
 
-@dataclass(frozen=True)
-class CVariable:
+class CVariable(NamedTuple):
     """A variable of the machine by its number, or one in memory by its address."""
 
     place: int
@@ -54,8 +55,7 @@ class CVariable:
     in_memory: bool
 
 
-@dataclass(frozen=True)
-class Target:
+class Target(NamedTuple):
     """What can be assigned to: a variable of the machine, or memory at an offset from the address on the stack."""
 
     type: CType
@@ -63,8 +63,7 @@ class Target:
     variable: int | None = None
 
 
-@dataclass(frozen=True)
-class Callee:
+class Callee(NamedTuple):
     """A function that is called by its number."""
 
     number: int
@@ -72,16 +71,19 @@ class Callee:
     result: Scalar
 
 
+@lru_cache(maxsize=KEPT)
 def get(variable: int) -> bytes:
     """Return the instruction that puts a variable of the machine on the stack."""
     return b"\x20" + unsigned(variable)
 
 
+@lru_cache(maxsize=KEPT)
 def set_to(variable: int) -> bytes:
     """Return the instruction that takes a variable's value from the stack."""
     return b"\x21" + unsigned(variable)
 
 
+@lru_cache(maxsize=KEPT)
 def integer(value: int) -> bytes:
     """Return the instruction that puts an integer on the stack."""
     return b"\x41" + signed(value)

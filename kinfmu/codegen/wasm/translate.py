@@ -6,6 +6,7 @@ place; all others are added. Arrays of functions are at fixed addresses: generat
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Mapping
 
 from kinfmu.codegen.wasm.binary import Binary, code_of, number_bytes, unsigned
@@ -143,6 +144,8 @@ class Translator(Expressions):
         """Read an initializer."""
         if isinstance(kind, Array) and kind.of == CHAR:
             return self.next()[1:-1].encode() + b"\0"
+        if isinstance(kind, Array) and kind.of == DOUBLE:
+            return self._doubles(kind)
         if isinstance(kind, Array | Struct):
             kinds = [kind.of] * kind.count if isinstance(kind, Array) else [one for _, one in kind.members.values()]
             made = b""
@@ -157,6 +160,15 @@ class Translator(Expressions):
         if kind == DOUBLE:
             return number_bytes(sign * float(self.next()))
         return (sign * self._whole()).to_bytes(4, "little", signed=True)[: kind.size]
+
+    def _doubles(self, kind: Array) -> bytes:
+        """Read an initializer of numbers; tables of laws have thousands."""
+        self.expect("{")
+        end = self.tokens.index("}", self.at)
+        texts = "".join(self.tokens[self.at : end]).removesuffix(",").split(",")
+        self.at = end + 1
+        made = struct.pack(f"<{len(texts)}d", *map(float, texts))
+        return made + bytes(kind.size - len(made))
 
     def _whole(self) -> int:
         """Read an integer or an address in an initializer."""

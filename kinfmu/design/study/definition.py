@@ -24,10 +24,10 @@ from kinfmu.mechanism.measures import Reading
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.mechanism.parameters import parameter_values
 from kinfmu.mechanism.valid import quoted
-from kinfmu.motion.batch_reading import dependent_numbers
 from kinfmu.motion.history import FEWEST
 from kinfmu.motion.measure import with_measures
 from kinfmu.motion.quantities import QuantityNames, coordinates_behind
+from kinfmu.motion.reading_plan import dependent_numbers
 from kinfmu.plan import compile_plan
 from kinfmu.run.driving import numbers_of, run_times
 from kinfmu.run.engine import require_engine

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kinfmu.arrays import FloatArray
+from kinfmu.arrays import FloatArray, IntArray
 from kinfmu.errors import KinfmuError
 from kinfmu.mechanism import toml_file
 from kinfmu.run import Run
@@ -55,12 +55,25 @@ def _estimates(run: Run) -> tuple[FloatArray, FloatArray]:
         return margin, error
     scales = np.array([1.0 if name.is_angle else model.plan.size for name in run.outputs])
     for k, table in enumerate(("values", "rates", "accelerations")):
-        apart = np.abs(getattr(again, table) - getattr(run, table)[rows]) / scales
-        apart = np.max(apart, axis=1, initial=0.0, where=np.isfinite(apart))  # columns that were not kept are NaN
+        apart = _apart(getattr(again, table), getattr(run, table), rows, scales)
         error[rows, k] = np.maximum(again.error[:, k], apart)
         if k == 0:
             margin[rows] = np.where(apart <= SAME_POSE, again.margin, np.nan)
     return margin, error
+
+
+def _apart(solved: FloatArray, held: FloatArray, rows: IntArray, scales: FloatArray) -> FloatArray:
+    """Return the largest difference of each row from that of a run, (n,); rows: of the run, which is larger."""
+    found = np.zeros(len(rows))
+    for k, scale in enumerate(scales.tolist()):  # columns of solved tables are contiguous
+        held_there = held[:, k] if len(rows) == len(held) else held[rows, k]
+        apart = np.subtract(solved[:, k], held_there)
+        np.abs(apart, out=apart)
+        apart /= scale
+        if not np.isfinite(apart).all():  # a column that was not kept is NaN
+            apart[~np.isfinite(apart)] = 0.0
+        np.maximum(found, apart, out=found)
+    return found
 
 
 def component_runs(run: Run) -> dict[str, Run]:

@@ -20,6 +20,7 @@ from kinfmu.fmu.host.ports import Port
 WARNING = 1  # fmi2Warning and fmi3Warning; a greater status is a failure
 DISCARD = 2  # fmi2Discard and fmi3Discard
 COUNTS = ("solver.status", "solver.iterations")
+_PYTHONFMU_FILE = "resources/slavemodule.txt"  # in every FMU of pythonfmu, of other tools too
 Log = Callable[[int, str], None]  # status and text of a message
 _TYPES = (  # of FMI 2.0 and 3.0, in fmpy's names of functions, by type of a variable
     {"Enumeration": "Integer"},
@@ -298,7 +299,7 @@ def _started(about: Any, folder: Path, log: Log, name: str, instance: str) -> Lo
         from fmpy.fmi2 import FMU2Slave
 
         fmpy = FMU2Slave(**common)
-        if is_own:
+        if is_own or (folder / _PYTHONFMU_FILE).exists():
             _instantiate(fmpy, folder, fmi2_callbacks(log))
         else:
             fmpy.instantiate(callbacks=fmi2_callbacks(log), loggingOn=False)
@@ -314,6 +315,11 @@ def _instantiate(fmpy: Any, folder: Path, callbacks: Any) -> None:
 
     path = (folder / "resources").absolute().as_posix()
     address = f"file://{path}" if path.startswith("/") else f"file:///{path}"
+    if "%20" in path and (folder / _PYTHONFMU_FILE).exists():
+        raise FmuError(
+            f"pythonfmu's library reads '%20' in '{folder.parent}' as a blank; "
+            "let TMPDIR be another folder, or build with --flavour native"
+        )
     fmpy.callbacks = callbacks  # the binary keeps a pointer to it
     fmpy.component = fmpy.fmi2Instantiate(
         fmpy.instanceName.encode(), fmi2CoSimulation, fmpy.guid.encode(), address.encode(), byref(callbacks), 0, 1

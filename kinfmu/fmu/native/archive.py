@@ -147,7 +147,8 @@ def _contents(
 def _build_description(identifier: str, units: tuple[str, ...]) -> bytes:
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
-    files = SubElement(configuration, "SourceFileSet", language="C99", compilerOptions="-ffp-contract=off")
+    options = {"compiler": "gcc", "compilerOptions": "-ffp-contract=off"}  # FMI has options of a named compiler only
+    files = SubElement(configuration, "SourceFileSet", {"language": "C99", **options})
     for name in units:
         SubElement(files, "SourceFile", name=name)
     return document(root)

@@ -8,7 +8,6 @@ host may continue), passes messages only to hosts that instantiate with loggingO
 
 from __future__ import annotations
 
-import ctypes
 import json
 import math
 import sys
@@ -71,7 +70,9 @@ class MechanismSlave(SlaveVariables):
             if pose.good:
                 self.motion.begin(pose)
             elif not isinstance(self.solver, UnsolvableModel):
-                self.log(f"initialization fails: at t = {self.time:g} s: {pose.message}", Fmi2Status.error)
+                shifted = self.driven_by_time and self.time != self.layout.start_time
+                hint = "; laws count from t = 0 s" if shifted else ""
+                self.log(f"initialization fails: at t = {self.time:g} s: {pose.message}{hint}", Fmi2Status.error)
         except Exception as error:  # an exception here would be Fatal for the host
             self.report_defect(error)
 
@@ -184,12 +185,3 @@ class MechanismSlave(SlaveVariables):
         if len(state) < DIGEST or sha256(data).digest() != state[:DIGEST]:
             return {}  # setting it is refused; an exception here would be Fatal for the host
         return json.loads(data)  # type: ignore[no-any-return]  # written by _fmu_state_to_bytes
-
-
-def hold(namespace: dict[str, Any]) -> None:
-    """Take a permanent reference to a module's namespace.
-
-    pythonfmu 0.7 runs the slave's module once per instance, and each time releases a reference to its namespace that it
-    does not own: without this, the third instance of a process would find the namespace freed and crash.
-    """
-    ctypes.pythonapi.Py_IncRef(ctypes.py_object(namespace))

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from kinfmu.arrays import FloatArray
+from kinfmu.arrays import FloatArray, finite
 from kinfmu.draw.scene import palette
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of, shown_range
@@ -44,9 +44,11 @@ class Group:
 
         It is `shown`, or contains all values and ends at 2 digits, so that equal motions have equal layouts.
         """
-        known = self.values[np.isfinite(self.values)]
-        if self.shown or self.path.startswith("solver/") or not len(known):
+        if self.shown or self.path.startswith("solver/"):
             return self.shown
+        known = finite(self.values)
+        if not len(known):
+            return None
         low, high = float(known.min()), float(known.max())
         if not 0.0 < high - low < np.inf:
             return None

@@ -49,6 +49,7 @@ class LawQuantity(NamedTuple):
     order: int = 0  # ... per x^order
     is_positive: bool = False
 
+    @lru_cache(maxsize=256)  # noqa: B019  there are few, and tables have thousands of numbers
     def quantity(self, led: str, argument: str) -> Quantity:
         """Return the quantity if u is of the kind `led` and x of the kind `argument` ('length', 'angle', 'time')."""
         kind = {"led": led, "argument": argument}.get(self.of, self.of)

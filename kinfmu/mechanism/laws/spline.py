@@ -45,6 +45,10 @@ class Spline(Law):
         object.__setattr__(self, "points", tuple(_pair(point) for point in self.points))
 
     def numbers(self) -> dict[ConstantPath, Constant]:
+        return self._numbers
+
+    @cached_property
+    def _numbers(self) -> dict[ConstantPath, Constant]:
         return {
             ("points", k, i): Constant(point[i], measured)
             for k, point in enumerate(self.points)

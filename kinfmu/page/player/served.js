@@ -7,8 +7,10 @@ started.then((page) => {
     if (page) serve(page);
 });
 
-function serve(page) {
-    takeBack(page);
+async function serve(page) {
+    if (page.isEditable) page.editor = await editorOf(page);
+    if (page.linkage) takeBack(page);
+    else page.editor.choose("link");
     const style = "padding: 10px 14px; color: var(--ink); overflow-wrap: anywhere; font-size: 14px; ";
     const line = element("div", { id: "file-problem", role: "alert", hidden: true });
     line.style = `${style}border-bottom: 1px solid var(--bad); background: var(--bad-back)`;
@@ -21,21 +23,36 @@ function serve(page) {
         line.hidden = !text;
         busy.hidden = !isBusy;
     };
-    const buttons = serverButtons(page);
+    let buttons = [];
+    page.whenTaken = () => (buttons = serverButtons(page));
+    if (page.linkage) page.whenTaken();
+    let wasBusy = false;
     const states = new EventSource("changes");
     states.addEventListener("state", (event) => {
-        const { version, problem, isBusy } = JSON.parse(event.data);
+        const { version, problem, isBusy, editor } = JSON.parse(event.data);
         buttons.forEach((button) => (button.disabled = false));
-        if (version !== SERVED) {
+        const isDrawn = Boolean(page.editor?.sketch);
+        if (isDrawn) page.editor.follow(editor, wasBusy && !isBusy);
+        else if (version !== SERVED) {
             keep(page);
             location.reload();
-        } else tell(problem && `The file cannot be used as it is: ${problem}`, isBusy);
+            return;
+        }
+        wasBusy = isBusy;
+        tell(problem && `The file cannot be used as it is: ${problem}`, isBusy && !isDrawn);
     });
     states.addEventListener("error", () => {
         buttons.forEach((button) => (button.disabled = true));
         tell("kinfmu play has ended. This page goes on working; it no longer follows the file.");
     });
     window.addEventListener("pagehide", () => states.close());
+}
+
+// Return the editor, whose script is packed: pages of many mechanisms stay small.
+async function editorOf(page) {
+    const [text, names] = EDITOR;
+    document.head.append(element("script", { textContent: new TextDecoder().decode(await unpacked(text)) }));
+    return new (window.kinfmuEditor(names))(page);
 }
 
 // ---- FMU and file
@@ -72,6 +89,10 @@ function serverButtons(page) {
     const buttons = [
         add("FMU with the values as set (FMI 3.0)", "save-fmu3", "Building the FMU\u2026", build(3)),
         add("FMU with the values as set (FMI 2.0)", "save-fmu2", "Building the FMU\u2026", build(2)),
+        add("Page with the values as set (HTML)", "save-page", "Making the page\u2026", async () => {
+            download(`${linkage.data.name}.html`, await (await post("page")).blob(), "text/html");
+            return `Made: ${linkage.data.name}.html, which works offline.`;
+        }),
         add("Mechanism file, into the folder of the file", "keep-file", "Saving\u2026", async () => `Saved: ${await (await post("file")).text()}`),
     ];
     part.after(note);

@@ -1,4 +1,4 @@
-"""The server of `kinfmu play`: a page, the changes of its file, and FMUs with the lengths that the page has set.
+"""The server of `kinfmu play`: a page, the changes of its file, its drawing, and FMUs with the lengths as set.
 
 Only programs of this machine reach it, and only with the token in its address. Requests of pages of other sites are
 refused: by their Origin, by the browser's Sec-Fetch-Site, and by their Host, which differs if a foreign host name
@@ -10,21 +10,25 @@ from __future__ import annotations
 import json
 import secrets
 import threading
+from functools import partial
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from types import TracebackType
-from urllib.parse import urlsplit
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
 
 import kinfmu
 from kinfmu.errors import KinfmuError
 from kinfmu.files import temporary_folder
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import parse
+from kinfmu.page.editor import StaleState, answer, view
+from kinfmu.page.html import page
 from kinfmu.page.player.source import PlaySource
 
 ADDRESS = "127.0.0.1"
-LARGEST_BODY = 4_000_000  # [bytes] of a mechanism file
+LARGEST_BODY = 4_000_000  # [bytes] of a mechanism file, or of operations on one
 HEARTBEAT = 10.0  # [s]; a closed page is noticed when this line cannot be sent
 SILENCE = 30.0  # [s] that a request may take to arrive
 MOST_COPIES = 1000
@@ -74,6 +78,8 @@ class PlayServer:
             threading.Thread(target=source.watch, daemon=True),
         ]
         self._building = threading.Lock()
+        self._viewing = threading.Lock()
+        self._view: tuple[int, bytes] = (0, b"")  # of a state
 
     @property
     def port(self) -> int:
@@ -123,6 +129,35 @@ class PlayServer:
         with self._building, temporary_folder() as folder:
             return kinfmu.build(mechanism, folder, fmi=fmi).read_bytes()
 
+    def drawing(self) -> tuple[int, dict[str, Any]]:
+        """Return the number of the current state of the drawing, and the answer to a page.
+
+        Raises:
+            KinfmuError: The file cannot be edited.
+
+        """
+        number, drawing, about = self.source.session().current()
+        return number, answer(drawing) | about
+
+    def view(self, asked: str) -> bytes:
+        """Return the full data of the page of the current state, as JSON; one is made at a time.
+
+        Args:
+            asked: The number of that state.
+
+        Raises:
+            StaleState: Another state is the current one.
+            KinfmuError: It cannot be solved.
+
+        """
+        with self._viewing:
+            number, drawing, _ = self.source.session().current()
+            if str(number) != asked:
+                raise StaleState(f"state {asked[:20]} is no longer the current one; it is {number} now")
+            if self._view[0] != number:
+                self._view = number, _json(view(drawing) | {"state": number})
+            return self._view[1]
+
     def save(self, text: str) -> Path:
         """Write a mechanism file next to that of the source, under a name that is not in use, and return its path.
 
@@ -160,12 +195,15 @@ class _Handler(BaseHTTPRequestHandler):
     sys_version = ""
 
     def do_GET(self) -> None:
-        """Answer with the page, or with the changes of its file."""
-        self._answer({"": self._page, "changes": self._changes})
+        """Answer with the page, the changes of its file, or its drawing."""
+        self._answer({"": self._page, "changes": self._changes, "editor": self._editor, "editor/view": self._view})
 
     def do_POST(self) -> None:
-        """Answer with an FMU, or with the name of a file that was saved."""
-        self._answer({"fmu2": lambda: self._fmu(2), "fmu3": lambda: self._fmu(3), "file": self._file})
+        """Answer with an FMU, a page, the name of a file that was saved, or the drawing after a change."""
+        changes = {f"editor/{name}": partial(self._edit, name) for name in ("operations", "undo", "redo", "save")}
+        answers: dict[str, object] = {"fmu2": partial(self._fmu, 2), "fmu3": partial(self._fmu, 3), "file": self._file}
+        answers["page"] = self._page_of_file
+        self._answer(answers | changes)
 
     def log_message(self, format: str, *args: object) -> None:  # noqa: A002  the name that http.server has
         """Write nothing: the terminal shows the address only."""
@@ -179,9 +217,9 @@ class _Handler(BaseHTTPRequestHandler):
                 raise Refusal(HTTPStatus.NOT_FOUND, f"'{place}' is not known")
             answer()
         except Refusal as refusal:
-            self._send(refusal.status, "text/plain", str(refusal).encode())
+            self._send_line(refusal.status, str(refusal))
         except KinfmuError as error:
-            self._send(HTTPStatus.UNPROCESSABLE_ENTITY, "text/plain", str(error).encode())
+            self._send_line(HTTPStatus.UNPROCESSABLE_ENTITY, str(error))
         except (BrokenPipeError, ConnectionError, TimeoutError):
             pass  # the page was closed
 
@@ -205,6 +243,9 @@ class _Handler(BaseHTTPRequestHandler):
         self._send_headers({"Content-Type": f"{kind}; charset=utf-8", "Content-Length": str(len(data))})
         self.wfile.write(data)
 
+    def _send_line(self, status: HTTPStatus, line: str) -> None:
+        self._send(status, "text/plain", line.encode("utf-8", "backslashreplace"))
+
     def _send_headers(self, headers: dict[str, str]) -> None:
         for name, value in (headers | _SECURITY).items():
             self.send_header(name, value)
@@ -225,26 +266,87 @@ class _Handler(BaseHTTPRequestHandler):
                 self.wfile.write(b":\n\n")
             else:
                 seen = state.change
-                data = json.dumps({"version": state.version, "problem": state.problem, "isBusy": state.is_busy})
+                shown = {"version": state.version, "problem": state.problem, "isBusy": state.is_busy}
+                data = json.dumps(shown | {"editor": state.editor})
                 self.wfile.write(f"event: state\ndata: {data}\n\n".encode())
 
     def _fmu(self, fmi: int) -> None:
         mechanism, _ = self._mechanism()
         self._send(HTTPStatus.OK, "application/zip", self.server.play.build_fmu(mechanism, fmi))
 
+    def _page_of_file(self) -> None:
+        mechanism, _ = self._mechanism()
+        self._send(HTTPStatus.OK, "text/html", page(mechanism).encode())
+
     def _file(self) -> None:
         _, text = self._mechanism()
         self._send(HTTPStatus.OK, "text/plain", str(self.server.play.save(text)).encode())
 
+    def _editor(self) -> None:
+        self._send_drawing(HTTPStatus.OK)
+
+    def _view(self) -> None:
+        (asked,) = parse_qs(urlsplit(self.path).query).get("state", [""])[:1]
+        try:
+            self._send(HTTPStatus.OK, "application/json", self.server.play.view(asked))
+        except StaleState as problem:
+            raise Refusal(HTTPStatus.CONFLICT, str(problem)) from None
+
+    def _edit(self, what: str) -> None:
+        """Change the drawing; a change of another state than the current one is answered with the current one."""
+        asked, source = self._object(), self.server.play.source
+        session, number = source.session(), asked.get("state")
+        try:
+            if what == "operations":
+                session.operate(number, asked.get("operations"))
+            elif what == "save":
+                session.save(number, force=asked.get("force") is True)
+            elif what == "undo":
+                session.undo(number)
+            else:
+                session.redo(number)
+        except StaleState as problem:
+            source.report_states()
+            self._send_drawing(HTTPStatus.CONFLICT, problem=str(problem))
+        else:
+            source.report_states()
+            self._send_drawing(HTTPStatus.OK)
+
+    def _send_drawing(self, status: HTTPStatus, **more: str) -> None:
+        _, found = self.server.play.drawing()
+        self._send(status, "application/json", _json(found | more))
+
+    def _object(self) -> dict[str, Any]:
+        """Return the JSON object in the body of the request."""
+        try:
+            found = json.loads(self._body(), parse_constant=_refuse_constant)
+        except (ValueError, RecursionError):
+            raise Refusal(HTTPStatus.BAD_REQUEST, "the body must be a JSON object without NaN and Infinity") from None
+        if not isinstance(found, dict):
+            raise Refusal(HTTPStatus.BAD_REQUEST, "the body must be a JSON object")
+        return found
+
     def _mechanism(self) -> tuple[Mechanism, str]:
         """Return the mechanism in the body of the request, and its text; files that it names are refused."""
+        text = self._body()
+        return parse(text, "mechanism as set"), text
+
+    def _body(self) -> str:
+        """Return the body of the request, which is text."""
         length = self.headers.get("Content-Length", "")
         if not (length.isascii() and length.isdigit()):
             raise Refusal(HTTPStatus.LENGTH_REQUIRED, "the length of the body is required")
         if len(length) > 12 or int(length) > LARGEST_BODY:
             raise Refusal(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"at most {LARGEST_BODY} bytes are read")
         try:
-            text = self.rfile.read(int(length)).decode()
+            return self.rfile.read(int(length)).decode()
         except UnicodeDecodeError:
             raise Refusal(HTTPStatus.BAD_REQUEST, "a mechanism file is text in UTF-8") from None
-        return parse(text, "mechanism as set"), text
+
+
+def _json(value: object) -> bytes:
+    return json.dumps(value, separators=(",", ":"), allow_nan=False).encode()
+
+
+def _refuse_constant(name: str) -> None:
+    raise ValueError(f"{name} is no number of JSON")

@@ -19,6 +19,19 @@ export function draw(pen, linkage, view, theme, show, extra, spots) {
     return { handles: painter.handles, hasHidden: painter.names.hidden.length > 0 };
 }
 
+// Return a factor for the widths of lines, less than 1 if links are short compared with the linkage.
+export function fineness(linkage) {
+    const lengths = [];
+    linkage.data.shapes.forEach((shape) => {
+        const points = shape.between || (shape.kind === "link" ? shape.at : []);
+        points.slice(1).forEach((point, k) => lengths.push(Math.hypot(...linkage.point(point).map((value, i) => value - linkage.point(points[k])[i]))));
+    });
+    const [x0, y0, x1, y1] = linkage.box();
+    const size = Math.max(x1 - x0, y1 - y0);
+    const shortest = Math.min(...lengths.filter((length) => length > 1e-3 * size), size);
+    return Math.sqrt(Math.min(Math.max(shortest / (0.12 * size), 0.01), 1));
+}
+
 // Find the spots of names that are free at most poses of the motion.
 export function foresee(linkage, view, theme, show, spots) {
     const frames = [];

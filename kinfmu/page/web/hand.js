@@ -37,7 +37,7 @@ export class Hand {
                 return;
             }
             drag = this.#grab(view.plane(at(event)), reach(event)) || { kind: "pan" };
-            if (drag.kind !== "pan") page.motion.play(false);
+            if (["pin", "grip"].includes(drag.kind)) page.motion.play(false);
             canvas.classList.add("dragging");
             page.refresh();
         });
@@ -58,7 +58,7 @@ export class Hand {
             } else if (drag?.kind === "pan") {
                 view.pan(p[0] - before[0], p[1] - before[1]);
                 page.refresh();
-            } else if (drag) {
+            } else if (["pin", "grip"].includes(drag?.kind)) {
                 const dragged = drag;
                 page.refresh(() => this.#drag(dragged, view.plane(p)), "hand");
             }
@@ -136,7 +136,8 @@ export class Hand {
     }
 
     #grab(p, reach) {
-        const { linkage, mode, handles, view } = this.page;
+        const { editor, linkage, mode, handles, view } = this.page;
+        if (editor?.isShown) return editor.isPressed ? { kind: "drawn" } : null; // by the editor itself
         const handle = handleAt(linkage, view, handles, p, reach);
         const point = mode === "lengths" ? pinAt(linkage, p, handle ? handle.gap : reach) : null; // the nearer one
         if (point !== null) return { kind: "pin", point, names: null };
@@ -164,7 +165,8 @@ export class Hand {
     }
 
     #toggleCurve(p, reach) {
-        const { linkage, drawn, traces } = this.page;
+        const { editor, linkage, drawn, traces } = this.page;
+        if (editor?.isShown) return;
         const point = pinAt(linkage, p, reach);
         if (point === null) return;
         const found = drawn.findIndex((one) => one.point === point);
@@ -186,6 +188,7 @@ export function keyboard(page) {
         }
         if (isField(event.target) || event.ctrlKey || event.metaKey || event.altKey) return;
         const { linkage } = page;
+        if (!linkage) return;
         const k = page.driver;
         const step = linkage.data.drivers[k]?.kind === "angle" ? Math.PI / 180 : (linkage.ranges[k][1] - linkage.ranges[k][0]) / 200;
         const by = (way) => {

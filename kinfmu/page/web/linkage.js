@@ -1,7 +1,7 @@
 // The mechanism that moves: engines, the pose that is shown, curves and ranges, quantities of the pose.
 
 import { changePointsOf, comesTo, partingOf, rangesOf } from "./ranges.js";
-import { isGood } from "./engine.js";
+import { compiled, Engine, isGood } from "./engine.js";
 import { CAMS, axlesOf, formsOf } from "./forms.js";
 import { TURN, placed } from "./geometry.js";
 import { dialOf } from "./marks.js";
@@ -27,6 +27,16 @@ function between({ t, columns }, at) {
     const value = (all) => (typeof all === "number" ? all : part === 1 ? all[high] : all[low] + part * (all[high] - all[low]));
     const [u, ud, udd] = [0, 1, 2].map((order) => Float64Array.from(columns, (one) => value(one[order])));
     return { u, ud, udd };
+}
+
+// Return the mechanism of the data of a page, with its engines.
+export async function linkageOf(data, solver) {
+    const engines = {};
+    for (const [which, part] of Object.entries(data.modules)) {
+        const module = part && (await compiled(solver, part.text));
+        engines[which] = part && [await Engine.load(module), await Engine.load(module)];
+    }
+    return new Linkage(data, engines);
 }
 
 export class Linkage {

@@ -3,12 +3,12 @@
 import { Address, Design } from "./design.js";
 import { arrows } from "./marks.js";
 import { CanvasPen, THEMES } from "./pen.js";
-import { draw, foresee } from "./drawing.js";
+import { draw, fineness, foresee } from "./drawing.js";
 import { $, breakable, element } from "./elements.js";
-import { compiled, Engine, unpacked } from "./engine.js";
+import { unpacked } from "./engine.js";
 import { Frames, Motion } from "./motion.js";
 import { Hand, keyboard } from "./hand.js";
-import { Linkage } from "./linkage.js";
+import { linkageOf } from "./linkage.js";
 import { ofJoints, withStop } from "./numbers.js";
 import { PATIENCE, Spots } from "./names.js";
 import { filesPanel, Plots, showPanel } from "./panels.js";
@@ -19,43 +19,61 @@ import { View } from "./view.js";
 const TRACE = 600; // points of a trace
 
 class Page {
-    constructor(linkage) {
-        const { interest, loops } = linkage.data;
-        this.linkage = linkage;
-        this.design = new Design(linkage);
+    // linkage: null without a mechanism that moves; solver: unpacked, for the mechanisms that `take` is given
+    constructor(linkage, solver) {
+        this.solver = solver;
         this.view = new View();
-        this.show = { names: true, curves: true, traces: false, velocity: false, acceleration: false, transmission: loops.length > 0 && loops.length < 4, centres: false, limits: true, loads: true, forces: false, shaking: false, grid: true };
-        this.drawn = interest.map(({ point, colour }) => ({ point, colour })); // points with curves
-        this.curves = [];
-        this.traces = new Map();
+        this.show = { names: true, curves: true, traces: false, velocity: false, acceleration: false, centres: false, limits: true, loads: true, forces: false, shaking: false, grid: true };
         this.handles = []; // of drivers, as drawn
         this.hasHidden = false; // names without a place
-        this.spots = new Spots(); // of names
         this.now = performance.now(); // [ms] of the frame
-        this.isToForesee = true; // before the next frame: it takes as long as some frames
         this.mode = "move";
-        this.driver = 0;
+        this.editor = null; // in which the mechanism is drawn by hand, if the page is served for that
+        this.whenTaken = () => {}; // what else is made anew for another mechanism
         this.canvas = $("drawing");
         this.context = this.canvas.getContext("2d");
         this.frames = new Frames((now, work) => this.frame(now, work));
-        this.motion = new Motion(this);
         this.address = new Address(this);
         this.#theme(storedTheme());
         this.#header();
         this.#tabs();
+        this.hand = new Hand(this);
+        keyboard(this);
+        if (linkage) this.take(linkage);
+        new ResizeObserver(() => this.#resize()).observe($("stage"));
+        this.#resize();
+    }
+
+    // Show a mechanism, in place of the one before.
+    take(linkage) {
+        const { data } = linkage;
+        const isFirst = !this.linkage;
+        if (this.isPlaying) this.motion.play(false);
+        this.linkage = linkage;
+        this.design = new Design(linkage);
+        this.show.transmission ??= data.loops.length > 0 && data.loops.length < 4;
+        this.drawn = data.interest.map(({ point, colour }) => ({ point, colour })); // points with curves
+        this.curves = [];
+        this.traces = new Map();
+        this.spots = new Spots(); // of names
+        this.isToForesee = true; // before the next frame: it takes as long as some frames
+        this.driver = 0;
+        this.hand.pin = null;
+        $("name").textContent = breakable(data.name);
+        $("title").textContent = data.title;
+        if (!linkage.parameters.some((one) => one.points.length)) $("edit").hidden = true;
+        for (const id of ["values", "plots", "show", "files", "drivers", "speed"]) $(id).replaceChildren();
+        this.motion = new Motion(this);
         this.transport = new Transport(this);
         this.values = new Values(this, $("values"));
         this.plots = new Plots(this, $("plots"));
         showPanel(this, $("show"));
         filesPanel(this, $("files"));
-        this.hand = new Hand(this);
-        keyboard(this);
-        this.address.read();
+        if (isFirst) this.address.read();
         linkage.fineness = fineness(linkage);
-        new ResizeObserver(() => this.#resize()).observe($("stage"));
-        this.#resize();
-        this.view.fit(linkage.box());
+        if (isFirst) this.fit();
         this.reshape();
+        this.whenTaken();
     }
 
     // ---- frames
@@ -71,11 +89,11 @@ class Page {
 
     frame(now, waiting) {
         this.now = now;
-        if (this.motion.isPlaying) this.motion.advance(now);
+        if (this.isPlaying) this.motion.advance(now);
         for (const work of waiting) work();
         this.#trace();
         this.paint();
-        return this.motion.isPlaying;
+        return this.isPlaying;
     }
 
     // The lengths are others: curves, ranges and plots follow, and the drawing in the next frame.
@@ -96,6 +114,7 @@ class Page {
         const ratio = window.devicePixelRatio || 1;
         c.setTransform(ratio, 0, 0, ratio, 0, 0);
         c.clearRect(0, 0, view.width, view.height);
+        if (this.editor?.paint(c) || !linkage) return;
         this.spots.begin(this.now, linkage.pose, view);
         const state = `${this.spots.state} ${linkage.changed}`;
         if (this.isToForesee && this.show.names && state !== this.foreseen) {
@@ -135,8 +154,8 @@ class Page {
         if (!this.isPlaying) this.canvas.setAttribute("aria-label", `Drawing of the mechanism at ${this.transport.pose()}. Arrow keys move the driver, space plays, question mark lists all keys.`);
         const note = linkage.leftOut.length ? `Not drawn with these values: ${linkage.leftOut.join("; ")}. The lines of kinfmu check hold for the saved file.` : "";
         if ($("note").textContent !== note) [$("note").textContent, $("note").hidden] = [note, !note]; // screen readers speak it
-        $("undo").disabled = !design.past.length;
-        $("redo").disabled = !design.future.length;
+        $("undo").disabled = !design.past.length && !this.editor?.canUndo(false);
+        $("redo").disabled = !design.future.length && !this.editor?.canUndo(true);
         $("reset").disabled = !design.changes().length;
         const head = design.isInvalid ? "Not valid: " : design.isOtherBranch ? "Another branch: " : "Does not close: ";
         if (!design.isOk) this.#banner(head, `${withStop(this.inWords(design.failure))} The last good pose is shown in grey.`);
@@ -160,7 +179,7 @@ class Page {
     // ---- motion
 
     get isPlaying() {
-        return this.motion.isPlaying;
+        return Boolean(this.motion?.isPlaying);
     }
 
     get blocked() {
@@ -193,6 +212,11 @@ class Page {
     }
 
     undo(isRedo = false) {
+        if (this.editor?.canUndo(isRedo)) {
+            this.editor.undo(isRedo);
+            return;
+        }
+        if (this.editor?.isShown) return;
         this.refresh(() => {
             if (!(isRedo ? this.design.redo() : this.design.undo())) return;
             this.#taken();
@@ -219,9 +243,6 @@ class Page {
     }
 
     #header() {
-        const { data } = this.linkage;
-        $("name").textContent = breakable(data.name);
-        $("title").textContent = data.title;
         $("undo").addEventListener("click", () => this.undo());
         $("redo").addEventListener("click", () => this.undo(true));
         $("reset").addEventListener("click", () => {
@@ -246,11 +267,10 @@ class Page {
         $("in").addEventListener("click", () => this.zoom(1.3));
         $("out").addEventListener("click", () => this.zoom(1 / 1.3));
         $("edit").addEventListener("click", () => this.toggleMode());
-        if (!this.linkage.parameters.some((one) => one.points.length)) $("edit").hidden = true;
     }
 
     fit() {
-        this.view.fit(this.linkage.box());
+        this.view.fit(this.editor?.box ?? this.linkage.box());
         this.isToForesee = true;
         this.refresh();
     }
@@ -283,7 +303,7 @@ class Page {
                 one.tabIndex = isChosen ? 0 : -1;
                 $(one.getAttribute("aria-controls")).hidden = !isChosen;
             }
-            if (tab.id === "tab-plots") this.plots.draw();
+            if (tab.id === "tab-plots") this.plots?.draw();
         };
         tabs.forEach((tab, k) => {
             tab.addEventListener("click", (event) => {
@@ -306,7 +326,7 @@ class Page {
         const ratio = window.devicePixelRatio || 1;
         [view.width, view.height] = [box.width, box.height];
         [canvas.width, canvas.height] = [Math.round(box.width * ratio), Math.round(box.height * ratio)];
-        if (view.isFitted && this.linkage.pose) view.fit(this.linkage.box());
+        if (view.isFitted && this.linkage) this.fit();
         this.isToForesee = true;
         this.refresh();
     }
@@ -322,29 +342,12 @@ function storedTheme() {
     return window.matchMedia?.("(prefers-color-scheme: dark)").matches ? "dark" : "light";
 }
 
-// Return a factor for the widths of lines, less than 1 if links are short compared with the linkage.
-function fineness(linkage) {
-    const lengths = [];
-    linkage.data.shapes.forEach((shape) => {
-        const points = shape.between || (shape.kind === "link" ? shape.at : []);
-        points.slice(1).forEach((point, k) => lengths.push(Math.hypot(...linkage.point(point).map((value, i) => value - linkage.point(points[k])[i]))));
-    });
-    const [x0, y0, x1, y1] = linkage.box();
-    const size = Math.max(x1 - x0, y1 - y0);
-    const shortest = Math.min(...lengths.filter((length) => length > 1e-3 * size), size);
-    return Math.sqrt(Math.min(Math.max(shortest / (0.12 * size), 0.01), 1));
-}
-
 async function start() {
     try {
         const data = JSON.parse(new TextDecoder().decode(await unpacked($("data").textContent)));
         const solver = await unpacked(data.solver);
-        const engines = {};
-        for (const [which, part] of Object.entries(data.modules)) {
-            const module = part && (await compiled(solver, part.text));
-            engines[which] = part && [await Engine.load(module), await Engine.load(module)];
-        }
-        window.kinfmu = new Page(new Linkage(data, engines));
+        window.kinfmu = new Page(data.modules && (await linkageOf(data, solver)), solver);
+        window.kinfmu.isEditable = data.isEditable;
         return window.kinfmu;
     } catch (error) {
         $("banner").hidden = false;

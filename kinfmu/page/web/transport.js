@@ -21,16 +21,16 @@ export class Transport {
         const speeds = [...slower, ...SPEEDS];
         speeds.forEach((value) => speed.append(element("option", { value, textContent: `${value}\u00d7` })));
         speed.value = speeds.reduce((best, value) => (Math.abs(Math.log(value / wanted)) < Math.abs(Math.log(best / wanted)) ? value : best));
-        $("play").addEventListener("click", () => page.motion.play());
+        $("play").onclick = () => page.motion.play();
         const time = $("time");
         [time.min, time.max] = [run.from, run.to];
         if (!linkage.hasTime) [time.previousElementSibling.textContent, time.ariaLabel] = ["Sample", "Sample"];
         if (linkage.data.over) for (const one of [time.parentElement, $("clock")]) one.hidden = true; // the driver's slider is the axis
-        time.addEventListener("input", () => {
+        time.oninput = () => {
             page.motion.play(false);
             page.refresh(() => page.motion.arrive(linkage.goToTime(Number(time.value))), "place");
             page.address.writeSoon();
-        });
+        };
         this.sliders = drivers.map((driver, k) => {
             const { unit, factor } = shownUnit(driver.unit);
             const slider = element("input", { type: "range", step: "any", "aria-label": `${driver.name}, slider` });

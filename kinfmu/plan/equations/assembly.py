@@ -107,6 +107,12 @@ def find_assembly(system: System) -> AssembledStart:
     )
 
 
+def closed_start(system: System, q: FloatArray, u: FloatArray) -> AssembledStart:
+    """Return the start of a mechanism that closes in a pose q (n,) at driver values u (d,) as it is."""
+    pose = _without_spare_rows(system, q, u) or Assembled(q, u, margin(system, q))
+    return AssembledStart(StartValues(q, u), pose)
+
+
 def start_values(system: System) -> StartValues:
     """Return the start values of `find_assembly`; nothing is assembled if start poses and laws agree."""
     given = start_from_poses(system)
@@ -138,8 +144,8 @@ def _assembled(system: System, start: StartValues) -> Assembled | None:
         found = _assembled_nearby(system, start) if gap < _NEARLY else None
         return found if found or order.blocks else assemble_from_random_starts(system, start, None, order)
     found = _without_spare_rows(system, q, u) or Assembled(q, u, margin(system, q))
-    if found.margin > comfortable(system):
-        return found
+    if found.margin > comfortable(system) or (found.margin > SINGULAR and not len(u)):
+        return found  # without drivers it stays where it is
     nearby = []
     for side in (1.0, -1.0):
         if found.margin > SINGULAR:

@@ -120,8 +120,10 @@ def motion_samples(part: Part, q: FloatArray, count: int, step: float = 0.2) -> 
     first = free @ rng.standard_normal(free.shape[1])
     for direction in (first, -first):
         pose = start
-        while free.shape[1] > 0 and found < count:
+        while found < count:
             free, _ = _freedom(part.jacobian(pose))
+            if free.shape[1] == 0:  # all held, also where a singular start has been left
+                break
             direction = free @ (free.T @ direction) + 0.3 * free @ rng.standard_normal(free.shape[1])
             direction /= np.abs(direction).max()
             onward = _onward(part, pose, free, direction, step, least)

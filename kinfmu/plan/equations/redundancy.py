@@ -66,14 +66,16 @@ class Redundancy:
         return tuple(row for row in self.dependent if not row.is_consistent)
 
 
-def find_redundancy(system: System) -> Redundancy:
+def find_redundancy(system: System, assembly: AssembledStart | None = None) -> Redundancy:
     """Find redundant and inconsistent joint rows: test every row without itself, later rows first.
 
     A row is dependent if its gradient lies in the span of the other rows' gradients at every sampled pose of the motion
     that the others leave. A loss of rank at one pose only is a singular point and does not count. Haug (1989) judges
     rank at one pose; along the motion, a parallel third crank shows as redundant and a stretched linkage does not.
+
+    assembly: the start of the mechanism, if it is known. Default: it is assembled.
     """
-    assembly = find_assembly(system)
+    assembly = assembly or find_assembly(system)
     assembled = assembly.pose
     free, joint_rows = len(system.coordinates), range(system.joint_row_count)
     if assembled is not None and assembled.margin > comfortable(system) and len(system.rows) == free:

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,8 +18,9 @@ from kinfmu import Certificate
 from kinfmu.analysis.certified import cells
 from kinfmu.analysis.certified.cover import Cover
 from kinfmu.analysis.certified.intervals import Intervals
+from kinfmu.analysis.certified.stored import proved_again
 from kinfmu.cli import main
-from kinfmu.errors import RequestError
+from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.mechanism.gallery import load, names
 from tests import oracle
 from tests.gallery_members import mostly_long
@@ -23,6 +28,7 @@ from tests.mechanisms import fourbar
 
 CHANGE_POINTS = {"fourbar": 2, "parallel_jaw": 2}  # of which nothing is proved
 SLOW = ("fourbar_chain",)  # a hundred loops
+NOT_PROVED = "the cell from 0.498665501 to 0.598398601 is not proved"
 
 
 @pytest.fixture(scope="module")
@@ -164,6 +170,58 @@ def test_check_prints_the_certificate() -> None:
     ]
     assert found["complete"]
     assert len(found["dead_centres"]) == 2
+
+
+@pytest.mark.parametrize("name", ["crank_rocker", "triple_rocker", "fourbar", "excavator"])
+def test_a_certificate_is_proved_again(name: str, tmp_path: Path) -> None:
+    certificate = kinfmu.certify(load(name))
+    certificate.write(tmp_path / "proof.json")
+    shown = CliRunner().invoke(main, ["verify", str(tmp_path / "proof.json")])
+    assert shown.exit_code == 0, shown.output
+    assert shown.output == f"{certificate}\n"
+
+
+def test_a_certificate_of_tolerances_is_proved_again(tmp_path: Path) -> None:
+    kinfmu.certify(load("crank_rocker"), tolerances=0.001).write(tmp_path / "proof.json")
+    assert proved_again(tmp_path / "proof.json").is_complete
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda of: of["cells"]["path"][0][0].__setitem__(5, 9.0), NOT_PROVED),
+        (lambda of: of["cells"]["radii"][0].__setitem__(5, 1.0), NOT_PROVED),
+        (lambda of: [of["cells"][key].pop(5) for key in ("low", "high", "u")], "cells.path must be 3 x 2 x 62 finite"),
+        (lambda of: of["states"].update(high=7.0), "its range is not that of the mechanism"),
+        (lambda of: of["states"].update(turns=2), "its range is not that of the mechanism"),
+        (lambda of: of.update(mechanism=of["mechanism"].replace("[20.0, 0.0]", "[45.0, 0.0]")), "proof.json: "),
+        (lambda of: of.pop("cells"), "not a complete certificate"),
+        (lambda of: of.update(format="x"), "not a certificate of kinfmu; its format is 'kinfmu certificate 1'"),
+    ],
+)
+def test_a_changed_certificate_is_refused(
+    change: Callable[[dict[str, Any]], object], message: str, crank_rocker: Certificate, tmp_path: Path
+) -> None:
+    path = tmp_path / "proof.json"
+    crank_rocker.write(path)
+    content = json.loads(path.read_bytes())
+    change(content)
+    path.write_text(json.dumps(content))
+    with pytest.raises(KinfmuError, match=re.escape(message)):
+        proved_again(path)
+
+
+def test_a_missing_cell_is_missed_when_it_is_proved_again(crank_rocker: Certificate, tmp_path: Path) -> None:
+    path = tmp_path / "proof.json"
+    crank_rocker.write(path)
+    content = json.loads(path.read_bytes())
+    for row in (content["cells"][key] for key in ("low", "high", "u")):
+        del row[5]
+    for row in (*content["cells"]["radii"], *(row for table in content["cells"]["path"] for row in table)):
+        del row[5]
+    path.write_text(json.dumps(content))
+    with pytest.raises(KinfmuError, match=r"0\.498665501 to 0\.598398601 is not proved: not proved"):
+        proved_again(path)
 
 
 def test_intervals_of_a_cell_are_ordered(crank_rocker: Certificate) -> None:

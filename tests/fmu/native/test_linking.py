@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 import shutil
 import subprocess
-import zipfile
 from pathlib import Path
-from xml.etree import ElementTree as ET
 
 import pytest
 
@@ -16,7 +14,6 @@ from kinfmu.codegen.c import compiler
 from kinfmu.fmu.native.sources import headers, sources
 from kinfmu.fmu.variables import interface
 from kinfmu.plan import compile_plan
-from tests.fmu.conftest import Build
 
 CC, NM = shutil.which("gcc") or shutil.which("clang"), shutil.which("nm")
 LINKED = {"first": ("fourbar", "2.0"), "second": ("double_pendulum", "2.0"), "third": ("fourbar", "3.0")}
@@ -72,12 +69,3 @@ def test_fmus_of_both_versions_are_linked_into_one_program(tmp_path: Path) -> No
     done = subprocess.run([str(program)], capture_output=True, text=True, check=True)
     wanted = [0.0, 0.5, math.cos(5.5), 0.75]  # crank.phi, upper.x, crank.phi
     assert [float(word) for word in done.stdout.split()] == pytest.approx(wanted, abs=1e-14)
-
-
-def test_the_build_description_of_fmi_3_keeps_products_and_sums_apart(built_native: Build) -> None:
-    with zipfile.ZipFile(built_native("fourbar", 3)) as zipped:
-        root = ET.fromstring(zipped.read("sources/buildDescription.xml"))  # noqa: S314  # our own
-        inside = {name.removeprefix("sources/") for name in zipped.namelist() if name.startswith("sources/")}
-    (files,) = root.iterfind("BuildConfiguration/SourceFileSet")
-    assert files.get("compilerOptions") == "-ffp-contract=off"
-    assert {file.get("name") for file in files} <= inside

@@ -94,3 +94,13 @@ def test_fmpy_ends_past_a_limit_and_its_recorder_holds_the_rows(
     assert times == [0.0, 0.5, 1.0, 1.5, 2.0, *([2.0] if kind == "ModelExchange" else [])]
     message = "at t = 2.5 s: crank = 6.544985 rad (375 deg) cannot be reached: the limit is crank = 6.2831853072 rad"
     assert message in capfd.readouterr().out
+
+
+def test_fmpy_ends_silently_past_a_limit_of_a_python_fmu_before_the_stop_time(built: Build) -> None:
+    from fmpy import simulate_fmu
+
+    path, names = str(built("double_pendulum", "time")), ["solver.ok", "upper.phi"]
+    rows = simulate_fmu(path, start_time=0.0, stop_time=3.0, output_interval=0.5, output=names)
+    assert rows["time"].tolist() == [0.0, 0.5, 1.0, 1.5, 2.0, 2.0]
+    assert rows["solver.ok"].tolist() == 5 * [True] + [False]
+    assert rows["upper.phi"][-1] == rows["upper.phi"][-2]

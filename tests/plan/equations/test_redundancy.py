@@ -9,6 +9,7 @@ import kinfmu
 from kinfmu import AngleDriver, Body, Distance, Mechanism, Point, Revolute
 from kinfmu.errors import InconsistentError
 from kinfmu.mechanism.gallery.chains import fourbar_chain
+from kinfmu.plan.equations.assembly import closed_start
 from kinfmu.plan.equations.redundancy import find_redundancy
 from kinfmu.plan.equations.system import System
 from tests.mechanisms import bar_as_body, fourbar, reference_fourbar, six_bar
@@ -103,3 +104,22 @@ def test_a_redundant_bar_in_every_loop_of_a_chain_is_found_with_its_own_loop() -
     assert [row.row.owner for row in redundancy.redundant] == [bar.name for bar in bars]
     for k, row in enumerate(redundancy.redundant, start=1):
         assert row.implied_by_joints == (f"O_{k - 1}", f"O_{k}", f"P_{k}", f"Q_{k}")
+
+
+def test_a_structure_without_drivers_that_is_nearly_singular_is_judged() -> None:
+    pins = {"A": (9.4111, 6.619), "B": (9.4114, 6.62)}
+    structure = Mechanism(
+        "structure",
+        [Body("ground", pins), Body("link", {**pins, "D": (-30, 0)}, (0, 0, 0))],
+        [Revolute(name, (f"ground.{name}", f"link.{name}")) for name in pins],
+    )
+    assert find_redundancy(System(structure)).mobility == 0
+
+
+def test_a_known_closed_start_gives_the_same_mobility() -> None:
+    for name in ("fourbar", "parallel_jaw", "peaucellier"):
+        system = System(kinfmu.load(name))
+        found = find_redundancy(system)
+        assert found.assembly.pose is not None
+        again = find_redundancy(system, closed_start(system, found.assembly.pose.q, found.assembly.pose.u))
+        assert (again.mobility, again.kept) == (found.mobility, found.kept)

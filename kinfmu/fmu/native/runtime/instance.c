@@ -24,6 +24,7 @@ void kf_start(kf_instance *instance, bool model_exchange)
     s->time = s->last_time = kf_start_time;
     s->stop_time = DBL_MAX;
     s->mode = KF_INSTANTIATED;
+    s->committed_status = KF_INCONSISTENT;
     memcpy(s->committed_u, KF_POSE_U(&s->poses[0]), sizeof s->committed_u);
     for (k = 0; k < 3 * KF_DRIVERS; ++k) {
         s->committed_inputs[k] = s->real[k];
@@ -56,6 +57,10 @@ static const struct {
 kf_answer kf_possible(const kf_instance *instance, kf_call call)
 {
     const bool is_possible = calls[call].modes >> instance->now.mode & 1u;
+    if (!kf_rounds_to_nearest() && call != KF_TERMINATE) {
+        return kf_answered(instance, KF_ERROR,
+                           "the host does not round to nearest; call fesetround(FE_TONEAREST) before the FMU");
+    }
     return is_possible ? KF_DONE : kf_answered(instance, KF_ERROR, "%s", calls[call].refusal);
 }
 
@@ -99,7 +104,8 @@ kf_answer kf_exit_initialization(kf_instance *instance)
         return kf_answered(instance, KF_ERROR, "initialization fails: %s", s->solver.message);
     }
     if (!KF_GOOD(kf_ask(instance))) {
-        return kf_answered(instance, KF_ERROR, "initialization fails: at t = %g s: %s", s->time, s->message);
+        return kf_answered(instance, KF_ERROR, "initialization fails: at t = %g s: %s%s", s->time, s->message,
+                           s->driven_by_time && s->time != kf_start_time ? "; laws count from t = 0 s" : "");
     }
     if (kf_begin_motion(instance) != KF_DONE) {
         return KF_ERROR;

@@ -227,6 +227,14 @@ extern const double kf_sixth_order[3];
 double kf_largest_rate(const double *v);
 double kf_trial_step(kf_state *state);
 
+/* Return whether numbers are rounded to nearest: sines and cosines, among others, rely on it. */
+static inline bool kf_rounds_to_nearest(void)
+{
+    static const volatile double small = 1e-40; /* volatile: added when the program runs */
+    const double added = small;
+    return 1.0 + added == 1.0 - added;
+}
+
 /* Return whether a call has valid arguments: an instance, and arrays that are not NULL. */
 static inline kf_answer kf_check(const kf_instance *instance, const void *references, const void *values, size_t count)
 {

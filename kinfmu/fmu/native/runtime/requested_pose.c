@@ -32,7 +32,7 @@ KF_RARE kf_answer kf_bind_parameters(kf_instance *instance)
     s->unsolvable = !kf_solver_bind(&s->solver, KF_REAL(s, KF_PART_PARAMETERS));
     s->committed = s->asked = 0;
     s->poses[0] = s->solver.anchor;
-    s->committed_status = KF_OK;
+    s->committed_status = KF_INCONSISTENT; /* no pose of a solve: the solver has not judged its anchor yet */
     memcpy(s->committed_u, KF_POSE_U(&s->poses[0]), sizeof s->committed_u);
     s->samples = 0;
     kf_forget(s);
@@ -43,7 +43,7 @@ KF_RARE kf_answer kf_bind_parameters(kf_instance *instance)
 inline void kf_solve_at(kf_state *s, const double *u)
 {
     s->solver.tolerance = *KF_REAL(s, KF_PART_TOLERANCE);
-    if (!s->unsolvable && memcmp(u, s->committed_u, sizeof s->committed_u) == 0) {
+    if (KF_GOOD(s->committed_status) && memcmp(u, s->committed_u, sizeof s->committed_u) == 0) {
         s->asked = s->committed;
         s->status = s->committed_status;
         s->work = 0;

@@ -48,7 +48,7 @@ static KF_RARE kf_answer set_other(kf_instance *instance, unsigned reference, do
     return KF_DONE;
 }
 
-/* Refuse to set: an array is NULL, or the instance is terminated. */
+/* Refuse to set: an array is NULL, the instance is terminated, or numbers are not rounded to nearest. */
 static KF_RARE kf_answer set_nothing(const kf_instance *instance, const unsigned *references, size_t count,
                                      const double *values)
 {
@@ -60,7 +60,7 @@ kf_answer kf_set_real(kf_instance *instance, const unsigned *references, size_t 
 {
     kf_state *const s = &instance->now;
     size_t k;
-    if (instance == NULL || references == NULL || values == NULL || s->mode == KF_TERMINATED) {
+    if (instance == NULL || references == NULL || values == NULL || s->mode == KF_TERMINATED || !kf_rounds_to_nearest()) {
         return set_nothing(instance, references, count, values);
     }
     for (k = 0; k < count; ++k) {

@@ -49,8 +49,8 @@ static KF_RARE kf_answer refuse_step(const kf_instance *instance, double time, d
 /* Return whether a step is possible that is outside start and stop time by no more than rounding. */
 static KF_RARE bool is_all_but_inside(const kf_state *s, double time, double step)
 {
-    return s->mode == KF_STEPPING && isfinite(time + step) && step >= 0.0 && time >= s->start_time - KF_SAME_TIME * step &&
-           !kf_is_past_stop(s, time, step);
+    return s->mode == KF_STEPPING && kf_rounds_to_nearest() && isfinite(time + step) && step >= 0.0 &&
+           time >= s->start_time - KF_SAME_TIME * step && !kf_is_past_stop(s, time, step);
 }
 
 kf_answer kf_step(kf_instance *instance, double time, double step)
@@ -58,7 +58,7 @@ kf_answer kf_step(kf_instance *instance, double time, double step)
     kf_state *const s = &instance->now;
     const double end = time + step;
     kf_answer answer;
-    if (!(s->mode == KF_STEPPING && step >= 0.0 && time >= s->start_time && end <= s->stop_time) &&
+    if (!(s->mode == KF_STEPPING && kf_rounds_to_nearest() && step >= 0.0 && time >= s->start_time && end <= s->stop_time) &&
         !is_all_but_inside(s, time, step)) {
         return refuse_step(instance, time, step);
     }

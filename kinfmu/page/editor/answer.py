@@ -1,0 +1,170 @@
+"""Answers to a page: what is drawn at the start pose, the mobility, what is missing; the full data of a page."""
+
+from __future__ import annotations
+
+import tomllib
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from kinfmu.analysis import check
+from kinfmu.analysis.doctor import advice
+from kinfmu.draw.scene.instant import Instant
+from kinfmu.errors import KinfmuError, MobilityError
+from kinfmu.mechanism.quantities.placement import body_of
+from kinfmu.page.describe import drawn
+from kinfmu.page.editor.drawing import AS_DRAWN, PLACEHOLDER, Drawing
+from kinfmu.page.html import page_data
+from kinfmu.plan import plan_from
+from kinfmu.plan.equations.redundancy import Redundancy
+
+_MOST_NOTES = 5  # of one kind in an answer
+
+
+def answer(drawing: Drawing) -> dict[str, Any]:
+    """Return the answer to a page after a change: the text, and what of it needs no run."""
+    problem = _problem(drawing)
+    badge = _badge(drawing, problem)
+    return {
+        "name": drawing.mechanism.name,
+        "text": drawing.text,
+        "badge": badge,
+        "findings": _findings(drawing, problem),
+        "sketch": sketch(drawing),
+        "view": None,
+        "isViewComing": badge["isComplete"],
+    }
+
+
+def sketch(drawing: Drawing) -> dict[str, Any]:
+    """Return what is drawn at the start pose, with the keys of the data of a page; nothing of it needs a solution."""
+    mechanism, poses = drawing.mechanism, drawing.poses
+    rows = {name: np.array([pose]) for name, pose in poses.items()}
+    found = drawn(Instant(mechanism, rows, {driver.name: 1.0 for driver in mechanism.drivers}))
+    for body in found["bodies"]:
+        body["pose"] = list(poses[body["name"]])
+    for point in found["points"]:
+        point["at"] = list(drawing.at(f"{point['body']}.{point['name']}"))
+    if not drawing.has_bodies:
+        found["bodies"] = [body for body in found["bodies"] if body["name"] != PLACEHOLDER]
+        found["shapes"] = [shape for shape in found["shapes"] if shape["frame"] != PLACEHOLDER]
+    places = np.array([point["at"] for point in found["points"]]).reshape(-1, 2)
+    box = [places.min(axis=0).tolist(), places.max(axis=0).tolist()] if len(places) else None
+    return found | {
+        "box": box,
+        "over": None,
+        "samples": None,
+        "modules": None,
+        "file": None,
+        "closedNumbers": 0,
+        "size": drawing.size,
+    }
+
+
+def _problem(drawing: Drawing) -> KinfmuError | None:
+    """Return why a drawing cannot be solved; None if it can."""
+    problem = _problem_with(drawing, drawing.redundancy)
+    if problem is None or not isinstance(drawing.redundancy, Redundancy):
+        return problem
+    is_matched = drawing.redundancy.mobility == len(drawing.mechanism.drivers)
+    return _problem_with(drawing, drawing.assembled) if is_matched else problem  # a start pose may be singular
+
+
+def _problem_with(drawing: Drawing, redundancy: Redundancy | KinfmuError) -> KinfmuError | None:
+    if not isinstance(redundancy, Redundancy):
+        return redundancy
+    try:
+        plan_from(drawing.mechanism, drawing.system, drawing.origin, redundancy)
+    except KinfmuError as problem:
+        return problem
+    return None
+
+
+def _badge(drawing: Drawing, problem: KinfmuError | None) -> dict[str, Any]:
+    """Return the mobility, the number of drivers, and a line on what is missing."""
+    drivers = len(drawing.mechanism.drivers)
+    redundancy = drawing.redundancy
+    if not drawing.has_bodies:
+        return {"mobility": 0, "drivers": 0, "text": "nothing drawn yet", "isComplete": False}
+    if not isinstance(redundancy, Redundancy):
+        return {"mobility": None, "drivers": drivers, "text": "cannot be solved", "isComplete": False}
+    mobility = redundancy.mobility
+    missing = mobility - drivers
+    if missing > 0:
+        text = f"{missing} more joint{'s'[: missing > 1]} or driver{'s'[: missing > 1]}"
+    elif missing < 0:
+        text = f"{-missing} driver{'s'[: missing < -1]} too many"
+    elif not drivers:
+        text = "a structure: nothing moves"
+    elif problem is None:
+        text = "complete"
+    else:
+        text = "does not close" if not isinstance(problem, MobilityError) else "the drivers do not determine the motion"
+    return {"mobility": mobility, "drivers": drivers, "text": text, "isComplete": problem is None and drivers > 0}
+
+
+def _findings(drawing: Drawing, problem: KinfmuError | None) -> list[dict[str, Any]]:
+    """Return lines on what is missing, with operations that would help."""
+    if not drawing.has_bodies:
+        return []
+    found: list[dict[str, Any]] = []
+    if problem is not None:
+        found.append({"kind": "problem", "text": str(problem), "edits": _help(drawing)})
+        found += _unpinned(drawing)
+    return found
+
+
+def _unpinned(drawing: Drawing) -> list[dict[str, Any]]:
+    """Return a line for each place where points of two bodies meet that no joint holds together."""
+    held = {frozenset(map(body_of, joint.between)) for joint in drawing.mechanism.joints if hasattr(joint, "between")}
+    points = [*drawing.mechanism.body_points]
+    places = np.array([drawing.at(point) for point in points]).reshape(-1, 2)
+    near = cKDTree(places).query_pairs(AS_DRAWN * drawing.size) if points else ()
+    found = []
+    for k, j in sorted(near):
+        a, b = points[k], points[j]
+        if body_of(a) != body_of(b) and b not in drawing.pins[a] and frozenset((body_of(a), body_of(b))) not in held:
+            pin = {"text": f"pin {a} and {b}", "operations": [{"do": "pin", "points": [a, b]}]}
+            found.append({"kind": "note", "text": f"{a} and {b} are in one place and not joined", "edits": [pin]})
+    return found[:_MOST_NOTES]
+
+
+def _help(drawing: Drawing) -> list[dict[str, Any]]:
+    """Return operations that may complete a drawing: motors of bodies that are pinned to the ground."""
+    redundancy, mechanism = drawing.redundancy, drawing.mechanism
+    if not isinstance(redundancy, Redundancy) or redundancy.mobility <= len(mechanism.drivers):
+        return []
+    driven = {body for driver in mechanism.drivers for body in driver.bodies()}
+    return [
+        {"text": f"add a motor to {body}", "operations": [{"do": "motor", "body": body}]}
+        for body in drawing.pinned_to("ground")
+        if body not in driven
+    ]
+
+
+def view(drawing: Drawing) -> dict[str, Any]:
+    """Return the data of the page of a drawing and the findings of its check.
+
+    A drawing that cannot be solved has no such data; its problem comes with changes that were tried.
+
+    Raises:
+        KinfmuError: It is too large for a page.
+
+    """
+    report = check(drawing.mechanism)
+    notes = [{"kind": "note", "text": line, "edits": []} for line in report.notes]
+    problem = []
+    if report.problem is not None:
+        problem = [{"kind": "problem", "text": str(report.problem), "edits": _advised(drawing)}]
+        if report.plan is None:
+            return {"view": None, "findings": problem + notes}
+    return {"view": page_data(drawing.mechanism, report), "findings": problem + notes}
+
+
+def _advised(drawing: Drawing) -> list[dict[str, Any]]:
+    """Return changes after which a drawing moves, as operations."""
+    return [
+        {"text": f"{one.text}: {one.leads_to}", "operations": [{"do": "edit", "edits": one.as_json()["edits"]}]}
+        for one in advice(tomllib.loads(drawing.text))
+    ]

@@ -1,0 +1,224 @@
+"""The page of the editor: what is drawn goes on, is undone, kept, saved and shared, and half-drawn files are shown."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PIL import Image
+
+import kinfmu
+from kinfmu.mechanism.gallery.load import folder
+from kinfmu.page.player import PlayServer, PlaySource
+from tests.page.editor.drawn import FOURBAR, drawn
+from tests.page.editor.hand import DrawingHand, drawing_hand
+from tests.page.engines import Browser, needs_browser
+from tests.page.test_page import CONTRASTS, LABELS, LARGEST
+
+pytestmark = [needs_browser, pytest.mark.long]
+CONFLICT = "Failed to load resource: the server responded with a status of 409 (Conflict)"
+
+
+@pytest.fixture
+def hand(chromium: Browser, tmp_path: Path) -> Iterator[DrawingHand]:
+    """A hand that draws in the page of a four-bar, with the tool for moving."""
+    with drawing_hand(chromium, tmp_path, drawn(*FOURBAR).text) as opened:
+        opened.button("#draw")
+        opened.page.tab.wait_for_function("window.kinfmu.editor.machine")
+        yield opened
+
+
+def places(hand: DrawingHand) -> dict[str, Any]:
+    """Return the places of all points."""
+    found: dict[str, Any] = hand.get(
+        "Object.fromEntries(e.sketch.data.points.map((p, k) => [e.sketch.nameOf(k), p.at]))"
+    )
+    return found
+
+
+def test_a_dragged_pin_moves_with_all_that_is_pinned_there_and_locks_keep_lengths(hand: DrawingHand) -> None:
+    hand.drag((120, 80), (130, 90))
+    assert places(hand)["coupler.D"] == places(hand)["rocker.D"] == [130, 90]
+    assert hand.get("k.linkage.data.file") is not None
+    hand.click((115, 45))
+    assert hand.page.tab.inner_text("#draw-panel .selected h2") == "Link rocker"
+    hand.page.tab.check("#draw-panel .selected .check input")
+    hand.drag((130, 90), (100, 150))
+    x, y = places(hand)["rocker.D"]
+    assert (x, y) == pytest.approx((100, (30**2 + 90**2) ** 0.5))
+    assert hand.page.errors == []
+
+
+def test_lengths_and_places_are_typed_for_what_is_selected(hand: DrawingHand) -> None:
+    hand.click((0, 20))
+    hand.typed("50")
+    assert places(hand)["crank.C"] == places(hand)["coupler.C"] == [0, 50]
+    hand.click((120, 80))
+    hand.typed("125, 70")
+    assert places(hand)["rocker.D"] == [125, 70]
+    hand.page.tab.get_by_label("Place", exact=True).fill("110, 75")
+    hand.page.tab.keyboard.press("Enter")
+    hand.wait()
+    assert places(hand)["rocker.D"] == [110, 75]
+
+
+def test_all_is_undone_and_made_again(chromium: Browser, tmp_path: Path) -> None:
+    with drawing_hand(chromium, tmp_path) as hand:
+        empty = hand.get("e.session.answer.text")
+        hand.click((0, 0), (0, 40), (120, 80), (100, 0))
+        whole = hand.get("e.session.answer.text")
+        hand.press("Escape", *["Control+z"] * 3)
+        assert hand.get("e.session.answer.text") == empty
+        assert hand.page.tab.is_disabled("#undo")
+        hand.press(*["Control+y"] * 3)
+        assert hand.get("e.session.answer.text") == whole
+        assert hand.page.errors == []
+
+
+def test_findings_apply_their_edits_and_the_mechanism_plays_in_the_same_page(chromium: Browser, tmp_path: Path) -> None:
+    with drawing_hand(chromium, tmp_path) as hand:
+        hand.get("window.isSamePage = true")
+        hand.click((0, 0), (0, 40), (120, 80), (100, 0))
+        assert hand.page.tab.inner_text("#badge") == hand.get("e.session.answer.badge.text") != "complete"
+        hand.tool("ground")
+        hand.click((0, 0), (100, 0))
+        assert hand.page.tab.is_hidden("#transport")
+        hand.button("#draw-panel .ghost >> nth=0")
+        assert hand.plays()
+        assert hand.page.tab.inner_text("#badge") == "complete"
+        assert hand.get("window.isSamePage")
+        hand.press("Space")
+        hand.page.tab.click("#tab-files")
+        with hand.page.tab.expect_download() as download:
+            hand.page.tab.click("#save-time")
+        assert download.value.path().read_text("utf-8").startswith("time [s],link_1.phi [deg]")
+        with hand.page.tab.expect_download() as download:
+            hand.page.tab.click("#save-fmu2")
+        fmu = tmp_path / "drawn.fmu"
+        download.value.save_as(fmu)
+        assert kinfmu.simulate(fmu).t[-1] == pytest.approx(2)
+        with hand.page.tab.expect_download() as download:
+            hand.page.tab.click("#save-page")
+        assert download.value.path().read_text("utf-8").startswith("<!doctype html>")
+        hand.press("Control+z")
+        assert hand.get("e.session.answer.badge.drivers") == 0
+        assert hand.page.tab.is_hidden("#transport")
+        assert hand.page.errors == []
+
+
+def test_values_set_while_it_moves_are_part_of_the_drawing(hand: DrawingHand) -> None:
+    hand.button("#draw")
+    hand.get("(k.design.set({'bodies.crank.points.C.y': 45, 'bodies.coupler.points.C.y': 45}), k.design.commit())")
+    hand.page.settle()
+    hand.press("v")
+    hand.page.tab.wait_for_function("window.kinfmu.editor.session.answer.text.includes('45')")
+    assert places(hand)["crank.C"] == [0, 45]
+    assert hand.page.errors == []
+
+
+def test_a_file_that_another_program_writes_is_not_overwritten(hand: DrawingHand) -> None:
+    hand.press("v")
+    hand.path.write_text(hand.path.read_text("utf-8") + "# first\n", "utf-8")
+    hand.page.tab.wait_for_function("window.kinfmu.editor.session.answer.text.includes('# first')")
+    hand.drag((120, 80), (130, 90))
+    hand.path.write_text(hand.path.read_text("utf-8") + "# second\n", "utf-8")
+    hand.press("Control+s")
+    banner = hand.page.tab.locator("#draw-banner")
+    assert banner.locator("span").inner_text().startswith("mine.toml was changed by another program")
+    assert "# second" in hand.path.read_text("utf-8")
+    banner.get_by_text("Overwrite the file").click()
+    hand.page.tab.wait_for_function("document.getElementById('save').textContent === 'Saved'")
+    assert "130" in hand.path.read_text("utf-8")
+    assert set(hand.page.errors) == {CONFLICT}
+
+
+def test_a_second_editor_is_noticed_and_shown(hand: DrawingHand) -> None:
+    other = {"state": hand.get("e.session.state"), "operations": [{"do": "name", "name": "elsewhere"}]}
+    hand.get(
+        f"(k.frames.ask(), fetch('editor/operations', {{ method: 'POST', body: {json.dumps(json.dumps(other))} }}))"
+    )
+    hand.page.tab.wait_for_function("document.getElementById('name').textContent === 'elsewhere'")
+    hand.get("e.session.answer.state = 0")
+    hand.drag((120, 80), (130, 90))
+    assert hand.page.tab.inner_text("#draw-banner span").endswith("what is shown is the newer state.")
+    assert places(hand)["rocker.D"] == [120, 80]
+
+
+def test_a_text_is_pasted_and_a_refusal_is_one_line(hand: DrawingHand) -> None:
+    paste = """text => {
+        const data = new DataTransfer();
+        data.setData("text", text);
+        document.dispatchEvent(new ClipboardEvent("paste", { clipboardData: data, bubbles: true }));
+    }"""
+    text = (folder() / "crank_rocker" / "mechanism.toml").read_text("utf-8")
+    hand.page.tab.evaluate(paste, text)
+    hand.wait()
+    assert hand.get("e.session.answer.text") == text
+    hand.page.tab.evaluate(paste, "not\na mechanism")
+    hand.wait()
+    line = hand.page.tab.inner_text("#draw-banner span")
+    assert line.startswith("replace: ") or "TOML" in line
+    assert "\n" not in line
+    assert hand.get("e.session.answer.text") == text
+    hand.press("Escape")
+    assert hand.page.tab.is_hidden("#draw-banner")
+
+
+def test_a_picture_is_scaled_by_two_clicks_and_a_length(hand: DrawingHand, tmp_path: Path) -> None:
+    path = tmp_path / "picture.png"
+    Image.new("RGB", (400, 300), "white").save(path)
+    hand.page.tab.set_input_files("#picture-file", path)
+    hand.page.tab.wait_for_function("window.kinfmu.editor.machine?.tool === 'scale'")
+    (x, y), size = hand.get("e.picture.at"), hand.get("e.picture.size")
+    hand.click((x + 50 * size, y - 100 * size), (x + 250 * size, y - 100 * size))
+    hand.typed("80")
+    assert hand.get("e.picture.size") == pytest.approx(0.4, rel=0.02)
+    hand.page.tab.click("text=Move it")
+    (x, y), size = hand.get("e.picture.at"), hand.get("e.picture.size")
+    hand.click((x + 50 * size, y - 100 * size), (0, 0))
+    assert hand.get("e.picture.at") == pytest.approx([-50 * size, 100 * size], abs=0.5)
+    assert hand.get("e.machine.tool") == "move"
+
+
+def test_a_half_drawn_file_is_opened_in_the_editor(chromium: Browser, tmp_path: Path) -> None:
+    with drawing_hand(chromium, tmp_path, drawn(*FOURBAR[:4]).text) as hand:
+        hand.page.tab.wait_for_function("window.kinfmu.editor.sketch")
+        hand.wait()
+        assert hand.page.tab.is_visible("#draw-tools")
+        assert hand.page.tab.is_hidden("#transport")
+        hand.tool("delete")
+        hand.click((60, 60))
+        assert set(places(hand)) == {"ground.A", "ground.B", "crank.A", "crank.C"}
+        assert hand.page.errors == []
+
+
+@pytest.mark.parametrize("name", ["excavator_loaded", "jansen_leg"])
+def test_pages_with_an_editor_are_small(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    kinfmu.save(kinfmu.load(name), path)
+    with PlayServer(PlaySource(str(path))) as server:
+        assert len(server.source.page().encode()) <= LARGEST
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_all_controls_have_names_and_texts_can_be_read(hand: DrawingHand, theme: str) -> None:
+    if hand.page.tab.evaluate("document.documentElement.dataset.theme") != theme:
+        hand.page.tab.click("#theme")
+    hand.click((0, 20))
+    hand.page.tab.wait_for_timeout(300)  # transitions of colours
+    assert hand.page.tab.evaluate(f"({LABELS})()")["found"] == []
+    dim = [one for one in hand.page.tab.evaluate(f"({CONTRASTS})()") if one["ratio"] < one["least"]]
+    assert dim == []
+
+
+def test_a_pin_that_is_dropped_on_another_one_is_pinned_there(hand: DrawingHand) -> None:
+    hand.tool("link")
+    hand.click((40, 20), (60, 20))
+    hand.tool("move")
+    hand.drag((60, 20), (100, 0))
+    (end,) = (name for name, at in places(hand).items() if name.startswith("link_1.") and at == [100, 0])
+    joints = hand.get(f"e.sketch.data.joints.filter((j) => j.points.some((k) => e.sketch.nameOf(k) === '{end}'))")
+    assert [joint["type"] for joint in joints] == ["revolute"]
