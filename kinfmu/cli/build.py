@@ -73,6 +73,12 @@ if TYPE_CHECKING:
     help="Write also <name>_OspModelDescription.xml next to the FMU: groups of variables, for libcosim.",
 )
 @outputs_option
+@click.option(
+    "--parameters",
+    metavar="NAMES",
+    help="Plain numbers of the file that become parameters of the FMU, too: all, lengths, masses, or names such as "
+    "crank.P.x,AB.length. Default: only the [parameters] of the file.",
+)
 @click.option("--author", help="Author, stated in the FMU.")
 @click.option("--model-version", "version", help="Version of the model, stated in the FMU.")
 @click.option("--license", "license_", help="Licence of the model, stated in the FMU.")
@@ -93,6 +99,7 @@ def build(
     ssp: bool,
     osp: bool,
     outputs: str | None,
+    parameters: str | None,
     author: str | None,
     version: str | None,
     license_: str | None,
@@ -129,6 +136,7 @@ def build(
             flavour=chosen,
             drive=drive,
             outputs=names_in(outputs),
+            parameters=names_in(parameters) or (),
             fmi=int(fmi),
             platforms=platforms,
             metadata={name: text for name, text in stated.items() if text is not None},

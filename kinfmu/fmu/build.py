@@ -17,6 +17,7 @@ from kinfmu.fmu.interface import DRIVES, Drive
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.laws import External
 from kinfmu.mechanism.mechanism import require_mechanism
+from kinfmu.mechanism.opened import with_open_numbers
 from kinfmu.version import VERSION
 
 FLAVOURS = ("python", "native")
@@ -31,6 +32,7 @@ def build(
     flavour: str | None = None,
     drive: Drive | None = None,
     outputs: Sequence[str] | None = None,
+    parameters: str | Sequence[str] = (),
     fmi: int = 2,
     platforms: str = "host",
     metadata: Mapping[str, str] | None = None,
@@ -56,6 +58,8 @@ def build(
         outputs: Coordinates such as 'coupler.x', forces such as 'crank.torque' and reactions such as 'pin.force_x' that
             the FMU has. Default: all, with the forces of mechanisms with masses or loads, without reactions that
             redundant joints leave undetermined. What no output needs is not solved.
+        parameters: Plain numbers of the file that become parameters, next to those of [parameters]: 'all', 'lengths',
+            'masses', or names such as 'crank.P.x' and 'AB.length'; one of these or several. Default: none.
         fmi: Version of FMI, 2 or 3. The python flavour is FMI 2.0 only.
         platforms: Platforms of the native flavour: 'host' (compiled by the system's compiler) or 'all' (by zig).
         metadata: Texts of the model description by name: author, version, license, copyright, date. Default: none,
@@ -73,7 +77,8 @@ def build(
         Path of the file.
 
     Raises:
-        RequestError: If a choice is unknown, or two choices exclude each other, or efforts do not determine the motion.
+        RequestError: If a choice or a number is unknown, or two choices exclude each other, or efforts do not determine
+            the motion.
         MechanismError: If the mechanism is not valid.
         AssemblyError: If the mechanism cannot be assembled.
         CompilerError: If no compiler is found.
@@ -93,7 +98,9 @@ def build(
     path = _file(path, mechanism.name, ssp=ssp)
     if osp and suffix_of(path) == ".ssp":
         raise RequestError("osp describes an FMU for the folder that it is in; an .ssp holds none")
-    given, shown, mechanism = mechanism, mechanism.length_unit, mechanism.in_metres() if si else mechanism
+    given, shown = mechanism, mechanism.length_unit
+    mechanism = with_open_numbers(mechanism, parameters) if parameters else mechanism
+    mechanism = mechanism.in_metres() if si else mechanism
     coordinates, names = chosen_outputs(mechanism, outputs)
     owned, forces = None, {}
     if drive == "torque":

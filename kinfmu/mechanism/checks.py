@@ -19,6 +19,7 @@ from kinfmu.mechanism.members import Bodies, Members, NumberPath, path_text
 from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.quantities import PoseQuantity
 from kinfmu.mechanism.quantities.placement import Reference
+from kinfmu.mechanism.settings import law_constants
 from kinfmu.mechanism.valid import check_line, check_name, quoted
 from kinfmu.units import METRES, CoordinateName, factors
 
@@ -76,7 +77,7 @@ def check_members(
     for member in acting:
         _check_references(bodies, member)
         _with_causes((table_of(member), member.name), member.check, parameters, expressions, length_unit)
-    _check_names_of_results(members, parameters)
+    _check_names_of_results(members, parameters, expressions)
 
 
 def check_outputs(members: Members, points: Mapping[str, str], coordinates: str | tuple[str, ...]) -> None:
@@ -174,8 +175,11 @@ def _check_names(table: str, names: Iterable[str]) -> None:
         seen.add(name)
 
 
-def _check_names_of_results(members: Members, parameters: Mapping[str, Parameter]) -> None:
-    """Raise a MechanismError for a name that two inputs or outputs would have."""
+def _check_names_of_results(
+    members: Members, parameters: Mapping[str, Parameter], expressions: Mapping[NumberPath, Expression]
+) -> None:
+    """Raise a MechanismError for a name that two inputs, outputs or settings would have."""
+    _check_dotted(members, [name for name in parameters if "." in name], parameters, expressions)
     given: tuple[Driver | Load, ...] = (*members.drivers, *members.loads)
     for member in given:
         what = "driver" if isinstance(member, Driver) else "load"
@@ -188,6 +192,25 @@ def _check_names_of_results(members: Members, parameters: Mapping[str, Parameter
             raise MechanismError(f"[loads.{load.name}]: a driver has this name already; give the load another one")
         if load.columns and load.name in joints:  # such as spring.force
             raise MechanismError(f"[loads.{load.name}]: a joint has this name already; give the load another one")
+
+
+def _check_dotted(
+    members: Members, dotted: Iterable[str], parameters: Iterable[str], expressions: Mapping[NumberPath, Expression]
+) -> None:
+    """Raise a MechanismError for parameters such as 'crank.P.x' whose names are taken, or equal others in code."""
+    taken: dict[str, str] = {}
+    for name in dotted:
+        if not taken:
+            constants = law_constants((*members.drivers, *members.loads), expressions)
+            taken = {one.name: f"the law of '{one.owner}' has a constant" for one in constants}
+            taken |= dict.fromkeys(members.coordinate_names, "a body has a coordinate")
+        if name in taken:
+            raise MechanismError(f"[parameters] {name}: {taken[name]} of this name already")
+    in_code: dict[str, str] = {}
+    for name in parameters if taken else ():
+        other = in_code.setdefault(name.replace(".", "_"), name)
+        if other != name:
+            raise MechanismError(f"[parameters] {other} and {name} differ only in dots and underscores; rename one")
 
 
 def table_of(member: Joint | Driver | Load) -> str:

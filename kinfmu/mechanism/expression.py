@@ -39,7 +39,7 @@ DEEPEST = 40  # parentheses within parentheses
 LARGEST_POWER = 20  # exponent; a polynomial of a higher degree loses its digits to rounding
 _TOKEN = re.compile(
     r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
-    r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<sign>\*\*|[-+*/(),])"
+    r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z_][A-Za-z0-9_]*)*)|(?P<sign>\*\*|[-+*/(),])"
 )
 _WORD = r"(?:[A-Za-z_][A-Za-z0-9_]*|\N{DEGREE SIGN})"
 _UNIT = re.compile(rf"[ \t]*({_WORD}((?: {_WORD}){{0,2}}))(/{_WORD})?")  # the longest has three words, 'N m s/rad'

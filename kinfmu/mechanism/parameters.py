@@ -19,7 +19,7 @@ from kinfmu.mechanism.members import Members, NumberPath, path_text
 from kinfmu.mechanism.number import NumberWithUnit, expression_error, given_unit, read_number
 from kinfmu.mechanism.operations import OPERATIONS, UNKNOWN, WORDS, Dimension, ExpressionStep
 from kinfmu.mechanism.quantities.arithmetic import Value
-from kinfmu.mechanism.valid import check_line, check_name, check_number, quoted
+from kinfmu.mechanism.valid import MOST_PARTS, check_line, check_name, check_number, quoted
 from kinfmu.units import KINDS, METRES, Quantity, every_unit, length_power
 
 NUMBER = Quantity("number")
@@ -59,7 +59,7 @@ class Parameter:
 
 def read_parameter(name: str, parameter: Parameter | float | str, length_unit: str) -> Parameter:
     """Return a parameter before it is computed, or raise a MechanismError for an invalid name or value."""
-    check_name("[parameters]", name)
+    check_name("[parameters]", name, most_parts=MOST_PARTS)
     if name in WORDS:
         raise MechanismError(f"[parameters] {name}: this name is reserved in expressions; reserved: {listed(WORDS)}")
     if not isinstance(parameter, Parameter):

@@ -23,11 +23,13 @@ from kinfmu.mechanism.quantities import POSE_QUANTITIES
 from kinfmu.mechanism.quantities.placement import Reference
 from kinfmu.mechanism.repeats import LARGEST_COUNT, REPEATED
 from kinfmu.mechanism.toml_document import table_keys
+from kinfmu.mechanism.valid import MOST_PARTS
 from kinfmu.units import METRES, Quantity
 
 Schema = dict[str, Any]
 DIALECT = "http://json-schema.org/draft-07/schema#"  # the newest that editors of TOML agree on
-NAME = "^[A-Za-z_][A-Za-z0-9_]{0,99}$"
+_PART = "[A-Za-z_][A-Za-z0-9_]{0,99}"
+NAME = f"^{_PART}$"
 _BRACED = r"(?:[A-Za-z_]|\{[A-Za-z0-9_+\- ]+\})(?:[A-Za-z0-9_]|\{[A-Za-z0-9_+\- ]+\})*"  # with numbers of repeats
 _REFERRED = {"point": "point", "body": "braced_name", "coordinate": "point"}  # definitions by what is referred to
 
@@ -44,7 +46,7 @@ def schema() -> Schema:
         "name": _ref("name", description="The mechanism's name, and its FMU's"),
         "title": {"type": "string", "description": "One line for people"},
         "units": _table({"length": {"enum": [*METRES, "inch"], "description": "Unit of bare lengths; default: m"}}),
-        "parameters": _named(_ref("parameter"), "Numbers that expressions refer to by name"),
+        "parameters": _named(_ref("parameter"), "Numbers that expressions refer to by name", "parameter_name"),
         "run": _table(
             {
                 **_without_defaults(RunSettings),
@@ -99,6 +101,7 @@ def _definitions() -> Schema:
     laws_of_joints = [law for law in LAWS if law is not External]
     return {
         "name": {"type": "string", "pattern": NAME},
+        "parameter_name": {"type": "string", "pattern": rf"^{_PART}(?:\.{_PART}){{0,{MOST_PARTS - 1}}}$"},
         "braced_name": {"type": "string", "pattern": f"^{_BRACED}$"},
         "point": {"type": "string", "pattern": rf"^{_BRACED}\.{_BRACED}$"},
         "number": {
@@ -245,9 +248,9 @@ def _list(items: Schema, least: int, most: int | None = None) -> Schema:
     return {"type": "array", "items": items, "minItems": least, **({} if most is None else {"maxItems": most})}
 
 
-def _named(member: Schema, description: str) -> Schema:
-    """Describe a table of named members."""
-    names = {"propertyNames": _ref("name")}
+def _named(member: Schema, description: str, name: str = "name") -> Schema:
+    """Describe a table of named members; name: what their names match."""
+    names = {"propertyNames": _ref(name)}
     return {"type": "object", "description": description, "additionalProperties": member, **names}
 
 

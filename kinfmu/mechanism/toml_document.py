@@ -153,10 +153,10 @@ def table_of(document: Mapping[str, Any], name: str) -> dict[str, Any]:
     return table
 
 
-def named_values(document: Mapping[str, Any], name: str) -> Iterable[tuple[str, Any]]:
-    """Yield the keys and values of the table [name]; the keys are checked as names."""
+def named_values(document: Mapping[str, Any], name: str, most_parts: int = 1) -> Iterable[tuple[str, Any]]:
+    """Yield the keys and values of the table [name]; the keys are checked as names of so many parts at most."""
     for key, value in table_of(document, name).items():
-        check_name(f"[{name}]", key)
+        check_name(f"[{name}]", key, most_parts=most_parts)
         yield key, value
 
 

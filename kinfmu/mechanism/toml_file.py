@@ -35,7 +35,7 @@ from kinfmu.mechanism.toml_document import (
     text_in,
     text_of,
 )
-from kinfmu.mechanism.valid import check_name, quoted
+from kinfmu.mechanism.valid import MOST_PARTS, check_name, quoted
 
 _QUANTITY = '{ measure = "angle", of = "rocker" }'  # in messages
 _SEGMENT = ("law", "rise", "duration")
@@ -105,7 +105,7 @@ def mechanism_of(document: dict[str, Any], folder: Path | None) -> Mechanism:
             for name, target in named_values(document, "points")
         },
         coordinates=coordinates,
-        parameters={name: _parameter(name, value) for name, value in named_values(document, "parameters")},
+        parameters={name: _parameter(name, value) for name, value in named_values(document, "parameters", MOST_PARTS)},
         run=RunSettings(**run),
         measures=read_measures(document, folder),
         gravity=_gravity(document),

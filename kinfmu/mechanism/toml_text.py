@@ -101,6 +101,7 @@ def _parameter(name: str, parameter: Parameter, mechanism: Mechanism, as_written
         pass
     elif parameter.expression is None and parameter.quantity and parameter.kind != "number":
         value = f"{float(parameter.value)!r} {unit_of(parameter.quantity, mechanism.length_unit)}"
+    name = f'"{name}"' if "." in name else name
     if not parameter.description:
         return f"{name} = {toml_value(value)}"
     return f"{name} = {{ value = {toml_value(value)}, description = {toml_value(parameter.description)} }}"

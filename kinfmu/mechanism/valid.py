@@ -14,11 +14,13 @@ from kinfmu.errors import MechanismError
 
 LARGEST_NUMBER = 1e30  # lengths, angles, rates: products of a few of them stay far from overflow
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}\Z")
+MOST_PARTS = 8  # of the name of a parameter
 
 
-def check_name(where: str, name: str) -> None:
-    """Raise a MechanismError unless `name` is a valid name."""
-    if not _NAME.match(name):
+def check_name(where: str, name: str, *, most_parts: int = 1) -> None:
+    """Raise a MechanismError unless `name` is a valid name; most_parts: of names with dots, such as 'crank.P.x'."""
+    parts = name.split(".", most_parts)
+    if len(parts) > most_parts or not all(map(_NAME.match, parts)):
         rule = "must consist of at most 100 letters, digits and underscores, and not begin with a digit"
         raise MechanismError(f"{where} {quoted(name)} {rule}")
 

@@ -192,7 +192,7 @@ MESSAGES = {
     ),
     "nan": "'nan', character 1: no parameter 'nan'; did you mean 'tan'?; parameters: a, b, long_name_2",
     "__import__('os')": f"'__import__('os')', character 1: no function '__import__'; functions: {ALL}",
-    "a.real": "'a.real', character 2: expected one of + - * / **, found '.'",
+    "a.real": "'a.real', character 1: no parameter 'a.real'; parameters: a, b, long_name_2",
 }
 
 

@@ -14,10 +14,15 @@ import pytest
 import kinfmu
 from kinfmu import Mechanism, Parameter, Run, Status
 from kinfmu.draw.instant import instant
+from kinfmu.errors import MechanismError, RequestError
+from kinfmu.mechanism import gallery
 from kinfmu.mechanism.members import NumberPath
-from kinfmu.mechanism.opened import Opened, opened, place_text
+from kinfmu.mechanism.opened import Opened, opened, place_text, with_open_numbers
+from kinfmu.mechanism.toml_file import parse
+from kinfmu.mechanism.toml_text import text
 from kinfmu.page.describe import written_file
 from kinfmu.page.module import page_module
+from kinfmu.units import Quantity
 from tests.page.engines import answers, driven_of, needs_node, rows_of, sweep_call, table
 
 CLOSE = 1e-12  # of the size, or of a radian
@@ -152,6 +157,67 @@ def test_file_of_a_page_has_a_place_for_each_mass_and_load() -> None:
     text = written_file(mechanism, page_module(mechanism), found.places)
     slots = set(re.findall(r"\{\{([\w.]+)\}\}", text))
     assert {"bodies.ram.mass", "loads.balance.stiffness", "loads.work.law.rise_1"} <= slots
+
+
+def test_chosen_numbers_are_parameters_named_after_their_places() -> None:
+    mechanism = kinfmu.load("fourbar_loaded")
+    lengths = set(with_open_numbers(mechanism, "lengths").parameters) - {*mechanism.parameters}
+    masses = set(with_open_numbers(mechanism, ["masses"]).parameters) - {*mechanism.parameters}
+    points = {"ground.C.x", "crank.P.x", "coupler.Q.x", "rocker.Q.x"}
+    assert lengths == {*points, "coupler.thickness", "coupler.width"}  # no zeros
+    assert masses == {"crank.mass", "crank.inertia", "coupler.density", "rocker.mass", "rocker.inertia"}
+    every = with_open_numbers(mechanism, "all")
+    assert {*every.parameters} == {*mechanism.parameters} | lengths | masses | {"gravity.y"}
+    some = with_open_numbers(mechanism, ["crank.O.y", "crank_center", "masses"])  # a zero, and a parameter of the file
+    assert {*some.parameters} == {*mechanism.parameters} | masses | {"crank.O.y"}
+    assert every.parameters["crank.P.x"] == Parameter(40.0, Quantity("length"), "Body crank: point P, x")
+    assert every.parameters["gravity.y"].description == "Gravity: y"
+
+
+@pytest.mark.parametrize("name", gallery.names())
+def test_a_file_with_such_parameters_is_read_back(name: str) -> None:
+    mechanism = with_open_numbers(kinfmu.load(name), "all")
+    assert parse(text(mechanism)) == mechanism
+    assert {*mechanism.in_metres().parameters} == {*mechanism.parameters}
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        (
+            "crank.Q.x",
+            "there is no parameter 'crank.Q.x'; did you mean 'crank.P.x'?; parameters: all, lengths, ",
+        ),
+        ("masses", "parameters: mechanism 'fourbar' has no masses that are not parameters already"),
+        ("crank.speed", "there is no parameter 'crank.speed'"),
+    ],
+)
+def test_what_is_no_number_is_refused(names: str, message: str) -> None:
+    with pytest.raises(RequestError) as refusal:
+        with_open_numbers(kinfmu.load("fourbar"), names)
+    assert str(refusal.value).startswith(message)
+    assert "\n" not in str(refusal.value)
+
+
+def test_names_that_clash_are_refused() -> None:
+    written = text(kinfmu.load("fourbar_loaded"))
+    with pytest.raises(MechanismError, match=r"^\[parameters\] gravity.y: a body has a coordinate of this name"):
+        with_open_numbers(parse(re.sub(r"(?<=[.\"])rocker\b", "gravity", written)), "all")
+    points = written.replace("crank_center", "crank_middle").replace('["crank_middle"', "[1.0")
+    points = points.replace("points = { O = [0.0, 0.0], P", "points = { center_of_mass = [1.0, 0.0], O = [0.0, 0.0], P")
+    with pytest.raises(
+        RequestError,
+        match=r"^parameters: \[bodies.crank\] points.center_of_mass and \[bodies.crank\] center_of_mass would both be "
+        "'crank.center_of_mass.x'; rename one$",
+    ):
+        with_open_numbers(parse(points), "all")
+    for own, message in (
+        ('"crank.speed" = 1.0', "crank.speed: the law of 'crank' has a constant of this name already"),
+        ('"crank.P" = 1.0\ncrank_P = 2.0', "crank.P and crank_P differ only in dots and underscores; rename one"),
+        ('"crank..P" = 1.0', "'crank..P' must consist of"),
+    ):
+        with pytest.raises(MechanismError, match=re.escape(f"[parameters] {message}")):
+            parse(written.replace("[parameters]", f"[parameters]\n{own}"))
 
 
 def far_crank_rocker() -> Mechanism:

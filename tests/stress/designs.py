@@ -124,29 +124,37 @@ def _failures_planned_once() -> Iterator[None]:
 
 
 def _differences(designs: Designs, k: int, run: Run | None) -> tuple[np.ndarray, list[str]]:
-    """Return the largest differences (3,) of a design from the run of its file, and those that are too large, in words.
+    """Return the differences of a design from the run of its file, as `differences`; None: it cannot be solved."""
+    if run is None:
+        return np.zeros(3), ["its file cannot be solved, but the design is"] if designs.good[k].any() else []
+    tables = [table if table is None else table[k] for table in (designs.values, designs.rates, designs.accelerations)]
+    return differences(designs.outputs, designs.status[k], tables, run)
 
-    run: None if the file cannot be solved.
+
+def differences(
+    outputs: Sequence[CoordinateName], status: np.ndarray, tables: Sequence[np.ndarray | None], run: Run
+) -> tuple[np.ndarray, list[str]]:
+    """Return the largest differences (3,) from the run of a file, and those that are too large, in words.
+
+    tables: Values, rates and accelerations of the outputs.
     """
     worst = np.zeros(3)
-    if run is None:
-        return worst, ["its file cannot be solved, but the design is"] if designs.good[k].any() else []
-    if (designs.status[k] != run.status).any():
-        sample = int(np.flatnonzero(designs.status[k] != run.status)[0])
-        return worst, [f"status {designs.status[k, sample]} at sample {sample}, of its file {run.status[sample]}"]
+    if (status != run.status).any():
+        sample = int(np.flatnonzero(status != run.status)[0])
+        return worst, [f"status {status[sample]} at sample {sample}, of its file {run.status[sample]}"]
     found = []
-    for order, table in enumerate((designs.values, designs.rates, designs.accelerations)):
+    for order, table in enumerate(tables):
         if table is None or not run.good.any():
             continue
-        wanted = np.column_stack([_column(run, output, order) for output in designs.outputs])
+        wanted = np.column_stack([_column(run, output, order) for output in outputs])
         size = np.maximum(np.nanmax(np.abs(wanted), axis=0), 1.0)
-        is_equal = (table[k] == wanted) | (np.isnan(table[k]) & np.isnan(wanted))
-        apart = np.where(is_equal, 0.0, np.abs(table[k] - wanted) / size)
+        is_equal = (table == wanted) | (np.isnan(table) & np.isnan(wanted))
+        apart = np.where(is_equal, 0.0, np.abs(table - wanted) / size)
         apart[np.isnan(apart)] = np.inf  # a number in one of them alone
         worst[order] = apart.max()
         if worst[order] > CLOSE[order]:
             row, column = np.unravel_index(int(apart.argmax()), apart.shape)
-            output = designs.outputs[column].derivative(order)
+            output = outputs[column].derivative(order)
             found.append(f"{output} differs by {worst[order]:.1e} at sample {row} of status {run.status[row]}")
     return worst, found
 

@@ -23,7 +23,7 @@ from kinfmu.run.sensitivities import Sensitivities
 from tests.fmu.host import OK, Host
 from tests.fmu.native.test_memory import CC, check_under_sanitizers
 from tests.mechanisms import fourbar
-from tests.stress import far
+from tests.stress import far, parameters
 from tests.stress.designs import faults
 from tests.stress.forces import ENERGY
 from tests.stress.forces import WRONG as WRONG_FORCES
@@ -45,6 +45,23 @@ def test_a_batch_equals_files_with_the_numbers_of_its_designs(name: str) -> None
 @pytest.mark.parametrize("name", ["crank_rocker", "five_bar", "jansen_leg", "slider_crank"])
 def test_a_batch_in_c_equals_files_with_the_numbers_of_its_designs(name: str) -> None:
     assert list(faults(name, 6, 1, ["native"])) == [], f"python -m tests.stress.designs {name} --count 6 --seed 1"
+
+
+# ----------------------------------------------------------------------------------------------------------- parameters
+
+
+@pytest.mark.parametrize("name", ["crank_rocker", "fourbar_loaded", "toggle_press"])
+def test_an_fmu_with_all_numbers_open_equals_files_with_its_settings(name: str, tmp_path: Path) -> None:
+    found = parameters.compared(name, parameters.built(name, tmp_path, ["python", "native"]), 3, 0)
+    assert found.faults == [], f"python -m tests.stress.parameters {name} --count 3"
+    assert found.counts["stepped"] > 0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", names())
+def test_every_fmu_with_all_numbers_open_equals_files_with_its_settings(name: str, tmp_path: Path) -> None:
+    found = parameters.compared(name, parameters.built(name, tmp_path), 12, 1)
+    assert found.faults == [], f"python -m tests.stress.parameters {name} --count 12 --seed 1"
 
 
 # ------------------------------------------------------------------------------------------------------------ repeating
