@@ -15,7 +15,7 @@ from kinfmu.mechanism.imports import imported, is_pmks_link
 from kinfmu.mechanism.toml_document import content_of
 
 
-class Drawing(ArgumentType):
+class DrawingArgument(ArgumentType):
     """An existing file, or a link."""
 
     name = "SOURCE"
@@ -25,7 +25,7 @@ class Drawing(ArgumentType):
 
 
 @main.command("import", epilog="Example: kinfmu import press.linkage2 -o press.toml")
-@click.argument("source", type=Drawing())
+@click.argument("source", type=DrawingArgument())
 @click.option("-o", "output", type=OutputFile(".toml"), help="The mechanism file to write. Default: print it.")
 def import_(source: Path | str, output: Path | None) -> None:
     """Write a drawing of another program as a mechanism file.

@@ -24,13 +24,13 @@ from kinfmu.mechanism.laws import ConstantValue, Law, Polynomial
 from kinfmu.mechanism.members import LENGTH
 from kinfmu.mechanism.quantities.placement import Placement, body_of
 from kinfmu.page.editor.drawing import Spot
-from kinfmu.page.editor.pen import Arguments, Pen
+from kinfmu.page.editor.pen import OperationArguments, Pen
 
 _KEYS = {Distance: "length", Coordinate: "value", RackAndPinion: "offset", CamTranslating: "offset"}
 _CHANGED = 1e-12  # of the size; numbers that differ by less stay as they are written
 
 
-def move(pen: Pen, values: Arguments) -> None:
+def move(pen: Pen, values: OperationArguments) -> None:
     """Move a point with all that is pinned to it."""
     point = pen.drawing.point(values.text("point"), f"{values.name}: point")
     to = values.spot("to")
@@ -43,7 +43,7 @@ def move(pen: Pen, values: Arguments) -> None:
     carry(pen, point, _kept(pen, values, point, to, kept))
 
 
-def length(pen: Pen, values: Arguments) -> None:
+def length(pen: Pen, values: OperationArguments) -> None:
     """Move the second of two points along their line, to a distance from the first."""
     first, second = (pen.drawing.point(one, f"{values.name}: between") for one in values.texts("between", 2))
     value = values.number("value")
@@ -56,7 +56,7 @@ def length(pen: Pen, values: Arguments) -> None:
     carry(pen, second, (a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])))
 
 
-def _kept(pen: Pen, values: Arguments, point: str, to: Spot, kept: list[list[str]]) -> Spot:
+def _kept(pen: Pen, values: OperationArguments, point: str, to: Spot, kept: list[list[str]]) -> Spot:
     """Return the place nearest to another one at which lengths from points that do not move stay."""
     moved = _moved_with(pen, point)
     circles: dict[Spot, float] = {}

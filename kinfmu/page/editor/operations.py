@@ -25,14 +25,14 @@ from kinfmu.page.editor.parts import (
     slot,
     spring,
 )
-from kinfmu.page.editor.pen import Arguments, Pen
+from kinfmu.page.editor.pen import OperationArguments, Pen
 from kinfmu.page.editor.tables import delete, edit, rename, set_numbers, set_value
 
 _THAT_MOVE = ("move", "length", "pin")  # points; bodies stay where they are
 MOST_OPERATIONS = 1000  # in one request
 
 
-def _replace(drawing: Drawing, values: Arguments) -> Drawing:
+def _replace(drawing: Drawing, values: OperationArguments) -> Drawing:
     """Return the drawing of another text: a mechanism file, a link of PMKS+, or the file of another program.
 
     The name of the file that it comes from shows what it is.
@@ -45,7 +45,7 @@ def _replace(drawing: Drawing, values: Arguments) -> Drawing:
     return Drawing.of(text, drawing.folder)
 
 
-_OPERATIONS: dict[str, Callable[[Pen, Arguments], None]] = {
+_OPERATIONS: dict[str, Callable[[Pen, OperationArguments], None]] = {
     "bar": bar,
     "point": point,
     "ground": ground,
@@ -67,7 +67,7 @@ _OPERATIONS: dict[str, Callable[[Pen, Arguments], None]] = {
     "units": lambda pen, values: pen.put(("units", "length"), values.text("length")),
     "edit": edit,
 }
-_WHOLE: dict[str, Callable[[Drawing, Arguments], Drawing]] = {  # of the text, not only of its tables
+_WHOLE: dict[str, Callable[[Drawing, OperationArguments], Drawing]] = {  # of the text, not only of its tables
     "rename": rename,
     "delete": delete,
     "replace": _replace,
@@ -95,7 +95,7 @@ def changed(drawing: Drawing, operations: object) -> Drawing:
 def _after(drawing: Drawing, operation: object) -> Drawing:
     if not isinstance(operation, dict) or not isinstance(operation.get("do"), str):
         raise MechanismError(f"{quoted(operation)} is not an operation: an object with the key 'do'")
-    values, name = Arguments(operation), operation["do"]
+    values, name = OperationArguments(operation), operation["do"]
     if name in _WHOLE:
         found = _WHOLE[name](drawing, values)
         values.finish()

@@ -11,7 +11,7 @@ from kinfmu.mechanism.quantities.placement import body_of, point_of
 from kinfmu.mechanism.valid import check_name, quoted
 from kinfmu.page.editor.drawing import Spot, written_angle, written_number
 from kinfmu.page.editor.moving import carry
-from kinfmu.page.editor.pen import Arguments, Pen, written_spot
+from kinfmu.page.editor.pen import OperationArguments, Pen, written_spot
 
 _RUN = {"start": 0, "stop": 2, "step": 0.01}  # [s], of files without a run: one turn of a motor
 _SPEED = "30 rpm"
@@ -26,7 +26,7 @@ _ON_LINE = 1e-12  # of its length; a pin that is nearer is on the slot
 _ROUND = 2  # digits of a default length
 
 
-def bar(pen: Pen, values: Arguments) -> None:
+def bar(pen: Pen, values: OperationArguments) -> None:
     """Add a body with two points; an end on a point or a body is pinned there."""
     (first, a), (second, b) = (pen.target(values.target(key)) for key in ("from", "to"))
     if pen.is_same(a, b):
@@ -50,7 +50,7 @@ def bar(pen: Pen, values: Arguments) -> None:
             pen.pin(held, f"{name}.{letter}")
 
 
-def point(pen: Pen, values: Arguments) -> None:
+def point(pen: Pen, values: OperationArguments) -> None:
     """Add a point of a body."""
     body, spot = pen.body(values.text("body")), values.spot("at")
     before = len(pen.edits)
@@ -59,7 +59,7 @@ def point(pen: Pen, values: Arguments) -> None:
         raise values.error(f"there is a point already: {found}")
 
 
-def ground(pen: Pen, values: Arguments) -> None:
+def ground(pen: Pen, values: OperationArguments) -> None:
     """Add a point of the ground; on a point or a body also a pin."""
     held, spot = pen.target(values.target("at"))
     if held and body_of(held) == GROUND_NAME:
@@ -74,7 +74,7 @@ def ground(pen: Pen, values: Arguments) -> None:
         raise values.error(f"there is a point already: {at}")
 
 
-def pin(pen: Pen, values: Arguments) -> None:
+def pin(pen: Pen, values: OperationArguments) -> None:
     """Add a revolute joint between two points, or between two bodies at a place."""
     if not values.has("points"):
         first, second = (pen.body(name) for name in values.texts("bodies", 2))
@@ -92,7 +92,7 @@ def pin(pen: Pen, values: Arguments) -> None:
         carry(pen, second, pen.spot(first))
 
 
-def motor(pen: Pen, values: Arguments) -> None:
+def motor(pen: Pen, values: OperationArguments) -> None:
     """Add a driver of the angle of a body relative to one that it is pinned to, first the ground."""
     body = pen.body(values.text("body"))
     if body == GROUND_NAME:
@@ -126,7 +126,7 @@ def _add_run(pen: Pen) -> None:
         pen.put(("run",), _RUN)
 
 
-def slider(pen: Pen, values: Arguments) -> None:
+def slider(pen: Pen, values: OperationArguments) -> None:
     """Let a point slide along a line of the ground or of another body; as a block, without turning."""
     holder = pen.body(values.text("on", GROUND_NAME))
     along, is_block = values.spot("along"), values.truth("block")
@@ -145,7 +145,7 @@ def slider(pen: Pen, values: Arguments) -> None:
         pen.put(("joints", pen.free_name(point_of(moved))), {"type": "point_on_line", **line})
 
 
-def _axis(pen: Pen, values: Arguments, holder: str, along: Spot) -> str:
+def _axis(pen: Pen, values: OperationArguments, holder: str, along: Spot) -> str:
     """Return the angle of a direction of the world in the frame of a body, as it is written."""
     if along == (0.0, 0.0):
         raise values.error("the line needs a direction")
@@ -157,7 +157,7 @@ def _turned(angle: float) -> float:
     return angle if -math.pi <= angle <= math.pi else math.remainder(angle, math.tau)
 
 
-def _point_of_body(pen: Pen, values: Arguments) -> str:
+def _point_of_body(pen: Pen, values: OperationArguments) -> str:
     """Return the point that slides: a point of a body, or a new one."""
     moved, _ = pen.target(values.target("point"))
     if moved is None:
@@ -165,7 +165,7 @@ def _point_of_body(pen: Pen, values: Arguments) -> str:
     return moved
 
 
-def slot(pen: Pen, values: Arguments) -> None:
+def slot(pen: Pen, values: OperationArguments) -> None:
     """Let a point run in a slot of a body, which is moved onto the point."""
     moved = _point_of_body(pen, values)
     body, a, b = pen.body(values.text("body")), values.spot("from"), values.spot("to")
@@ -184,7 +184,7 @@ def slot(pen: Pen, values: Arguments) -> None:
     pen.put(("joints", pen.free_name(point_of(moved))), {"type": "point_on_line", **line})
 
 
-def _ends(pen: Pen, values: Arguments) -> tuple[list[str], float]:
+def _ends(pen: Pen, values: OperationArguments) -> tuple[list[str], float]:
     """Return the two points of a part between bodies, and their distance."""
     (a, first), (b, second) = (pen.target(values.target(key), ground=True) for key in ("from", "to"))
     if a is None or b is None or body_of(a) == body_of(b):
@@ -198,7 +198,7 @@ def _rounded(value: float) -> float | int:
     return written_number(float(f"{value:.{_ROUND}g}"))
 
 
-def cylinder(pen: Pen, values: Arguments) -> None:
+def cylinder(pen: Pen, values: OperationArguments) -> None:
     """Add a driver of the distance of two points."""
     ends, length = _ends(pen, values)
     rise = values.number("stroke") if values.has("stroke") else _rounded(_STROKE * length)
@@ -209,7 +209,7 @@ def cylinder(pen: Pen, values: Arguments) -> None:
     _add_run(pen)
 
 
-def gear(pen: Pen, values: Arguments) -> None:
+def gear(pen: Pen, values: OperationArguments) -> None:
     """Add a pair of gears on the body that holds both pivots."""
     first, second = (pen.body(name) for name in values.texts("bodies", 2))
     if first == second or GROUND_NAME in (first, second):
@@ -230,7 +230,7 @@ def gear(pen: Pen, values: Arguments) -> None:
     pen.put(("joints", pen.numbered_name("gear")), joint)
 
 
-def cam(pen: Pen, values: Arguments) -> None:
+def cam(pen: Pen, values: OperationArguments) -> None:
     """Add a cam that a roller or a flat face of a follower touches, with a rise, a dwell, a return and a dwell."""
     body = pen.body(values.text("body"))
     kind = values.text("kind", "roller")
@@ -265,7 +265,7 @@ def cam(pen: Pen, values: Arguments) -> None:
     pen.put(("joints", pen.numbered_name("cam")), element | law)
 
 
-def spring(pen: Pen, values: Arguments) -> None:
+def spring(pen: Pen, values: OperationArguments) -> None:
     """Add a spring between two points, without force as drawn."""
     ends, length = _ends(pen, values)
     stiffness: Any = _STIFFNESS
@@ -277,7 +277,7 @@ def spring(pen: Pen, values: Arguments) -> None:
     pen.put(("loads", pen.numbered_name("spring")), load)
 
 
-def force(pen: Pen, values: Arguments) -> None:
+def force(pen: Pen, values: OperationArguments) -> None:
     """Add a constant force at a point."""
     at, spot = pen.target(values.target("at"))
     if at is None or body_of(at) == GROUND_NAME:
@@ -294,7 +294,7 @@ def force(pen: Pen, values: Arguments) -> None:
     pen.put(("loads", pen.numbered_name("force")), {"type": "force", "at": at, **numbers})
 
 
-def interest(pen: Pen, values: Arguments) -> None:
+def interest(pen: Pen, values: OperationArguments) -> None:
     """Make a point of a body a point of interest."""
     at, _ = pen.target(values.target("at"))
     if at is None:

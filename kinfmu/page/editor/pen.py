@@ -24,7 +24,7 @@ TABLES = ("bodies", "joints", "drivers", "loads", "points", "parameters", "measu
 SAME = 1e-9  # of the size; places that are nearer are one place
 
 
-class Arguments:
+class OperationArguments:
     """The arguments of one operation, each checked as it is read.
 
     Args:
@@ -261,7 +261,7 @@ class Pen:
 
         ground: True to make a point of the ground at a free place.
         """
-        values = Arguments(given)
+        values = OperationArguments(given)
         if values.has("point"):
             point = self.drawing.point(values.text("point"), f"{values.name}: point")
             values.has("at")  # where the point was seen

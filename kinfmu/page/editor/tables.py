@@ -17,7 +17,7 @@ from kinfmu.mechanism.quantities import PoseQuantity
 from kinfmu.mechanism.toml_document import document_of
 from kinfmu.mechanism.valid import LARGEST_NUMBER, check_name, quoted
 from kinfmu.page.editor.drawing import Drawing
-from kinfmu.page.editor.pen import TABLES, Arguments, Pen
+from kinfmu.page.editor.pen import TABLES, OperationArguments, Pen
 from kinfmu.page.editor.text_edits import edited_text, renamed_text
 from kinfmu.units import Quantity
 
@@ -29,7 +29,7 @@ _OF_POINTS = ("rod", "plate")  # keys of a body that name its points, with those
 _WITH_POINTS = ("density", "areal_density", "thickness", "width")
 
 
-def set_value(pen: Pen, values: Arguments) -> None:
+def set_value(pen: Pen, values: OperationArguments) -> None:
     """Put a value at a place; the last key may be the number of an entry of a list."""
     place = values.entries("place")
     value = _value(values, "value", values.any("value"))
@@ -43,7 +43,7 @@ def set_value(pen: Pen, values: Arguments) -> None:
         pen.put((*tables, last), value)
 
 
-def set_numbers(pen: Pen, values: Arguments) -> None:
+def set_numbers(pen: Pen, values: OperationArguments) -> None:
     """Set numbers by the names that a page has for them, such as 'bodies.crank.points.P.x' or 'motor.speed'."""
     given = values.any("values")
     if not isinstance(given, dict):
@@ -59,12 +59,12 @@ def set_numbers(pen: Pen, values: Arguments) -> None:
         if name not in numbers:
             raise values.error(f"there is no number {quoted(name)}{suggestion(name, numbers)}")
         path, old, quantity = numbers[name]
-        number = Arguments({"do": f"{values.name}: {name}", "value": value}).number("value")
+        number = OperationArguments({"do": f"{values.name}: {name}", "value": value}).number("value")
         if number != float(old):
             _put_number(pen, values, path, pen.written(path, old, number, quantity))
 
 
-def _put_number(pen: Pen, values: Arguments, path: NumberPath, written: Any) -> None:
+def _put_number(pen: Pen, values: OperationArguments, path: NumberPath, written: Any) -> None:
     """Put a number at its path; numbers of laws are in the table of their owner, or in a list of it."""
     *tables, last = (key for key in path if key != "law")
     table = _at(pen.document, tables)
@@ -89,7 +89,7 @@ def _put_number(pen: Pen, values: Arguments, path: NumberPath, written: Any) -> 
         pen.put((*map(str, tables), last), written)
 
 
-def edit(pen: Pen, values: Arguments) -> None:
+def edit(pen: Pen, values: OperationArguments) -> None:
     """Make edits that are given as values: {put, value} and {remove}."""
     for one in values.entries("edits"):
         if not isinstance(one, dict) or one.keys() not in ({"put", "value"}, {"remove"}):
@@ -103,7 +103,7 @@ def edit(pen: Pen, values: Arguments) -> None:
             pen.remove(place)
 
 
-def _place(values: Arguments, key: str, place: object, *, with_number: bool = False) -> tuple[Any, ...]:
+def _place(values: OperationArguments, key: str, place: object, *, with_number: bool = False) -> tuple[Any, ...]:
     if not isinstance(place, list) or not 0 < len(place) <= _DEEPEST:
         raise values.wrong(key, "a list of keys")
     *tables, last = place
@@ -115,7 +115,7 @@ def _place(values: Arguments, key: str, place: object, *, with_number: bool = Fa
     return tuple(place)
 
 
-def _value(values: Arguments, key: str, value: Any, depth: int = 0) -> Any:
+def _value(values: OperationArguments, key: str, value: Any, depth: int = 0) -> Any:
     """Return what TOML can hold of what JSON can."""
     if depth > _DEEPEST:
         raise values.error(f"{key}: nested too deeply")
@@ -152,7 +152,7 @@ def references(member: Any) -> set[str]:
     return found
 
 
-def delete(drawing: Drawing, values: Arguments) -> Drawing:
+def delete(drawing: Drawing, values: OperationArguments) -> Drawing:
     """Remove a place with all that depends on it."""
     place = _place(values, "place", values.entries("place"))
     if _at(drawing.document, place) is None:
@@ -194,7 +194,7 @@ def _remove_dependents(pen: Pen, body: str, point: str) -> None:
             pen.remove(("bodies", body, key))
 
 
-def rename(drawing: Drawing, values: Arguments) -> Drawing:
+def rename(drawing: Drawing, values: OperationArguments) -> Drawing:
     """Give a member or a point another name, also where it is named."""
     place = _place(values, "place", values.entries("place"))
     name = values.text("name")
