@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from kinfmu.analysis.certified.certificate import Certificate, certify
+from kinfmu.analysis.certified.certificate import Certificate
+from kinfmu.analysis.certified.proving import certify
 from kinfmu.errors import KinfmuError
 from tests.stress.branch import INSIDE, OUTSIDE, TURN, Interval
 from tests.stress.comparisons import all_compared, command_line

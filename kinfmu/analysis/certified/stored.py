@@ -1,4 +1,4 @@
-"""Certificates as files: what is needed to prove them again, cell by cell, without searching."""
+"""Proving the certificate of a file again, cell by cell, without searching."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from kinfmu.analysis.certified.cells import Cells, Prover
-from kinfmu.analysis.certified.certificate import (
-    Certificate,
+from kinfmu.analysis.certified.certificate import FORMAT, Certificate
+from kinfmu.analysis.certified.cover import joined
+from kinfmu.analysis.certified.proving import (
     formulas_of,
     of_branch,
     of_range,
@@ -18,35 +19,12 @@ from kinfmu.analysis.certified.certificate import (
     poses_at,
     prepared,
 )
-from kinfmu.analysis.certified.cover import joined
 from kinfmu.analysis.driver_path import follow
 from kinfmu.errors import KinfmuError
 from kinfmu.mechanism.toml_file import parse
-from kinfmu.mechanism.toml_text import text
-from kinfmu.version import VERSION
 
-FORMAT = "kinfmu certificate 1"
 _LARGEST = 500_000_000  # [bytes]
 _SAME = 1e-9  # of the range; what is proved again may differ by rounding of other versions
-
-
-def written(certificate: Certificate) -> bytes:
-    """Return a certificate as JSON: mechanism, what it states, and centre, prediction and tube of each cell."""
-    cells, tubes = certificate.cover.cells, certificate.cover.tubes
-    radii = [
-        (tubes.wide.high[block.place] / certificate.prover.unit[block.place]).tolist()
-        for block in certificate.prover.formulas.blocks
-    ]
-    content = {
-        "format": FORMAT,
-        "version": VERSION,
-        "mechanism": text(certificate.mechanism),
-        "over": "run" if certificate.driver == "time" else "range",
-        "tolerances": dict(tolerances) if isinstance(tolerances := certificate.tolerances, dict) else tolerances,
-        "states": certificate.as_json(),
-        "cells": {name: getattr(cells, name).tolist() for name in ("low", "high", "u", "path")} | {"radii": radii},
-    }
-    return json.dumps(content).encode()
 
 
 def proved_again(path: str | Path) -> Certificate:
