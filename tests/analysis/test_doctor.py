@@ -220,5 +220,5 @@ def test_nothing_is_advised_where_no_small_change_helps() -> None:
 @pytest.mark.few(5)
 def test_a_slip_is_undone(number: int) -> None:
     """A few slips of `tests.stress.slips`, one of each kind, drawn with a seed."""
-    slip = treated(len(KINDS) * 77 + number)
+    slip = treated(len(KINDS) * 78 + number)
     assert slip.runs[0], (slip.name, slip.texts)

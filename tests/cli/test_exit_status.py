@@ -126,7 +126,7 @@ WRONG_USAGE = [
     ("play --new mine.txt", "mine.txt: its name must end in .toml"),
     ("play --new broken.toml", "broken.toml is there already; kinfmu play broken.toml opens it"),
     ("verify none.fmu", "none.fmu: there is no such file"),
-    ("verify short.csv", "short.csv: its name must end in .fmu"),
+    ("verify short.csv", "short.csv: its name must end in one of .fmu, .json"),
 ]
 AT_FAULT = [
     ("import broken.toml", "broken.toml: is not a link of PMKS+, a .linkage2 file of Linkage, or a DXF drawing"),

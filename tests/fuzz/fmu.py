@@ -18,7 +18,8 @@ from tests.fuzz.summary import Summary, seeds
 
 DRIVER = Path(__file__).with_name("fmu_driver.c")
 CALLS = 400  # of a trial, by each thread
-MOST_STEPS = "#define MOST 1000000 "  # of the integrator in one step of the host
+MOST_STEPS = "#define KF_TORQUE_MOST (1000000)"  # of the integrator in one step of the host
+FEW_STEPS = "#define KF_TORQUE_MOST (500)"
 PATIENCE = 120.0  # [s] for one trial
 SANITIZERS = {
     "address": ("-fsanitize=address,undefined", "-fno-sanitize-recover=all"),
@@ -91,8 +92,8 @@ def _program(variant: Variant, folder: Path) -> Path:
         version = f"{variant.fmi}.0"
         files = fmu_sources(_mechanism(variant.mechanism), variant.fmi, variant.drive)[0] | headers(version)
         if variant.drive == "torque":  # under sanitizers a million steps take a minute
-            assert MOST_STEPS in files["torque.c"]
-            files["torque.c"] = files["torque.c"].replace(MOST_STEPS, "#define MOST 500 ")
+            assert MOST_STEPS in files["efforts.h"]
+            files["efforts.h"] = files["efforts.h"].replace(MOST_STEPS, FEW_STEPS)
         files[DRIVER.name] = DRIVER.read_text("utf-8")
         flags = ("-std=c99", "-g", "-O0", "-ffp-contract=off", "-pthread")
         compiler.compile_files(

@@ -195,7 +195,7 @@ def test_an_fmu_of_a_mechanism_that_is_too_large_for_a_page(
         assert "documentation/play.html" not in archive.namelist()
 
 
-def _refused(*_arguments: object) -> None:
+def _refused(*_arguments: object, **_named: object) -> None:
     raise RequestError("too large")
 
 

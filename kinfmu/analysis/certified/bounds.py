@@ -51,7 +51,8 @@ def _most(quantity: EnclosedQuantity, cells: Cells, tubes: Tubes, sign: float) -
     """Return an interval that contains the largest value of a quantity times a sign."""
     best = sure = -np.inf  # a known lower bound of the maximum, and an upper one of it over the cells given up
     while True:
-        places = [quantity.at(cells, tubes, Intervals(at)) * sign for at in (cells.s.low, 0.0 * cells.u, cells.s.high)]
+        ends = (Intervals(cells.low) - cells.u, Intervals(0.0 * cells.u), Intervals(cells.high) - cells.u)
+        places = [quantity.at(cells, tubes, at) * sign for at in ends]
         best = max(best, *(float(place.low.max()) for place in places))
         high = (quantity.at(cells, tubes, cells.s) * sign).high
         rest = float(high.max())
@@ -98,6 +99,7 @@ class EnclosedQuantity:
         self.order = order
         self.series = formulas.along([node], order + 2)[0][order:]
         self.slopes = [formulas.gradient([self.series[0]], name)[0] for name in formulas.unknowns]
+        self.varied = {name: formulas.gradient([self.series[0]], name)[0] for name in formulas.varied}
         self.first = [formulas.gradient([node], name)[0] for name in formulas.unknowns]
 
     def at(self, cells: Cells, tubes: Tubes, s: Intervals) -> Intervals:
@@ -118,4 +120,8 @@ class EnclosedQuantity:
             used = [k for k, node in enumerate(nodes) if node.constant != 0.0]
             for k, slope in zip(used, enclosed([nodes[k] for k in used], moving, shape), strict=True):
                 value = value + slope * deviations[k]
+        for name, node in self.varied.items():
+            if node.constant != 0.0:
+                (slope,) = enclosed([node], moving, shape)
+                value = value + slope * (moving[name] - self.prover.middle[name])
         return value.intersection(enclosed([self.series[0]], moving, shape)[0])

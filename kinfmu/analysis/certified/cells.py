@@ -23,13 +23,21 @@ from typing import Any
 import numpy as np
 
 from kinfmu.analysis.certified.formulas import BlockFormulas, Formulas
-from kinfmu.analysis.certified.intervals import Intervals, approximate, around, enclosed, interval, joined_intervals
+from kinfmu.analysis.certified.intervals import (
+    Intervals,
+    approximate,
+    around,
+    enclosed,
+    interval,
+    joined_intervals,
+    jumping,
+)
 from kinfmu.arrays import FloatArray
 from kinfmu.plan.equations.graph import Node
 
 WIDEST_TUBE = 0.1  # [rad, sizes]
 _CONTRACTION = 0.4  # of a tube by Krawczyk's operator, aimed at
-_TRIES = 6  # of narrower tubes
+_TRIES = 8  # of narrower tubes
 _CONTRACTIONS = 3  # of a proved tube
 _NEWTON = 6  # corrections of a predicted pose
 _LARGEST_CONTRACTION = 1.0 - 1e-6  # by which rates are bounded
@@ -362,7 +370,8 @@ class Prover:
                 break
             w = around(np.zeros((block.size, len(todo))), radius[todo] * unit)
             image, off = self._image(block, broad, narrow, y, moved, w, todo)
-            inside = image.is_inside(w).all(axis=0)
+            jumps = self._jumping(block, broad, narrow, w, todo)
+            inside = image.is_inside(w).all(axis=0) & ~jumps
             done = todo[inside]
             proved[done] = True
             wide.low[:, done], wide.high[:, done] = w.low[:, inside], w.high[:, inside]
@@ -377,11 +386,20 @@ class Prover:
                 again, contraction[done] = self._image(block, broad, narrow, y, moved, least, done)
                 least = _with_zero(least.intersection(again))
             narrow_own.low[:, done], narrow_own.high[:, done] = least.low, least.high
-            shrink = np.minimum(_CONTRACTION / np.maximum(off[~inside], 1e-300), 0.5)
+            shrink = np.minimum(_CONTRACTION / np.maximum(off[~inside], 1e-300), np.where(jumps[~inside], 0.03, 0.5))
             todo = todo[~inside]
             radius[todo] = np.where(np.isfinite(shrink), radius[todo] * shrink, radius[todo] * 0.1)
             todo = todo[(radius[todo] > needed[todo]) & (radius[todo] > 1e-15)]
         return proved, wide, narrow_own, contraction
+
+    def _jumping(
+        self, block: BlockFormulas, broad: Mapping[str, Intervals], narrow: Intervals, w: Intervals, which: Any
+    ) -> Any:
+        """Return where a law or an angle in the rows may jump within the tubes of some cells."""
+        values = {name: value[which] for name, value in self._tubes_at(broad, narrow, block.place).items()}
+        for k, name in enumerate(block.names):
+            values[name] = values[name] + w[k]
+        return jumping(block.rows[0], values, (len(which),))
 
     def _image(
         self,

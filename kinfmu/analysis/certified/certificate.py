@@ -93,8 +93,8 @@ class Certificate:
     @cached_property
     def tube(self) -> float:
         """The narrowest tube of all cells [rad, sizes], within which no other pose is near a pose of the run."""
-        wide = self.cover.tubes.wide
-        return float((wide.high / self.prover.unit[:, None]).min(initial=math.inf))
+        clear = self.cover.tubes.wide.high - self.cover.tubes.narrow.magnitude
+        return float((clear / self.prover.unit[:, None]).min(initial=math.inf) * (1.0 - 1e-12))
 
     def __str__(self) -> str:
         """The certificate as lines of the report of `kinfmu check`."""
@@ -161,9 +161,14 @@ class Certificate:
             order: Of the derivative.
 
         Raises:
-            RequestError: There is no such output.
+            RequestError: There is no such output, or the range ends at a dead centre.
 
         """
+        if self.dead_centres:
+            raise RequestError(
+                f"the range of {self.driver} ends at a dead centre, up to which outputs are not bounded; use "
+                "over = 'run'"
+            )
         return bounds(self.prover, self.cover.cells, self.cover.tubes, self._node(output), order)
 
     def enclosed(self, output: str, x: FloatArray, order: int = 0) -> tuple[FloatArray, FloatArray]:

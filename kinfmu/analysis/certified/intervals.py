@@ -277,7 +277,8 @@ def curve(x: Intervals, data: CurveData, order: int = 0) -> Intervals:
         for at in jumping_breaks(data, order - 1):
             jumps |= (x.low <= at) & (x.high >= at)
         found = Intervals(np.where(jumps, -np.inf, found.low), np.where(jumps, np.inf, found.high))
-    return found
+    lost = ~(found.low <= found.high)  # of what is no number
+    return Intervals(np.where(lost, -np.inf, found.low), np.where(lost, np.inf, found.high))
 
 
 def _piece(piece: Piece, order: int, x: Intervals) -> Intervals:
@@ -342,6 +343,15 @@ def enclosed(targets: Sequence[Node], values: Mapping[str, Intervals], shape: tu
         else:
             at[node] = _OPERATIONS[node.op](*(at[arg] for arg in node.args))
     return [at[target] for target in targets]
+
+
+def jumping(targets: Sequence[Node], values: Mapping[str, Intervals], shape: tuple[int, ...]) -> Any:
+    """Return where a floor or an angle in the targets may jump: derivatives do not show it."""
+    found = np.zeros(shape, dtype=bool)
+    nodes = [node for node in reachable(targets) if node.op in ("floor", "atan2")]
+    for value in enclosed(nodes, values, shape):
+        found = found | ~(np.isfinite(value.low) & np.isfinite(value.high))
+    return found
 
 
 _NUMBERS: dict[str, Callable[..., Any]] = {

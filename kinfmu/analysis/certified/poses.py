@@ -156,8 +156,8 @@ def _whole_turns(
     for name in plan.unknowns:
         if not name.is_angle:
             continue
-        c = _turns([*outputs, *residuals, *watches.values()], name)
-        moving = [output.is_angle and _is_whole(c[node]) for output, node in zip(plan.outputs, outputs, strict=True)]
+        c = turns_of([*outputs, *residuals, *watches.values()], {name: 1.0})
+        moving = [output.is_angle and is_whole(c[node]) for output, node in zip(plan.outputs, outputs, strict=True)]
         is_same = all(ok or c[node] == 0.0 for ok, node in zip(moving, outputs, strict=True))
         is_same &= all(c[node] == 0.0 for node in residuals)
         for row, node in watches.items():
@@ -170,8 +170,11 @@ def _whole_turns(
     return steps, reasons
 
 
-def _turns(targets: Sequence[Node], name: str) -> dict[Node, float | None]:
-    """Return by how many turns nodes change for a whole turn of an angle; None: otherwise."""
+def turns_of(targets: Sequence[Node], turned: Mapping[str, float]) -> dict[Node, float | None]:
+    """Return by how many turns nodes change if symbols change by turns; None: otherwise.
+
+    Numbers of turns within 1e-12 of a whole one count as whole: ratios of gears are rounded.
+    """
     c: dict[Node, float | None] = {}
     for node in reachable(targets):
         known = [c[arg] for arg in node.args]
@@ -181,7 +184,7 @@ def _turns(targets: Sequence[Node], name: str) -> dict[Node, float | None]:
         elif any(of):
             c[node] = _turns_of(node, of)
         else:
-            c[node] = 1.0 if node.op == "symbol" and node.name == name else 0.0
+            c[node] = turned.get(node.name, 0.0) if node.op == "symbol" else 0.0
     return c
 
 
@@ -195,14 +198,15 @@ def _turns_of(node: Node, of: Sequence[float]) -> float | None:
         found = sum(turns * (other.constant or 0.0) for turns, other in zip(of, reversed(node.args), strict=True))
     elif node.op == "/" and node.args[1].constant is not None:
         found = of[0] / node.args[1].constant
-    elif node.op in ("sin", "cos") and _is_whole(of[0]):
+    elif node.op in ("sin", "cos") and is_whole(of[0]):
         found = 0.0
-    elif node.op == "floor" and _is_whole(of[0] * math.tau):
+    elif node.op == "floor" and is_whole(of[0] * math.tau):
         found = of[0]
     return 0.0 if found is not None and abs(found) < 1e-12 else found
 
 
-def _is_whole(turns: float | None) -> bool:
+def is_whole(turns: float | None) -> bool:
+    """Return whether a number of turns is whole, to within 1e-12."""
     return turns is not None and abs(turns - round(turns)) < 1e-12
 
 

@@ -14,6 +14,7 @@ from kinfmu.analysis.certified.cover import Cover, Guess, cover
 from kinfmu.analysis.certified.dead_centre import dead_centre
 from kinfmu.analysis.certified.formulas import Formulas
 from kinfmu.analysis.certified.intervals import Intervals, around
+from kinfmu.analysis.certified.poses import is_whole, turns_of
 from kinfmu.analysis.driver_path import DriverPath, follow
 from kinfmu.arrays import FloatArray
 from kinfmu.codegen.python import load_model
@@ -26,7 +27,9 @@ from kinfmu.solver.python import Pose, Solver
 
 WIDTH = 0.1  # [rad, sizes] of the driver; of the first cells
 LEAST = 1e-9  # [rad, sizes]; narrower cells are given up
+_NEAR_CENTRE = 1e3  # times _MEET before a dead centre: there its own cells prove the block that turns back
 _MEET = 1e-9  # of the driver; what is covered up to this distance from the end of the range counts as covered
+_TURN = (6.283185307179586, 6.283185307179587)  # [rad], with 2 pi between them
 
 
 def certify(
@@ -72,6 +75,11 @@ def prepared(
     mechanism = replace(mechanism, coordinates="all")
     made, varied = (mechanism, {}) if tolerances is None else _varied(mechanism, tolerances)
     plan = compile_plan(made)
+    if varied and plan.watches:
+        raise RequestError(
+            f"redundant rows ({listed(plan.watch_names)}) close for the numbers of the file only: there is no "
+            "certificate of tolerances"
+        )
     box: dict[str, Intervals] = {
         parameter_symbol(one.name): around(np.array(one.value), np.array(varied[one.name]))
         for one in plan.parameters
@@ -125,7 +133,7 @@ def of_range(path: DriverPath, prover: Prover, found: Cover) -> Certificate:
     for centre in centres:
         low, high = (low, centre.high) if centre.is_high else (centre.low, high)
     gaps = _gaps(found, low, high, centres, reasons, _MEET * unit)
-    turns = path.turns if path.turns is not None and not gaps and _closes(found, path.turns) else None
+    turns = path.turns if path.turns is not None and not gaps and _closes(prover, found, path.turns) else None
     return Certificate(path.plan.mechanism, path.name, low, high, turns, found, tuple(centres), tuple(gaps), prover)
 
 
@@ -213,13 +221,32 @@ def _guess(solver: Solver, poses: Mapping[float, Pose], values: Values) -> Guess
     return guess
 
 
-def _closes(found: Cover, turns: int) -> bool:
-    """Return whether the pose at the end of whole turns is the one at their begin, angles moved by whole turns."""
-    first, last = found.cells[:1], found.cells[-1:]
+def _closes(prover: Prover, found: Cover, turns: int) -> bool:
+    """Return whether the poses come back after turns of the driver: all rows and outputs do, and the pose at the end.
+
+    That is the pose of the first cell, angles moved by whole turns.
+    """
+    formulas, first, last = prover.formulas, found.cells[:1], found.cells[-1:]
+    is_angle = np.array([name.is_angle for name in formulas.plan.unknowns], dtype=bool)[:, None]
     begin, end = first.at(Intervals(first.low) - first.u), last.at(Intervals(last.high) - last.u)
-    whole = np.rint((end - begin).middle / math.tau) * math.tau
-    inside = end + found.tubes[-1:].narrow - Intervals(whole, np.nextafter(whole, np.inf)) - begin
-    return turns > 0 and bool(inside.is_inside(found.tubes[:1].wide).all())
+    count = np.where(is_angle, np.rint((end - begin).middle / math.tau), 0.0)
+    off = end + found.tubes[-1:].narrow - Intervals(*_TURN) * count - begin
+    outputs = [motion[0] for motion in formulas.outputs]
+    rows = [node for block in formulas.blocks for node in block.rows[0]]
+    changes = turns_of(
+        [*rows, *outputs],
+        {formulas.x: float(turns)} | dict(zip(formulas.unknowns, count.ravel().tolist(), strict=True)),
+    )
+    names = formulas.plan.outputs
+    return (
+        turns > 0
+        and all(changes[row] == 0.0 for row in rows)
+        and all(
+            is_whole(changes[node]) if name.is_angle else changes[node] == 0.0
+            for name, node in zip(names, outputs, strict=True)
+        )
+        and bool(off.is_inside(found.tubes[:1].wide).all())
+    )
 
 
 def _gaps(
@@ -237,7 +264,7 @@ def _gaps(
     gaps = []
     for k, (begin, end) in enumerate(zip(starts, ends, strict=True)):
         is_end = [centre for centre in centres if (centre.is_high if k == len(pieces) else not centre.is_high)]
-        if k in (0, len(pieces)) and (is_end or end - begin <= near):
+        if k in (0, len(pieces)) and end - begin <= (_NEAR_CENTRE * near if is_end else near):
             continue
         if 0 < k < len(pieces) and begin < end and _changes_sign(found, k):
             gaps.append(Gap(begin, end, "branches cross: a change point"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -42,9 +43,12 @@ def proved_again(path: str | Path) -> Certificate:
         mechanism, over, tolerances = parse(content["mechanism"], str(path)), content["over"], content["tolerances"]
         arrays = {name: np.array(content["cells"][name], dtype=float) for name in ("low", "high", "u", "path", "radii")}
         states = content["states"]
-        low, high, gaps = states["low"], states["high"], [(gap["low"], gap["high"]) for gap in states["not_proved"]]
-        centres, turns = len(states["dead_centres"]), states["turns"]
-    except (KeyError, TypeError, ValueError) as error:
+        low, high, tube = (float(states[key] or 0.0) for key in ("low", "high", "tube"))
+        gaps = [(float(gap["low"]), float(gap["high"])) for gap in states["not_proved"]]
+        centres = [(float(one["low"]), float(one["high"]), one["is_high"]) for one in states["dead_centres"]]
+        if not np.isfinite([low, high, tube, *(x for gap in gaps for x in gap)]).all():
+            raise ValueError("a number is not finite")
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise KinfmuError(f"{path}: not a complete certificate ({type(error).__name__}: {error})") from None
     plan, box = prepared(mechanism, over, tolerances)
     path_of_driver = follow(plan, 0) if over == "range" else None
@@ -70,14 +74,23 @@ def proved_again(path: str | Path) -> Certificate:
         certificate = of_range(path_of_driver, prover, of_branch(found, {p.u[0]: p for p in path_of_driver.poses}))
     else:
         certificate = of_run(plan, prover, of_branch(found, poses_at(plan, cells.u)[1]))
-    near = _SAME * max(abs(high - low), 1e-300)
+    certificate = replace(certificate, mechanism=mechanism, tolerances=tolerances)
+    near = _SAME * max(abs(certificate.high - certificate.low), 1e-300)
     for gap in certificate.gaps:
         if not any(a - near <= gap.low and gap.high <= b + near for a, b in gaps):
             raise KinfmuError(f"{path}: {gap.low:.9g} to {gap.high:.9g} is not proved: {gap.reason}")
-    if certificate.low > low + near or certificate.high < high - near or certificate.turns != turns:
+    if certificate.low > low + near or certificate.high < high - near or certificate.turns != states["turns"]:
         raise KinfmuError(f"{path}: its range is not that of the mechanism")
-    if len(certificate.dead_centres) < centres:
-        raise KinfmuError(f"{path}: a dead centre that it states is not proved")
+    own = certificate.dead_centres
+    for a, b, is_high in centres:
+        if not any(a - near <= one.low and one.high <= b + near and one.is_high == is_high for one in own):
+            raise KinfmuError(f"{path}: a dead centre that it states is not proved")
+    proved = certificate.as_json()
+    for key in ("complete", "driver", "mechanism"):
+        if states[key] != proved[key]:
+            raise KinfmuError(f"{path}: '{key}' is {proved[key]!r}, not {states[key]!r}")
+    if tube > certificate.tube * (1.0 + _SAME) or states["share"] > certificate.share + _SAME:
+        raise KinfmuError(f"{path}: its tube or its share is not proved")
     return certificate
 
 
