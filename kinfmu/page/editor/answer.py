@@ -21,6 +21,7 @@ from kinfmu.plan.equations.assembly import SINGULAR
 from kinfmu.plan.equations.redundancy import Redundancy
 
 _LARGE = 60  # coordinates
+_MOST_EDITS = 3  # that are offered for a problem
 _MOST_NOTES = 5  # of one kind in an answer
 
 
@@ -125,8 +126,9 @@ def _findings(drawing: Drawing, problem: KinfmuError | None) -> list[dict[str, A
         return []
     found: list[dict[str, Any]] = []
     if problem is not None:
-        found.append({"kind": "problem", "text": str(problem), "edits": _help(drawing)})
-        found += _unpinned(drawing)
+        unpinned = _unpinned(drawing)
+        pins = [edit for one in unpinned for edit in one["edits"]]  # what is left open by mistake comes first
+        found = [{"kind": "problem", "text": str(problem), "edits": [*pins, *_help(drawing)][:_MOST_EDITS]}, *unpinned]
     return found
 
 

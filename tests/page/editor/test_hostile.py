@@ -292,6 +292,8 @@ def test_a_large_drawing_in_a_singular_pose_is_answered_at_once(tmp_path: Path) 
 def test_the_problem_of_a_drawing_comes_with_changes_that_help(server: PlayServer, fourbar: dict[str, Any]) -> None:
     meant = fourbar["text"]
     without = draw(server, {"do": "delete", "place": ["joints", "D"]})
+    at_once, *_ = without["findings"][0]["edits"]
+    assert at_once["text"].startswith("pin ")
     status, _, answer = ask(server, f"editor/view?state={without['state']}")
     assert status == HTTPStatus.OK
     assert answer["view"] is None
