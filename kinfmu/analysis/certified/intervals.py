@@ -153,10 +153,6 @@ def _known(low: Any, high: Any) -> Intervals:
     return Intervals(np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high))
 
 
-def _everything(like: FloatArray) -> Intervals:
-    return Intervals(np.full_like(like, -np.inf), np.full_like(like, np.inf))
-
-
 # ---- functions
 
 
