@@ -252,7 +252,7 @@ def problems(name: str, found: list[Block]) -> list[str]:
     for before, block in zip([Block("", ""), *found], found, strict=False):
         listed = any(name == page and block.head.startswith(begin) for page, begin in CHECKED_ELSEWHERE)
         if block.kind == "indented":
-            is_shown = FORMULA.match(block.text) or name.startswith("fmus/")  # there are sketches of the mechanism
+            is_shown = FORMULA.match(block.text)
             executed = is_shown and not any(map(is_typed, block.text.splitlines()))
         elif block.kind == "text":
             executed = before.kind in ("commands", "python", "text")  # what they print
