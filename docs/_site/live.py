@@ -1,15 +1,19 @@
-"""Pages in which a mechanism of the gallery is dragged, with its FMU: files next to the pages of the site."""
+"""Pages in which a mechanism of the gallery is dragged, with its FMU and its picture: files next to those of the site."""
 
 from __future__ import annotations
 
+from html import escape
 from pathlib import Path
 from typing import Any
 
+import kinfmu
 from kinfmu import build
-from kinfmu.mechanism import gallery
+from kinfmu.fmu.picture import picture, svg
+from kinfmu.mechanism import Mechanism, gallery
 from kinfmu.page import page
 
 FOLDER = "gallery/live"
+CARD = (280, 190)  # [px] of a picture
 FRAME = """\
 ```{{raw}} html
 <iframe class="live" src="live/{name}.html" loading="lazy" title="{name}: drag the mechanism"></iframe>
@@ -20,11 +24,19 @@ platform on which this site was built)</p>
 
 
 def write(app: Any, failure: Exception | None) -> None:
-    """Write these pages and FMUs, when the site is built (a Sphinx event)."""
+    """Write these pages, FMUs and pictures, when the site is built (a Sphinx event)."""
     if failure is None and app.builder.name == "html":
         folder = Path(app.outdir, FOLDER)
         folder.mkdir(parents=True, exist_ok=True)
         for name in gallery.names():
             mechanism = gallery.load(name)
             (folder / f"{name}.html").write_text(page(mechanism), encoding="utf-8", newline="\n")
+            (folder / f"{name}.svg").write_text(drawn(mechanism), encoding="utf-8", newline="\n")
             build(mechanism, folder / f"{name}.fmu")
+
+
+def drawn(mechanism: Mechanism) -> str:
+    """Return the picture of a mechanism, as SVG."""
+    shown = picture(kinfmu.solve(mechanism), *CARD)
+    assert shown is not None, mechanism.name
+    return svg(shown, escape(mechanism.title or mechanism.name))

@@ -54,15 +54,18 @@ class Picture:
     height: float
 
 
-def picture(run: Run) -> Picture | None:
-    """Return the picture of the mechanism at the first sample of a run; None if there is nothing to draw."""
+def picture(run: Run, width: float = WIDTH, highest: float = _HIGHEST) -> Picture | None:
+    """Return the picture of the mechanism at the first sample of a run; None if there is nothing to draw.
+
+    width, highest: of the picture [px]; bars, pins and supports have the same size in all.
+    """
     found, _ = drawable(run)
     if found is None or not found.shapes or not run.good.any():
         return None
     row = int(np.argmax(run.good))
     extent = np.maximum(found.high - found.low, 1e-3 * found.size)
-    scale = min((WIDTH - 2 * _EDGE) / extent[0], (_HIGHEST - 2 * _EDGE) / extent[1])
-    width, height = WIDTH, max(float(extent[1] * scale + 2 * _EDGE), _LOWEST)
+    scale = min((width - 2 * _EDGE) / extent[0], (highest - 2 * _EDGE) / extent[1])
+    height = max(float(extent[1] * scale + 2 * _EDGE), min(_LOWEST, highest))
     middle = 0.5 * (found.low + found.high)
 
     def placed(points: FloatArray) -> FloatArray:
