@@ -14,6 +14,7 @@ from kinfmu.page import page
 
 FOLDER = "gallery/live"
 CARD = (280, 190)  # [px] of a picture
+PART = 0.12  # of the run, after which its pose is drawn: bars are rarely in line there
 FRAME = """\
 ```{{raw}} html
 <iframe class="live" src="live/{name}.html" loading="lazy" title="{name}: drag the mechanism"></iframe>
@@ -37,6 +38,6 @@ def write(app: Any, failure: Exception | None) -> None:
 
 def drawn(mechanism: Mechanism) -> str:
     """Return the picture of a mechanism, as SVG."""
-    shown = picture(kinfmu.solve(mechanism), *CARD)
+    shown = picture(kinfmu.solve(mechanism), *CARD, PART)
     assert shown is not None, mechanism.name
     return svg(shown, escape(mechanism.title or mechanism.name))

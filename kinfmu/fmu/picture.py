@@ -54,15 +54,16 @@ class Picture:
     height: float
 
 
-def picture(run: Run, width: float = WIDTH, highest: float = _HIGHEST) -> Picture | None:
-    """Return the picture of the mechanism at the first sample of a run; None if there is nothing to draw.
+def picture(run: Run, width: float = WIDTH, highest: float = _HIGHEST, part: float = 0.0) -> Picture | None:
+    """Return the picture of the mechanism in a run; None if there is nothing to draw.
 
-    width, highest: of the picture [px]; bars, pins and supports have the same size in all.
+    width, highest: of the picture [px]; bars, pins and supports have the same size in all. part: of the solved samples,
+    after which the pose is drawn; 0: the first.
     """
     found, _ = drawable(run)
     if found is None or not found.shapes or not run.good.any():
         return None
-    row = int(np.argmax(run.good))
+    row = int(np.flatnonzero(run.good)[int(part * (run.good.sum() - 1))])
     extent = np.maximum(found.high - found.low, 1e-3 * found.size)
     scale = min((width - 2 * _EDGE) / extent[0], (highest - 2 * _EDGE) / extent[1])
     height = max(float(extent[1] * scale + 2 * _EDGE), min(_LOWEST, highest))

@@ -223,7 +223,6 @@ CHECKED_ELSEWHERE = {  # other blocks than commands, Python and what these print
     ("host-osp.md", "<VariableGroupConnection>"): "tests/docs/test_host_pages.py",
     ("mechanism-files.md", "time, crank_angle [deg]"): "tests/docs/test_mechanism_files.py",
     ("mechanism-files.md", "kinfmu: press.toml: [joints.P]"): "tests/docs/test_mechanism_files.py",
-    ("tutorial.md", "tip"): "a sketch",
 }
 FORMULA = re.compile(r"[^\n\"{]*( = | -> )[^\n\"{]*\n")  # neither a command nor TOML
 BY_NAME = {name: blocks(page.read_text(encoding="utf-8")) for name, page in PAGES.items()}

@@ -64,7 +64,8 @@ def test_the_page_of_the_command_line_holds_every_option(site: Any, tmp_path: Pa
 def test_a_page_of_the_gallery_has_figure_report_file_and_reference(site: Any) -> None:
     page = site("_site.gallery")._page("fourbar")
     mechanism = kinfmu.load("fourbar")
-    assert page.startswith(f"# {mechanism.title}\n")
+    assert page.startswith(f"# {mechanism.title}\n\n```{{raw}} html\n<iframe ")
+    assert page.count("<details") == 4
     assert str(kinfmu.check(mechanism)) in page
     for name in ("figure.svg", "mechanism.toml", "reference.csv"):
         assert f"../../fmus/fourbar/{name}>`" in page
@@ -74,9 +75,17 @@ def test_a_page_of_the_gallery_has_figure_report_file_and_reference(site: Any) -
 
 def test_links_to_folders_of_the_gallery_lead_to_its_pages(site: Any) -> None:
     source = ["[`engine`](../fmus/engine/README.md) and [page](fmu.md)"]
+    site("_site.gallery").linked(None, "cams", source)
+    assert source == ["[`engine`](gallery/engine.md) and [page](fmu.md)"]
+
+
+def test_every_mechanism_of_the_gallery_has_a_card(site: Any) -> None:
+    source = [(DOCS / "gallery.md").read_text(encoding="utf-8")]
     site("_site.gallery").linked(None, "gallery", source)
-    assert source[0].startswith("[`engine`](gallery/engine.md) and [page](fmu.md)")
     assert re.findall(r"^gallery/(\w+)$", source[0], re.MULTILINE) == gallery.names()
+    assert sorted(re.findall(r'<a class="card" href="gallery/(\w+)\.html">', source[0])) == gallery.names()
+    assert "| what it shows |" not in source[0]
+    assert site("_site.live").drawn(kinfmu.load("fourbar")).startswith("<svg ")
 
 
 @pytest.mark.long
