@@ -26,8 +26,8 @@ def setup(app: Any) -> dict[str, bool]:
 def _describe(_app: Any, _page: str, _template: str, context: dict[str, Any], doctree: nodes.document | None) -> None:
     """Give a page its first paragraph as its description, which search engines show."""
     paragraphs = doctree.findall(nodes.paragraph) if doctree else ()
-    text = " ".join(next((one.astext() for one in paragraphs), context["title"]).split())
-    context["metatags"] += f'<meta name="description" content="{escape(shorten(text, 160))}">'
+    text = " ".join(next((one.astext() for one in paragraphs), "kinfmu: kinematics of planar mechanisms").split())
+    context["metatags"] = context.get("metatags", "") + f'<meta name="description" content="{escape(shorten(text, 160))}">'
 
 
 def _write_pages(app: Any) -> None:

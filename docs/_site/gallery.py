@@ -9,7 +9,7 @@ from typing import Any
 
 import kinfmu
 from _site.live import FRAME
-from _site.pages import Pages, folded, table
+from _site.pages import Pages, coded, folded, table
 from kinfmu.mechanism import gallery
 
 ROWS = 5  # of the reference data on a page
@@ -40,8 +40,8 @@ def linked(_app: Any, page: str, source: list[str]) -> None:
 def _cards(rows: str) -> str:
     """Return rows of the table as cards; `live.write` draws their pictures."""
     cards = "\n".join(
-        f'<a class="card" href="gallery/{name}.html"><img src="gallery/live/{name}.svg" loading="lazy" alt="">'
-        f"<strong>{escape(title)}</strong> <code>{name}</code><span>{escape(words)}</span></a>"
+        f'<a class="card" href="gallery/{name}.html"><img src="gallery/live/{name}.svg" class="dark-light" loading="lazy" alt="">'
+        f"<strong>{escape(title)}</strong> <code>{name}</code><span>{coded(escape(words))}</span></a>"
         for name, title, words in ROW.findall(rows)
     )
     return f'```{{raw}} html\n<div class="cards">\n{cards}\n</div>\n```\n'
@@ -66,7 +66,7 @@ def _page(name: str) -> str:
 {{download}}`Mechanism file <{up}/mechanism.toml>` · {{download}}`Reference data <{up}/reference.csv>` ·
 {{download}}`Figure <{up}/figure.svg>`
 
-{folded("Figure with names", f"![{title.lstrip('# ')}]({up}/figure.svg)", is_open=True)}
+{folded("Figure with names", f"![{title.lstrip('# ')}]({up}/figure.svg)")}
 {folded("Report of `kinfmu check`", report)}
 {folded("The file", file)}
 {folded("Reference data", _reference(name))}"""

@@ -37,7 +37,11 @@ def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
     return "\n".join("| " + " | ".join(cell.replace("|", r"\|") for cell in line) + " |" for line in lines)
 
 
-def folded(title: str, content: str, *, is_open: bool = False) -> str:
+def folded(title: str, content: str) -> str:
     """Return Markdown that a reader opens and closes; it must not contain headings."""
-    heading = re.sub(r"`([^`]*)`", r"<code>\1</code>", title)
-    return f"<details{' open' * is_open}>\n<summary>{heading}</summary>\n\n{content}\n\n</details>\n"
+    return f"<details>\n<summary>{coded(title)}</summary>\n\n{content}\n\n</details>\n"
+
+
+def coded(text: str) -> str:
+    """Return text with HTML for its backticks."""
+    return re.sub(r"`([^`]*)`", r"<code>\1</code>", text)
