@@ -8,7 +8,7 @@ from typing import Any
 
 from docutils import nodes
 
-from _site import api, command_line, docstrings, formulas, gallery, live, variables
+from _site import api, command_line, docstrings, examples, formulas, gallery, live, variables
 from _site.pages import Pages
 
 
@@ -17,6 +17,7 @@ def setup(app: Any) -> dict[str, bool]:
     formulas.connect(app)
     app.connect("builder-inited", _write_pages)
     app.connect("source-read", gallery.linked)
+    app.connect("source-read", examples.with_pictures)
     app.connect("html-page-context", _describe)
     app.connect("build-finished", live.write)
     app.connect("autodoc-process-docstring", docstrings.prepared, priority=400)  # before napoleon, at 500

@@ -1,0 +1,93 @@
+"""An example of every type of mechanism-files.md, from examples.toml: its lines in the page, its picture in the site."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Sequence
+from functools import cache
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import kinfmu
+from _site import formulas
+from kinfmu.fmu.picture import picture, svg
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.toml_file import parse
+
+PAGE = "mechanism-files"
+SIZE = (180, 130)  # [px] of a picture
+PART = 0.12  # of the run, after which the pose is drawn
+HEAD = """\
+name = "example"
+units.length = "mm"
+run = {{ stop = {stop}, step = 0.01 }}
+bodies.ground.points = {{ O = [0, 0], C = [70, 0], G = [0, 10], B = [0, -20] }}
+"""
+HEADING = re.compile(r"^### `([\w-]+)`\n", re.MULTILINE)
+FORMULA = re.compile(r"^    (.+)\n+", re.MULTILINE)
+SECTION = re.compile(r"(?<=<!-- generated: )(joints|drivers|loads|laws)( -->.*?)(?=<!-- end)", re.DOTALL)
+
+
+@cache
+def examples() -> dict[str, Any]:
+    """Return the tables of examples.toml."""
+    return tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+
+
+def shown(group: str, name: str) -> str:
+    """Return the lines that the page shows."""
+    return str(examples()[group][name]["shown"]).strip()
+
+
+def mechanism(group: str, name: str) -> Mechanism:
+    """Return the mechanism of an example."""
+    one = examples()[group][name]
+    parts = one.get("parts", ["crank"] if group == "laws" else [])
+    lines = [HEAD.format(stop=2 if group == "laws" else 1), *(examples()["parts"][part] for part in parts)]
+    return parse("".join([*lines, one.get("rest", ""), one["shown"]]), f"{name}.toml")
+
+
+def drawn(group: str, name: str) -> str:
+    """Return the picture of an example, as SVG: the mechanism, or the curve of a law."""
+    run = kinfmu.solve(mechanism(group, name))
+    if group == "laws":
+        return _curves(name, [run[f"crank.{column}"] for column in ("phi", "omega", "alpha")])
+    made = picture(run, *SIZE, PART)
+    assert made is not None, name
+    return svg(made, f"Example of {name}")
+
+
+def _curves(name: str, curves: Sequence[Any]) -> str:
+    """Return a law over time (strong) with its rate and acceleration (thin), each scaled to the picture."""
+    width, height = SIZE
+    lines = []
+    for values, style in zip(curves, ('#0072b2" stroke-width="3', '#009e73', '#d55e00'), strict=True):
+        largest = np.abs(values).max() or 1.0
+        y = 0.5 * height - 0.42 * height * values / largest
+        points = " ".join(f"{x:.1f},{at:.1f}" for x, at in zip(np.linspace(4, width - 4, len(y)), y, strict=True))
+        lines.append(f'<polyline points="{points}" stroke="{style}"/>')
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" role="img" fill="none" '
+        f'stroke-width="1.3" aria-label="{escape(name)} over time, with rate and acceleration">'
+        f'<path d="M4 {0.5 * height}H{width - 4}" stroke="#888"/>{"".join(reversed(lines))}</svg>\n'
+    )
+
+
+def with_pictures(_app: Any, page: str, source: list[str]) -> None:
+    """Put the picture of each type under its heading, and set formulas as formulas (a Sphinx event)."""
+    if page != PAGE:
+        return
+
+    def section(found: re.Match[str]) -> str:
+        text = FORMULA.sub(lambda one: f"$$\n{formulas.latex(one[1])}\n$$\n\n", found[2])
+        return found[1] + HEADING.sub(lambda one: f"{one[0]}\n{_inline(drawn(found[1], one[1]))}\n", text)
+
+    source[0] = SECTION.sub(section, source[0])
+
+
+def _inline(text: str) -> str:
+    return f'```{{raw}} html\n<div class="example">{text.strip()}</div>\n```\n'
