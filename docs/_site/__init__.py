@@ -17,7 +17,7 @@ def setup(app: Any) -> dict[str, bool]:
     formulas.connect(app)
     app.connect("builder-inited", _write_pages)
     app.connect("source-read", gallery.linked)
-    app.connect("source-read", examples.with_pictures)
+    app.connect("source-read", examples.added)
     app.connect("html-page-context", _describe)
     app.connect("build-finished", live.write)
     app.connect("autodoc-process-docstring", docstrings.prepared, priority=400)  # before napoleon, at 500

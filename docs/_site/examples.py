@@ -1,4 +1,4 @@
-"""An example of every type of mechanism-files.md, from examples.toml: its lines in the page, its picture in the site."""
+"""An example of every type of mechanism-files.md, from examples.toml: lines and a picture, in the site."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ units.length = "mm"
 run = {{ stop = {stop}, step = 0.01 }}
 bodies.ground.points = {{ O = [0, 0], C = [70, 0], G = [0, 10], B = [0, -20] }}
 """
-HEADING = re.compile(r"^### `([\w-]+)`\n", re.MULTILINE)
+HEADING = re.compile(r"^### `([\w-]+)`\n\n(.+)\n", re.MULTILINE)  # of a type, with its summary
 FORMULA = re.compile(r"^    (.+)\n+", re.MULTILINE)
-SECTION = re.compile(r"(?<=<!-- generated: )(joints|drivers|loads|laws)( -->.*?)(?=<!-- end)", re.DOTALL)
+SECTION = re.compile(r"(?<=<!-- generated: )(joints|drivers|loads|measures|laws)( -->.*?)(?=<!-- end)", re.DOTALL)
 
 
 @cache
@@ -77,17 +77,19 @@ def _curves(name: str, curves: Sequence[Any]) -> str:
     )
 
 
-def with_pictures(_app: Any, page: str, source: list[str]) -> None:
-    """Put the picture of each type under its heading, and set formulas as formulas (a Sphinx event)."""
+def added(_app: Any, page: str, source: list[str]) -> None:
+    """Put the example of each type under its summary, and set formulas as formulas (a Sphinx event)."""
     if page != PAGE:
         return
 
     def section(found: re.Match[str]) -> str:
         text = FORMULA.sub(lambda one: f"$$\n{formulas.latex(one[1])}\n$$\n\n", found[2])
-        return found[1] + HEADING.sub(lambda one: f"{one[0]}\n{_inline(drawn(found[1], one[1]))}\n", text)
+        return found[1] + HEADING.sub(lambda one: _example(found[1], one[1], one[2]), text)
 
     source[0] = SECTION.sub(section, source[0])
 
 
-def _inline(text: str) -> str:
-    return f'```{{raw}} html\n<div class="example">{text.strip()}</div>\n```\n'
+def _example(group: str, name: str, summary: str) -> str:
+    """Return the heading of a type with picture, summary and lines; quantities and measures have no picture."""
+    image = f'```{{raw}} html\n<div class="example">{drawn(group, name).strip()}</div>\n```\n\n' * (group != "measures")
+    return f"### `{name}`\n\n{image}{summary}\n\n```toml\n{shown(group, name)}\n```\n"

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections import Counter
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
@@ -18,7 +16,6 @@ from kinfmu.mechanism.measures import READINGS
 from kinfmu.mechanism.quantities import POSE_QUANTITIES
 from kinfmu.units import ANGLES, KINDS, METRES, OTHER_SPELLINGS, SECONDS, Quantity
 
-EXAMPLES = tomllib.loads(Path(__file__).parents[2].joinpath("docs/_site/examples.toml").read_text(encoding="utf-8"))
 SHAPES = {
     "truth": "`true` or `false`",
     "numbers": "list of numbers",
@@ -48,7 +45,7 @@ REFERRED = {
 def sections() -> dict[str, str]:
     """Return the generated parts of the page by name, as Markdown."""
     groups = {"joints": JOINTS, "drivers": DRIVERS, "loads": LOADS, "measures": POSE_QUANTITIES, "laws": LAWS}
-    return {"units": _units()} | {name: _types(classes, name) for name, classes in groups.items()}
+    return {"units": _units()} | {name: _types(classes) for name, classes in groups.items()}
 
 
 def filled(page: str) -> str:
@@ -102,8 +99,8 @@ def _listed(units: Iterable[str]) -> str:
     return ", ".join(f"`{unit}`" for unit in units)
 
 
-def _types(classes: Iterable[Any], group: str = "") -> str:
-    """Return a section a type, after a table of the keys that several types share; group: of their examples, if any."""
+def _types(classes: Iterable[Any]) -> str:
+    """Return a section a type, after a table of the keys that several types share."""
     classes = list(classes)
     counts = Counter(key for cls in classes for key in keys_of(cls))
     shared = [key for key, count in counts.items() if count >= SHARED]
@@ -120,8 +117,7 @@ def _types(classes: Iterable[Any], group: str = "") -> str:
         lines = [_item(key) for key in keys if key not in shared]
         if cls.type == "spline":
             lines.append("* `file` (name of a CSV file): two columns, instead of `points`")
-        example = [f"```toml\n{EXAMPLES[group][cls.type]['shown']}```"] if group else []
-        blocks += [f"### `{cls.type}`", summary, *example, *(["\n".join(equation)] if equation else [])]
+        blocks += [f"### `{cls.type}`", summary, *(["\n".join(equation)] if equation else [])]
         blocks += ["\n".join(lines)] if lines else []
     return "\n\n".join(blocks)
 

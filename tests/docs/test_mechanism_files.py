@@ -27,8 +27,7 @@ from tests.docs.key_tables import filled
 PATH = Path(__file__).parents[2] / "docs" / "mechanism-files.md"
 PAGE = PATH.read_text(encoding="utf-8")
 SCREW, LIFT = "[joints.screw]", "[repeat.j]"  # blocks that are not of press.toml
-WRITTEN = re.sub(r"<!-- generated: .*?<!-- end", "", PAGE, flags=re.DOTALL)  # without examples of types
-BLOCKS = re.findall(r"```toml\n(.*?)```", WRITTEN, re.DOTALL)
+BLOCKS = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 PRESS = "\n".join(block for block in BLOCKS if not block.startswith((SCREW, LIFT)))
 
 

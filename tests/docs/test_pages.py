@@ -165,8 +165,8 @@ def test_reviewing_has_a_table_with_units(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("page", "folder"),
-    [("docs/reviewing-a-run.md", "docs"), ("docs/gallery.md", "docs"), ("README.md", "")],
-    ids=["page", "gallery", "readme"],
+    [("docs/reviewing-a-run.md", "docs"), ("README.md", "")],
+    ids=["page", "readme"],
 )
 def test_pictures_are_there_of_a_size_to_load_and_made_by_the_script(page: str, folder: str) -> None:
     found = re.findall(r"!\[[^\]]+\]\(([\w./-]+)\)", (ROOT / page).read_text(encoding="utf-8"))

@@ -16,6 +16,11 @@ import pytest
 import kinfmu
 from kinfmu.cli import main
 from kinfmu.mechanism import gallery
+from kinfmu.mechanism.drivers import DRIVERS
+from kinfmu.mechanism.joints import JOINTS
+from kinfmu.mechanism.laws import LAWS
+from kinfmu.mechanism.loads import LOADS
+from kinfmu.mechanism.quantities import POSE_QUANTITIES
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -86,6 +91,28 @@ def test_every_mechanism_of_the_gallery_has_a_card(site: Any) -> None:
     assert sorted(re.findall(r'<a class="card" href="gallery/(\w+)\.html">', source[0])) == gallery.names()
     assert "| what it shows |" not in source[0]
     assert site("_site.live").drawn(kinfmu.load("fourbar")).startswith("<svg ")
+
+
+def test_every_type_has_an_example_that_solves_and_is_drawn(site: Any) -> None:
+    examples = site("_site.examples")
+    groups = {"joints": JOINTS, "drivers": DRIVERS, "loads": LOADS, "measures": POSE_QUANTITIES, "laws": LAWS}
+    source = [(DOCS / "mechanism-files.md").read_text(encoding="utf-8")]
+    examples.added(None, "mechanism-files", source)
+    for group, classes in groups.items():
+        assert list(examples.examples()[group]) == [cls.type for cls in classes]
+        for cls in classes:
+            mechanism = examples.mechanism(group, cls.type)
+            assert kinfmu.check(mechanism).problem is None, cls.type
+            assert kinfmu.solve(mechanism).good.all(), cls.type
+            assert f'"{cls.type}"' in examples.shown(group, cls.type)
+            assert examples.shown(group, cls.type) in source[0]
+    assert source[0].count('<div class="example"><svg ') == sum(map(len, groups.values())) - len(POSE_QUANTITIES)
+
+
+def test_formulas_of_docstrings_are_set(site: Any) -> None:
+    latex = site("_site.formulas").latex
+    assert latex("Phi = n.d    (1 row, scale 1)") == r"\Phi =n \cdot d \quad \text{(1 row, scale 1)}"
+    assert latex("e = -damping ds/dt    along    s = |d|").endswith(r"\dot s  \quad \text{along} \quad s=|d|")
 
 
 @pytest.mark.long
