@@ -139,6 +139,12 @@ def test_forces(request: pytest.FixtureRequest, tmp_path: Path) -> None:
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("name", ["forces-reference.md", "torque.md"])
+def test_forces_that_are_looked_up(name: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    accept(name, follow(name, tmp_path).commented(page_text(name)), request)
+
+
+@pytest.mark.long
 def test_measures(request: pytest.FixtureRequest, tmp_path: Path) -> None:
     followed = follow("measures.md", tmp_path)
     report, as_json, faster = followed.outputs.values()
