@@ -54,7 +54,5 @@ html_theme_options = {
     "secondary_sidebar_items": {"**": ["page-toc"], "index": [], "gallery": []},
     "footer_start": ["copyright"],
     "footer_end": [],
-    "pygments_light_style": "tango",
-    "pygments_dark_style": "github-dark",
 }
 html_sidebars = {"tutorial": [], "index": [], "gallery": []}

@@ -148,10 +148,14 @@ def test_forces_that_are_looked_up(name: str, request: pytest.FixtureRequest, tm
 def test_measures(request: pytest.FixtureRequest, tmp_path: Path) -> None:
     followed = follow("measures.md", tmp_path)
     report, as_json, faster = followed.outputs.values()
-    page = with_outputs(with_readings(page_text("measures.md")), report[report.index("  measures ") :])
+    page = with_outputs(page_text("measures.md"), report[report.index("  measures ") :])
     accept("measures.md", followed.commented(page), request)
     assert '"measures": {' in as_json
     assert "at 6.28319 rad/s" in faster
+
+
+def test_the_types_of_measures_are_what_the_classes_declare(request: pytest.FixtureRequest) -> None:
+    accept("measures-reference.md", with_readings(page_text("measures-reference.md")), request)
 
 
 @pytest.mark.long
