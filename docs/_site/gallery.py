@@ -52,8 +52,8 @@ def _page(name: str) -> str:
     title, text = (folder / "README.md").read_text(encoding="utf-8").split("\n\n", 1)
     up = f"../../fmus/{name}"
     report = f"    kinfmu check {name}\n\n```text\n{kinfmu.check(kinfmu.load(name))}\n```"
-    file = f"""    kinfmu new {name} mine.toml        # a copy, to edit
-    kinfmu build {name}                # its FMU
+    file = f"""    kinfmu new {name} mine.toml   # a copy, to edit
+    kinfmu build {name}           # its FMU
 
 ```{{literalinclude}} {up}/mechanism.toml
 :language: toml
