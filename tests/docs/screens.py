@@ -75,9 +75,10 @@ def main(folder: Path, names: tuple[str, ...]) -> None:
         for name, tab in opened(chromium, names):
             for wide in tab.evaluate(WIDE):
                 print(f"{name}: {wide}")
-            high = min(tab.evaluate("document.documentElement.scrollHeight"), HIGHEST)
-            tab.set_viewport_size({"width": tab.viewport_size["width"], "height": max(high, 900)})
-            tab.wait_for_timeout(300)
+            if "-live-" not in name:  # live pages fit their window
+                high = min(tab.evaluate("document.documentElement.scrollHeight"), HIGHEST)
+                tab.set_viewport_size({"width": tab.viewport_size["width"], "height": max(high, 900)})
+                tab.wait_for_timeout(300)
             tab.screenshot(path=folder / f"{name}.png")
 
 

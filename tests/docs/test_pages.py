@@ -14,13 +14,19 @@ from fmpy.ssp.ssd import read_ssd
 
 from kinfmu.cli import main
 from kinfmu.log import read
-from tests.docs.blocks import DOCS, PAGES, ROOT, Block, blocks, commands, is_typed
+from tests.docs.blocks import DOCS, PAGES, ROOT, Block, blocks, commands, is_typed, words
 from tests.docs.follow import NOT_RUN, SHOWN, accept, files, follow, page_text, typed
 from tests.docs.key_tables import with_readings
 from tests.draw.picture import differences, picture
 
 SCRIPT = (ROOT / "scripts" / "pictures").read_text(encoding="utf-8")
+MOST_WORDS = 35_000  # in docs
 MOST = 600_000  # [bytes] of a picture; pages load it
+
+
+def test_pages_stay_short() -> None:
+    assert words(page_text("README.md")) <= 600
+    assert sum(words(page.read_text(encoding="utf-8")) for page in DOCS.glob("*.md")) <= MOST_WORDS
 
 
 def with_outputs(page: str, *outputs: str) -> str:
