@@ -28,7 +28,9 @@ def _describe(_app: Any, _page: str, _template: str, context: dict[str, Any], do
     """Give a page its first paragraph as its description, which search engines show."""
     paragraphs = doctree.findall(nodes.paragraph) if doctree else ()
     text = " ".join(next((one.astext() for one in paragraphs), "kinfmu: kinematics of planar mechanisms").split())
-    context["metatags"] = context.get("metatags", "") + f'<meta name="description" content="{escape(shorten(text, 160))}">'
+    context["metatags"] = (
+        context.get("metatags", "") + f'<meta name="description" content="{escape(shorten(text, 160))}">'
+    )
 
 
 def _write_pages(app: Any) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Sequence
+from base64 import b64encode
 from functools import cache
 from html import escape
 from pathlib import Path
@@ -13,14 +13,12 @@ from typing import Any
 import numpy as np
 
 import kinfmu
-from _site import formulas
-from kinfmu.fmu.picture import picture, svg
+from _site import formulas, live
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import parse
 
 PAGE = "mechanism-files"
 SIZE = (180, 130)  # [px] of a picture
-PART = 0.12  # of the run, after which the pose is drawn
 HEAD = """\
 name = "example"
 units.length = "mm"
@@ -29,6 +27,7 @@ bodies.ground.points = {{ O = [0, 0], C = [70, 0], G = [0, 10], B = [0, -20] }}
 """
 HEADING = re.compile(r"^### `([\w-]+)`\n\n(.+)\n", re.MULTILINE)  # of a type, with its summary
 FORMULA = re.compile(r"^    (.+)\n+", re.MULTILINE)
+LEGEND = "Pictures: the value (thick, blue), its rate (green) and its acceleration (red) over time, each scaled.\n\n"
 SECTION = re.compile(r"(?<=<!-- generated: )(joints|drivers|loads|measures|laws)( -->.*?)(?=<!-- end)", re.DOTALL)
 
 
@@ -53,19 +52,16 @@ def mechanism(group: str, name: str) -> Mechanism:
 
 def drawn(group: str, name: str) -> str:
     """Return the picture of an example, as SVG: the mechanism, or the curve of a law."""
-    run = kinfmu.solve(mechanism(group, name))
-    if group == "laws":
-        return _curves(name, [run[f"crank.{column}"] for column in ("phi", "omega", "alpha")])
-    made = picture(run, *SIZE, PART)
-    assert made is not None, name
-    return svg(made, f"Example of {name}")
+    shown = mechanism(group, name)
+    return _curves(name, kinfmu.solve(shown)) if group == "laws" else live.drawn(shown, SIZE)
 
 
-def _curves(name: str, curves: Sequence[Any]) -> str:
+def _curves(name: str, run: kinfmu.Run) -> str:
     """Return a law over time (strong) with its rate and acceleration (thin), each scaled to the picture."""
+    curves = [run[f"crank.{column}"] for column in ("phi", "omega", "alpha")]
     width, height = SIZE
     lines = []
-    for values, style in zip(curves, ('#0072b2" stroke-width="3', '#009e73', '#d55e00'), strict=True):
+    for values, style in zip(curves, ('#0072b2" stroke-width="3', "#009e73", "#d55e00"), strict=True):
         largest = np.abs(values).max() or 1.0
         y = 0.5 * height - 0.42 * height * values / largest
         points = " ".join(f"{x:.1f},{at:.1f}" for x, at in zip(np.linspace(4, width - 4, len(y)), y, strict=True))
@@ -84,12 +80,19 @@ def added(_app: Any, page: str, source: list[str]) -> None:
 
     def section(found: re.Match[str]) -> str:
         text = FORMULA.sub(lambda one: f"$$\n{formulas.latex(one[1])}\n$$\n\n", found[2])
+        text = text.replace("### `", f"{LEGEND}### `", 1) if found[1] == "laws" else text
         return found[1] + HEADING.sub(lambda one: _example(found[1], one[1], one[2]), text)
 
     source[0] = SECTION.sub(section, source[0])
 
 
+def _image(group: str, name: str) -> str:
+    """Return the picture as an element that holds it; as an image it has its own dark colours."""
+    data = b64encode(drawn(group, name).encode()).decode()
+    return f'<img class="example dark-light" alt="Example of {name}" src="data:image/svg+xml;base64,{data}">'
+
+
 def _example(group: str, name: str, summary: str) -> str:
     """Return the heading of a type with picture, summary and lines; quantities and measures have no picture."""
-    image = f'```{{raw}} html\n<div class="example">{drawn(group, name).strip()}</div>\n```\n\n' * (group != "measures")
+    image = "" if group == "measures" else f"```{{raw}} html\n{_image(group, name)}\n```\n\n"
     return f"### `{name}`\n\n{image}{summary}\n\n```toml\n{shown(group, name)}\n```\n"

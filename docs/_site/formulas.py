@@ -40,10 +40,20 @@ def _svg(latex: str, *, display: bool = False) -> str:
 # ----------------------------------------------------------------------------------------------- formulas of docstrings
 
 
-_WORDS = re.compile(r"(?<![\w`])(along|or the same with y|up to|then mirrored|continuous|angle of \w in the cam's frame)")
+_WORDS = re.compile(
+    r"(?<![\w`])(along|or the same with y|up to|then mirrored|continuous|angle of \w in the cam's frame)"
+)
 _NOTE = re.compile(r" {2,}\(([^()]*)\)$")  # such as (2 rows, scale 1)
 _TOKEN = re.compile(r"\\text\{[^}]*\}|[A-Za-z][A-Za-z_]*(?:\d|\{k\+1\})?|\d+|\.\.\.|\S| ")
-_KNOWN = {"phi": r"\varphi", "Phi": r"\Phi", "pi": r"\pi", "sin": r"\sin", "cos": r"\cos", "sum": r"\sum", "...": r"\dots"}
+_KNOWN = {
+    "phi": r"\varphi",
+    "Phi": r"\Phi",
+    "pi": r"\pi",
+    "sin": r"\sin",
+    "cos": r"\cos",
+    "sum": r"\sum",
+    "...": r"\dots",
+}
 
 
 def latex(line: str) -> str:
@@ -60,15 +70,15 @@ def _math(text: str) -> str:
     """Return a formula with its names as LaTeX; a blank between two factors stays visible."""
     made = ""
     last, was_blank = "", False
-    for token in _TOKEN.findall(text):
-        if token == " ":
+    for sign in _TOKEN.findall(text):
+        if sign == " ":
             was_blank = True
             continue
-        is_factor = token[0].isalnum() or token[0] in "(\\|"
+        is_factor = sign[0].isalnum() or sign[0] in "(\\|"
         if was_blank and is_factor and (last[-1:].isalnum() or last[-1:] in ")}|'"):
             made += r"\, "
-        made += _name(token)
-        last, was_blank = token, False
+        made += _name(sign)
+        last, was_blank = sign, False
     return re.sub(r"\[(.*?)\]", _column, made)
 
 
@@ -77,21 +87,21 @@ def _column(found: re.Match[str]) -> str:
     return rf"\begin{{bmatrix}} {rows} \end{{bmatrix}}" if rows != found[1] else found[0]
 
 
-def _name(token: str) -> str:
+def _name(sign: str) -> str:
     """Return a name or sign as LaTeX: letters with indices as they are, names of keys upright."""
-    if token == "dsdt":
+    if sign == "dsdt":
         return r"\dot s "
-    if token == "@":
+    if sign == "@":
         return r" \cdot "
-    base, _, index = token.partition("_")
-    if token in _KNOWN or (base in _KNOWN and index):
+    base, _, index = sign.partition("_")
+    if sign in _KNOWN or (base in _KNOWN and index):
         return _KNOWN[base] + (f"_{{{index}}}" if index else " ")
     if len(base) == 1 and base.isalpha():
         return f"{base}_{{{index}}}" if index else base
-    if re.fullmatch(r"[a-z]\d", token):
-        return f"{token[0]}_{token[1]}"
+    if re.fullmatch(r"[a-z]\d", sign):
+        return f"{sign[0]}_{sign[1]}"
     if index in ("1", "k", "{k+1}"):
         return rf"\mathrm{{{base}}}_{index}"
-    if token[0].isalpha():
-        return rf"\mathrm{{{token.replace('_', chr(92) + '_')}}}"
-    return token
+    if sign[0].isalpha():
+        return rf"\mathrm{{{sign.replace('_', chr(92) + '_')}}}"
+    return sign

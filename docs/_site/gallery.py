@@ -1,4 +1,4 @@
-"""The gallery: cards with pictures, and a page for each mechanism: live, figure, report of `check`, file, reference data."""
+"""The gallery as cards, and a page for each mechanism: live, figure, report of `check`, file, reference data."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def write(pages: Pages) -> None:
 
 
 def linked(_app: Any, page: str, source: list[str]) -> None:
-    """Lead links from a mechanism's folder to its page, offer examples as files, show the gallery as cards (an event)."""
+    """Lead links from a mechanism's folder to its page, offer examples as files, make cards (a Sphinx event)."""
     up = "../" * page.count("/")
     if page == "gallery":
         names = "\n".join(f"gallery/{name}" for name in gallery.names())
@@ -40,7 +40,8 @@ def linked(_app: Any, page: str, source: list[str]) -> None:
 def _cards(rows: str) -> str:
     """Return rows of the table as cards; `live.write` draws their pictures."""
     cards = "\n".join(
-        f'<a class="card" href="gallery/{name}.html"><img src="gallery/live/{name}.svg" class="dark-light" loading="lazy" alt="">'
+        f'<a class="card" href="gallery/{name}.html">'
+        f'<img src="gallery/live/{name}.svg" class="dark-light" loading="lazy" alt="">'
         f"<strong>{escape(title)}</strong> <code>{name}</code><span>{coded(escape(words))}</span></a>"
         for name, title, words in ROW.findall(rows)
     )

@@ -1,4 +1,4 @@
-"""Pages in which a mechanism of the gallery is dragged, with its FMU and its picture: files next to those of the site."""
+"""Pages in which a mechanism of the gallery is dragged, with its FMU and its picture: files next to the site's pages."""
 
 from __future__ import annotations
 
@@ -36,8 +36,9 @@ def write(app: Any, failure: Exception | None) -> None:
             build(mechanism, folder / f"{name}.fmu")
 
 
-def drawn(mechanism: Mechanism) -> str:
-    """Return the picture of a mechanism, as SVG."""
-    shown = picture(kinfmu.solve(mechanism), *CARD, PART)
-    assert shown is not None, mechanism.name
+def drawn(mechanism: Mechanism, size: tuple[float, float] = CARD) -> str:
+    """Return the picture of a mechanism in a size [px], as SVG."""
+    shown = picture(kinfmu.solve(mechanism), *size, PART)
+    if shown is None:
+        raise ValueError(f"mechanism '{mechanism.name}' has nothing to draw")
     return svg(shown, escape(mechanism.title or mechanism.name))

@@ -12,7 +12,7 @@ for (const code of document.querySelectorAll("article pre")) {
 }
 
 // Names for readers aloud that the theme leaves out, and keys for what scrolls.
-for (const button of document.querySelectorAll(".search-button-field")) button.removeAttribute("aria-label"); // it has a text
+for (const button of document.querySelectorAll(".search-button-field")) button.ariaLabel = button.textContent.trim().replace(/\s+/g, " ");
 for (const summary of document.querySelectorAll("summary"))
     if (!summary.textContent.trim()) summary.ariaLabel = `Pages of ${summary.parentElement.parentElement.querySelector("a").textContent.trim()}`;
 for (const head of document.querySelectorAll("th")) if (!head.textContent.trim()) head.role = "presentation";

@@ -99,4 +99,8 @@ def executed(path: Path) -> str:
 
 if __name__ == "__main__":
     counts = {path.name: words(path.read_text(encoding="utf-8")) for path in sorted(DOCS.glob("*.md"))}
-    print("\n".join(f"{count:6} {name}" for name, count in counts.items()), f"{sum(counts.values()):6} words in docs", sep="\n")
+    print(
+        "\n".join(f"{count:6} {name}" for name, count in counts.items()),
+        f"{sum(counts.values()):6} words in docs",
+        sep="\n",
+    )

@@ -72,7 +72,10 @@ BEFORE = {  # commands for the files that a page takes as given
     "hosts.md": ["kinfmu build fourbar", "kinfmu solve fourbar -o host.csv"],
     "playing.md": ["kinfmu new crank_rocker mine.toml", "kinfmu simulate mine.toml"],
 }
-FROM_PAGES = {"commands.md": ["fitting.md", "studies.md"], "torque.md": ["forces.md"]}  # pages whose files a page takes as given
+FROM_PAGES = {
+    "commands.md": ["fitting.md", "studies.md"],
+    "torque.md": ["forces.md"],
+}  # pages whose files a page takes as given
 SHOWN = re.compile(r"(print\(.*\))  # (.*)")
 INPUTS = {  # files that pages take as given
     "crank.csv": "time,crank_angle\n0,0\n0.5,0.5\n1,1\n",

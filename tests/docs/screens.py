@@ -1,7 +1,7 @@
 """Take screenshots of the built site and of its live pages: `python -m tests.docs.screens FOLDER [NAME ...]`.
 
-Desktop and phone, light and dark, as whole pages; NAME: pages by their path in docs/_build, without `.html`. Prints what
-is wider than the window, and code that does not fit its column on a desktop.
+Desktop and phone, light and dark, as whole pages; NAME: pages by their path in docs/_build, without `.html`. Prints
+what is wider than the window, and code that does not fit its column on a desktop.
 """
 
 from __future__ import annotations
@@ -48,8 +48,10 @@ WIDE = """() => {
     const page = document.scrollingElement;
     const found = page.scrollWidth > innerWidth ? [`page ${page.scrollWidth} px`] : [];
     const isDesktop = innerWidth > 1000;
-    for (const code of document.querySelectorAll("article pre"))
-        if (isDesktop && code.scrollWidth > code.clientWidth + 1) found.push(`code: ${code.textContent.trim().split("\\n").sort((a, b) => b.length - a.length)[0]}`);
+    for (const code of document.querySelectorAll("article pre")) {
+        const [longest] = code.textContent.trim().split("\\n").sort((a, b) => b.length - a.length);
+        if (isDesktop && code.scrollWidth > code.clientWidth + 1) found.push(`code: ${longest}`);
+    }
     return found;
 }"""
 

@@ -106,7 +106,7 @@ def test_every_type_has_an_example_that_solves_and_is_drawn(site: Any) -> None:
             assert kinfmu.solve(mechanism).good.all(), cls.type
             assert f'"{cls.type}"' in examples.shown(group, cls.type)
             assert examples.shown(group, cls.type) in source[0]
-    assert source[0].count('<div class="example"><svg ') == sum(map(len, groups.values())) - len(POSE_QUANTITIES)
+    assert source[0].count('<img class="example ') == sum(map(len, groups.values())) - len(POSE_QUANTITIES)
 
 
 def test_formulas_of_docstrings_are_set(site: Any) -> None:
