@@ -3,7 +3,7 @@
 import { $, breakable, element } from "./elements.js";
 import { linkageOf } from "./linkage.js";
 import { gridOf, hit, ONE_PIN, typed } from "./editor_places.js";
-import { baseOf, chosen, clicked, deletions, escaped, toolOf } from "./editor_tools.js";
+import { baseOf, chosen, clicked, deletions, escaped, titleOf, toolOf } from "./editor_tools.js";
 import { EditorHand } from "./editor_hand.js";
 import { EditorPainter } from "./editor_paint.js";
 import { DrawPanel } from "./editor_panel.js";
@@ -130,6 +130,7 @@ export class Editor {
             });
             return button;
         });
+        if (machine?.tool === "move" && !machine.picks.length && this.selection) options.push(this.deleteButton(`Delete ${titleOf(this.selection)}`));
         const number = machine?.number ? ` Ratio ${machine.number}.` : "";
         $("draw-bar").hidden = !text;
         $("draw-bar").replaceChildren(element("p", { textContent: text + number, className: refusal ? "refused" : "", role: "status" }), ...options);
@@ -143,7 +144,7 @@ export class Editor {
         if (!name) return null;
         if (name.kind === "point") return sketch.numberOfPoint(name.point) < 0 ? null : hit(sketch, sketch.point(sketch.numberOfPoint(name.point)), ONE_PIN * sketch.size);
         if (name.kind === "body") return sketch.body(name.body) < 0 ? null : { ...name, bodies: [name.body] };
-        return sketch.lines.some((line) => line.table === name.table && line.name === name.name) ? name : null;
+        return sketch.data[name.table].some((one) => one.name === name.name) ? name : null;
     }
 
     // Make operations after those that wait; return whether they were made.
@@ -244,6 +245,7 @@ export class Editor {
         const { page } = this;
         const found = await this.session.view();
         if (!found) return;
+        $("badge").textContent = this.session.answer.badge.text;
         if (found.findings) this.panel.findings(found.findings);
         if (!found.view) {
             if (found.message) this.panel.findings([...this.session.answer.findings, { kind: "problem", text: found.message }]);
@@ -256,7 +258,6 @@ export class Editor {
         page.take(linkage);
         if (this.machine) Object.assign(page.view, { scale, x, y, isFitted });
         this.isPlayable = true;
-        $("badge").textContent = this.session.answer.badge.text;
         const isIdle = !this.machine?.picks.length && !this.hand.isPressed;
         if (!wasPlayable && isIdle && this.session.answer.badge.isComplete && this.isDrawn && !window.matchMedia("(prefers-reduced-motion: reduce)").matches) {
             this.machine = null;
@@ -358,7 +359,7 @@ export class Editor {
     }
 
     #typeSelected(selection, found) {
-        if (selection.kind === "point" && found.at) this.operate([{ do: "move", point: selection.point, to: found.at }]);
+        if (selection.kind === "point" && found.at) this.operate([{ do: "move", point: selection.point, to: found.at, exact: true }]);
         else if (selection.kind === "body" && found.value > 0) {
             const between = this.sketch.data.points.map((_, k) => this.sketch.nameOf(k)).filter((name) => name.split(".")[0] === selection.body).slice(0, 2);
             this.operate([{ do: "length", between, value: found.value }]);
@@ -389,6 +390,13 @@ export class Editor {
 
     deleteSelected() {
         this.operate(deletions(this.selection));
+    }
+
+    // Return a button that deletes what is selected.
+    deleteButton(textContent) {
+        const button = element("button", { textContent });
+        button.addEventListener("click", () => this.deleteSelected());
+        return button;
     }
 
     // Draw in place of the mechanism that moves; return whether that is the editor's.

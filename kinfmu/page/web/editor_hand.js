@@ -27,7 +27,7 @@ export class EditorHand {
         const { editor } = this;
         const { machine } = editor;
         const tool = toolOf(machine.tool);
-        const options = { reach: here.reach, step: editor.step, base: editor.base, isFree: here.isFree || machine.tool in OF_PICTURE, isAngled: here.isAngled, hasMembers: tool?.hasMembers || (machine.tool === "move" && !machine.picks.length) };
+        const options = { symbols: editor.painter.symbols, reach: here.reach, step: editor.step, base: editor.base, isFree: here.isFree || machine.tool in OF_PICTURE, isAngled: here.isAngled, hasMembers: tool?.hasMembers || (machine.tool === "move" && !machine.picks.length) };
         return snapped(editor.sketch, here.p, options);
     }
 

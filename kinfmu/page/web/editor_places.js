@@ -26,11 +26,11 @@ export function clean(value, step) {
 // of points that no joint holds together); of a "body" also body and along (of its line); of a "member" (a cylinder, spring
 // or rod) also table and name; "free": nothing.
 
-// Return the target at a place within a reach; members: whether cylinders, springs and rods count.
-export function hit(sketch, p, reach, hasMembers = false) {
+// Return the target at a place within a reach; members: whether cylinders, springs and rods count; symbols: other members.
+export function hit(sketch, p, reach, hasMembers = false, symbols = []) {
     const pin = nearest(sketch.pins.map((one) => ({ ...one, gap: distance(one.at, p) })), reach);
     if (pin) return pointTarget(sketch, pin);
-    const lines = sketch.lines.map((line) => ({ ...line, gap: distanceToSegment(p, ...line.ends) })).filter((line) => line.gap < 0.7 * reach);
+    const lines = [...sketch.lines, ...symbols].map((line) => ({ ...line, gap: distanceToSegment(p, ...line.ends) })).filter((line) => line.gap < 0.7 * reach);
     const member = hasMembers && nearest(lines.filter((line) => line.table), reach);
     if (member) return { kind: "member", at: p, bodies: [], table: member.table, name: member.name };
     const bars = lines.filter((line) => !line.table).sort((a, b) => a.gap - b.gap);
@@ -80,15 +80,15 @@ export function crossingOf([a, b], [c, d]) {
 
 // Return the target of a click at p: a pin, a place on a body, or a place of the grid. base: from where a link is drawn;
 // isFree: nothing snaps; isAngled: directions from the base snap.
-export function snapped(sketch, p, { reach, step, base = null, isFree = false, isAngled = false, hasMembers = false }) {
+export function snapped(sketch, p, { reach, step, base = null, isFree = false, isAngled = false, hasMembers = false, symbols = [] }) {
     const fine = step / 100;
     if (isFree) return { kind: "free", at: p.map((x) => clean(x, fine)), bodies: [] };
-    const found = hit(sketch, p, reach, hasMembers);
+    const found = hit(sketch, p, reach, hasMembers, symbols);
     if (found.kind === "point" || found.kind === "member" || found.isExact) return found;
     if (found.ends) return { ...found, at: alongLine(found.ends, p, step) };
     if (found.kind === "free" && base && isAngled) {
         const angle = ANGLE * Math.round(Math.atan2(p[1] - base[1], p[0] - base[0]) / ANGLE);
-        return { ...found, at: polar(base, clean(distance(p, base), step), angle, step / 1e6) };
+        return { ...found, at: polar(base, clean(distance(p, base), step), angle) };
     }
     return { ...found, at: p.map((x) => clean(x, step)) };
 }
@@ -101,11 +101,16 @@ function alongLine([a, b], p, step) {
     const wanted = Math.min(Math.max((p[0] - a[0]) * along[0] + (p[1] - a[1]) * along[1], 0), length);
     const choices = [clean(wanted, step), length / 2].filter((part) => part > 0 && part < length);
     const part = choices.sort((x, y) => Math.abs(x - wanted) - Math.abs(y - wanted))[0] ?? wanted;
-    return [0, 1].map((k) => clean(a[k] + part * along[k], step / 1e6));
+    return [0, 1].map((k) => rounded(a[k] + part * along[k], length));
 }
 
-function polar([x, y], length, angle, step) {
-    return [clean(x + length * Math.cos(angle), step), clean(y + length * Math.sin(angle), step)];
+function polar([x, y], length, angle) {
+    return [rounded(x + length * Math.cos(angle), length), rounded(y + length * Math.sin(angle), length)];
+}
+
+// Return a number of a place without the rounding of a line of a length; a place on the line stays on it.
+function rounded(value, length) {
+    return clean(value, 1e-12 * length);
 }
 
 // ---- typed numbers
@@ -129,7 +134,7 @@ export function typed(text, base, towards) {
     const length = form === "angle" ? Math.hypot(dx, dy) : first;
     if (!(length > 0)) return { problem: "a length must be greater than 0" };
     const angle = form === "polar" ? second * DEGREE : form === "angle" ? first * DEGREE : Math.atan2(dy, dx);
-    return { at: polar(base, length, angle, 1e-12 * length), value: first };
+    return { at: polar(base, length, angle), value: first };
 }
 
 function read(text) {

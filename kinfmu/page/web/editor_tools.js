@@ -82,6 +82,11 @@ function pointed([link, place], { option }) {
     return option === "interest" ? [{ do: "interest", at }] : place ? [{ do: "point", ...at }] : [];
 }
 
+// Return what a target is called.
+export function titleOf({ kind, point, body, name }) {
+    return kind === "point" ? `pin ${point}` : kind === "body" ? `link ${body}` : name;
+}
+
 // Return operations that delete what a target is.
 export function deletions(target) {
     if (target.kind === "member") return [{ do: "delete", place: [target.table, target.name] }];
