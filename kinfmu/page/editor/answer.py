@@ -14,12 +14,13 @@ from kinfmu.draw.scene.instant import Instant
 from kinfmu.errors import KinfmuError, MobilityError
 from kinfmu.mechanism.quantities.placement import body_of
 from kinfmu.page.describe import drawn
-from kinfmu.page.editor.drawing import AS_DRAWN, LARGE, PLACEHOLDER, Drawing
+from kinfmu.page.editor.drawing import AS_DRAWN, PLACEHOLDER, Drawing
 from kinfmu.page.html import page_data
 from kinfmu.plan import plan_from
 from kinfmu.plan.equations.assembly import SINGULAR
 from kinfmu.plan.equations.redundancy import Redundancy
 
+_LARGE = 60  # coordinates
 _MOST_EDITS = 3  # that are offered for a problem
 _MOST_NOTES = 5  # of one kind in an answer
 
@@ -35,7 +36,7 @@ def answer(drawing: Drawing) -> dict[str, Any]:
         "findings": _findings(drawing, problem),
         "sketch": sketch(drawing),
         "view": None,
-        "isViewComing": badge["mobility"] is not None and badge["mobility"] <= badge["drivers"] > 0,
+        "isViewComing": badge["isComplete"],
     }
 
 
@@ -78,7 +79,7 @@ def _problem(drawing: Drawing) -> KinfmuError | None:
 def _is_singular(drawing: Drawing) -> bool:
     """Return whether a large drawing is drawn in a singular pose: looking for a way out of it takes long."""
     redundancy = drawing.redundancy
-    if not isinstance(redundancy, Redundancy) or len(drawing.system.coordinates) <= LARGE:
+    if not isinstance(redundancy, Redundancy) or len(drawing.system.coordinates) <= _LARGE:
         return False
     pose = redundancy.assembly.pose
     return redundancy.mobility == len(drawing.mechanism.drivers) > 0 and pose is not None and pose.margin <= SINGULAR
@@ -174,7 +175,7 @@ def view(drawing: Drawing) -> dict[str, Any]:
     if report.problem is not None:
         problem = [{"kind": "problem", "text": str(report.problem), "edits": _advised(drawing)}]
         if report.plan is None:
-            return {"view": None, "findings": problem + _unpinned(drawing) + notes}
+            return {"view": None, "findings": problem + notes}
     return {"view": page_data(drawing.mechanism, report), "findings": problem + notes}
 
 

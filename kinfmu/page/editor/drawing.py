@@ -33,7 +33,6 @@ from kinfmu.plan.equations.start_poses import is_in_world_coordinates, law_targe
 from kinfmu.plan.equations.system import System
 
 AS_DRAWN = 1e-9  # of the size; start poses that close this well are the drawn poses, to the bit
-LARGE = 60  # coordinates; with more, only what takes little time is done at once
 _STEPS = 10  # on the way of a driver
 PLACEHOLDER = "_"  # stands for the bodies of a file that has only the ground, which is no mechanism yet
 

@@ -9,13 +9,14 @@ from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.drivers import AngleDriver, RelativeAngleDriver
 from kinfmu.mechanism.quantities.placement import body_of, point_of
 from kinfmu.mechanism.valid import check_name, quoted
-from kinfmu.page.editor.drawing import LARGE, Drawing, Spot, written_angle, written_number
+from kinfmu.page.editor.drawing import Drawing, Spot, written_angle, written_number
 from kinfmu.page.editor.moving import carry
 from kinfmu.page.editor.pen import OperationArguments, Pen, written_spot
 
 _RUN = {"start": 0, "stop": 2, "step": 0.01}  # [s], of files without a run: one turn of a motor
 _SPEED = "30 rpm"
 _STROKE = 0.25  # of the drawn length of a cylinder
+_LARGE = 60  # coordinates of a drawing; with more, finding a stroke takes too long
 _FREE = 0.8  # of the way to a dead centre, which a cylinder goes
 _SHORT = 0.5  # of a stroke; with less the other direction is looked at
 _CYLINDER_TIME = 2  # [s]
@@ -218,7 +219,7 @@ def cylinder(pen: Pen, values: OperationArguments) -> None:
 def _possible_stroke(drawing: Drawing, driver: str, length: float, wanted: float) -> float:
     """Return the stroke of a cylinder, out or else in, that ends well before a dead centre; the wanted one at most."""
     best = 0.0
-    if len(drawing.system.coordinates) <= LARGE:
+    if len(drawing.system.coordinates) <= _LARGE:
         for stroke in (wanted, -wanted):
             if abs(best) < _SHORT * wanted:
                 best = max(best, _FREE * (drawing.reached(driver, length + stroke / _FREE) - length), key=abs)

@@ -245,7 +245,6 @@ export class Editor {
         const { page } = this;
         const found = await this.session.view();
         if (!found) return;
-        $("badge").textContent = this.session.answer.badge.text;
         if (found.findings) this.panel.findings(found.findings);
         if (!found.view) {
             if (found.message) this.panel.findings([...this.session.answer.findings, { kind: "problem", text: found.message }]);
@@ -258,6 +257,7 @@ export class Editor {
         page.take(linkage);
         if (this.machine) Object.assign(page.view, { scale, x, y, isFitted });
         this.isPlayable = true;
+        $("badge").textContent = this.session.answer.badge.text;
         const isIdle = !this.machine?.picks.length && !this.hand.isPressed;
         if (!wasPlayable && isIdle && this.session.answer.badge.isComplete && this.isDrawn && !window.matchMedia("(prefers-reduced-motion: reduce)").matches) {
             this.machine = null;

@@ -176,7 +176,7 @@ export class EditorHand {
     placeField() {
         const { editor, field, here, isTouch } = this;
         const { machine, selection } = editor;
-        const isWaiting = machine && (machine.tool !== "move" || selection);
+        const isWaiting = machine && (machine.tool !== "move" || (selection && selection.kind !== "member"));
         const isInBar = Boolean(isTouch && isWaiting);
         if (isInBar !== (field.parentElement === $("draw-bar"))) (isInBar ? $("draw-bar") : $("stage")).append(field);
         if (document.activeElement !== field && !field.value) field.hidden = !isInBar;

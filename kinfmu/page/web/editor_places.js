@@ -6,6 +6,7 @@ import { niceStep } from "./numbers.js";
 const GRID = 9; // [px] between places to which clicks snap, at least
 const ANGLE = Math.PI / 12; // to which links snap with Shift
 export const ONE_PIN = 1e-6; // of the size; points that are closer are one pin
+const DIGITS = 14; // of a place, compared with the length of its line
 const DEGREE = Math.PI / 180;
 export const GROUND = "ground";
 
@@ -93,24 +94,25 @@ export function snapped(sketch, p, { reach, step, base = null, isFree = false, i
     return { ...found, at: p.map((x) => clean(x, step)) };
 }
 
-// Return the place on a line that is nearest to p, in whole steps from its begin, or its middle or end.
+// Return the place on a line that is nearest to p, of those on lines of the grid that cross it, and of its middle.
 function alongLine([a, b], p, step) {
     const length = distance(a, b);
     if (!length) return a;
-    const along = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
-    const wanted = Math.min(Math.max((p[0] - a[0]) * along[0] + (p[1] - a[1]) * along[1], 0), length);
-    const choices = [clean(wanted, step), length / 2].filter((part) => part > 0 && part < length);
-    const part = choices.sort((x, y) => Math.abs(x - wanted) - Math.abs(y - wanted))[0] ?? wanted;
-    return [0, 1].map((k) => rounded(a[k] + part * along[k], length));
+    const way = [b[0] - a[0], b[1] - a[1]];
+    const wanted = Math.min(Math.max(((p[0] - a[0]) * way[0] + (p[1] - a[1]) * way[1]) / length ** 2, 0), 1);
+    const axis = Math.abs(way[0]) >= Math.abs(way[1]) ? 0 : 1;
+    const onGrid = (clean(a[axis] + wanted * way[axis], step) - a[axis]) / way[axis];
+    const part = [onGrid, 0.5].filter((one) => one > 0 && one < 1).sort((x, y) => Math.abs(x - wanted) - Math.abs(y - wanted))[0] ?? wanted;
+    return [0, 1].map((k) => rounded(a[k] + part * way[k], length));
 }
 
 function polar([x, y], length, angle) {
     return [rounded(x + length * Math.cos(angle), length), rounded(y + length * Math.sin(angle), length)];
 }
 
-// Return a number of a place without the rounding of a line of a length; a place on the line stays on it.
+// Return a number of a place without the digits that only rounding has put there; on a line of a length it stays on the line.
 function rounded(value, length) {
-    return clean(value, 1e-12 * length);
+    return Number(value.toFixed(Math.min(Math.max(DIGITS - Math.ceil(Math.log10(length)), 0), 20))) + 0;
 }
 
 // ---- typed numbers
