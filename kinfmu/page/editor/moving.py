@@ -22,6 +22,7 @@ from kinfmu.mechanism.joints import (
 )
 from kinfmu.mechanism.joints.joint import Joint
 from kinfmu.mechanism.laws import ConstantValue, Law, Polynomial
+from kinfmu.mechanism.loads import Load
 from kinfmu.mechanism.members import LENGTH
 from kinfmu.mechanism.quantities.placement import Placement, body_of
 from kinfmu.page.editor.drawing import Spot
@@ -119,11 +120,11 @@ def _lines_under(pen: Pen, group: frozenset[str]) -> list[_Line]:
 
 
 def _slot_through(pen: Pen, line: _Line, to: Spot) -> dict[str, Spot]:
-    """Return places of the points of a slot that is moved to a place; none on the ground, or if it holds other parts."""
+    """Return places of the points of a slot that is moved to a place; none if it is on the ground or holds others."""
     mechanism = pen.drawing.mechanism
     splits = {one: line.split(pen.spot(one)) for one in mechanism.body_points if body_of(one) == line.body}
     own = {one: along for one, (along, across) in splits.items() if pen.is_same((0.0, across), (0.0, 0.0))}
-    members = (*mechanism.joints, *mechanism.drivers, *mechanism.loads)
+    members: list[Joint | Driver | Load] = [*mechanism.joints, *mechanism.drivers, *mechanism.loads]
     held = {one for member in members if member.name != line.joint for one in references(member)}
     if line.body == GROUND_NAME or held & own.keys():
         return {}

@@ -44,7 +44,7 @@ export class Editor {
 
     get box() {
         if (!this.isShown) return null;
-        const [x0, y0, x1, y1] = this.sketch.box();
+        const [x0, y0, x1, y1] = this.sketch.extent();
         const least = this.sketch.data.box ? 0.1 * Math.max(x1 - x0, y1 - y0) || 50 : 0;
         return [x0 - least, y0 - least, x1 + least, y1 + least];
     }

@@ -117,7 +117,7 @@ def test_what_is_selected_is_deleted_by_a_button_or_a_key(hand: DrawingHand) -> 
     assert hand.page.errors == []
 
 
-def test_the_name_of_a_pin_is_beside_the_arc_of_its_motor(hand: DrawingHand) -> None:
+def test_the_name_of_a_pin_is_off_the_arc_of_its_motor(hand: DrawingHand) -> None:
     drawn_at = """() => {
         const own = CanvasRenderingContext2D.prototype.fillText;
         const found = [];
