@@ -90,7 +90,8 @@ export class DrawPanel {
         const drawn = new Set(data.shapes.filter(({ frame }) => isBody && frame === target.body).map(({ name }) => name)); // as gears and cams
         const isHere = (one) => one.points?.some((k) => numbers.includes(k)) || drawn.has(one.name) || (isBody && (one.body === target.body || one.frame === target.body));
         const drivers = data.drivers.filter((one) => isHere(one) || (target.kind === "point" && bodies.includes(one.body)));
-        return [["joints", data.joints.filter(isHere)], ["drivers", drivers], ["loads", data.loads.filter(isHere)], ["points", data.interest.filter(({ point }) => numbers.includes(point)).map(({ name }) => ({ name, type: "of interest" }))]].flatMap(([table, all]) => all.map(({ name, type }) => ({ name: `${name} (${type.replaceAll("_", " ")})`, place: [table, name] })));
+        const kind = ({ type, points = [] }, table) => [type.replaceAll("_", " "), ...(table === "joints" && points.length ? [points.map((k) => data.points[k].body).join("\u2013")] : [])].join(", ");
+        return [["joints", data.joints.filter(isHere)], ["drivers", drivers], ["loads", data.loads.filter(isHere)], ["points", data.interest.filter(({ point }) => numbers.includes(point)).map(({ name }) => ({ name, type: "of interest" }))]].flatMap(([table, all]) => all.map((one) => ({ name: `${one.name} (${kind(one, table)})`, place: [table, one.name] })));
     }
 
     #member(name, place) {

@@ -23,7 +23,7 @@ export function clean(value, step) {
 
 // ---- what is at a place
 //
-// A target is { kind, at, bodies, ... }: of a "point" also point (the name that operations take), points, joints and open (pairs
+// A target is { kind, at, bodies, ... }: of a "point" also point (the name that operations take), points, joints, onGround (those of them with the ground) and open (pairs
 // of points that no joint holds together); of a "body" also body and along (of its line); of a "member" (a cylinder, spring
 // or rod) also table and name; "free": nothing.
 
@@ -50,11 +50,12 @@ function pointTarget(sketch, { at, points }) {
     const own = points.map((k) => data.points[k].body);
     const through = sketch.lines.filter((line) => !line.table && distanceToSegment(at, ...line.ends) < ONE_PIN * sketch.size).map((line) => line.body);
     const joints = data.joints.filter((joint) => joint.points?.some((k) => points.includes(k)));
+    const onGround = joints.filter((joint) => joint.points.some((k) => data.points[k].body === GROUND)).map(({ name }) => name);
     const held = points.map((k) => sketch.heldWith(k));
     const open = names.flatMap((a, i) => names.slice(i + 1).map((b, j) => [i, i + 1 + j])).filter(([i, j]) => held[i] !== held[j] && own[i] !== own[j]).map((pair) => pair.map((k) => names[k]));
     const first = Math.max(own.indexOf(GROUND), 0);
     const isEnd = own[first] !== GROUND && data.points.filter((one) => one.body === own[first]).length <= 2; // without it no link is left
-    return { kind: "point", at: [...at], point: names[first], points: names, body: own[first], bodies: [...new Set([...own, ...through])], joints: joints.map(({ name }) => name), open, isEnd };
+    return { kind: "point", at: [...at], point: names[first], points: names, body: own[first], bodies: [...new Set([...own, ...through])], joints: joints.map(({ name }) => name), onGround, open, isEnd };
 }
 
 function bodyTarget(bars, p, reach) {
