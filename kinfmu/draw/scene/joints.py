@@ -112,7 +112,7 @@ def _slot(shown: Instant, a: str, e: FloatArray, at: float) -> tuple[float, floa
     near = _ON_LINE * (float(np.abs(away).max(initial=0.0)) + abs(at))
     on_line = [float(along) for along in away[np.abs(away @ [-e[1], e[0]]) <= near] @ e]
     if abs(at) > near:
-        end = min((along for along in on_line if along / at >= 1.0), key=abs, default=at)
+        end = min((along for along in on_line if along / at > 1.0 + _ON_LINE), key=abs, default=at)
         return min(0.0, end), max(0.0, end)
     return (0.0, 0.0) if body.name == GROUND_NAME else (min(on_line), max(on_line))
 

@@ -30,6 +30,7 @@ from kinfmu.page.editor.pen import OperationArguments, Pen
 from kinfmu.page.editor.tables import references
 
 _KEYS = {Distance: "length", Coordinate: "value", RackAndPinion: "offset", CamTranslating: "offset"}
+_SQUARE = 1e-9  # cosine of lines at right angles
 _CHANGED = 1e-12  # of the size; numbers that differ by less stay as they are written
 
 
@@ -114,8 +115,7 @@ def _lines_under(pen: Pen, group: frozenset[str]) -> list[_Line]:
             if isinstance(joint, Translational) and body_of(held) == GROUND_NAME:
                 origin, held = held, origin
             if held in group and origin not in group:
-                e_x, e_y = pen.drawing.placement.direction(body_of(joint.between[0]), float(joint.axis))
-                found.append(_Line(joint.name, body_of(origin), pen.spot(origin), (float(e_x), float(e_y))))
+                found.append(_Line(joint.name, body_of(origin), pen.spot(origin), _direction(pen, joint)))
     return found
 
 
@@ -125,10 +125,25 @@ def _slot_through(pen: Pen, line: _Line, to: Spot) -> dict[str, Spot]:
     splits = {one: line.split(pen.spot(one)) for one in mechanism.body_points if body_of(one) == line.body}
     own = {one: along for one, (along, across) in splits.items() if pen.is_same((0.0, across), (0.0, 0.0))}
     members: list[Joint | Driver | Load] = [*mechanism.joints, *mechanism.drivers, *mechanism.loads]
-    held = {one for member in members if member.name != line.joint for one in references(member)}
+    holding = (one for one in members if one.name != line.joint and not _slides_across(pen, one, line.along))
+    held = {one for member in holding for one in references(member)}
     if line.body == GROUND_NAME or held & own.keys():
         return {}
     return {one: line.place(along, line.split(to)[1]) for one, along in own.items()}
+
+
+def _slides_across(pen: Pen, member: Joint | Driver | Load, along: Spot) -> bool:
+    """Return whether a joint is a slide at right angles to a direction."""
+    if not isinstance(member, PointOnLine | Translational):
+        return False
+    e_x, e_y = _direction(pen, member)
+    return abs(e_x * along[0] + e_y * along[1]) <= _SQUARE
+
+
+def _direction(pen: Pen, joint: PointOnLine | Translational) -> Spot:
+    """Return the direction of the line of a slide in the world."""
+    e_x, e_y = pen.drawing.placement.direction(body_of(joint.between[0]), float(joint.axis))
+    return float(e_x), float(e_y)
 
 
 def _kept(pen: Pen, values: OperationArguments, point: str, to: Spot, kept: list[list[str]]) -> Spot:

@@ -7,6 +7,7 @@ from typing import Any
 
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.drivers import AngleDriver, RelativeAngleDriver
+from kinfmu.mechanism.joints import Revolute
 from kinfmu.mechanism.quantities.placement import body_of, point_of
 from kinfmu.mechanism.valid import check_name, quoted
 from kinfmu.page.editor.drawing import Drawing, Spot, written_angle, written_number
@@ -137,8 +138,7 @@ def slider(pen: Pen, values: OperationArguments) -> None:
     if body_of(moved) == holder:
         raise values.error(f"{moved} is a point of {holder}; a slide is between two bodies")
     at = pen.add_point(holder, pen.spot(moved), point_of(moved))
-    if at in pen.drawing.pins.get(moved, ()):
-        raise values.error(f"{moved} is pinned to {at}; delete that joint first")
+    _unpin(pen, moved, holder)
     line = {"between": [at, moved], "axis": _axis(pen, values, holder, along)}
     if is_block:
         poses = pen.drawing.poses
@@ -146,6 +146,13 @@ def slider(pen: Pen, values: OperationArguments) -> None:
         pen.put(("joints", pen.free_name(point_of(moved))), {"type": "translational", **line, **turn})
     else:
         pen.put(("joints", pen.free_name(point_of(moved))), {"type": "point_on_line", **line})
+
+
+def _unpin(pen: Pen, point: str, body: str) -> None:
+    """Remove the pin between a point that is to slide and a body."""
+    for joint in pen.drawing.mechanism.joints:
+        if isinstance(joint, Revolute) and point in joint.between and body in joint.bodies():
+            pen.remove(("joints", joint.name))
 
 
 def _axis(pen: Pen, values: OperationArguments, holder: str, along: Spot) -> str:
@@ -182,6 +189,7 @@ def slot(pen: Pen, values: OperationArguments) -> None:
     normal = (-along[1] / length, along[0] / length)
     off = (x - a[0]) * normal[0] + (y - a[1]) * normal[1]
     shift = (0.0, 0.0) if abs(off) <= _ON_LINE * length else (off * normal[0], off * normal[1])
+    _unpin(pen, moved, body)
     first, _ = (pen.add_point(body, (end[0] + shift[0], end[1] + shift[1])) for end in (a, b))
     line = {"between": [first, moved], "axis": _axis(pen, values, body, along)}
     pen.put(("joints", pen.free_name(point_of(moved))), {"type": "point_on_line", **line})

@@ -3,7 +3,7 @@
 import { $, breakable, element } from "./elements.js";
 import { linkageOf } from "./linkage.js";
 import { gridOf, hit, ONE_PIN, typed } from "./editor_places.js";
-import { baseOf, chosen, clicked, deletions, escaped, titleOf, toolOf } from "./editor_tools.js";
+import { baseOf, chosen, clicked, deletions, escaped, toolOf } from "./editor_tools.js";
 import { EditorHand } from "./editor_hand.js";
 import { EditorPainter } from "./editor_paint.js";
 import { DrawPanel } from "./editor_panel.js";
@@ -130,7 +130,8 @@ export class Editor {
             });
             return button;
         });
-        if (machine?.tool === "move" && !machine.picks.length && this.selection) options.push(this.deleteButton(`Delete ${titleOf(this.selection)}`));
+        const { selection } = this;
+        if (machine?.tool === "move" && !machine.picks.length && selection) options.push(this.deleteButton(`Delete ${selection.kind === "point" ? `pin ${selection.point}` : selection.body || selection.name}`));
         const number = machine?.number ? ` Ratio ${machine.number}.` : "";
         $("draw-bar").hidden = !text;
         $("draw-bar").replaceChildren(element("p", { textContent: text + number, className: refusal ? "refused" : "", role: "status" }), ...options);

@@ -3,7 +3,6 @@
 import { distance } from "./geometry.js";
 import { element } from "./elements.js";
 import { number } from "./numbers.js";
-import { titleOf } from "./editor_tools.js";
 import { GROUND } from "./editor_places.js";
 
 const UNITS = ["mm", "cm", "m", "in"];
@@ -57,7 +56,7 @@ export class DrawPanel {
         }
         const isPin = target.kind === "point";
         const bodies = (isPin ? target.bodies : [target.body]).filter((body) => body !== GROUND);
-        const rows = [element("h2", { textContent: titleOf(target).replace(/^(pin|link) /, (word) => word[0].toUpperCase() + word.slice(1)) })];
+        const rows = [element("h2", { textContent: isPin ? `Pin ${target.point}` : target.kind === "member" ? target.name : `Link ${target.body}` })];
         if (isPin) rows.push(this.#field("Place", `${number(target.at[0], 9)}, ${number(target.at[1], 9)}`, editor.unit, (text) => editor.typed(text)));
         if (target.kind === "body") rows.push(...this.#body(target.body));
         if (isPin && target.points.length > 1) rows.push(element("p", { className: "quiet", textContent: `Points: ${target.points.join(", ")}` }));

@@ -23,18 +23,21 @@ export function clean(value, step) {
 
 // ---- what is at a place
 //
-// A target is { kind, at, bodies, ... }: of a "point" also point (the name that operations take), points, joints, onGround (those of them with the ground) and open (pairs
-// of points that no joint holds together); of a "body" also body and along (of its line); of a "member" (a cylinder, spring
-// or rod) also table and name; "free": nothing.
+// A target is { kind, at, bodies, ... }: of a "point" also point (the name that operations take), points, joints, onGround (those
+// of them with the ground) and open (pairs of points that no joint holds together); of a "body" also body and along (of its
+// line); of a "member" (a cylinder, spring, rod, motor or force) also table and name; "free": nothing.
 
-// Return the target at a place within a reach; members: whether cylinders, springs and rods count; symbols: other members.
+// Return the target at a place within a reach; members: whether cylinders, springs and rods count; symbols: other members, where
+// no link is nearer.
 export function hit(sketch, p, reach, hasMembers = false, symbols = []) {
     const pin = nearest(sketch.pins.map((one) => ({ ...one, gap: distance(one.at, p) })), reach);
     if (pin) return pointTarget(sketch, pin);
-    const lines = [...sketch.lines, ...symbols].map((line) => ({ ...line, gap: distanceToSegment(p, ...line.ends) })).filter((line) => line.gap < 0.7 * reach);
-    const member = hasMembers && nearest(lines.filter((line) => line.table), reach);
-    if (member) return { kind: "member", at: p, bodies: [], table: member.table, name: member.name };
+    const near = (all) => all.map((line) => ({ ...line, gap: distanceToSegment(p, ...line.ends) })).filter((line) => line.gap < 0.7 * reach);
+    const lines = near(sketch.lines);
     const bars = lines.filter((line) => !line.table).sort((a, b) => a.gap - b.gap);
+    const beyond = near(symbols).filter((line) => !(line.gap > bars[0]?.gap));
+    const member = hasMembers && nearest([...lines.filter((line) => line.table), ...beyond], reach);
+    if (member) return { kind: "member", at: p, bodies: [], table: member.table, name: member.name };
     if (bars.length) return bodyTarget(bars, p, reach);
     const area = sketch.areas.find((one) => one.contains(p));
     return area ? { kind: "body", at: p, body: area.body, bodies: [area.body] } : { kind: "free", at: p, bodies: [] };

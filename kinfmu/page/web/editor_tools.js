@@ -72,19 +72,15 @@ function sliding([from, to], { option }) {
 }
 
 function slotted([pin, from, to]) {
-    const own = ownPlace(pin);
-    const [body] = moving(pin);
-    return [{ do: "slot", point: own.point || own, body: moving(from).find((one) => one !== body) || GROUND, from: from.at, to: to.at }];
+    const bodies = moving(pin);
+    const body = bodies.length > 1 && bodies.find((one) => from.bodies.includes(one)) || moving(from).find((one) => one !== bodies[0]) || GROUND;
+    const own = ownPlace({ ...pin, bodies: bodies.filter((one) => one !== body) });
+    return [{ do: "slot", point: own.point || own, body, from: from.at, to: to.at }];
 }
 
 function pointed([link, place], { option }) {
     const at = place ? { body: moving(link)[0], at: place.at } : ownPlace(link);
     return option === "interest" ? [{ do: "interest", at }] : place ? [{ do: "point", ...at }] : [];
-}
-
-// Return what a target is called.
-export function titleOf({ kind, point, body, name }) {
-    return kind === "point" ? `pin ${point}` : kind === "body" ? `link ${body}` : name;
 }
 
 // Return operations that delete what a target is.

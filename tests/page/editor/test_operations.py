@@ -224,7 +224,7 @@ YOKE = (
     bar(("ground", 0, 0), (40, 0), "crank"),
     bar((40, -60), (40, 60), "yoke"),
     {"do": "slot", "point": "crank.B", "body": "yoke", "from": [40, -60], "to": [40, 60]},
-    {"do": "slider", "point": {"body": "yoke", "at": [70, 0]}, "along": [1, 0], "block": True},
+    {"do": "slider", "point": {"body": "yoke", "at": [40, -20]}, "along": [1, 0], "block": True},
     {"do": "motor", "body": "crank"},
 )
 
@@ -258,7 +258,7 @@ def test_a_typed_length_moves_a_pin_along_its_slot_or_the_slot_if_nothing_else_h
     assert [after.at(f"lever.{name}") for name in "CD"] == [before.at(f"lever.{name}") for name in "CD"]
     yoke = drawn(*YOKE, length("crank.A", "crank.B", 30))
     assert yoke.at("crank.B") == (30, 0)
-    assert [yoke.at(f"yoke.{name}") for name in "CDE"] == [(30, -60), (30, 60), (70, 0)]
+    assert [yoke.at(f"yoke.{name}") for name in "CDE"] == [(30, -60), (30, 60), (30, -20)]
     assert answer(after)["badge"]["isComplete"]
     assert answer(yoke)["badge"]["isComplete"]
 
@@ -280,6 +280,20 @@ def test_what_is_typed_and_a_line_forbids_is_one_line(operation: Operation, text
     with pytest.raises(MechanismError) as raised:
         drawn(operation, begin=drawn(*LEVER))
     assert str(raised.value) == text
+
+
+@pytest.mark.parametrize(
+    "slide",
+    [
+        {"do": "slider", "point": "crank.C", "on": "lever", "along": [2, 5]},
+        {"do": "slot", "point": "crank.C", "body": "lever", "from": [0, 0], "to": [80, 200]},
+    ],
+    ids=["slider", "slot"],
+)
+def test_a_pin_that_is_to_slide_along_its_own_link_is_freed_from_it(slide: Operation) -> None:
+    drawing = drawn(bar((0, 0), (80, 200), "lever"), bar((0, 100), ("lever", 40, 100), "crank"), slide)
+    assert [joint.type for joint in drawing.mechanism.joints] == ["point_on_line"]
+    assert drawn_lines(drawing, "slot") == [([[0, 0], [80, 200]], None)]
 
 
 def drawn_lines(drawing: Drawing, kind: str) -> list[Any]:

@@ -202,6 +202,7 @@ def test_tools_make_their_operations() -> None:
     slot = {"do": "slot", "point": "crank.B", "body": "rod", "from": [30, 5], "to": [60, 5]}
     assert made("slot", pin("crank.B"), rod, free(60, 5)) == [slot]
     assert made("slot", pin("crank.B"), free(0, 5), free(60, 5))[0]["body"] == "ground"
+    assert made("slot", pin("rod.B", "crank.B"), rod, free(60, 5)) == [slot]
     ends = {"from": {"at": [0, 0]}, "to": {"body": "rod", "at": [30, 5]}}
     assert made("cylinder", free(0, 0), rod) == [{"do": "cylinder", **ends}]
     assert made("spring", free(0, 0), rod) == [{"do": "spring", **ends}]
