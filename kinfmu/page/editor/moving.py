@@ -38,13 +38,6 @@ def move(pen: Pen, values: OperationArguments) -> None:
     """Move a point with all that is pinned to it."""
     point = pen.drawing.point(values.text("point"), f"{values.name}: point")
     to = values.spot("to")
-    kept = []
-    if values.has("keep"):
-        for pair in values.entries("keep"):
-            if not isinstance(pair, list) or len(pair) != 2 or not all(isinstance(one, str) for one in pair):
-                raise values.wrong("keep", "a list of pairs of points")
-            kept.append([pen.drawing.point(one, f"{values.name}: keep") for one in pair])
-    to = _kept(pen, values, point, to, kept)
     if values.truth("exact") and not pen.is_same(near := _on_lines(pen, _moved_with(pen, point), to), to):
         place = ", ".join(f"{x:.6g}" for x in near)
         raise values.error(f"{point} slides on a line, on which {place} is the nearest place; move that line first")
@@ -144,33 +137,6 @@ def _direction(pen: Pen, joint: PointOnLine | Translational) -> Spot:
     """Return the direction of the line of a slide in the world."""
     e_x, e_y = pen.drawing.placement.direction(body_of(joint.between[0]), float(joint.axis))
     return float(e_x), float(e_y)
-
-
-def _kept(pen: Pen, values: OperationArguments, point: str, to: Spot, kept: list[list[str]]) -> Spot:
-    """Return the place nearest to another one at which lengths from points that do not move stay."""
-    moved = _moved_with(pen, point)
-    circles: dict[Spot, float] = {}
-    for a, b in kept:
-        if (a in moved) != (b in moved):
-            fixed, end = map(pen.spot, (b, a) if a in moved else (a, b))
-            circles.setdefault(fixed, math.dist(fixed, end))
-    if len(circles) > 2:
-        raise values.error(f"{point} is held by {len(circles)} lengths that stay, so it cannot move; release one")
-    if not circles:
-        return to
-    (centre, radius), *others = circles.items()
-    spot = pen.spot(point)
-    if not others:
-        away = math.dist(centre, to)
-        if away == 0.0:
-            return spot
-        part = radius / away
-        return centre[0] + part * (to[0] - centre[0]), centre[1] + part * (to[1] - centre[1])
-    other = others[0][0]
-    d_x, d_y = other[0] - centre[0], other[1] - centre[1]
-    across = 2.0 * ((spot[0] - centre[0]) * -d_y + (spot[1] - centre[1]) * d_x) / math.dist(centre, other) ** 2
-    mirrored = spot[0] + across * d_y, spot[1] - across * d_x
-    return min(spot, mirrored, key=lambda place: math.dist(place, to))  # two lengths allow these two places
 
 
 def carry(pen: Pen, point: str, to: Spot) -> None:

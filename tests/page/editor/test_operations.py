@@ -189,17 +189,6 @@ def test_numbers_keep_their_units_and_parameters_are_not_overwritten() -> None:
         drawn({"do": "move", "point": "crank.C", "to": [5, 45]}, begin=Drawing.of(with_parameter, Path()))
 
 
-def test_lengths_that_stay_hold_a_moved_pin() -> None:
-    drawing = drawn(*FOURBAR)
-    one = drawn({"do": "move", "point": "crank.C", "to": [30, 30], "keep": [["crank.A", "crank.C"]]}, begin=drawing)
-    assert one.at("crank.C") == pytest.approx((math.sqrt(800), math.sqrt(800)))
-    keep = [["crank.A", "crank.C"], ["coupler.C", "coupler.D"]]
-    both = drawn({"do": "move", "point": "crank.C", "to": [40, -5], "keep": keep}, begin=drawing)
-    assert math.dist(both.at("crank.C"), (0, 0)) == pytest.approx(40)
-    assert math.dist(both.at("crank.C"), (120, 80)) == pytest.approx(math.dist((0, 40), (120, 80)))
-    assert both.at("crank.C") != drawing.at("crank.C")
-
-
 def test_a_slider_that_is_moved_takes_its_line_along() -> None:
     begin = (bar(("ground", 0, 0), (30, 0), "crank"), bar("crank.B", (120, 0), "rod"))
     slider = {"do": "slider", "point": "rod.C", "along": [1, 0]}
