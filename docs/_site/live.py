@@ -1,4 +1,4 @@
-"""Pages in which a mechanism of the gallery is dragged, with its FMU and its picture: files next to the site's pages."""
+"""Pages in which a mechanism of the gallery is dragged, with its FMU and picture: files next to the site's pages."""
 
 from __future__ import annotations
 
