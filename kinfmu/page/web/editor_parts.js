@@ -27,9 +27,12 @@ const KEYS = [
     ["<kbd>Alt</kbd>, <kbd>Shift</kbd> with a click", "nothing snaps; links snap to steps of 15\u00b0"],
     ["<kbd>Esc</kbd>", "leaves a link half-way, then the tool"],
     ["<kbd>Space</kbd>, <kbd>V</kbd>", "play the mechanism; draw again"],
-    ["<kbd>Del</kbd>, <kbd>Ctrl</kbd>+<kbd>S</kbd>, <kbd>Home</kbd>", "delete what is selected, save, fit to view"],
+    ["<kbd>Del</kbd>, <kbd>Ctrl</kbd>+<kbd>S</kbd>", "delete what is selected; save"],
+    ["<kbd>Ctrl</kbd>+<kbd>Z</kbd>, <kbd>Ctrl</kbd>+<kbd>Y</kbd>", "undo, redo"],
+    ["<kbd>+</kbd> <kbd>-</kbd>, <kbd>Home</kbd>", "zoom, as the wheel or two fingers; fit to view"],
     ["Middle button, or two fingers", "move the view"],
 ];
+const OF_PAGE = ["<kbd>V</kbd>", "draws: changes the mechanism itself"];
 
 // Add the parts; what they do is the editor's.
 export function buildEditor(editor) {
@@ -59,8 +62,8 @@ export function buildEditor(editor) {
     const panel = element("div", { id: "draw-panel", hidden: true });
     document.querySelector("aside").append(panel);
     Object.assign($("keys-title"), { tabIndex: -1, autofocus: true }); // the dialog begins at its top
-    for (const [head, text] of KEYS) {
-        const row = element("tr");
+    for (const [head, text] of [OF_PAGE, ...KEYS]) {
+        const row = element("tr", { className: head === OF_PAGE[0] ? "" : "of-drawing" });
         row.innerHTML = `<td>${head}</td><td>${text}</td>`;
         document.querySelector("#keys table").append(row);
     }
