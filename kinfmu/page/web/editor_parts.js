@@ -39,7 +39,7 @@ export function buildEditor(editor) {
     const { page } = editor;
     document.head.append(element("style", { textContent: EDITOR_STYLE }));
     const header = document.querySelector("header");
-    const tools = element("div", { id: "draw-tools", role: "toolbar", "aria-label": "Drawing tools", hidden: true });
+    const tools = element("nav", { id: "draw-tools", "aria-label": "Drawing tools", hidden: true });
     for (const { id, key, label, hints } of TOOLS) {
         const button = element("button", { title: `${hints[0]} (${key.toUpperCase()})`, "aria-pressed": "false" });
         button.dataset.tool = id;
@@ -58,7 +58,8 @@ export function buildEditor(editor) {
     button.innerHTML = `${PEN}<span>Draw</span>`;
     button.addEventListener("click", () => (editor.machine && editor.isPlayable ? editor.leave() : editor.choose(editor.sketch && !editor.sketch.data.points.length ? "link" : "move")));
     $("edit").before(button, element("span", { id: "badge", role: "status", hidden: true }));
-    $("stage").append(element("div", { id: "draw-banner", role: "alert", hidden: true }), element("div", { id: "draw-bar", hidden: true }));
+    $("stage").append(element("div", { id: "draw-banner", role: "alert", hidden: true }));
+    $("stage").after(element("div", { id: "draw-bar", hidden: true }));
     const panel = element("div", { id: "draw-panel", hidden: true });
     document.querySelector("aside").append(panel);
     Object.assign($("keys-title"), { tabIndex: -1, autofocus: true }); // the dialog begins at its top
