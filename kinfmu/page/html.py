@@ -147,13 +147,14 @@ def page_of(data: Mapping[str, Any], script: str = "") -> str:
 
     """
     text = json.dumps({**data, "solver": solver()}, separators=(",", ":"), allow_nan=False)
+    code = "\n".join([*(_script(name) for name in _SCRIPTS), f"{{\n{script}\n}}"])  # names of its own
     return _filled(
         (_WEB / "index.html").read_text("utf-8"),
         {
             "title": html.escape(str(data["name"])),
             "style": (_WEB / "style.css").read_text("utf-8"),
             "data": packed(text.encode()),
-            "script": "\n".join([*(_script(name) for name in _SCRIPTS), f"{{\n{script}\n}}"]),  # names of its own
+            "script": packed(code.encode()),
         },
     )
 

@@ -1,6 +1,6 @@
 // The page of `kinfmu play`: it follows the file, and asks the server for FMUs and for a copy of the file.
 
-const SERVED = Number("{{served version}}"); // of the page
+const SERVED = Number(document.documentElement.dataset.version); // of the page
 const KEPT = "kinfmu-kept"; // what is shown, across a reload
 
 started.then((page) => {

@@ -338,8 +338,8 @@ class _Handler(BaseHTTPRequestHandler):
         (asked,) = parse_qs(urlsplit(self.path).query).get("state", [""])[:1]
         try:
             self._send(HTTPStatus.OK, "application/json", self.server.play.view(asked))
-        except StaleState as problem:
-            raise Refusal(HTTPStatus.CONFLICT, str(problem)) from None
+        except StaleState:
+            self._send(HTTPStatus.NO_CONTENT, "application/json", b"")  # its page knows the newer state soon
 
     def _edit(self, what: str) -> None:
         """Change the drawing; a change of another state than the current one is answered with the current one."""

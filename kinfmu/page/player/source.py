@@ -117,7 +117,7 @@ class PlaySource:
     def page(self) -> str:
         """Return the page of the last valid content of the file; it knows its version."""
         with self._news:
-            return self._page.replace("{{served version}}", str(self._state.version))
+            return self._page.replace("<html", f'<html data-version="{self._state.version}"', 1)
 
     @property
     def is_closed(self) -> bool:

@@ -81,7 +81,8 @@ export class Editor {
     }
 
     async open() {
-        this.#answered(await this.session.load());
+        const answer = await this.session.load();
+        if (answer.message) this.#answered(answer);
     }
 
     // Draw what another window or program has made: the number of the drawing's state; isFile: its file was read again.

@@ -30,7 +30,7 @@ export class Session {
     async view() {
         const { state } = this;
         const { status, text } = await fetched(`editor/view?state=${state}`);
-        if (this.state !== state || status === 409) return null;
+        if (this.state !== state || status === 204) return null;
         return status === 200 ? JSON.parse(text) : { view: null, message: text };
     }
 
