@@ -31,8 +31,8 @@ LARGEST = 600  # coordinates; a larger mechanism takes too long
 NEAR = 0.1  # of the size; points that are nearer may be one pin
 _APART = 30.0  # cost of a distance between points to be joined, by the size
 _COINCIDE = 1e-3  # of the size; points that are nearer are in one place
-_BESIDE = 0.05  # of the size; points without joints that are nearer were meant to be in one place
-_SLIDES = 0.1  # of the size, in the run: the travel of a slide whose speed nobody has set
+_NEXT_TO = 0.05  # of the size; points without joints that are nearer belong in one place
+_SLIDES = 0.1  # of the size, in the run: the travel of a slide without a speed
 _MOST_POINTS = 400  # every pair is compared
 _MOST_PAIRS = 40  # the nearest ones are tried
 _FACTORS = (1000.0, 0.001, 25.4, 1.0 / 25.4)  # slips between m and mm, and between inches and mm
@@ -469,7 +469,7 @@ def completion(case: Case) -> tuple[tuple[Edit, ...], list[str]]:
     """Return pins of points in one place, then drivers, that together hold all that is free, and them in words."""
     free, edits, words = case.free, list[Edit](), list[str]()
     for _, a, b in _pairs(case):
-        reach = _BESIDE if not {a, b} & case.joined else _COINCIDE
+        reach = _NEXT_TO if not {a, b} & case.joined else _COINCIDE
         if free.shape[1] < 2 or case.distance(a, b) > reach * case.size:
             continue
         probe = System(

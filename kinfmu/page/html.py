@@ -164,13 +164,18 @@ def gallery_page() -> str:
     """Return the page of a server that links the pages of the mechanisms of the gallery, gallery/NAME."""
     titles = {name: gallery.load(name).title for name in gallery.names()}
     cards = "\n".join(
-        f'<a class="button" href="gallery/{name}"><b>{name}</b>{html.escape(title)}</a>' for name, title in titles.items()
+        f'<a class="button" href="gallery/{name}"><b>{name}</b>{html.escape(title)}</a>'
+        for name, title in titles.items()
     )
     text = (_WEB / "index.html").read_text("utf-8")
     head = _filled(text[: text.index("<body>")], {"title": "Gallery", "style": (_WEB / "style.css").read_text("utf-8")})
-    header = '<header><div class="name"><h1>Gallery</h1></div><a class="button" href=".">Back to the mechanism</a></header>'
+    header = (
+        '<header><div class="name"><h1>Gallery</h1></div><a class="button" href=".">Back to the mechanism</a></header>'
+    )
     dark = 'if (matchMedia("(prefers-color-scheme: dark)").matches) document.documentElement.dataset.theme = "dark";'
-    return f'{head}<body>\n<script>{dark}</script>\n{header}\n<main class="gallery">\n{cards}\n</main>\n</body>\n</html>\n'
+    return (
+        f'{head}<body>\n<script>{dark}</script>\n{header}\n<main class="gallery">\n{cards}\n</main>\n</body>\n</html>\n'
+    )
 
 
 def editor_script() -> str:

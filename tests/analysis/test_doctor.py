@@ -141,7 +141,7 @@ def test_a_slide_is_driven_along_its_axis() -> None:
 
 
 @pytest.mark.parametrize("apart", [0.0, 0.05])
-def test_pins_beside_each_other_are_joined_before_drivers_are_added(apart: float) -> None:
+def test_pins_next_to_each_other_are_joined_before_drivers_are_added(apart: float) -> None:
     whole = fourbar(4, 1, 3.5, 3)
     joints = tuple(joint for joint in whole.joints if joint.name != "Q")
     bodies = [

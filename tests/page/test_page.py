@@ -310,7 +310,9 @@ def test_every_key_press_and_value_within_one_frame_counts(chromium: Browser) ->
         page.settle()
         assert page.get("k.linkage.u[0]") == pytest.approx(math.radians(6))
         crank, rocker = "bodies.crank.points.P.x", "bodies.rocker.points.Q.x"
-        page.get(f"(k.setValues({{ '{crank}': 19 }}), k.setValues({{ '{rocker}': 51 }}), k.commit(), k.undo(), k.undo(true))")
+        page.get(
+            f"(k.setValues({{ '{crank}': 19 }}), k.setValues({{ '{rocker}': 51 }}), k.commit(), k.undo(), k.undo(true))"
+        )
         page.settle()
         assert page.get("Object.fromEntries(k.design.changes())") == {crank: 19, rocker: 51}
         assert page.errors == []
@@ -676,9 +678,7 @@ def test_a_play_that_has_stopped_begins_again(chromium: Browser) -> None:
         assert page.errors == []
 
 
-def test_a_page_moves_once_when_it_opens_unless_less_motion_is_wanted(
-    chromium: Browser, tmp_path: Path
-) -> None:
+def test_a_page_moves_once_when_it_opens_unless_less_motion_is_wanted(chromium: Browser, tmp_path: Path) -> None:
     text = text_of("crank_rocker")
     with chromium.open(text) as page:
         assert not page.get("k.isPlaying")
@@ -706,9 +706,7 @@ def test_a_page_moves_once_when_it_opens_unless_less_motion_is_wanted(
 
 @pytest.mark.parametrize("size", [PHONE, {"width": 390, "height": 844}, {"width": 700, "height": 480}])
 @pytest.mark.parametrize("name", ["jansen_leg", "excavator"])
-def test_on_a_small_page_the_drawing_has_most_of_the_height(
-    chromium: Browser, size: dict[str, int], name: str
-) -> None:
+def test_on_a_small_page_the_drawing_has_most_of_the_height(chromium: Browser, size: dict[str, int], name: str) -> None:
     with chromium.open(text_of(name)) as page:
         page.resize(size)
         assert page.get("k.view.height") >= 0.7 * size["height"]
@@ -747,7 +745,9 @@ def test_values_are_lengths_of_links_with_their_colours_and_locks_belong_to_chan
         page.tab.click("#edit")
         assert page.tab.locator(".lock:visible").count() == 5
         page.tab.click("[aria-label='Lock rocker length']")
-        assert page.get("[...k.design.locked]") == [f"bodies.rocker.points.{one}" for one in ("Q.x", "Q.y", "C.x", "C.y")]
+        assert page.get("[...k.design.locked]") == [
+            f"bodies.rocker.points.{one}" for one in ("Q.x", "Q.y", "C.x", "C.y")
+        ]
         field = page.tab.get_by_label("coupler P\u2013tracer mm", exact=True)
         field.fill("120")
         field.press("Enter")
@@ -815,7 +815,14 @@ def test_plots_have_what_joints_do(chromium: Browser) -> None:
         groups = select.locator("optgroup").evaluate_all("all => all.map((one) => one.label)")
         assert groups.index("joint P") < groups.index("frame of rod")
         found = {}
-        for name in ("joint P.x", "joint P.speed", "joint P.acceleration", "joint P.angle", "joint bore.travel", "joint bore.speed"):
+        for name in (
+            "joint P.x",
+            "joint P.speed",
+            "joint P.acceleration",
+            "joint P.angle",
+            "joint bore.travel",
+            "joint bore.speed",
+        ):
             select.select_option(name)
             page.settle()
             found[name] = np.array(page.get("[...k.plots.table.columns[0]]"))

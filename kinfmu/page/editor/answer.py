@@ -28,7 +28,7 @@ Finding = dict[str, Any]  # a line, or a change that helps: its text, and "edits
 _LARGE = 60  # coordinates
 _MOST_EDITS = 3  # that are offered for a problem
 _MOST_NOTES = 5  # of one kind in an answer
-_BESIDE = 0.05  # of the size; points without joints that are nearer were meant to be in one place
+_NEXT_TO = 0.05  # of the size; points without joints that are nearer belong in one place
 
 
 def answer(drawing: Drawing) -> dict[str, Any]:
@@ -149,15 +149,19 @@ def _unpinned(drawing: Drawing) -> list[Finding]:
     held = {frozenset(map(body_of, joint.between)) for joint in drawing.mechanism.joints if hasattr(joint, "between")}
     points = [*drawing.mechanism.body_points]
     places = np.array([drawing.at(point) for point in points]).reshape(-1, 2)
-    near = cKDTree(places).query_pairs(_BESIDE * drawing.size) if points else ()
+    near = cKDTree(places).query_pairs(_NEXT_TO * drawing.size) if points else ()
     found = []
     for apart, k, j in sorted((math.dist(places[k], places[j]), k, j) for k, j in near):
         a, b = points[k], points[j]
-        is_open = max(len(drawing.pins[a]), len(drawing.pins[b])) == 1  # what is pinned nearby may be meant to be there
+        is_open = max(len(drawing.pins[a]), len(drawing.pins[b])) == 1  # what is pinned nearby may belong there
         if body_of(a) == body_of(b) or b in drawing.pins[a] or frozenset((body_of(a), body_of(b))) in held:
             continue
         if apart <= AS_DRAWN * drawing.size or is_open:
-            where = "in one place" if apart <= AS_DRAWN * drawing.size else f"{apart:.2g} {drawing.mechanism.length_unit} apart"
+            where = (
+                "in one place"
+                if apart <= AS_DRAWN * drawing.size
+                else f"{apart:.2g} {drawing.mechanism.length_unit} apart"
+            )
             pin = {"text": f"pin {a} and {b}", "operations": [{"do": "pin", "points": [a, b]}]}
             found.append({"kind": "note", "text": f"{a} and {b} are {where} and not joined", "edits": [pin]})
     return found[:_MOST_NOTES]

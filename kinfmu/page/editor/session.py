@@ -3,7 +3,8 @@
 A folder of the user's own holds the text of every state and a list of them: `states.json` names the texts in order, the
 current one, and what the file held when it was last read or saved. Everything is written to a temporary file that then
 takes the place of the older one, the texts before the list, so that a list never names a text that is not there. A
-state is an undo step; those of a drawing that is saved are removed a month after the last one. Several processes on one file share the folder: each looks at the list before it answers.
+state is an undo step; those of a drawing that is saved are removed a month after the last one. Several processes on one
+file share the folder: each looks at the list before it answers.
 """
 
 from __future__ import annotations

@@ -149,13 +149,13 @@ class PlayServer:
         with self._building, temporary_folder() as folder:
             path = folder / f"{mechanism.name}{suffix}"
             if suffix == ".gif":
-                run = mechanism.run
-                animate(kinfmu.solve(mechanism, np.linspace(run.start, run.stop, _FRAMES)), path)
+                animate(kinfmu.solve(mechanism, np.linspace(mechanism.run.start, mechanism.run.stop, _FRAMES)), path)
             else:
                 starts = [float(driver.law.at(mechanism.run.start)) for driver in mechanism.drivers]
                 inputs = [str(driver.inputs()[0]) for driver in mechanism.drivers]
-                way = [np.linspace(start, value, _FRAMES) for start, value in zip(starts, values, strict=True)]
-                run = kinfmu.solve(mechanism, **dict(zip(inputs, way, strict=True)))
+                path_of = [np.linspace(start, value, _FRAMES) for start, value in zip(starts, values, strict=True)]
+                given: dict[str, Any] = dict(zip(inputs, path_of, strict=True))
+                run = kinfmu.solve(mechanism, **given)
                 dxf(run.part(np.arange(len(run)) == len(run) - 1), path)
             return path.read_bytes()
 
@@ -234,7 +234,11 @@ class _Handler(BaseHTTPRequestHandler):
         """Answer with an FMU, a page, the name of a file that was saved, or the drawing after a change."""
         changes = {f"editor/{name}": partial(self._edit, name) for name in ("operations", "undo", "redo", "save")}
         answers: dict[str, object] = {"fmu2": partial(self._fmu, 2), "fmu3": partial(self._fmu, 3), "file": self._file}
-        answers |= {"page": self._page_of_file, "gif": partial(self._export, ".gif"), "dxf": partial(self._export, ".dxf")}
+        answers |= {
+            "page": self._page_of_file,
+            "gif": partial(self._export, ".gif"),
+            "dxf": partial(self._export, ".dxf"),
+        }
         self._answer(answers | changes)
 
     def log_message(self, format: str, *args: object) -> None:  # noqa: A002  the name that http.server has
@@ -339,7 +343,7 @@ class _Handler(BaseHTTPRequestHandler):
         try:
             self._send(HTTPStatus.OK, "application/json", self.server.play.view(asked))
         except StaleState:
-            self._send(HTTPStatus.NO_CONTENT, "application/json", b"")  # its page knows the newer state soon
+            self._send(HTTPStatus.NO_CONTENT, "text/plain", b"")  # its page knows the newer state soon
 
     def _edit(self, what: str) -> None:
         """Change the drawing; a change of another state than the current one is answered with the current one."""

@@ -181,7 +181,7 @@ export function keyboard(page) {
     const isField = (target) => target.closest?.("input, select, textarea, dialog[open], [role=tab]") || target.tagName === "CANVAS" && target !== page.canvas;
     document.addEventListener("click", (event) => {
         if (event.detail) event.target.closest("button")?.blur(); // a click by hand; the keys then are those of the page
-    });
+    }, true); // before a dialog opens, which gives the focus back
     document.addEventListener("keydown", (event) => {
         const key = event.key.toLowerCase();
         if ((event.ctrlKey || event.metaKey) && (key === "z" || key === "y")) {

@@ -14,7 +14,7 @@ const FORCES = 90; // poses of a run that decide the scale of forces
 const USUAL = 0.99; // part of the forces that are not outliers
 const LAW = 400; // times at which the laws are tabled
 const TO_CLOSING = 16; // of the way to values that do not close
-const OPEN = 1e-6; // of the size; a pin that is open by more is drawn
+const OPEN = 1e-6; // of the size; a larger gap of a pin is drawn
 export const PER_TURN = 360; // samples of plots and tables over a driver, as for the measures of kinfmu check
 
 // Return driver values, speeds and accelerations between the samples of a record.

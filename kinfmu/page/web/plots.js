@@ -36,8 +36,8 @@ function rank(linkage, output) {
     return output.units[0] === "rad" ? 1 : 2;
 }
 
-function ofOutputs(linkage, isMeant) {
-    const outputs = linkage.part.outputs.filter(isMeant).sort((a, b) => rank(linkage, a) - rank(linkage, b));
+function ofOutputs(linkage, isWanted) {
+    const outputs = linkage.part.outputs.filter(isWanted).sort((a, b) => rank(linkage, a) - rank(linkage, b));
     return outputs.flatMap((output) => output.names.map((label, order) => {
         const unit = output.units[order];
         const scale = unit.startsWith("rad") ? DEGREES : 1;

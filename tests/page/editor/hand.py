@@ -119,8 +119,8 @@ def drawing_hand(chromium: Browser, folder: Path, text: str = "", **options: Any
     if text:
         path.write_text(text, "utf-8")
     source = PlaySource(str(path), is_new=not text)
-    usual = {"bypass_csp": True, "reduced_motion": "no-preference"}  # what is complete begins to move
-    with PlayServer(source) as server, chromium.open_at(server.url, **(usual | options)) as page:
+    with PlayServer(source) as server, chromium.open_at(server.url, bypass_csp=True, **options) as page:
+        page.tab.emulate_media(reduced_motion="no-preference")  # what is drawn begins to move when it is complete
         page.tab.wait_for_function("window.kinfmu.editor")
         hand = DrawingHand(page, path, with_fingers=options.get("has_touch", False))
         if not text:

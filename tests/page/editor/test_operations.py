@@ -119,18 +119,18 @@ def test_points_in_one_place_that_are_not_joined_are_pinned_by_a_finding() -> No
     assert [joint.between for joint in after.mechanism.joints] == [("ground.A", "a.A"), ("a.B", "b.C")]
 
 
-def test_a_pin_that_is_dropped_beside_its_partner_comes_first_also_among_what_was_tried() -> None:
-    beside = drawn(*FOURBAR[:4], bar((123, 78), "ground.B", "rocker"))
+def test_a_pin_that_is_dropped_next_to_its_partner_comes_first_also_among_what_was_tried() -> None:
+    drawing = drawn(*FOURBAR[:4], bar((123, 78), "ground.B", "rocker"))
     pin = {"text": "pin coupler.D and rocker.E", "operations": [{"do": "pin", "points": ["coupler.D", "rocker.E"]}]}
-    for found in (answer(beside), view(beside)):
+    for found in (answer(drawing), view(drawing)):
         problem, note, *_ = found["findings"]
         assert problem["edits"][0] == pin
         assert (note["text"], note["edits"]) == ("coupler.D and rocker.E are 3.6 mm apart and not joined", [pin])
     assert found["view"] is None
     _, tried, *_ = problem["edits"]
     assert tried["text"].startswith("join coupler.D and rocker.E and drive crank: ")
-    assert answer(changed(beside, tried["operations"]))["badge"]["isComplete"]
-    after = changed(beside, pin["operations"])  # type: ignore[arg-type]
+    assert answer(changed(drawing, tried["operations"]))["badge"]["isComplete"]
+    after = changed(drawing, pin["operations"])  # type: ignore[arg-type]
     assert after.at("coupler.D") == after.at("rocker.E") == (120, 80)
 
 

@@ -265,8 +265,8 @@ def test_undo_and_redo_of_an_import_fit_the_view_and_its_notes_are_shown(chromiu
 def test_a_half_drawn_mechanism_gets_changes_that_were_tried_and_one_click_makes_them(
     chromium: Browser, tmp_path: Path
 ) -> None:
-    beside = drawn(*FOURBAR[:4], bar((123, 78), "ground.B", "rocker"))
-    with drawing_hand(chromium, tmp_path, beside.text) as hand:
+    half = drawn(*FOURBAR[:4], bar((123, 78), "ground.B", "rocker"))
+    with drawing_hand(chromium, tmp_path, half.text) as hand:
         hand.page.tab.wait_for_function("window.kinfmu.editor.sketch")
         ghosts = hand.page.tab.locator("#draw-panel .problem .ghost")
         tried = hand.page.tab.locator(".problem .ghost", has_text="join coupler.D and rocker.E and drive crank")
@@ -284,7 +284,7 @@ def test_a_half_drawn_mechanism_gets_changes_that_were_tried_and_one_click_makes
 
 
 def test_locks_are_there_after_a_reload(hand: DrawingHand) -> None:
-    hand.click((115, 45))
+    hand.click((111, 45))
     hand.page.tab.check("#draw-panel .selected .check input")
     hand.get("k.design.lock(['bodies.crank.points.C.y'])")
     hand.page.tab.reload()
@@ -292,7 +292,7 @@ def test_locks_are_there_after_a_reload(hand: DrawingHand) -> None:
     assert hand.get("[...k.design.locked]") == ["bodies.crank.points.C.y"]
     hand.button("#draw")
     hand.page.tab.wait_for_function("window.kinfmu.editor.machine")
-    hand.click((115, 45))
+    hand.click((111, 45))
     assert hand.page.tab.is_checked("#draw-panel .selected .check input")
     assert hand.page.errors == []
 
@@ -321,8 +321,11 @@ def test_keys_are_listed_once(hand: DrawingHand) -> None:
         assert sum("Space" in one for one in keys) == sum("Ctrl+Z" in one for one in keys) == 1
         assert ("chooses a tool" in hand.page.tab.inner_text("#keys")) is is_drawing
         hand.page.tab.click("#keys button")
-        hand.press("Escape", "Space")
-        hand.press("Space")
+        assert hand.page.tab.is_hidden("#keys")
+        if is_drawing:
+            hand.page.tab.keyboard.press("Space")  # plays: the button that opened the list has no focus
+            hand.page.tab.wait_for_function("window.kinfmu.isPlaying && !window.kinfmu.editor.machine")
+            hand.page.tab.keyboard.press("Space")
 
 
 def test_on_a_phone_the_drawing_is_not_covered(chromium: Browser, tmp_path: Path) -> None:
@@ -337,7 +340,9 @@ def test_on_a_phone_the_drawing_is_not_covered(chromium: Browser, tmp_path: Path
         assert box["#draw-bar"]["y"] >= bottom
         assert box["#typed"]["y"] >= bottom
         assert hand.page.tab.inner_text("#badge") == "2 more joints or drivers"
-        assert hand.page.tab.evaluate("(() => { const b = document.getElementById('badge'); return b.scrollWidth <= b.clientWidth; })()")
+        assert hand.page.tab.evaluate(
+            "(() => { const b = document.getElementById('badge'); return b.scrollWidth <= b.clientWidth; })()"
+        )
         assert box["#badge"]["x"] + box["#badge"]["width"] <= 390
         assert hand.page.tab.evaluate("document.documentElement.scrollWidth") <= 390
         assert box["#drawing"]["height"] > 0.45 * 844

@@ -267,7 +267,9 @@ def test_states_with_nothing_to_undo_end_with_the_program(path: Path, states_fol
     assert Session(path).current()[2]["canUndo"]
 
 
-@pytest.mark.parametrize(("is_saved", "is_used", "is_kept"), [(True, False, False), (False, False, True), (True, True, True)])
+@pytest.mark.parametrize(
+    ("is_saved", "is_used", "is_kept"), [(True, False, False), (False, False, True), (True, True, True)]
+)
 def test_states_of_saved_drawings_go_after_a_month(
     path: Path, states_folder: Path, is_saved: bool, is_used: bool, is_kept: bool
 ) -> None:
