@@ -788,6 +788,11 @@ def test_what_does_not_close_is_drawn_with_its_gap_and_a_way_back(
         assert gaps
         size = page.get("k.linkage.data.size")
         assert all(math.dist(*gap) > 0.01 * size for gap in gaps)
+        page.tab.click("#tab-files")
+        with page.tab.expect_download() as waiting:
+            page.tab.click("#save-svg")
+        assert waiting.value.path().read_text("utf-8").count('stroke-dasharray="7 5"') == len(gaps)
+        page.tab.click("#tab-values")
         assert page.get("Array.from(k.linkage.pose.q)") == pose
         page.tab.click("#play")
         page.tab.click("#play")

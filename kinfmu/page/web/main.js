@@ -129,10 +129,7 @@ class Page {
             foresee(linkage, view, this.theme, this.show, this.spots);
         }
         this.isToForesee = false;
-        const { pose } = linkage;
-        linkage.pose = this.open?.pose || pose;
         const drawn = draw(new CanvasPen(c), linkage, view, this.theme, this.show, this.extra(), this.spots);
-        linkage.pose = pose;
         [this.handles, this.hasHidden] = [drawn.handles, drawn.hasHidden];
         clearTimeout(this.settling);
         if (this.spots.isWaiting && !this.isPlaying) this.settling = setTimeout(() => this.refresh(), PATIENCE);
@@ -145,7 +142,7 @@ class Page {
         const curves = this.drawn.map(({ colour }, k) => ({ line: this.curves[k] || [], colour }));
         if (this.show.traces) for (const [point, line] of this.traces) curves.push({ line, colour: this.drawn.find((one) => one.point === point)?.colour || [90, 90, 90], isTrace: true });
         const { found, legend } = arrows(this);
-        return { curves, arrows: found, legend, held: this.hand.place, pointer: this.hand.pointer, isOnPins: this.mode === "move", gaps: this.open?.gaps || [], isGhost: !this.design.isOk };
+        return { curves, arrows: found, legend, held: this.hand.place, pointer: this.hand.pointer, isOnPins: this.mode === "move", gaps: this.open?.gaps || [], pose: this.open?.pose, isGhost: !this.design.isOk };
     }
 
     #trace() {

@@ -1,6 +1,6 @@
 // The panel of values: a slider, a number field and a lock for each; lengths of links first.
 
-import { css, edgeOf } from "./pen.js";
+import { css } from "./pen.js";
 import { distance, isSlim } from "./geometry.js";
 import { grouped, number } from "./numbers.js";
 import { breakable, element, shownUnit } from "./elements.js";
@@ -132,7 +132,7 @@ export class Values {
         const colour = this.page.linkage.data.bodies.find(({ name }) => name === body)?.colour;
         if (!colour) return [];
         const swatch = element("span", { className: "swatch" });
-        [swatch.style.background, swatch.style.borderColor] = [css(colour), edgeOf(colour, this.page.theme)];
+        swatch.style.background = css(colour);
         return [swatch];
     }
 
