@@ -86,8 +86,8 @@ _LABELS = {  # of parameters, in messages, before their values where these are s
     "--columns",
     metavar="NAMES",
     help="Columns of a table or a plot, with the names of simulate --channels: coupler.x, 'coupler.*', q, crank_angle, "
-    "solver.margin, -error. A table always contains time and status. Default: all columns; for plots angles, "
-    "points of interest (if there are none, all coordinates), efforts and energies.",
+    "solver.margin, -error. A table always contains time and status. Default: all columns; for plots the six panels "
+    "that tell most of the motion, with a line that names the others.",
 )
 @click.option(
     "--x",
@@ -104,10 +104,10 @@ _LABELS = {  # of parameters, in messages, before their values where these are s
     "cam joint's lift, or write them as a table.",
 )
 @click.option(
-    "--degrees",
-    is_flag=True,
-    help="Angles in deg, and their rates in time: in tables, and in plots, where driver values and those of --x always "
-    "are.",
+    "--degrees/--radians",
+    default=None,
+    help="Unit of angles, and of their rates in time. Default: degrees in plots, where driver values and those of --x "
+    "always have them, radians in tables and --svaj.",
 )
 @click.option(
     "--start", metavar="VALUE", help="First sample: time [s], or driver value of solve --angle, such as 30deg."

@@ -35,7 +35,7 @@ def write_table(run: Run, output: Path, options: Options) -> None:
     from kinfmu.motion.motion_curve import svaj_columns
     from kinfmu.run.tables import csv_lines
 
-    names, degrees, form = names_in(options["columns"]), options["degrees"], options["form"]
+    names, degrees, form = names_in(options["columns"]), bool(options["degrees"]), options["form"]
     columns = svaj_columns(run, options["svaj"], degrees=degrees) if options["svaj"] else None
     if output == STANDARD_OUTPUT:
         _print(csv_lines(columns or columns_of(run, names, degrees=degrees), **form))
@@ -52,7 +52,7 @@ def write_plot(run: Run, output: Path, options: Options) -> None:
 
     degrees, other = options["degrees"], options["other"]
     if options["svaj"]:
-        svaj(run, output, options["svaj"], degrees=degrees)
+        svaj(run, output, options["svaj"], degrees=bool(degrees))
         return
     how: dict[str, Any] = {"x": names_in(options["across"]) or (), "overlaid": options["overlay"]}
     if other is not None:
@@ -123,7 +123,7 @@ def write_cam(shown: str, output: Path, joint: str, settings: Sequence[tuple[str
     suffix = ".csv" if output == STANDARD_OUTPUT else suffix_of(output)
     if suffix not in CAM_FORMATS:
         raise click.UsageError(f"{output}: the profile of a cam is written as {listed(CAM_FORMATS)}")
-    form, degrees, tolerance = csv_form(suffix, (".csv",), options), options["degrees"], options["tolerance"]
+    form, degrees, tolerance = csv_form(suffix, (".csv",), options), bool(options["degrees"]), options["tolerance"]
     if degrees and suffix != ".csv":
         about = "its figure has angles in deg" if suffix != ".dxf" else "a drawing has no angles"
         raise click.UsageError(f"--degrees: of a cam only for .csv, not {suffix}; {about}")

@@ -58,7 +58,7 @@ def test_plots_and_moving_pictures_are_made_of_a_record(
     monkeypatch.setattr(animation, "MOST", 3)
     assert command("export", record, "-o", "run.svg", "--columns", "coupler.x,rocker.phi").exit_code == 0
     text = (tmp_path / "run.svg").read_text(encoding="utf-8")
-    assert "rocker.phi" in text
+    assert "rocker.φ" in text
     assert "coupler.y" not in text
     assert command("export", record, "-o", "run.gif").exit_code == 0
     assert (tmp_path / "run.gif").read_bytes().startswith(b"GIF89a")
@@ -81,11 +81,11 @@ def test_coordinates_of_a_plot_are_chosen_as_columns_of_a_table_are(
 ) -> None:
     assert command("export", record, "-o", "run.svg", "--columns", "coupler.*,rocker.phi").exit_code == 0
     words = re.findall(r">([\w.]+)</text>", (tmp_path / "run.svg").read_text(encoding="utf-8"))
-    assert [word for word in words if word in read(record).outputs] == [
+    assert [word for word in words if word[:1].isalpha() and "." in word] == [
         "coupler.x",
         "coupler.y",
-        "coupler.phi",
-        "rocker.phi",
+        "coupler.φ",
+        "rocker.φ",
     ]
 
 

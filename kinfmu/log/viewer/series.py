@@ -9,10 +9,11 @@ from functools import cached_property
 import numpy as np
 
 from kinfmu.arrays import FloatArray, finite
+from kinfmu.draw.chart import repeats_effort
 from kinfmu.draw.scene import palette
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of, shown_range
-from kinfmu.units import ForceName, Quantity, unit_of
+from kinfmu.units import Quantity, unit_of
 
 ORDERS = ("position", "velocity", "acceleration")
 KINDS = ("angle", "length")
@@ -100,7 +101,7 @@ def efforts(run: Run) -> list[Group]:
         columns = [
             k
             for k, name in enumerate(run.force_names)
-            if name.quantity.kind == kind and name not in run.absent and not _hides_effort(run, name)
+            if name.quantity.kind == kind and name not in run.absent and not repeats_effort(run, name)
         ]
         if not columns or run.forces is None:
             continue
@@ -139,16 +140,6 @@ def signals(run: Run) -> list[Group]:
             )
         )
     return found
-
-
-def _hides_effort(run: Run, name: ForceName) -> bool:
-    """Return True for a bias effort that equals its effort to round-off, in a run that keeps both."""
-    effort = f"{name.owner}.{name.noun.removeprefix('bias_')}"
-    if not name.noun.startswith("bias_") or effort in run.absent:
-        return False
-    own, other = run[name], run[effort]
-    largest = float(np.max(np.abs(other), initial=0.0, where=np.isfinite(other)))
-    return bool(np.all(~run.good | (np.abs(own - other) <= SAME * largest) | ~np.isfinite(own)))
 
 
 def _title(quantity: Quantity, length_unit: str) -> str:
