@@ -87,7 +87,7 @@ _LABELS = {  # of parameters, in messages, before their values where these are s
     metavar="NAMES",
     help="Columns of a table or a plot, with the names of simulate --channels: coupler.x, 'coupler.*', q, crank_angle, "
     "solver.margin, -error. A table always contains time and status. Default: all columns; for plots the six panels "
-    "that tell most of the motion, with a line that names the others.",
+    "that show most of the motion, with a line that names the others.",
 )
 @click.option(
     "--x",

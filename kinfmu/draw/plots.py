@@ -178,7 +178,7 @@ def _chosen(runs: Sequence[Run], columns: Sequence[str], path: Path, *, degrees:
     stacks, constant = moving(runs, found, keeps_one=bool(columns))
     notes = [_constants(run, constant, degrees=degrees)]
     if not columns:
-        stacks, others = most_telling(run, stacks or found)
+        stacks, others = main_panels(run, stacks or found)
         notes.append(f"not drawn: {', '.join(map(symbol, others))}" if others else "")
     if len(stacks) > MOST_COORDINATES:
         what = (
@@ -232,13 +232,13 @@ def _constants(run: Run, panels: Sequence[Panel], *, degrees: bool) -> str:
     return f"constant: {', '.join(found)}" if found else ""
 
 
-def most_telling(run: Run, stacks: Sequence[Stack]) -> tuple[list[Stack], list[str]]:
-    """Return the stacks of at most MOST_PANELS panels that tell most of a motion, and names of what else moves.
+def main_panels(run: Run, stacks: Sequence[Stack]) -> tuple[list[Stack], list[str]]:
+    """Return the stacks of at most MOST_PANELS panels that show most of a motion, and names of what else moves.
 
     First are points of interest, then bodies that slide, turn, or do both; last is what follows a driver at a constant
     ratio. The first effort has its place behind the first coordinate.
     """
-    kept = [stack._replace(panels=panels) for stack in stacks if (panels := _told(run, stack))]
+    kept = [stack._replace(panels=panels) for stack in stacks if (panels := _kept_panels(run, stack))]
     coordinates = sorted((one for one in kept if _is_coordinate(one)), key=lambda stack: _rank(run, stack))
     forces = [one for one in kept if not _is_coordinate(one)]
     first = [forces[0]._replace(panels=forces[0].panels[:2])] if forces else []
@@ -258,7 +258,7 @@ def _is_coordinate(stack: Stack) -> bool:
     return isinstance(stack.panels[0].name, CoordinateName)
 
 
-def _told(run: Run, stack: Stack) -> tuple[Panel, ...]:
+def _kept_panels(run: Run, stack: Stack) -> tuple[Panel, ...]:
     """Return the panels of a stack that the run keeps, without bias efforts that repeat their efforts."""
     return tuple(
         panel
@@ -269,7 +269,7 @@ def _told(run: Run, stack: Stack) -> tuple[Panel, ...]:
 
 
 def _rank(run: Run, stack: Stack) -> tuple[bool, int]:
-    """Return the rank of a coordinate: lower ones tell more."""
+    """Return the rank of a coordinate: lower ones are drawn first."""
     name = next(output for output in run.outputs if output == stack.title)
     is_point = name in run.outputs[run.coordinate_count :] and bool(run.names)
     turns = any(other.is_angle and other.owner == name.owner for other in run.names)

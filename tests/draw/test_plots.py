@@ -28,7 +28,7 @@ from kinfmu.draw.chart import (
     rows_of,
 )
 from kinfmu.draw.overlay import overlay, overlay_sheet
-from kinfmu.draw.plots import _sheet, _shown, _title_of, most_telling, moving, stacks_of, usual_coordinates
+from kinfmu.draw.plots import _sheet, _shown, _title_of, main_panels, moving, stacks_of, usual_coordinates
 from kinfmu.draw.svaj_figure import _sheet as _svaj_sheet
 from kinfmu.draw.svaj_figure import driver_axis
 from kinfmu.errors import FigureError, RequestError
@@ -76,7 +76,7 @@ def test_without_names_six_panels_are_drawn_and_lines_name_what_is_constant_and_
 
 def drawn(run: Run) -> tuple[dict[str, list[str]], list[str]]:
     """The columns of the panels by title, and the names of what else moves."""
-    stacks, others = most_telling(run, moving([run], stacks_of(run, []), keeps_one=False)[0])
+    stacks, others = main_panels(run, moving([run], stacks_of(run, []), keeps_one=False)[0])
     return {stack.title: [panel.column for panel in stack.panels] for stack in stacks}, others
 
 
