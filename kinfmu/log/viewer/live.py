@@ -133,8 +133,10 @@ class LiveView:
                 linkage = Linkage(self._stream, one.root, timeline, one.run, one.scene)
                 linkage.log_paths(one.scene.paths)
                 log_loads(linkage, log_arrows(linkage, one.arrows))
-        log_card(self._stream, card(run, " ".join([*left_out(run, shown), note]).strip()))
-        self._stream.send_blueprint(single(timeline, shown, drawn, groups(shown), forces, solver))
+        curves = groups(shown)
+        text = " ".join([*left_out(run, shown), note]).strip()
+        log_card(self._stream, card(run, text, [*curves.values(), *forces]))
+        self._stream.send_blueprint(single(timeline, shown, drawn, curves, forces, solver))
         self._flush()
 
     def _flush(self) -> None:

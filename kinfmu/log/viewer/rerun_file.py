@@ -4,7 +4,7 @@
     /linkage/...        bodies with what joints add to them, pins, bars, cylinders, supports, rails; y up
     /linkage/paths/...  paths of points of interest over the run; /linkage/trails/...: over the last moments
     /position/angle     and /position/length, /velocity/..., /acceleration/...: one entity for each kind of quantity,
-                        one curve a coordinate, in rad and the mechanism's unit of length
+                        one curve a coordinate, in deg and the mechanism's unit of length
     /forces/torque      efforts of drivers, with /forces/force, /forces/power, /forces/energy [N m, N, W, J]
     /reactions/force    sizes of the forces of joints; /reactions/torque: moments; with shaking force and moment
     /signals/0          outputs of FMUs that are not kinfmu's, an entity for each unit
@@ -39,7 +39,7 @@ from kinfmu.errors import LogError
 from kinfmu.files import temporary_folder
 from kinfmu.log.cdr import check_times
 from kinfmu.log.target import replacing
-from kinfmu.log.viewer.blueprint import Drawn, single
+from kinfmu.log.viewer.blueprint import Drawn, is_ok, single
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.linkage import APPLICATION, Linkage
 from kinfmu.log.viewer.marks import log_arrows, log_loads
@@ -105,7 +105,7 @@ def write_rrd(run: Run, path: str | Path) -> None:
         for group in (*curves.values(), *forces, *solver):
             log_group(rec, "", timeline, shown, group)
         log_status(rec, "", timeline, timeline.placed(run))
-        log_card(rec, card(run, " ".join([*left_out(run, shown), note]).strip()))
+        log_card(rec, card(run, " ".join([*left_out(run, shown), note]).strip(), [*curves.values(), *forces]))
 
 
 def drawn_linkages(run: Run) -> tuple[list[Drawn], str]:
@@ -138,10 +138,14 @@ def application(runs: Sequence[Run], groups: Iterable[Group]) -> str:
 
     The viewer keeps one layout per application, so recordings that need another layout get another id.
     """
-    ranges = [(group.path, group.extent) for group in groups]
+    ranges = [(group.path, group.extent, group.is_constant) for group in groups]
     spans = [(float(run.t.min()), float(run.t.max())) for run in runs if len(run)]
     facts = repr(
-        (spans, ranges, [(run.mechanism_text, run.outputs, run.axis, bool(notable_events(run))) for run in runs])
+        (
+            spans,
+            ranges,
+            [(run.mechanism_text, run.outputs, run.axis, bool(notable_events(run)), is_ok(run)) for run in runs],
+        )
     )
     parts = [name for run in runs for name in component_runs(run)]
     facts += repr(parts) if parts else ""  # each has a view
@@ -172,9 +176,12 @@ def recording(path: str | Path, name: str, layout: rrb.Blueprint, application: s
 
 
 def log_group(
-    rec: rr.RecordingStream, root: str, timeline: Timeline, run: Run, group: Group, width: float = 1.5
+    rec: rr.RecordingStream, root: str, timeline: Timeline, run: Run, group: Group, width: float | None = None
 ) -> None:
-    """Log the curves of a group: lines with gaps where they are NaN, or points if a sample lies between two gaps."""
+    """Log the curves of a group: lines with gaps where they are NaN, or points if a sample lies between two gaps.
+
+    width: of all lines [points]. Default: that of `Group.widths`.
+    """
     import rerun as rr
 
     path = f"{root}/{group.path}"
@@ -186,7 +193,7 @@ def log_group(
         look = rr.SeriesLines(
             names=names,
             colors=colours,
-            widths=[width] * len(names),
+            widths=group.widths() if width is None else [width] * len(names),
             interpolation_mode="StepAfter" if group.is_stepped else "Linear",
         )
     rec.log(path, look, static=True)
