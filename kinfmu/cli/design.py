@@ -93,6 +93,12 @@ def fit(file: Path, output: Path | None, picture: Path | None, starts: int, seed
     type=OutputFile(CSV, XLSX),
     help="Also write the results for a spreadsheet, .xlsx or .csv, in the units of the summary.",
 )
+@click.option(
+    "--recordings",
+    metavar="FOLDER",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Also record designs, at most 24, for the Rerun viewer: kinfmu review FOLDER compares them.",
+)
 @table_options
 def study(
     file: Path,
@@ -104,6 +110,7 @@ def study(
     picture: Path | None,
     measures: str | None,
     table: Path | None,
+    recordings: Path | None,
     **of_table: Any,
 ) -> None:
     """Measure many designs: parameters on a grid, in ranges, or with tolerances.
@@ -148,6 +155,15 @@ def study(
         own = result.mechanism.length_unit
         write_sheet([in_lengths(one, own, of_table["lengths"]) for one in result.shown_columns()], table, **form)
         click.echo(f"table: {table}")
+    if recordings is not None:
+        from kinfmu.design.study.recordings import write_recordings
+        from kinfmu.log.viewer.package import without_pandas
+
+        with without_pandas():
+            count = len(write_recordings(defined, result, recordings))
+        click.echo(
+            f"recordings of {count} designs: {recordings}; to compare them: kinfmu review {quote(str(recordings))}"
+        )
     if picture is not None:
         result.figure(picture, tuple(names_in(measures) or ()))
         click.echo(f"figure: {picture}")

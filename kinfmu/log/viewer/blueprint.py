@@ -65,12 +65,14 @@ def single(
     curves: Mapping[tuple[str, str], Group],
     forces: Sequence[Group],
     solver: Sequence[Group],
+    *,
+    is_dataset: bool = False,
 ) -> rrb.Blueprint:
-    """Return the layout of one run: linkages on the left, each in a view of its own; plots on the right.
+    """Return the layout of one run, or of each in a dataset: linkages on the left, in views of their own; plots right.
 
     The tab 'motion' has one row per order, with one column per unit, and efforts, energies and signals below; curves
     that are all constant have no plot. The tab 'solver' has states, log and diagnostics; it is the one in front if a
-    sample is not ok.
+    sample is not ok. Of a dataset 'motion' is in front, and the list of its recordings is open.
     """
     import rerun.blueprint as rrb
 
@@ -79,12 +81,14 @@ def single(
     has_motion = bool(run.outputs) or any(one.scene for one in drawn)
     tabs = [_stacked(rows, timeline, [run], name="motion")] if rows else []
     if has_motion or solver:
-        tabs.append(_solver_tab(_abreast(_known(map(_alone, solver)), 2), timeline, run))
-    right = rrb.Tabs(*tabs, active_tab=0 if rows and is_ok(run) else len(tabs) - 1)
+        has_log = is_dataset or bool(notable_events(run))
+        tabs.append(_solver_tab(_abreast(_known(map(_alone, solver)), 2), timeline, run, has_log=has_log))
+    right = rrb.Tabs(*tabs, active_tab=0 if rows and (is_dataset or is_ok(run)) else len(tabs) - 1)
     linked = [linkage_view([one.root], timeline, [one.run], [one.scene], one.title, one.arrows) for one in drawn]
     linkages = (linked[0] if len(linked) == 1 else rrb.Grid(*linked)) if has_motion and linked else None
     left = _left(linkages)
-    return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), timeline, [run])
+    content = rrb.Horizontal(left, right, column_shares=[1, 1.25])
+    return arranged(content, timeline, [run], is_dataset=is_dataset)
 
 
 def compared(
@@ -193,13 +197,13 @@ def _plots(
     return [rrb.Horizontal(*[plot(*one, timeline, runs, WIDTH / len(row), each) for one in row]) for row in rows]
 
 
-def _solver_tab(rows: Sequence[Sequence[Plot]], timeline: Timeline, run: Run) -> rrb.Container:
-    """Return the states of the solver, the log if there are events, and its diagnostics."""
+def _solver_tab(rows: Sequence[Sequence[Plot]], timeline: Timeline, run: Run, *, has_log: bool) -> rrb.Container:
+    """Return the states of the solver, the log, and its diagnostics."""
     import rerun.blueprint as rrb
 
     above: list[rrb.Container | rrb.View] = [status_view([""], timeline, [run])]
     shares = [STATUS]
-    if notable_events(run):
+    if has_log:
         above.append(log_view([""]))
         shares.append(LOG)
     free = 1.0 - sum(shares)
@@ -222,8 +226,10 @@ def _left(
     return rrb.Vertical(linkage, card_view(), *log, row_shares=[1.5, 0.9, 0.6] if log else [1.7, 1.0])
 
 
-def arranged(content: rrb.Container, timeline: Timeline, runs: Sequence[Run]) -> rrb.Blueprint:
-    """Return the blueprint of the content, with Rerun's own panels collapsed, ready to play."""
+def arranged(
+    content: rrb.Container, timeline: Timeline, runs: Sequence[Run], *, is_dataset: bool = False
+) -> rrb.Blueprint:
+    """Return the blueprint of the content, with Rerun's own panels collapsed but for the list of a dataset, to play."""
     import rerun.blueprint as rrb
 
     length = max((float(run.t.max() - run.t.min()) for run in runs if len(run)), default=0.0)
@@ -240,7 +246,7 @@ def arranged(content: rrb.Container, timeline: Timeline, runs: Sequence[Run]) ->
             fps=speed if timeline.parts else None,
         ),
         rrb.SelectionPanel(state="collapsed"),
-        rrb.BlueprintPanel(state="collapsed"),
+        rrb.BlueprintPanel(state="expanded" if is_dataset else "collapsed"),
         auto_views=False,
         auto_layout=False,
     )
@@ -311,7 +317,8 @@ def free_corner(
     boxes = {corner: (corner.startswith("Right"), corner.endswith("Top")) for corner in CORNERS}
     for group in groups:
         count = len(group.values)
-        x = (next((t for t in times if len(t) == count), np.linspace(start, stop, count)) - begin) / length
+        t = next((t for t in times if count % len(t) == 0), np.linspace(start, stop, count))
+        x = (np.resize(t, count) - begin) / length  # of a dataset the values of all runs are below each other
         y = (group.values - low) / (top - low or 1.0)
         for corner, (is_right, is_top) in list(boxes.items()):
             rows = (x >= 1.0 - wide) if is_right else (x <= wide)

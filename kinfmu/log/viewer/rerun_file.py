@@ -23,8 +23,9 @@ for the next. Other runs belong to another application.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 from uuid import uuid4
@@ -87,25 +88,52 @@ def write_rrd(run: Run, path: str | Path) -> None:
     """
     require_viewer(f"{path}: a recording")
     check_times(run.t)  # reports invalid times before a file is made
-    timeline = timeline_of([run])
-    shown = timeline.placed(decimated(run))
-    drawn, note = drawn_linkages(shown)
-    curves = groups(shown)
-    solver = [group for group in (accuracy(shown), error_estimates(shown), margin(shown), iterations(shown)) if group]
-    forces = [*efforts(shown), *reactions(shown), *signals(shown)]
+    content = content_of(run, timeline_of([run]))
+    layout = single(content.timeline, content.shown, content.drawn, content.curves, content.forces, content.solver)
     name = run.info.get("title") or run.info.get("name") or Path(path).stem
-    layout = single(timeline, shown, drawn, curves, forces, solver)
-    with recording(path, name, layout, application([shown], [*curves.values(), *forces])) as rec:
-        rec.send_property("kinfmu", _properties(run))
-        for one in drawn:
+    application_id = application([content.shown], [*content.curves.values(), *content.forces])
+    with recording(path, name, layout, application_id) as rec:
+        content.log(rec)
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """What the recording of a run holds.
+
+    shown: its samples on the timeline, fewer of long runs; note: what is not drawn; curves, forces, solver: groups.
+    """
+
+    run: Run
+    timeline: Timeline
+    shown: Run
+    drawn: Sequence[Drawn]
+    note: str
+    curves: Mapping[tuple[str, str], Group]
+    forces: Sequence[Group]
+    solver: Sequence[Group]
+
+    def log(self, rec: rr.RecordingStream) -> None:
+        """Log all of it."""
+        rec.send_property("kinfmu", _properties(self.run))
+        for one in self.drawn:
             if one.scene:
-                linkage = Linkage(rec, one.root, timeline, one.run, one.scene)
+                linkage = Linkage(rec, one.root, self.timeline, one.run, one.scene)
                 linkage.log()
                 log_loads(linkage, log_arrows(linkage, one.arrows))
-        for group in (*curves.values(), *forces, *solver):
-            log_group(rec, "", timeline, shown, group)
-        log_status(rec, "", timeline, timeline.placed(run))
-        log_card(rec, card(run, " ".join([*left_out(run, shown), note]).strip(), [*curves.values(), *forces]))
+        for group in (*self.curves.values(), *self.forces, *self.solver):
+            log_group(rec, "", self.timeline, self.shown, group)
+        log_status(rec, "", self.timeline, self.timeline.placed(self.run))
+        note = " ".join([*left_out(self.run, self.shown), self.note]).strip()
+        log_card(rec, card(self.run, note, [*self.curves.values(), *self.forces]))
+
+
+def content_of(run: Run, timeline: Timeline) -> Content:
+    """Return what the recording of a run holds."""
+    shown = timeline.placed(decimated(run))
+    drawn, note = drawn_linkages(shown)
+    solver = [group for group in (accuracy(shown), error_estimates(shown), margin(shown), iterations(shown)) if group]
+    forces = [*efforts(shown), *reactions(shown), *signals(shown)]
+    return Content(run, timeline, shown, drawn, note, groups(shown), forces, solver)
 
 
 def drawn_linkages(run: Run) -> tuple[list[Drawn], str]:
@@ -154,12 +182,17 @@ def application(runs: Sequence[Run], groups: Iterable[Group]) -> str:
 
 
 @contextmanager
-def recording(path: str | Path, name: str, layout: rrb.Blueprint, application: str) -> Iterator[rr.RecordingStream]:
-    """Yield a recording; its complete file replaces `path` when the block ends."""
+def recording(
+    path: str | Path, name: str, layout: rrb.Blueprint, application: str, identifier: str = ""
+) -> Iterator[rr.RecordingStream]:
+    """Yield a recording; its complete file replaces `path` when the block ends.
+
+    identifier: of the recording. Default: one that no other has.
+    """
     import rerun as rr
 
     with replacing(path) as temporary, _path_in_utf8(temporary) as saved:
-        rec = rr.RecordingStream(application, recording_id=f"{_in_utf8(Path(path).stem)}-{uuid4()}")
+        rec = rr.RecordingStream(application, recording_id=identifier or f"{_in_utf8(Path(path).stem)}-{uuid4()}")
         rec.set_log_time_enabled(False)  # wall-clock time is not needed and takes 16 bytes a row
         rec.set_log_tick_enabled(False)
         try:

@@ -20,6 +20,7 @@ from kinfmu.log.viewer import headless, timeline
 from kinfmu.log.viewer.blueprint import ABREAST, EDGE, NUMBERS, WIDTH, plot, with_two_labels
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.comparison import write_comparison
+from kinfmu.log.viewer.dataset import DesignRun, write_dataset
 from kinfmu.log.viewer.ground import dots, places_below, shown_names
 from kinfmu.log.viewer.marks import legend_start
 from kinfmu.log.viewer.series import margin
@@ -134,6 +135,19 @@ def test_the_error_of_a_view_is_reported(tmp_path: Path, viewer: headless.Viewer
     viewer.show(tmp_path / "wrong.rrd")
     (report,) = viewer.glance().reports
     assert report.startswith("wrong: error: 2D visualizers require a pinhole")
+
+
+def test_recordings_of_designs_are_a_table_whose_layout_shows_each(tmp_path: Path, viewer: headless.Viewer) -> None:
+    runs = [kinfmu.solve(kinfmu.load("jansen_leg"), np.linspace(0.0, 1.0, 31), parameters={"j": j}) for j in (49, 51)]
+    designs = [DesignRun(f"design {k}", run, {"j [mm]": 49.0 + 2 * k}) for k, run in enumerate(runs)]
+    paths = write_dataset(designs, tmp_path, "legs")
+    viewer.show(paths)
+    assert "/dataset/" in viewer._client.get_location() or "/entry/" in viewer._client.get_location()
+    for path in paths:
+        viewer.show(path)
+        shot = viewer.glance()
+        assert shot.reports == ()
+        assert {"linkage", "angle [deg]", "acceleration [mm/s2]"} <= set(shot.views)
 
 
 @pytest.mark.long
