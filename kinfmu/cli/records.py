@@ -70,4 +70,5 @@ def review(run: Path, other: Path | None, save: Path | None, screenshot: Path | 
     with without_pandas():
         recording = reviewed(run, other, save=save, screenshot=screenshot, at=place, report=note)
     made = [str(path) for path in (recording, screenshot) if path is not None]
-    click.echo(f"written: {listed(made)}")
+    if made:
+        click.echo(f"written: {listed(made)}")

@@ -16,7 +16,7 @@ from kinfmu.log.cdr import check_times
 from kinfmu.log.viewer.blueprint import Drawn, single
 from kinfmu.log.viewer.linkage import APPLICATION
 from kinfmu.log.viewer.package import require_viewer
-from kinfmu.log.viewer.rerun_file import Content, content_of, recording
+from kinfmu.log.viewer.rerun_file import RecordedRun, content_of, recording
 from kinfmu.log.viewer.series import Group
 from kinfmu.log.viewer.timeline import Timeline, timeline_of
 from kinfmu.run import Run
@@ -88,14 +88,14 @@ def _each_merged(found: Sequence[Sequence[Group]]) -> list[Group]:
     return [_merged([group for groups in found for group in groups if group.path == first.path]) for first in found[0]]
 
 
-def _content(design: DesignRun, timeline: Timeline) -> Content:
+def _content(design: DesignRun, timeline: Timeline) -> RecordedRun:
     """Return what the recording of a design holds, with its numbers on the card."""
     content = content_of(design.run, timeline)
     numbers = ", ".join(f"{name} = {number:.6g}" for name, number in design.numbers.items() if isfinite(number))
     return replace(content, note=f"{numbers}. {content.note}".strip())
 
 
-def _in_one_view(contents: Sequence[Content]) -> list[Content]:
+def _in_one_view(contents: Sequence[RecordedRun]) -> list[RecordedRun]:
     """Return the contents with scenes of one bounding box, so that all designs are drawn to one scale."""
     scenes = [one.scene for content in contents for one in content.drawn if one.scene]
     if not scenes:

@@ -97,7 +97,7 @@ def write_rrd(run: Run, path: str | Path) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Content:
+class RecordedRun:
     """What the recording of a run holds.
 
     shown: its samples on the timeline, fewer of long runs; note: what is not drawn; curves, forces, solver: groups.
@@ -127,13 +127,13 @@ class Content:
         log_card(rec, card(self.run, note, [*self.curves.values(), *self.forces]))
 
 
-def content_of(run: Run, timeline: Timeline) -> Content:
+def content_of(run: Run, timeline: Timeline) -> RecordedRun:
     """Return what the recording of a run holds."""
     shown = timeline.placed(decimated(run))
     drawn, note = drawn_linkages(shown)
     solver = [group for group in (accuracy(shown), error_estimates(shown), margin(shown), iterations(shown)) if group]
     forces = [*efforts(shown), *reactions(shown), *signals(shown)]
-    return Content(run, timeline, shown, drawn, note, groups(shown), forces, solver)
+    return RecordedRun(run, timeline, shown, drawn, note, groups(shown), forces, solver)
 
 
 def drawn_linkages(run: Run) -> tuple[list[Drawn], str]:

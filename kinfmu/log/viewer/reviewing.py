@@ -53,7 +53,7 @@ def review(
         report: Called with a line on the common coordinates if the two runs do not have the same. Default: none.
 
     Returns:
-        The path of the recording or the folder; None if only a screenshot was taken.
+        The path of the recording; None of a folder, and if only a screenshot was taken.
 
     Raises:
         RequestError: Invalid files or time.
@@ -63,7 +63,8 @@ def review(
     """
     run = Path(run)
     if run.is_dir():
-        return _review_dataset(run, other or save or at, screenshot)
+        _review_dataset(run, other or save or at, screenshot)
+        return None
     _check(run, other, save, screenshot, at)
     require_viewer(f"{run}: a review")
     moment: Cursor | CursorOn | None
@@ -92,7 +93,7 @@ def review(
     return recording
 
 
-def _review_dataset(folder: Path, other: object, screenshot: str | Path | None) -> Path | None:
+def _review_dataset(folder: Path, other: object, screenshot: str | Path | None) -> None:
     """Open the viewer on the recordings of a folder, or take a picture of their table."""
     recordings = sorted(folder.glob("*.rrd"))
     if other is not None:
@@ -104,10 +105,9 @@ def _review_dataset(folder: Path, other: object, screenshot: str | Path | None) 
         if suffix_of(screenshot) != ".png":
             raise RequestError(f"{screenshot}: the name must end in .png")
         _shoot(recordings, screenshot, None)
-        return None
+        return
     _need_display(folder)
     _open(*recordings)
-    return folder
 
 
 def _check(

@@ -15,6 +15,7 @@ from kinfmu.design.study.definition import define
 from kinfmu.design.study.recordings import MOST_DESIGNS, chosen_rows, write_recordings
 from kinfmu.design.study.run import run_study
 from kinfmu.errors import RequestError
+from kinfmu.log.viewer import reviewing
 from kinfmu.log.viewer.headless import executable
 from tests.design.study.linkage import RANGES, linkage, write
 from tests.log.viewer.test_rerun_file import documents, statics, verified
@@ -80,7 +81,12 @@ def test_designs_at_their_own_speeds_have_one_axis(tmp_path: Path) -> None:
         assert statics(path, "/__properties/design", "crank.speed [rpm]") == [speed]
 
 
-def test_a_folder_is_reviewed_as_a_dataset(dataset: Path, tmp_path: Path) -> None:
+def test_a_folder_is_reviewed_as_a_dataset(dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[Path] = []
+    monkeypatch.setattr(reviewing, "_need_display", lambda _: None)
+    monkeypatch.setattr(reviewing, "_open", lambda *recordings: opened.extend(recordings))
+    assert CliRunner().invoke(main, ["review", str(dataset)]).exit_code == 0
+    assert [path.name for path in opened] == [f"design_000{k}.rrd" for k in range(3)]
     with pytest.raises(RequestError, match="holds 0 recordings"):
         kinfmu.log.review(tmp_path)
     with pytest.raises(RequestError, match="a folder of recordings is shown as it is"):
