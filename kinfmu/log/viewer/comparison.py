@@ -226,7 +226,10 @@ def _differ(run: Run) -> str:
 
 def _largest(column: FloatArray, unit: str, factor: float) -> str:
     known = np.abs(column[np.isfinite(column)])
-    return f"{known.max() * factor:.2g} {unit}".replace("0 " + unit, "0") if len(known) else "-"
+    if not len(known):
+        return "-"
+    largest = float(f"{known.max() * factor:.2g}")
+    return f"{largest:.6g} {unit}" if largest else "0"
 
 
 class Apart(NamedTuple):
