@@ -221,15 +221,20 @@ def equal_below(curves: Sequence[FloatArray]) -> list[int]:
     known = np.concatenate([finite(values) for values in curves])
     seen = _SEEN * float(np.ptp(known)) if len(known) else 0.0
 
-    def is_seen(one: FloatArray, other: FloatArray) -> bool:
+    def are_equal(one: FloatArray, other: FloatArray) -> bool:
         apart = np.abs(one - other)
         return bool(np.array_equal(np.isnan(one), np.isnan(other)) and np.all(apart[np.isfinite(apart)] <= seen))
 
-    return [sum(is_seen(one, other) for other in curves[k + 1 :]) for k, one in enumerate(curves)]
+    step = max(len(curves[0]) // _FEW, 1)  # a few samples tell most curves apart
+    return [
+        sum(are_equal(one[::step], other[::step]) and are_equal(one, other) for other in curves[k + 1 :])
+        for k, one in enumerate(curves)
+    ]
 
 
 LOST: palette.Colour = (246, 222, 222)
 _SEEN = 2e-3  # of the range of all curves, by which two must differ to be seen apart
+_FEW = 50  # samples
 _BINS = 1500  # of a long run; each shows its least and its greatest value
 MOST_CURVES = 4  # of a panel
 WIDTH, HEIGHT = 4.4, 2.4  # [in] of a panel

@@ -89,10 +89,9 @@ def write_rrd(run: Run, path: str | Path) -> None:
     require_viewer(f"{path}: a recording")
     check_times(run.t)  # reports invalid times before a file is made
     content = content_of(run, timeline_of([run]))
-    layout = single(content.timeline, content.shown, content.drawn, content.curves, content.forces, content.solver)
     name = run.info.get("title") or run.info.get("name") or Path(path).stem
     application_id = application([content.shown], [*content.curves.values(), *content.forces])
-    with recording(path, name, layout, application_id) as rec:
+    with recording(path, name, content.layout(), application_id) as rec:
         content.log(rec)
 
 
@@ -123,8 +122,16 @@ class RecordedRun:
         for group in (*self.curves.values(), *self.forces, *self.solver):
             log_group(rec, "", self.timeline, self.shown, group)
         log_status(rec, "", self.timeline, self.timeline.placed(self.run))
+        self.log_card(rec)
+
+    def log_card(self, rec: rr.RecordingStream) -> None:
+        """Log the card alone."""
         note = " ".join([*left_out(self.run, self.shown), self.note]).strip()
         log_card(rec, card(self.run, note, [*self.curves.values(), *self.forces]))
+
+    def layout(self) -> rrb.Blueprint:
+        """Return the layout of this run."""
+        return single(self.timeline, self.shown, self.drawn, self.curves, self.forces, self.solver)
 
 
 def content_of(run: Run, timeline: Timeline) -> RecordedRun:
