@@ -110,7 +110,11 @@ def _in_one_view(contents: Sequence[RecordedRun]) -> list[RecordedRun]:
 
 
 def _merged(found: Sequence[Group]) -> Group:
-    """Return one group with the values of all designs, one below the other, in a range that shows them all."""
-    ranges = [group.extent for group in found if group.extent]
+    """Return one group with the values of all designs, one below the other.
+
+    Its range shows all designs, without those with gaps if others have none: at their ends rates grow without bound.
+    """
+    whole = [group for group in found if np.isfinite(group.values).all()]
+    ranges = [group.extent for group in whole or found if group.extent]
     shown = (min(low for low, _ in ranges), max(high for _, high in ranges)) if ranges else None
     return replace(found[0], values=np.vstack([group.values for group in found]), shown=shown)

@@ -16,7 +16,9 @@ from kinfmu.design.study.recordings import MOST_DESIGNS, chosen_rows, write_reco
 from kinfmu.design.study.run import run_study
 from kinfmu.errors import RequestError
 from kinfmu.log.viewer import reviewing
+from kinfmu.log.viewer.dataset import _merged
 from kinfmu.log.viewer.headless import executable
+from kinfmu.log.viewer.series import Group
 from tests.design.study.linkage import RANGES, linkage, write
 from tests.log.viewer.test_rerun_file import documents, statics, verified
 
@@ -91,3 +93,13 @@ def test_a_folder_is_reviewed_as_a_dataset(dataset: Path, tmp_path: Path, monkey
         kinfmu.log.review(tmp_path)
     with pytest.raises(RequestError, match="a folder of recordings is shown as it is"):
         kinfmu.log.review(dataset, save=tmp_path / "a.rrd")
+
+
+def test_designs_that_lock_do_not_flatten_the_scale_of_the_others() -> None:
+    groups = [
+        Group("velocity/angle", "angular velocity [deg/s]", ("a",), ((0, 0, 0),), np.array(values)[:, None])
+        for values in ([0.0, 1.0, 2.0], [0.0, 500.0, np.nan], [0.5, 1.0, 3.0])
+    ]
+    low, high = _merged(groups).shown or (0.0, 0.0)
+    assert (low, high) == pytest.approx((0.0, 3.0), abs=0.3)
+    assert (_merged(groups[1:2]).shown or (0.0, 0.0))[1] >= 500.0
