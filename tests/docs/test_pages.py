@@ -173,16 +173,16 @@ def test_playing_has_a_live_mechanism_with_the_length_of_the_page(tmp_path: Path
 
 
 @pytest.mark.long
-def test_reviewing_has_a_table_with_units(tmp_path: Path) -> None:
+def test_plots_have_a_table_with_units(tmp_path: Path) -> None:
     pytest.importorskip("pandas")
-    names = follow("reviewing-a-run.md", tmp_path).names
+    names = follow("plots.md", tmp_path).names
     assert names["table"].attrs["units"]["coupler.vx"] == "m/s"
 
 
 @pytest.mark.parametrize(
     ("page", "folder"),
-    [("docs/reviewing-a-run.md", "docs"), ("README.md", "")],
-    ids=["page", "readme"],
+    [("docs/reviewing-a-run.md", "docs"), ("docs/plots.md", "docs"), ("README.md", "")],
+    ids=["review", "plots", "readme"],
 )
 def test_pictures_are_there_of_a_size_to_load_and_made_by_the_script(page: str, folder: str) -> None:
     found = re.findall(r"!\[[^\]]+\]\(([\w./-]+)\)", (ROOT / page).read_text(encoding="utf-8"))
