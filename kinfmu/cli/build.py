@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
@@ -72,6 +73,12 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Write also <name>_OspModelDescription.xml next to the FMU: groups of variables, for libcosim.",
 )
+@click.option(
+    "--certify",
+    is_flag=True,
+    help="Put the proof of the motion, of check --certify, into the FMU, too. Default: only the record of its checks, "
+    "which verify prints.",
+)
 @outputs_option
 @click.option(
     "--parameters",
@@ -98,6 +105,7 @@ def build(
     si: bool,
     ssp: bool,
     osp: bool,
+    certify: bool,
     outputs: str | None,
     parameters: str | None,
     author: str | None,
@@ -144,6 +152,8 @@ def build(
             ssp=ssp,
             osp=osp,
             page=lambda: _page(mech, page),
+            checks=find_spec("fmpy") is not None,
+            certify=certify,
             progress=progress,
         )
     if drive == "time":
@@ -221,7 +231,8 @@ def verify(fmu: Path, results: Path | None, tolerance: float | None, columns: st
     """Check a host by the reference results in an FMU.
 
     An FMU of kinfmu holds the outputs at about 20 samples, in extra/org.kinfmu, with the step that belongs to them. An
-    FMU that torques drive has none.
+    FMU that torques drive has none. Without --results its files, description and states are checked, too, and its
+    certificate is proved again.
 
     A certificate (.json) of check --certificate, in place of an FMU, is proved again.
     """
@@ -232,6 +243,14 @@ def verify(fmu: Path, results: Path | None, tolerance: float | None, columns: st
         return
     from kinfmu.fmu import verify as verified
 
+    if results is None:
+        from kinfmu.fmu.conformance import conformance
+
+        checks = [check for check in conformance(fmu) if check.name != "results"]
+        for check in checks:
+            click.echo(f"{check.name:<12}" + check.text.replace("\n", f"\n{'':<12}"))
+        if wrong := [check for check in checks if not check.ok]:
+            raise KinfmuError(f"{fmu}: {wrong[0].name}: {wrong[0].text}")
     found = verified(fmu, results, tolerance=tolerance, columns=names_in(columns))
     click.echo(str(found))
     if not found.ok:

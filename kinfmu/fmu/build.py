@@ -40,6 +40,8 @@ def build(
     ssp: bool = False,
     osp: bool = False,
     page: bool | Callable[[], str] = False,
+    checks: bool = False,
+    certify: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Write the FMU of a mechanism and return its path.
@@ -71,6 +73,8 @@ def build(
         osp: True: write also `<name>_OspModelDescription.xml`, next to the FMU, with groups of variables for libcosim.
         page: True: put the page of `kinfmu play` into its documentation. Or a function that is
             called after the FMU is compiled and returns the page, '' for none. Default: no page.
+        checks: True: check the FMU as `kinfmu verify` does, and put the record inside. Default: no checks.
+        certify: True: the checks, and the proof of the motion of `kinfmu check --certify`. Default: no proof.
         progress: Called with (platforms done, number of platforms) during compilation.
 
     Returns:
@@ -82,7 +86,7 @@ def build(
         MechanismError: If the mechanism is not valid.
         AssemblyError: If the mechanism cannot be assembled.
         CompilerError: If no compiler is found.
-        FmuError: If the file cannot be written.
+        FmuError: If the file cannot be written, or the FMU fails a check.
 
     """
     require_mechanism(mechanism, "build")
@@ -122,7 +126,8 @@ def build(
         from kinfmu.fmu.native import archive
 
         data = archive.archive(plan, drive, VERSION, FMI_VERSIONS[fmi], platforms, progress, forces, owned, papers)
-    return _written(path, data, page() if callable(page) else _page_of(given) if page else "", osp=osp)
+    text = page() if callable(page) else _page_of(given) if page else ""
+    return _written(path, data, text, osp=osp, checks=checks, certify=certify)
 
 
 def _page_of(mechanism: Mechanism) -> str:
@@ -131,18 +136,21 @@ def _page_of(mechanism: Mechanism) -> str:
     return page(mechanism)
 
 
-def _written(path: Path, data: bytes, page: str, *, osp: bool) -> Path:
-    """Write an FMU, with its page, or the .ssp that holds it, and the description for OSP."""
+def _written(path: Path, data: bytes, page: str, *, osp: bool, checks: bool, certify: bool) -> Path:
+    """Write an FMU, with page and checks, or the .ssp that holds it, and the description for OSP."""
     if suffix_of(path) == ".ssp":
         from kinfmu.fmu.system_files import write_ssp
 
         with temporary_folder() as folder:
-            return write_ssp(_written(folder / "model.fmu", data, page, osp=False), path)
-    write(path, data)
-    if page:
-        from kinfmu.fmu.documents import add_page
+            fmu = _written(folder / "model.fmu", data, page, osp=False, checks=checks, certify=certify)
+            return write_ssp(fmu, path)
+    from kinfmu.fmu.documents import PLACE, completed
 
-        add_page(path, page)
+    write(path, completed(data, {PLACE: page.encode()} if page else {}))
+    if checks or certify:
+        from kinfmu.fmu.conformance import record
+
+        record(path, certify=certify)
     if osp:
         from kinfmu.fmu.system_files import write_osp
 
