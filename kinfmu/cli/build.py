@@ -67,7 +67,14 @@ if TYPE_CHECKING:
     help="Lengths of all variables in m, for hosts that convert no units; hosts that do show the file's unit. Angles, "
     "masses and forces are in SI units in any case.",
 )
-@click.option("--ssp", is_flag=True, help="Write an .ssp (SSP 1.0): the FMU, its connectors, a set of all parameters.")
+@click.option("--ssp", is_flag=True, help="Write an .ssp: the FMU, its connectors, a set of all parameters.")
+@click.option(
+    "--ssp-version",
+    type=click.Choice(["1", "2"]),
+    default="1",
+    show_default=True,
+    help="Version of SSP; 2 has enumerations, at which libcosim and Ecos end.",
+)
 @click.option(
     "--osp",
     is_flag=True,
@@ -104,6 +111,7 @@ def build(
     page: bool | None,
     si: bool,
     ssp: bool,
+    ssp_version: str,
     osp: bool,
     certify: bool,
     outputs: str | None,
@@ -126,7 +134,8 @@ def build(
     for option, value, plain in (("--fmi", fmi, "2"), ("--platforms", platforms, "host")):
         if flavour == "python" and value != plain:
             raise click.UsageError(f"{option} {value} needs --flavour native; the python flavour has {option} {plain}")
-    if osp and (ssp or (output is not None and suffix_of(output) == ".ssp")):
+    is_ssp = ssp or (output is not None and suffix_of(output) == ".ssp")
+    if osp and is_ssp:
         raise click.UsageError("--osp describes an FMU for the folder that it is in; an .ssp holds none")
     mech = checked_settings(gallery.load(mechanism), settings).mechanism()
     drive = drive or default_drive(mech)
@@ -149,7 +158,7 @@ def build(
             platforms=platforms,
             metadata={name: text for name, text in stated.items() if text is not None},
             si=si,
-            ssp=ssp,
+            ssp=int(ssp_version) if is_ssp else False,
             osp=osp,
             page=lambda: _page(mech, page),
             checks=find_spec("fmpy") is not None,
