@@ -146,5 +146,16 @@ def test_fmus_without_reference_results_or_record(built: Build, tmp_path: Path) 
     done = CliRunner().invoke(main, ["verify", str(torque)])
     assert done.exit_code == 1
     assert "efforts drive this FMU" in done.output
-    assert "no record of checks" in conformance(built("fourbar", "time"))[0].text
+    assert "holds no record of checks" in conformance(built("fourbar", "time"))[0].text
     assert all(check.ok for check in conformance(built("fourbar", "inputs")))
+
+
+def test_an_fmu_is_built_below_a_folder_in_which_it_cannot_be_stepped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "a%20b"
+    folder.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(folder))
+    path = kinfmu.build(kinfmu.load("crank_rocker"), tmp_path / "it.fmu", flavour="python", checks=True)
+    with zipfile.ZipFile(path) as zipped:
+        assert json.loads(zipped.read(RECORD))["checks"]["state"].startswith("not stepped: the temporary folder ")
