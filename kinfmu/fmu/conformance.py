@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from hashlib import sha256
 from pathlib import Path
+from textwrap import dedent
 from typing import NamedTuple
 
 from kinfmu.errors import FmuError, KinfmuError, listed
@@ -84,7 +85,7 @@ def record(path: Path, *, certify: bool = False) -> list[Check]:
             with temporary_folder() as place:
                 certificate.write(place / "it.json")
                 more[CERTIFICATE] = (place / "it.json").read_bytes()
-            checks.append(Check("motion", ok=True, text=str(certificate).strip()))
+            checks.append(Check("motion", ok=True, text=dedent(str(certificate)).strip()))
         files = _digests(folder) | {name: sha256(data).hexdigest() for name, data in more.items()}
     content = {
         "tool": about.generation_tool,
@@ -176,4 +177,4 @@ def _motion(path: Path, folder: Path) -> Check:
     own = toml_file.parse(text_in(path, folder, MECHANISM), f"{path}: {MECHANISM}")
     if certificate.mechanism is None or toml_text.text(certificate.mechanism) != toml_text.text(own):
         return Check("motion", ok=False, text=f"{CERTIFICATE} is of another mechanism")
-    return Check("motion", ok=True, text=f"proved again: {str(certificate).strip()}")
+    return Check("motion", ok=True, text=dedent(str(certificate)).strip())
