@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from kinfmu.analysis import Report
-from kinfmu.analysis.text import findings, measured_text, title
+from kinfmu.analysis.summary import measured_text
 from kinfmu.arrays import FloatArray
 from kinfmu.design.fit import FitResult
 from kinfmu.design.fit.picture import content_of
@@ -39,6 +39,11 @@ from kinfmu.run.verdict import notable_events, sentence
 
 _LARGEST = 300  # coordinates; mobility and plan of larger mechanisms take seconds
 _KEPT = 8  # drawings
+
+
+def title(mechanism: Mechanism) -> str:
+    """Return the name and the title of a mechanism."""
+    return f"{mechanism.name}: {mechanism.title}" if mechanism.title else mechanism.name
 
 
 @html_of.register
@@ -144,8 +149,8 @@ def _ends(values: FloatArray) -> tuple[object, object]:
 
 @html_of.register
 def report_html(report: Report) -> str:
-    """Return the findings as a table of subjects and texts."""
-    return page(title(report.mechanism), table(findings(report)))
+    """Return the verdicts and tables of a report."""
+    return page(title(report.mechanism), report.summary().html())
 
 
 @html_of.register

@@ -1,0 +1,169 @@
+"""A report as a document: figure, verdicts, tables and plots on pages of a PDF; its pictures as SVG for a page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kinfmu.display import COLOURS, Styled, Summary
+from kinfmu.draw.chart import HEIGHT, MOST_CURVES, WIDTH, curves, degree_ticks, dress, numbers, raised
+from kinfmu.draw.drawing import figure, sheet_of
+from kinfmu.draw.instant import instant
+from kinfmu.draw.plots import usual_coordinates
+from kinfmu.draw.sheet import GREY, INCH, INK, ink
+from kinfmu.draw.writing import svg_text, write_pdf
+from kinfmu.errors import KinfmuError
+from kinfmu.mechanism import Mechanism
+from kinfmu.run import Run
+from kinfmu.units import degrees_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_WIDTH, _HEIGHT = 595.0, 842.0  # [pt], A4
+_EDGE = 42.0  # [pt]
+_LETTERS, _LINE = 8.0, 10.5  # [pt]; size of letters, distance of lines
+_LETTER = 0.6021 * _LETTERS  # [pt], width of a letter of DejaVu Sans Mono
+_COLUMNS = int((_WIDTH - 2.0 * _EDGE) / _LETTER)
+_DRAWING = 255.0  # [pt], height of the figure with its scale
+_PANEL = 150.0  # [pt], height of a plot with its scale and names
+_ABREAST = 2
+_STILL = 1e-9  # of the size; a column that changes less is left out
+
+
+def document(path: Path, summary: Summary, mechanism: Mechanism, run: Run | None) -> None:
+    """Write a report with the figure of its mechanism and plots of a run as a PDF; equal reports give equal bytes.
+
+    FigureError if the file cannot be written, MissingPackageError without matplotlib.
+    """
+    write_pdf(path, lambda: _pages(summary, mechanism, run))
+
+
+def drawing_svg(mechanism: Mechanism) -> str:
+    """Return the figure of a mechanism as SVG, without its title; of one that does not close with its gap."""
+
+    def draw() -> Figure:
+        sheet = sheet_of(instant(mechanism, with_gap=True))
+        sheet.axes.set_title("", loc="left")
+        return sheet.figure
+
+    return svg_text("the figure", draw)
+
+
+def plots_svg(run: Run) -> list[str]:
+    """Return the plots of a run as SVG."""
+    return [svg_text("the plots", partial(_plot, run, names)) for names in _groups(run)]
+
+
+def _pages(summary: Summary, mechanism: Mechanism, run: Run | None) -> list[Figure]:
+    pages = _Pages()
+    head, *paragraphs = _paragraphs(summary)
+    pages.text(head)
+    axes = pages.axes(_DRAWING, 0, 1)
+    try:
+        figure(mechanism, ax=axes)
+        axes.set_title("", loc="left")
+    except KinfmuError as reason:
+        axes.set_axis_off()
+        axes.text(0.5, 0.5, str(reason), ha="center", wrap=True, fontsize=_LETTERS, color=ink(GREY), parse_math=False)
+    for paragraph in paragraphs:
+        pages.text(paragraph)
+    if run is not None:
+        for number, names in enumerate(_groups(run)):
+            _panel(pages.axes(_PANEL, number % _ABREAST, _ABREAST), run, names)
+    return pages.made
+
+
+class _Pages:
+    """Pages that are filled from the top."""
+
+    def __init__(self) -> None:
+        self.made: list[Figure] = []
+        self._y = 0.0  # [pt], height of what is free on the last page
+
+    def _space(self, height: float) -> None:
+        """Begin a page if less than `height` is free on the last one."""
+        from matplotlib.figure import Figure
+
+        if not self.made or height > self._y - _EDGE:
+            self.made.append(Figure(figsize=(_WIDTH / INCH, _HEIGHT / INCH), dpi=INCH, facecolor="white"))
+            self._y = _HEIGHT - _EDGE
+
+    def text(self, lines: Sequence[Sequence[Styled]]) -> None:
+        """Write lines below what is there, on one page if they fit on one."""
+        self._space(min(len(lines) * _LINE, _HEIGHT - 2.0 * _EDGE))
+        look: dict[str, Any] = {"fontsize": _LETTERS, "family": "DejaVu Sans Mono", "va": "top", "parse_math": False}
+        for line in lines:
+            self._space(_LINE)
+            x = _EDGE
+            for style, text in line:
+                colour = COLOURS.get(style, ink(GREY if style == "faint" else INK))
+                weight = "bold" if style in (*COLOURS, "title") else "normal"
+                at = (x + (len(text) - len(text.lstrip())) * _LETTER) / _WIDTH, self._y / _HEIGHT
+                self.made[-1].text(*at, text.strip(), color=colour, weight=weight, **look)
+                x += len(text) * _LETTER
+            self._y -= _LINE
+        self._y -= 0.6 * _LINE
+
+    def axes(self, height: float, column: int, columns: int) -> Axes:
+        """Return axes for a picture in one of several columns, the first of which begins a row."""
+        if column == 0:
+            self._space(height)
+            self._y -= height
+        width = (_WIDTH - 2.0 * _EDGE) / columns
+        left, right, bottom, top = 48.0, 10.0, 34.0, 24.0  # [pt] around the axes
+        corner = (_EDGE + column * width + left) / _WIDTH, (self._y + bottom) / _HEIGHT
+        size = (width - left - right) / _WIDTH, (height - bottom - top) / _HEIGHT
+        return self.made[-1].add_axes((*corner, *size))
+
+
+def _paragraphs(summary: Summary) -> list[list[list[Styled]]]:
+    """Return the lines of a report between empty lines."""
+    return [list(lines) for is_text, lines in groupby(summary.lines(_COLUMNS), bool) if is_text]
+
+
+def _groups(run: Run) -> list[list[str]]:
+    """Return the columns to plot, those of a unit together: outputs that move, and efforts of drivers."""
+    units = run.column_units()
+    drivers = {name.driver for name in run.input_names}
+    efforts = [name for name in run.force_names if name.owner in drivers and name.noun in ("torque", "force")]
+    names = [str(name) for name in (*usual_coordinates(run), *efforts) if _moves(run, name)]
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        groups.setdefault(units[name], []).append(name)
+    return [group[:MOST_CURVES] for group in groups.values()]
+
+
+def _moves(run: Run, name: str) -> bool:
+    """Return True for a column that changes, and not only as the only driver does."""
+    values = np.asarray(run[name], dtype=float)[run.good]
+    least = _STILL * float(np.abs(values).max(initial=0.0))
+    driven = run.inputs[run.good, 0] if len(run.input_names) == 3 else np.zeros(len(values))
+    return all(float(np.ptp(one)) > least for one in (values, values - driven, values + driven) if len(one))
+
+
+def _plot(run: Run, names: Sequence[str]) -> Figure:
+    from matplotlib.figure import Figure
+
+    made = Figure(figsize=(WIDTH, HEIGHT), layout="constrained", facecolor="white")
+    _panel(made.add_subplot(), run, names)
+    return made
+
+
+def _panel(axes: Axes, run: Run, names: Sequence[str]) -> None:
+    """Draw columns of one unit over the driver, or over time where several drivers move."""
+    x = str(run.input_names[0]) if len(run.input_names) == 3 else ""
+    curves(axes, run, names, x, degrees=True)
+    dress(axes, "")
+    degree_ticks(axes, 6)
+    unit = numbers(axes, raised(degrees_of(run.column_units()[names[0]])[0]))
+    axes.set_ylabel(f"[{unit}]", fontsize=_LETTERS, color=ink(GREY))
+    axes.set_xlabel(axes.get_xlabel(), fontsize=_LETTERS, color=ink(GREY))
+    look: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.0, "frameon": False}
+    axes.legend(fontsize=7.0, ncols=2, handlelength=1.2, **look)
