@@ -211,7 +211,9 @@ class Summary(NamedTuple):
             yield from ([Styled("", " " * indent + line)] for line in (*others, *(f"  {line}" for line in below)))
         for table in self.tables:
             yield []
-            yield from ([Styled("", " " * indent), *line] for line in _table_lines(table, width - indent))
+            lines = [*_table_lines(table, width - indent)]
+            left = min(indent, max(width - max(sum(len(part.text) for part in line) for line in lines), 2))
+            yield from ([Styled("", " " * left), *line] for line in lines)
 
     def html(self) -> str:
         """Return verdicts and tables as HTML."""
@@ -261,7 +263,7 @@ def _table_lines(table: Table, width: int) -> Iterator[list[Styled]]:
                 style = "faint" if number == 0 else "poor" if isinstance(cell, Poor) else ""
                 text = text.ljust(width) if k < table.left else text.rjust(width)
                 shown += [Styled("", " " * _GAP * (k > 0)), Styled(style, text)]
-            yield shown
+            yield [*shown[:-1], Styled(style, text.rstrip())]
 
 
 def _html_table(table: Table) -> str:

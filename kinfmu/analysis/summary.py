@@ -142,9 +142,8 @@ class _Summary:
     def _count(self) -> Iterator[Verdict]:
         """Yield what is counted, and what is redundant."""
         report, mechanism = self._report, self._report.mechanism
-        parts = [f"{len(mechanism.moving_bodies)} moving bodies", f"{len(mechanism.joints)} joints"]
-        parts = [part.removesuffix("s") if part.startswith("1 ") else part for part in parts]
-        parts[0] = parts[0].replace("1 moving bodie", "1 moving body")
+        bodies, joints = len(mechanism.moving_bodies), len(mechanism.joints)
+        parts = [f"{bodies} moving {'body' if bodies == 1 else 'bodies'}", f"{joints} joint{'s' * (joints != 1)}"]
         invalid = [f"without {name}" for name in report.left_out if name.startswith("[drivers")]
         parts.append(f"mobility {report.mobility}" if report.mobility >= 0 else "the joints do not close")
         if report.gruebler != report.mobility >= 0:
@@ -226,8 +225,8 @@ class _Summary:
             yield Verdict("poor", f"No forces, because {loading.reason}")
         elif loading.missing:
             yield Verdict("poor", f"{loading.missing} samples have no forces")
-        yield from (Verdict("note", _left_table_text(one)) for one in loading.left_tables)
-        yield from (Verdict("poor", _lift_off_text(one)) for one in loading.lift_offs)
+        yield from (Verdict("note", self._left_table(one)) for one in loading.left_tables)
+        yield from (Verdict("poor", self._lift_off(one)) for one in loading.lift_offs)
         yield from (Verdict("note", contact_text(one)) for one in loading.unknown_contacts)
         redundant = {row.row.name: row.row.owner for row in self._report.redundant}
         for names, rows in loading.undetermined:
@@ -235,6 +234,31 @@ class _Summary:
             joints = {redundant[row] for row in others}
             shared = [name for name in names if name.partition(".")[0] not in joints]
             yield Verdict("note", f"Statically indeterminate: {some(shared)} share the load with {some(others)}")
+
+    def _left_table(self, one: LeftTable) -> str:
+        """Return what a load does beyond its table."""
+
+        def extent(ends: tuple[float, float]) -> str:
+            return f"from {self._value(ends[0], one.unit)} to {self._value(ends[1], one.unit)}"
+
+        (first, last), (low, high) = one.table, one.reached
+        kept = [f"{self._value(one.kept[0], one.effort_unit)} before it"] if low < first else []
+        kept += [f"{self._value(one.kept[1], one.effort_unit)} after it"] if high > last else []
+        both = f"its table goes {extent(one.table)}, the motion {extent(one.reached)}"
+        return f"{one.load}: {both}; it keeps {' and '.join(kept)}"
+
+    def _lift_off(self, lift: LiftOff) -> str:
+        """Return where a follower lifts off, and the tension that would hold it."""
+        at = partial(self._value, unit=lift.at_unit)
+        parts = listed([f"{at(begin)} to {at(end)}" for begin, end in lift.parts])
+        extents = {"turn": f"at every angle of {lift.driver}", "motion": "in the whole motion"}
+        where = extents.get(lift.extent, f"from {parts} of {lift.driver}")
+        sign = "negative" if lift.sense > 0 else "positive"
+        kind, pull = ("moment", "moment that pulls") if lift.force.endswith("moment") else ("force", "tension")
+        return (
+            f"{lift.joint}: the follower lifts off: contact {kind} {lift.force} {sign} {where}; "
+            f"largest {pull} {self._value(lift.largest, lift.unit)} ({lift.driver} at {at(lift.at)})"
+        )
 
     def _notes(self) -> Iterator[Verdict]:
         """Yield notes that no other verdict states, and surplus drivers that the problem does not name."""
@@ -474,37 +498,10 @@ def _in_line(angle: TransmissionRange) -> str:
     return f"{angle.coupler} is perpendicular to the slide" if angle.is_slide else both
 
 
-def _left_table_text(one: LeftTable) -> str:
-    """Return what a load does beyond its table."""
-
-    def extent(ends: tuple[float, float]) -> str:
-        return f"from {place_text(ends[0], one.unit)} to {place_text(ends[1], one.unit)}"
-
-    (first, last), (low, high) = one.table, one.reached
-    kept = [f"{one.kept[0]:.6g} {one.effort_unit} before it"] if low < first else []
-    kept += [f"{one.kept[1]:.6g} {one.effort_unit} after it"] if high > last else []
-    both = f"its table goes {extent(one.table)}, the motion {extent(one.reached)}"
-    return f"{one.load}: {both}; it keeps {' and '.join(kept)}"
-
-
 def contact_text(contact: UnknownContact) -> str:
     """Return why the contact force of a cam is unknown, and which reactions have no value for this reason."""
     loaded = some(contact.reactions)
     return f"{contact.joint}: contact force unknown, {contact.reason}; without a value: {loaded}"
-
-
-def _lift_off_text(lift: LiftOff) -> str:
-    """Return where a follower lifts off, and the tension that would hold it."""
-    at = partial(place_text, unit=lift.at_unit)
-    parts = listed([f"{at(begin)} to {at(end)}" for begin, end in lift.parts])
-    extents = {"turn": f"at every angle of {lift.driver}", "motion": "in the whole motion"}
-    where = extents.get(lift.extent, f"from {parts} of {lift.driver}")
-    sign = "negative" if lift.sense > 0 else "positive"
-    kind, pull = ("moment", "moment that pulls") if lift.force.endswith("moment") else ("force", "tension")
-    return (
-        f"{lift.joint}: the follower lifts off: contact {kind} {lift.force} {sign} {where}; "
-        f"largest {pull} {lift.largest:.6g} {lift.unit} ({lift.driver} at {at(lift.at)})"
-    )
 
 
 def measured_text(value: MeasuredValue) -> str:

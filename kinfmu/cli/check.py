@@ -112,7 +112,7 @@ def check(
 
             figure(mech, picture, value)
             if not as_json:
-                click.echo(f"  figure      {picture}")
+                click.echo(f"{picture}: written")
         if report.problem is not None:
             raise report.problem if as_json else _shown(report.problem)
     if sys.stdout.isatty() and not (detail or as_json):

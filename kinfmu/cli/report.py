@@ -90,7 +90,10 @@ def _page(found: Report, run: Run | None) -> str:
     from kinfmu.notebook import picture, title
 
     name = title(found.mechanism)
-    parts = [picture(lambda: drawing_svg(found.mechanism), f"Drawing of {name}"), found.summary().html()]
+    parts = [picture(lambda: drawing_svg(found.mechanism), f"Drawing of {name}")]
+    if found.problem is not None and escaped(found.problem) in parts[0]:
+        parts.clear()  # the verdicts state it
+    parts.append(found.summary().html())
     with suppress(KinfmuError):  # the drawing states that matplotlib is missing
         parts += ["".join(picture(partial(str, svg), f"Plot of {name}") for svg in plots_svg(run))] if run else []
     head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{escaped(name)}</title>'

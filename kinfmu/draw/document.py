@@ -69,9 +69,8 @@ def _pages(summary: Summary, mechanism: Mechanism, run: Run | None) -> list[Figu
     try:
         figure(mechanism, ax=axes)
         axes.set_title("", loc="left")
-    except KinfmuError as reason:
-        axes.set_axis_off()
-        axes.text(0.5, 0.5, str(reason), ha="center", wrap=True, fontsize=_LETTERS, color=ink(GREY), parse_math=False)
+    except KinfmuError:  # the problem that the verdicts state
+        pages.remove(axes, _DRAWING)
     for paragraph in paragraphs:
         pages.text(paragraph)
     if run is not None:
@@ -121,6 +120,11 @@ class _Pages:
         corner = (_EDGE + column * width + left) / _WIDTH, (self._y + bottom) / _HEIGHT
         size = (width - left - right) / _WIDTH, (height - bottom - top) / _HEIGHT
         return self.made[-1].add_axes((*corner, *size))
+
+    def remove(self, axes: Axes, height: float) -> None:
+        """Take back the last row, of a height, which has only these axes."""
+        axes.remove()
+        self._y += height
 
 
 def _paragraphs(summary: Summary) -> list[list[list[Styled]]]:
