@@ -229,7 +229,7 @@ class Summary(NamedTuple):
 
 def terminal(part: Styled) -> str:
     """Return a part of a line with its colour, for a terminal."""
-    return f"\x1b[{_CODES[part.style]}m{part.text}\x1b[0m" if part.style else part.text
+    return f"\x1b[{_CODES[part.style]}m{part.text}\x1b[0m" if part.style and part.text.strip() else part.text
 
 
 def _wrapped(text: str, width: int, indent: str = "") -> list[str]:

@@ -275,9 +275,7 @@ class _Summary:
         if self._report.problem is not None:
             yield Verdict("problem", str(self._report.problem))
         for one in self._report.advice:
-            yield Verdict(
-                "advice", one.text, (f"leads to: {one.leads_to}", *(f"  {line}" for line in one.toml_lines()))
-            )
+            yield Verdict("advice", f"{one.text}; leads to: {one.leads_to}", tuple(one.toml_lines()))
 
     # -------------------------------------------------------------------------------------------------------- tables
 

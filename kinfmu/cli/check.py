@@ -116,7 +116,7 @@ def check(
         if report.problem is not None:
             raise report.problem if as_json else _shown(report.problem)
     if sys.stdout.isatty() and not (detail or as_json):
-        click.echo(f"\nkinfmu play {quote(mechanism)} moves it; --detail adds coordinates, solving order, all digits")
+        click.echo(f"\nkinfmu play {quote(mechanism)} moves it; --detail shows how it is solved")
 
 
 def _print_part(path: str, problem: MechanismError, *, detail: bool, as_json: bool) -> None:
