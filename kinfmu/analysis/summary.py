@@ -154,15 +154,14 @@ class _Summary:
             driven = [f"driven by {some(driver.name for driver in mechanism.drivers)}"] if mechanism.drivers else []
             parts += [*driven, *invalid] or ["no driver"]
         yield Verdict("note" if report.problem else "ok", ", ".join(parts))
-        joints: dict[str, tuple[str, ...]] = {}
+        implied_by: dict[str, dict[str, None]] = {}
         for row in report.redundant:
-            joints[row.row.owner] = tuple(dict.fromkeys((*joints.get(row.row.owner, ()), *row.implied_by_joints)))
-        for name, others in list(joints.items())[:_MOST]:
-            yield Verdict(
-                "note", f"{name} is redundant: it follows from {listed(others)}; set aside, residual monitored"
-            )
-        if len(joints) > _MOST:
-            yield Verdict("note", f"{len(joints) - _MOST} more joints are redundant")
+            implied_by.setdefault(row.row.owner, {}).update(dict.fromkeys(row.implied_by_joints))
+        for name, others in list(implied_by.items())[:_MOST]:
+            text = f"{name} is redundant: it follows from {listed(others)}; set aside, residual monitored"
+            yield Verdict("note", text)
+        if len(implied_by) > _MOST:
+            yield Verdict("note", f"{len(implied_by) - _MOST} more joints are redundant")
 
     def _singular(self) -> Iterator[Verdict]:
         """Yield where branches cross."""

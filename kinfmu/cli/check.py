@@ -100,9 +100,9 @@ def check(
     else:
         _print(report, detail=detail)
         if certificate is not None:
-            click.echo(str(certificate))
+            click.echo(f"\n{certificate}")
         if assemblies and (found := _assemblies(report)) is not None:
-            click.echo(str(found))
+            click.echo(f"\n{found}")
         if matrices and (report.problem is None or report.has_cut_cam):
             for matrix in report.matrices():
                 click.echo(f"\n{matrix}")

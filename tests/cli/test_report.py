@@ -63,15 +63,3 @@ def test_a_problem_is_in_the_report_and_ends_the_command(
 def test_numbers_that_are_set_are_those_of_the_report(command: Command) -> None:
     command("report", "jansen_leg", "--set", "m=14", "-o", "report.html")
     assert ", 14, " in Path("report.html").read_text("utf-8")
-
-
-@pytest.mark.parametrize(
-    ("output", "message"),
-    [
-        (["-o", "report.txt"], "report.txt: its name must end in one of .html, .pdf"),
-        (["-o", "report"], "report: its name must end in one of .html, .pdf"),
-        ([], "Missing option '-o' / '--output'"),
-    ],
-)
-def test_the_name_of_the_sheet_is_checked_first(output: list[str], message: str, refuses: Callable[..., str]) -> None:
-    assert message in refuses("report", "jansen_leg", *output)
