@@ -31,8 +31,8 @@ _EDGE = 42.0  # [pt]
 _LETTERS, _LINE = 8.0, 10.5  # [pt]; size of letters, distance of lines
 _LETTER = 0.6021 * _LETTERS  # [pt], width of a letter of DejaVu Sans Mono
 _COLUMNS = int((_WIDTH - 2.0 * _EDGE) / _LETTER)
-_DRAWING = 255.0  # [pt], height of the figure with its scale
-_PANEL = 150.0  # [pt], height of a plot with its scale and names
+_DRAWING = 225.0  # [pt], height of the figure with its scale
+_PANEL = 132.0  # [pt], height of a plot with its scale and names
 _ABREAST = 2
 _STILL = 1e-9  # of the size; a column that changes less is left out
 
@@ -133,23 +133,28 @@ def _paragraphs(summary: Summary) -> list[list[list[Styled]]]:
 
 
 def _groups(run: Run) -> list[list[str]]:
-    """Return the columns to plot, those of a unit together: outputs that move, and efforts of drivers."""
+    """Return the columns to plot, those of a unit together: outputs and efforts of drivers.
+
+    Columns that stand still, or change as the only driver does, are left out.
+    """
     units = run.column_units()
     drivers = {name.driver for name in run.input_names}
     efforts = [name for name in run.force_names if name.owner in drivers and name.noun in ("torque", "force")]
-    names = [str(name) for name in (*usual_coordinates(run), *efforts) if _moves(run, name)]
+    driven = run.inputs[run.good, 0] if len(run.input_names) == 3 else 0.0
     groups: dict[str, list[str]] = {}
-    for name in names:
+    for name in map(str, (*usual_coordinates(run), *efforts)):
         groups.setdefault(units[name], []).append(name)
-    return [group[:MOST_CURVES] for group in groups.values()]
-
-
-def _moves(run: Run, name: str) -> bool:
-    """Return True for a column that changes, and not only as the only driver does."""
-    values = np.asarray(run[name], dtype=float)[run.good]
-    least = _STILL * float(np.abs(values).max(initial=0.0))
-    driven = run.inputs[run.good, 0] if len(run.input_names) == 3 else np.zeros(len(values))
-    return all(float(np.ptp(one)) > least for one in (values, values - driven, values + driven) if len(one))
+    found = []
+    for unit, names in groups.items():
+        values = {name: np.asarray(run[name], dtype=float)[run.good] for name in names}
+        least = _STILL * max(float(unit == "rad"), *(float(np.abs(one).max(initial=0.0)) for one in values.values()))
+        moving = [
+            name
+            for name, one in values.items()
+            if all(np.ptp(relative) > least for relative in (one, one - driven, one + driven))
+        ]
+        found.append(moving[:MOST_CURVES])
+    return [names for names in found if names]
 
 
 def _plot(run: Run, names: Sequence[str]) -> Figure:
