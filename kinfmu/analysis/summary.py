@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 
 from kinfmu.analysis.cams import CamFindings
-from kinfmu.analysis.driver_path import degrees, place_text, value_text
+from kinfmu.analysis.driver_path import degrees
 from kinfmu.analysis.findings import Findings
 from kinfmu.analysis.loading import ForceRange, LeftTable, LiftOff, UnknownContact
 from kinfmu.analysis.loops import FourBar
@@ -18,7 +18,6 @@ from kinfmu.errors import listed, some
 from kinfmu.mechanism.measures import counted_from
 from kinfmu.motion import MeasuredValue
 from kinfmu.motion.cams import CamExtreme
-from kinfmu.units import degrees_of
 
 _MOST = 8  # rows of a table and lines of a kind; JSON has all
 _DIGITS, _ALL_DIGITS = 4, 9
@@ -68,13 +67,10 @@ class _Summary:
     # ------------------------------------------------------------------------------------------------------- numbers
 
     def _number(self, value: float) -> str:
-        return f"{float(f'{value:.{self._digits}g}') + 0.0:.10g}"
+        return _rounded(value, self._digits)
 
     def _value(self, value: float, unit: str) -> str:
-        """Return a value with its unit; angles in degrees."""
-        shown, factor = degrees_of(unit) if unit == "rad" else (unit, 1.0)
-        rounded = round(value * factor, self._digits) if unit == "rad" else value
-        return f"{self._number(rounded)} {shown}".removesuffix(" 1")
+        return value_with_unit(value, unit, self._digits)
 
     def _length(self, value: float) -> str:
         return self._number(round(value, 9))
@@ -399,12 +395,10 @@ class _Summary:
         measured = self._report.measured
         if measured is None:
             return
-        rows = []
-        for value in measured.values:
-            if not value.reason:
-                places = " and ".join(self._value(u, value.at_unit) for u in value.at)
-                rows.append((value.name, self._value(value.value, value.unit) + counted_from(value.type), places))
-        rows += [(value.name, "none", "") for value in measured.values if value.reason]
+        rows = [
+            (value.name, "none", "") if value.reason else (value.name, *measure_cells(value, self._digits))
+            for value in measured.values
+        ]
         driver = next((value.driver for value in measured.values if value.at), "")
         columns = ("measure", "value", f"at {driver}" if driver else "")
         yield Table(columns, tuple(rows), caption=f"Over {measured.over}{self._without_loads()}")
@@ -489,6 +483,23 @@ class _Summary:
             yield "gravity", f"({', '.join(map(self._number, report.loading.gravity))}) m/s2"
 
 
+def _rounded(value: float, digits: int) -> str:
+    return f"{float(f'{value:.{digits}g}') + 0.0:.10g}"
+
+
+def value_with_unit(value: float, unit: str, digits: int) -> str:
+    """Return a value with its unit; an angle in degrees."""
+    if unit == "rad":
+        value, unit = round(math.degrees(value), digits), "deg"
+    return f"{_rounded(value, digits)} {unit}".removesuffix(" 1")
+
+
+def measure_cells(value: MeasuredValue, digits: int) -> tuple[str, str]:
+    """Return the value of a measure with its unit, and the driver values where it occurs."""
+    places = " and ".join(value_with_unit(u, value.at_unit, digits) for u in value.at)
+    return value_with_unit(value.value, value.unit, digits) + counted_from(value.type), places
+
+
 def _in_line(angle: TransmissionRange) -> str:
     """Return the position of the links at a transmission angle of 0 or 180 degrees."""
     both = f"{angle.coupler} and {angle.output} fall in line"
@@ -499,11 +510,3 @@ def contact_text(contact: UnknownContact) -> str:
     """Return why the contact force of a cam is unknown, and which reactions have no value for this reason."""
     loaded = some(contact.reactions)
     return f"{contact.joint}: contact force unknown, {contact.reason}; without a value: {loaded}"
-
-
-def measured_text(value: MeasuredValue) -> str:
-    """Return a value with its unit and the driver values where it occurs."""
-    number = value_text(value.value, value.unit, "angle" if value.unit == "rad" else "length")
-    at = [place_text(u, value.at_unit) for u in value.at]
-    places = f" ({value.driver} at {' and '.join(at)})" if at else ""
-    return f"{number.removesuffix(' 1')}{counted_from(value.type)}{places}"
