@@ -179,7 +179,7 @@ class Styled(NamedTuple):
     text: str
 
 
-COLOURS = {"ok": "#1f883d", "note": "#0969da", "advice": "#0969da", "poor": "#cf222e", "problem": "#cf222e"}
+COLOURS = {"ok": "#1a7f37", "note": "#0969da", "advice": "#0969da", "poor": "#cf222e", "problem": "#cf222e"}
 _CODES = {"ok": "32", "note": "36", "advice": "36", "poor": "31", "problem": "1;31", "title": "1", "faint": "90"}
 _GAP = 2  # letters between columns
 _INSIDE = re.compile(r" (?== )|(?<= =) |(?<=\d) (?=[A-Za-z])")  # blanks at which no line ends

@@ -375,7 +375,7 @@ class _Summary:
                     (name, self._value(one.value, unit), self._value(cam.at(one.at), "rad"))
                     for name, unit, one in self._of_cam(cam)
                 ]
-                yield Table(("", "value", f"at {cam.driver}"), tuple(rows), caption=caption)
+                yield Table(("extreme", "value", f"at {cam.driver}"), tuple(rows), caption=caption)
 
     def _of_cam(self, cam: CamFindings) -> Iterator[tuple[str, str, CamExtreme]]:
         """Yield the name, the unit and the place of each extreme of a cam."""

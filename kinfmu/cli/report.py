@@ -31,7 +31,7 @@ h1 { font-size: 1.5em; }
 @media (max-width: 30em) { body { font-size: 13px; } th, td { padding-right: 0.7em; } }
 div { overflow-x: auto; }
 div:last-child p { display: inline-block; margin: 0; }
-@media (prefers-color-scheme: dark) {
+@media screen and (prefers-color-scheme: dark) {
   body { color: #d1d7e0; background: #151b23; }
   img { filter: invert(1) hue-rotate(180deg); mix-blend-mode: screen; }
   .ok { color: #3fb950 !important; }
@@ -100,5 +100,5 @@ def _page(found: Report, run: Run | None) -> str:
     body = "\n".join(f"<div>{part}</div>" for part in parts)
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>{head}\n<style>{_STYLE}</style></head>\n'
-        f"<body>\n<h1>{escaped(name)}</h1>\n{body}\n</body>\n</html>\n"
+        f"<body>\n<main>\n<h1>{escaped(name)}</h1>\n{body}\n</main>\n</body>\n</html>\n"
     )

@@ -104,8 +104,9 @@ class _Pages:
             for style, text in line:
                 colour = COLOURS.get(style, ink(GREY if style == "faint" else INK))
                 weight = "bold" if style in (*COLOURS, "title") else "normal"
-                at = (x + (len(text) - len(text.lstrip())) * _LETTER) / _WIDTH, self._y / _HEIGHT
-                self.made[-1].text(*at, text.strip(), color=colour, weight=weight, **look)
+                if shown := text.strip():
+                    at = (x + text.index(shown) * _LETTER) / _WIDTH, self._y / _HEIGHT
+                    self.made[-1].text(*at, shown, color=colour, weight=weight, **look)
                 x += len(text) * _LETTER
             self._y -= _LINE
         self._y -= 0.6 * _LINE
