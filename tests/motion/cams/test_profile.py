@@ -341,10 +341,11 @@ def test_pages_hold_flat_faces_and_cams_that_cannot_be_made(made: Any) -> None:
     assert "line" not in kinds.get("rod", {})
 
 
-def test_check_reports_a_steep_cam_as_a_note() -> None:
-    steep = followers.lifted_roller(8.0, followers.rise_and_return(30.0), offset=25.0)
-    notes = [note for note in kinfmu.check(steep).notes if "pressure angle" in note]
+def test_check_reports_a_steep_cam_as_a_note_and_its_text_once_as_poor() -> None:
+    report = kinfmu.check(followers.lifted_roller(8.0, followers.rise_and_return(30.0), offset=25.0))
+    notes = [note for note in report.notes if "pressure angle" in note]
     assert len(notes) == 1
+    assert unwrapped(report).count(notes[0]) == unwrapped(report).count(f" poor {notes[0]}\n") == 1
     assert "above 30 deg, the usual limit of translating followers" in notes[0]
     assert not [note for note in kinfmu.check(followers.lifted_roller(8.0)).notes if "pressure angle" in note]
 
