@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kinfmu.display import COLOURS, Styled, Summary
-from kinfmu.draw.chart import HEIGHT, MOST_CURVES, WIDTH, curves, degree_ticks, dress, numbers, raised
+from kinfmu.draw.chart import HEIGHT, MOST_CURVES, WIDTH, curves, dress, numbers, raised, round_ticks
 from kinfmu.draw.drawing import figure, sheet_of
 from kinfmu.draw.instant import instant
 from kinfmu.draw.plots import usual_coordinates
@@ -171,8 +171,10 @@ def _panel(axes: Axes, run: Run, names: Sequence[str]) -> None:
     x = str(run.input_names[0]) if len(run.input_names) == 3 else ""
     curves(axes, run, names, x, degrees=True)
     dress(axes, "")
-    degree_ticks(axes, 6)
-    unit = numbers(axes, raised(degrees_of(run.column_units()[names[0]])[0]))
+    shown, _ = degrees_of(run.column_units()[names[0]])
+    round_ticks(axes.xaxis, 6, "deg" if axes.get_xlabel().endswith("[deg]") else "")
+    round_ticks(axes.yaxis, 4, shown)
+    unit = numbers(axes, raised(shown))
     axes.set_ylabel(f"[{unit}]", fontsize=_LETTERS, color=ink(GREY))
     axes.set_xlabel(axes.get_xlabel(), fontsize=_LETTERS, color=ink(GREY))
     look: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.0, "frameon": False}
