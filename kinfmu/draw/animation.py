@@ -15,13 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.drawing import draw, extent, placed, shortest
+from kinfmu.draw.drawing import draw, extent, placed
 from kinfmu.draw.marks import gravity_in_margin, paths, pins
 from kinfmu.draw.scene import palette
 from kinfmu.draw.scene.instant import Instant
 from kinfmu.draw.scene.placing import poses_of, remedy, world
 from kinfmu.draw.scene.shapes import shapes
-from kinfmu.draw.sheet import GREY, PAPER, Sheet, ink
+from kinfmu.draw.scene.strokes import fineness
+from kinfmu.draw.sheet import GREY, Sheet, ink
 from kinfmu.draw.writing import check_suffix, figure_style, write_bytes
 from kinfmu.errors import FigureError, MechanismError, MissingPackageError, listed
 from kinfmu.files import suffix_of, temporary_folder
@@ -48,7 +49,6 @@ _TRAIL = 0.12  # of the pictures, length of a trail
 _FARTHEST = 0.5 * math.pi  # [rad], largest rotation of a body from picture to picture
 _LARGEST = 1e100  # largest position to draw: squares of larger ones are infinite
 _WIDTHS = (1.3, 1.9, 2.6, 3.3)  # [pt] of a trail, along it
-_LOST: palette.Colour = (185, 28, 28)
 
 
 class _Size(NamedTuple):
@@ -107,7 +107,7 @@ def animate(run: Run, path: str | Path, *, width: int | None = None) -> None:
     film = _film(run, poses, path)
     with figure_style(path):
         images = list(_images(run, mechanism, poses, film, _Size(width, path)))
-    own = [*PAPER, *_LOST, *(palette.LOAD if mechanism.loads else ())]
+    own = [*palette.WHITE, *palette.DRIVER, *(palette.LOAD if mechanism.loads else ())]
     write_bytes(path, mp4(images, film.seconds, path) if is_video else _gif(images, film, own))
 
 
@@ -184,10 +184,10 @@ def _images(run: Run, mechanism: Mechanism, poses: dict[str, FloatArray], film: 
         scenes.append((placed(shown, found), pins(shown)))
     extents = [part for drawn, places in scenes for part in (extent(drawn), *(mark.extent() for mark in places))]
     reach = np.vstack([*extents, *(track.extent() for track in tracks)])
-    thinnest = shortest(scenes[0][0], float(np.ptp(reach, axis=0).max()))
+    fine = fineness(scenes[0][0], float(np.ptp(reach, axis=0).max()))
     back = max(round(_TRAIL * len(film.rows)), 1)
     for k, (row, (drawn, places)) in enumerate(zip(film.rows, scenes, strict=True)):
-        sheet = Sheet(reach, thinnest, None, mechanism.title or mechanism.name)
+        sheet = Sheet(reach, fine, None, mechanism.title or mechanism.name)
         begun = k - back if k >= back else (k - back + len(film.rows) if film.repeats else 0)
         draw(sheet, drawn, tracks, places)
         _trails(sheet, run, mechanism, poses, (int(film.rows[begun]), int(row)))
@@ -216,7 +216,7 @@ def _clock(sheet: Sheet, run: Run, row: int) -> None:
     name = "" if axis.is_time else f"{axis.name}{' =' if axis.unit else ''} "
     text, colour = f"{name}{axis.values[row]:.{digits}f} {axis.unit}".rstrip(), GREY
     if not run.good[row]:
-        text, colour = f"no pose at {text}: the last one that closed", _LOST
+        text, colour = f"no pose at {text}: the last one that closed", palette.DRIVER
     sheet.axes.text(
         1.0, 0.0, text, fontsize=9.0, ha="right", va="bottom", transform=sheet.axes.transAxes, color=ink(colour)
     )
