@@ -18,7 +18,7 @@ from kinfmu.arrays import FloatArray
 from kinfmu.draw.drawing import draw, extent, placed
 from kinfmu.draw.marks import gravity_in_margin, paths, pins
 from kinfmu.draw.scene import palette
-from kinfmu.draw.scene.instant import Instant
+from kinfmu.draw.scene.instant import Instant, directions
 from kinfmu.draw.scene.placing import poses_of, remedy, world
 from kinfmu.draw.scene.shapes import shapes
 from kinfmu.draw.scene.strokes import fineness
@@ -174,13 +174,12 @@ def _comes_back(pose: FloatArray) -> bool:
 def _images(run: Run, mechanism: Mechanism, poses: dict[str, FloatArray], film: _Film, size: _Size) -> Iterator[Image]:
     """Yield the pictures in order, all of one size."""
     some = slice(None, None, max(-(-len(run) // _SAMPLES), 1))
-    directions = {driver.name: 1.0 for driver in mechanism.drivers}
-    start = int(film.rows[0])
-    whole = Instant(mechanism, {body: np.vstack([pose[start], pose[some]]) for body, pose in poses.items()}, directions)
+    start, ways = int(film.rows[0]), directions(run, mechanism)
+    whole = Instant(mechanism, {body: np.vstack([pose[start], pose[some]]) for body, pose in poses.items()}, ways)
     found, tracks = shapes(whole), paths(whole)  # for all pictures; the frames of the shapes move
     scenes = []
     for row in film.rows.tolist():
-        shown = Instant(mechanism, {body: pose[row : row + 1] for body, pose in poses.items()}, directions)
+        shown = Instant(mechanism, {body: pose[row : row + 1] for body, pose in poses.items()}, ways)
         scenes.append((placed(shown, found), pins(shown)))
     extents = [part for drawn, places in scenes for part in (extent(drawn), *(mark.extent() for mark in places))]
     reach = np.vstack([*extents, *(track.extent() for track in tracks)])

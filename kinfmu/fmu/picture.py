@@ -91,8 +91,6 @@ def png(drawn: Picture, size: int = ICON) -> bytes:
     colours = np.zeros((size, size, 3))
     cover = np.zeros((size, size, 1))
     for line in drawn.lines:
-        if line.dash:
-            continue
         points = line.points * scale + shift
         step = max(len(points) // 24, 1)
         points = np.vstack([points[:-1:step], points[-1:]])

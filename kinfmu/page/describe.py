@@ -78,7 +78,7 @@ def drawn(shown: Instant, report: Report | None = None) -> dict[str, Any]:
     found = []
     every = shapes(shown)
     for shape in every:
-        if shape.is_effort and shape.kind != "driver":
+        if shape.is_load:
             continue
         slide = next(along[shape.frame]) if shape.kind == "rod" else lines.get(shape.name)
         found.append(_shape(shown, shape, numbers) | _line(shape, slide, numbers))
@@ -101,7 +101,7 @@ def drawn(shown: Instant, report: Report | None = None) -> dict[str, Any]:
             {"name": name, "point": numbers[point], "colour": list(palette.body(len(bodies) - 1 + k))}
             for k, (name, point) in enumerate(mechanism.points.items())
         ],
-        "loads": [_load(mechanism, shape, numbers) for shape in every if shape.is_effort and shape.kind != "driver"],
+        "loads": [_load(mechanism, shape, numbers) for shape in every if shape.is_load],
         "gravity": _gravity(mechanism),
         "cams": [cam_data(mechanism, joint, numbers) for joint in shown.joints if joint.name in cams],
         "shapes": [shape for shape in found if shape["kind"] not in _NOT_DRAWN],

@@ -97,7 +97,7 @@ def _pushed(shown: Instant, driver: SlideDriver | CoordinateDriver) -> Shape:
     is_slide = isinstance(driver, SlideDriver)
     axes, point = (body_of(driver.between[0]), driver.between[1]) if is_slide else (GROUND_NAME, driver.of)
     angle = float(driver.axis) if is_slide else (0.0 if driver.axis == "x" else 0.5 * math.pi)
-    towards = shown.directions[driver.name] * np.array(unit_vector(angle))
+    towards = shown.directions.get(driver.name, 1.0) * np.array(unit_vector(angle))
     strips = _arrow(_FIRST, -_PUSH, _PUSH, _ASIDE)
     frame, at = body_of(point), shown.at(point)[None]
     return Shape("driver", driver.name, frame, at, palette.DRIVER, direction=towards, strips=strips, other=axes)
@@ -190,7 +190,7 @@ def _rings(shown: Instant, size: float) -> dict[str, Shape]:
     for driver in shown.drivers:
         if driver.quantity.kind == "angle":
             *held, body = driver.bodies()
-            ring = partial(turn, shown.directions[driver.name], ring=_DRIVEN)
+            ring = partial(turn, shown.directions.get(driver.name, 1.0), ring=_DRIVEN)
             rings.append((driver, (body, held[0] if held else GROUND_NAME), ring))
     shapes: dict[str, Shape] = {}
     for load, bodies, ring in sorted(rings, key=lambda entry: radii(entry[2](0.0))):
@@ -318,7 +318,7 @@ def arrows_apart(sense: float) -> tuple[Strip, ...]:
 
 
 def turn(sense: float, out: float = 0.0, ring: tuple[float, float, float] = _TURN) -> tuple[Strip, ...]:
-    """Return a circular arrow; sense: 1.0 counter-clockwise, -1.0 clockwise; out: added to its radius; ring: as _TURN."""
+    """Return a circular arrow; sense: -1.0 if it is clockwise, else 1.0; out: added to its radius; ring: as _TURN."""
     radius, first, last = ring[0] + out, *ring[1:]
     tip = last + _HEAD / radius
     arc = _polar(radius, _angles(first, last))

@@ -33,8 +33,7 @@ STATUS: tuple[Colour, ...] = (
 
 
 LEAST_CONTRAST = 3.0  # of lines to their background, WCAG 2.2, 1.4.11
-# What the strokes of a body, or of another thing with a colour, are mixed with on white paper and on dark paper, and how
-# much of it. The page has them from here.
+# What the colour of a thing is mixed with for its strokes, and how much of it, on white paper and on dark paper.
 ROLES: dict[str, tuple[tuple[Colour, float], tuple[Colour, float]]] = {
     "own": (((0, 0, 0), 0.0), (WHITE, 0.45)),
     "edge": (((0, 0, 0), 0.45), (WHITE, 0.25)),

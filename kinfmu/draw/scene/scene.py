@@ -10,7 +10,7 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.draw.scene import palette
-from kinfmu.draw.scene.instant import Instant, gravity_direction
+from kinfmu.draw.scene.instant import Instant, directions, gravity_direction
 from kinfmu.draw.scene.placing import poses_of, remedy, world
 from kinfmu.draw.scene.shape import Shape, frames, pins_of
 from kinfmu.draw.scene.shapes import shapes
@@ -88,7 +88,7 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
     good = np.flatnonzero(run.good)
     rows = np.concatenate([good[:1], good[_some(len(good))]])
     placed = {name: pose[rows] if len(rows) else np.zeros((1, 3)) for name, pose in known.items()}
-    shown = Instant(mechanism, placed, {driver.name: 1.0 for driver in mechanism.drivers})
+    shown = Instant(mechanism, placed, directions(run, mechanism))
     found = tuple(shape for shape in shapes(shown) if len(rows) or shape.kind in _WITHOUT_POSE)
     pins: dict[str, list[tuple[str, FloatArray]]] = {}
     for joint in mechanism.joints:

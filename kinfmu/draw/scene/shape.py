@@ -1,7 +1,7 @@
 """What is drawn of a mechanism, once for all pictures and robot descriptions: shapes in moving frames.
 
-A picture places the frames, and paints the strokes of each kind (see `strokes`). Frames are bodies, 'ground', or those of
-`frames`: bars, cylinders, and the blocks of pins.
+A picture places the frames, and paints the strokes of each kind (see `strokes`). Frames are bodies, 'ground', or those
+of `frames`: bars, cylinders, and the blocks of pins.
 
     link             a body's points: a closed plate or an open bar; rib: from a plate's corner to a point inside
     rod, slot        a line of a body on which another body slides, and the part of it in which a pin runs
@@ -41,7 +41,7 @@ from kinfmu.mechanism.quantities.placement import body_of
 
 FLAT = 1e-6  # of the points' extent; points nearer to a line than that count as a line
 _ROUND = np.linspace(0.0, 2.0 * np.pi, 73)  # [rad], corners of a circle
-_EFFORTS = frozenset({"driver", *(load.type for load in LOADS)})
+_LOADS = frozenset(load.type for load in LOADS)
 
 
 class Strip(NamedTuple):
@@ -78,9 +78,14 @@ class Shape:
     other: str = ""
 
     @property
+    def is_load(self) -> bool:
+        """True for the symbol of a load."""
+        return self.kind in _LOADS
+
+    @property
     def is_effort(self) -> bool:
         """True for the symbol of a load or driver."""
-        return self.kind in _EFFORTS
+        return self.is_load or self.kind == "driver"
 
     @property
     def is_bar(self) -> bool:

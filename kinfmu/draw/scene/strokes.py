@@ -68,7 +68,7 @@ STROKES: dict[str, tuple[Stroke, ...]] = {
     "pitch": (Stroke(2, width=0.7, dash=_DASHES),),
     "roller": (Stroke(3, fill="paper"), Stroke(6)),  # its edge is over the cam too
     "guide": (Stroke(4, width=1.1, fill="fill"),),  # the block of a follower
-    "cam": (Stroke(5, width=1.2, fill="pale"),),
+    "cam": (Stroke(5, width=1.2, fill="fill"),),
     "support": (Stroke(10, width=0.9, fill="fill"),),
     "hatch": (Stroke(11, width=0.6),),
     "ground": (Stroke(12, width=1.1),),

@@ -78,6 +78,7 @@ class Linkage:
         """Set what follows from the scene: sizes, and the names that are always shown."""
         self.sizes = self.scene.sizes._replace(point=self.width * self.scene.sizes.point)
         self.frames = Frames(self.rec, self.timeline, self.run, self.layer)
+        self.ground = Frames(self.rec, self.timeline, self.run, self.layer, is_fixed=True)
         bare = [shape.frame for shape in self.scene.shapes if shape.kind == "link" and len(shape.points) < 2]
         self._unlinked = {body: body for body in bare}  # bodies whose name is that of their first other shape
         is_named = self.colour is None and len(self.scene.bodies) <= MOST_NAMES
@@ -131,7 +132,8 @@ class Linkage:
             label = first.shape.name if first.shape.kind in _NAMED else self._unlinked.pop(first.shape.frame, None)
             lines = [line for one in painted for line in self._lines(one)]
             order = first.stroke.order + self.scene.bodies.get(first.shape.frame, 0) / 100.0
-            self.frames.lines(entity, lines, order, label, label in self.names)
+            frames = self.ground if first.shape.frame == GROUND_NAME else self.frames
+            frames.lines(entity, lines, order, label, shown=label in self.names)
 
     def _place(self, one: Painted) -> str:
         """Return the entity of a stroke; that of a link, a bar or a cylinder is the frame's own."""
@@ -151,7 +153,7 @@ class Linkage:
 
     def _points(self, path: str, frame: str) -> None:
         """Log pins with the names of their joints, which show when pointed at, and points of interest."""
-        pins = self.scene.pins.get(frame, ())
+        pins, frames = self.scene.pins.get(frame, ()), self.ground if frame == GROUND_NAME else self.frames
         (pin,), (point,) = STROKES["pin"], STROKES["point"]
         if pins:
             names, at = zip(*pins, strict=True)
@@ -160,11 +162,11 @@ class Linkage:
                 colour = palette.tint(role, palette.INK, is_dark=True)
                 texts = list(names) if name == "pins" else []
                 order = pin.order + (name != "pins") / 2.0
-                self.frames.points(f"{path}/{name}", np.array(at), size, colour, order, texts, shown=False)
+                frames.points(f"{path}/{name}", np.array(at), size, colour, order, texts, shown=False)
         for name, place in self.scene.points.get(frame, ()):
             colour = palette.tint(point.fill, self._colour_of(name), is_dark=True)
             radius, shown = self.sizes.radius(point), self.colour is None
-            self.frames.points(f"{path}/points/{name}", place[None], radius, colour, point.order, [name], shown)
+            frames.points(f"{path}/points/{name}", place[None], radius, colour, point.order, [name], shown)
 
     def _path(self, path: str, points: FloatArray, colour: palette.Colour) -> None:
         """Log the path of a point over the run, one line for each part between gaps."""
@@ -272,12 +274,17 @@ def filled(points: FloatArray, colour: palette.Colour, radius: float) -> list[Li
 
 
 class Frames:
-    """The frames of one run, placed on a timeline; layer: added to the order of drawing."""
+    """The frames of one run, placed on a timeline.
 
-    def __init__(self, rec: rr.RecordingStream, timeline: Timeline, run: Run, layer: float) -> None:
+    layer: added to the order of drawing; is_fixed: what is in them is there at all samples, as the ground is.
+    """
+
+    def __init__(
+        self, rec: rr.RecordingStream, timeline: Timeline, run: Run, layer: float, *, is_fixed: bool = False
+    ) -> None:
         self._rec, self._timeline, self._run, self._layer = rec, timeline, run, layer
         self._good = np.flatnonzero(run.good)
-        self._always = 0 < len(self._good) == len(run.good)  # every sample holds numbers
+        self._always = is_fixed or 0 < len(self._good) == len(run.good)  # every sample holds numbers
 
     def move(self, path: str, pose: FloatArray, stretch: FloatArray | None = None) -> None:
         """Send poses (n, 3) of the frame of an entity, x, y [length], phi [rad], at the samples that hold numbers.
@@ -304,7 +311,7 @@ class Frames:
             ),
         )
 
-    def lines(self, path: str, lines: Sequence[Line], order: float, label: str | None, shown: bool = False) -> None:
+    def lines(self, path: str, lines: Sequence[Line], order: float, label: str | None, *, shown: bool = False) -> None:
         """Log lines that are fixed in their frame, from the first pose on; grey where the run has no numbers.
 
         Later lines cover earlier ones. label: their name, if they have one; shown: True if it is always shown.
@@ -320,7 +327,7 @@ class Frames:
             self._with_first_pose(path, rr.LineStrips2D.columns(strips=strips).partition([len(strips)]))
             switches = self.switches()
             both = [[palette.grey(colour) for colour in colours], colours]
-            table = np.array([both[good] for good in self._run.good[switches]], np.uint8)  # (switches, lines, 3)
+            table = np.array(both, np.uint8)[self._run.good[switches].astype(int)]  # (switches, lines, 3)
 
             def columns(rows: slice) -> Any:
                 chosen = table[rows]
