@@ -14,9 +14,8 @@ from kinfmu.draw.scene import palette
 from kinfmu.draw.scene.instant import Instant, gravity_direction
 from kinfmu.draw.scene.joints import slides
 from kinfmu.draw.scene.loads import BETWEEN
-from kinfmu.draw.scene.palette import INK
 from kinfmu.draw.scene.strokes import STROKES
-from kinfmu.draw.sheet import GREY, Sheet
+from kinfmu.draw.sheet import GREY, INK, Sheet
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.drivers import DistanceDriver, Driver

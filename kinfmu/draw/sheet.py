@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.scene.palette import INK, Colour, tint
+from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.palette import Colour, tint
 from kinfmu.draw.scene.strokes import BAR, STROKES, Painted, Sizes
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MOVE, _LINE, _CLOSE = 1, 2, 79  # codes of a path of matplotlib
+INK: Colour = palette.INK
 GREY: Colour = (110, 110, 110)
 INCH = 72.0  # [pt]
 FONT = 9.0  # [pt]

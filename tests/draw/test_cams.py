@@ -16,10 +16,10 @@ from kinfmu.analysis import cam_profile
 from kinfmu.draw.cam_figure import _figure
 from kinfmu.draw.instant import instant
 from kinfmu.draw.scene import palette
-from kinfmu.draw.scene.strokes import on_face
 from kinfmu.draw.scene.joints import CamShape, cam_shapes
 from kinfmu.draw.scene.scene import scene
 from kinfmu.draw.scene.shape import Shape, guides_of_cams
+from kinfmu.draw.scene.strokes import on_face
 from kinfmu.draw.sheet import ink
 from kinfmu.fmu.picture import picture
 from kinfmu.log.urdf import robot_description

@@ -50,7 +50,9 @@ def test_the_page_has_picture_law_range_wiring_and_check(built: Built) -> None:
     pixels = _pixels(icon)
     assert pixels.shape == (100, 100, 4)
     assert 0.02 < (pixels[:, :, 3] > 128).mean() < 0.5
-    assert {tuple(one) for one in pixels.reshape(-1, 4)[:, :3].tolist()} >= {palette.lighter(palette.body(0))}  # the crank
+    assert {tuple(one) for one in pixels.reshape(-1, 4)[:, :3].tolist()} >= {
+        palette.lighter(palette.body(0))
+    }  # the crank
 
 
 def _pixels(data: bytes) -> np.ndarray:

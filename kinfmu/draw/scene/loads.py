@@ -83,20 +83,21 @@ def load_shapes(shown: Instant, box: FloatArray) -> Iterator[Shape]:
             yield _between(shown, load, off, float(np.ptp(box, axis=0).max()))
         elif isinstance(load, ForceAt | ForceAlong):
             yield from _force(shown, load, box.mean(axis=0))
-        elif load.name in rings:
-            yield rings[load.name]
+        elif load in rings:
+            yield rings[load]
     for driver in shown.drivers:
         if isinstance(driver, SlideDriver | CoordinateDriver):
             yield _pushed(shown, driver)
-        elif driver.name in rings:
-            yield rings[driver.name]
+        elif driver in rings:
+            yield rings[driver]
 
 
 def _pushed(shown: Instant, driver: SlideDriver | CoordinateDriver) -> Shape:
     """Return the arrow of a driver next to its point."""
-    is_slide = isinstance(driver, SlideDriver)
-    axes, point = (body_of(driver.between[0]), driver.between[1]) if is_slide else (GROUND_NAME, driver.of)
-    angle = float(driver.axis) if is_slide else (0.0 if driver.axis == "x" else 0.5 * math.pi)
+    if isinstance(driver, SlideDriver):
+        axes, point, angle = body_of(driver.between[0]), driver.between[1], float(driver.axis)
+    else:
+        axes, point, angle = GROUND_NAME, driver.of, 0.0 if driver.axis == "x" else 0.5 * math.pi
     towards = shown.directions.get(driver.name, 1.0) * np.array(unit_vector(angle))
     strips = _arrow(_FIRST, -_PUSH, _PUSH, _ASIDE)
     frame, at = body_of(point), shown.at(point)[None]
@@ -174,8 +175,8 @@ def _force(shown: Instant, load: ForceAt | ForceAlong, middle: FloatArray) -> It
     yield _shape(load, body_of(load.at), shown.at(load.at)[None], strips, direction=towards, other=load.axes)
 
 
-def _rings(shown: Instant, size: float) -> dict[str, Shape]:
-    """Return the symbols about pins, by name: of torques, torsion springs and dampers, and turning drivers.
+def _rings(shown: Instant, size: float) -> dict[Load | Driver, Shape]:
+    """Return the symbols about pins: of torques, torsion springs and dampers, and turning drivers.
 
     Those about one pin have different radii, springs the smallest ones. size: of the mechanism as drawn [length].
     """
@@ -192,9 +193,9 @@ def _rings(shown: Instant, size: float) -> dict[str, Shape]:
             *held, body = driver.bodies()
             ring = partial(turn, shown.directions.get(driver.name, 1.0), ring=_DRIVEN)
             rings.append((driver, (body, held[0] if held else GROUND_NAME), ring))
-    shapes: dict[str, Shape] = {}
-    for load, bodies, ring in sorted(rings, key=lambda entry: radii(entry[2](0.0))):
-        shapes[load.name] = _about(shown, load, bodies, ring, shapes.values(), size)
+    shapes: dict[Load | Driver, Shape] = {}
+    for member, bodies, own in sorted(rings, key=lambda entry: radii(entry[2](0.0))):
+        shapes[member] = _about(shown, member, bodies, own, shapes.values(), size)
     return shapes
 
 

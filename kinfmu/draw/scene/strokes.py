@@ -1,7 +1,7 @@
 """The table of strokes: how every line and area of a mechanism looks, in every picture.
 
-Figures, animations, FMUs and recordings paint what `strokes_of` yields, in a loop; so does the page, which has the table
-as data. Widths are in points.
+Figures, animations, FMUs and recordings paint what `strokes_of` returns, in a loop; so does the page, which has the
+table as data. Widths are in points.
 """
 
 from __future__ import annotations
@@ -252,7 +252,7 @@ def support() -> tuple[Strip, ...]:
 
 
 def rail(kind: str, length: float, size: float) -> tuple[Strip, ...]:
-    """Return the hatched line of a rail or bed of a length, which reaches beyond its block; size: usual one of details."""
+    """Return the hatched line of a rail or bed of a length, which reaches beyond its block; size: as for `rack`."""
     line = np.array([[part, 0.0, (2.0 * part - 1.0) * _REACH, -_LIFT[kind]] for part in (0.0, 1.0)])
     count = round((length / size + 2.0 * _REACH) / _HATCH_STEP)
     return _hatching(line, np.array([0.0, 0.0, 0.0, -1.0]), min(max(count, 3), 300)), Strip(line, "ground")

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import kinfmu
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.scene import strokes
 from kinfmu.draw.scene import loads as symbols
+from kinfmu.draw.scene import strokes
 from kinfmu.draw.scene.forces import LONGEST, arrows
 from kinfmu.draw.scene.instant import Instant
 from kinfmu.draw.scene.loads import load_text
@@ -203,7 +203,9 @@ def test_a_mechanism_without_loads_has_no_symbols(name: str) -> None:
     mechanism = kinfmu.load(name)
     shown = [shape.name for shape in scene_of(replace(mechanism, loads=())).shapes if shape.is_load]
     assert shown == []
-    assert [shape.name for shape in scene_of(mechanism).shapes if shape.is_load] == [one.name for one in mechanism.loads]
+    assert [shape.name for shape in scene_of(mechanism).shapes if shape.is_load] == [
+        one.name for one in mechanism.loads
+    ]
 
 
 @pytest.mark.parametrize("row", [0, 30, 77])

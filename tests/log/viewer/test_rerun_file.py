@@ -119,7 +119,8 @@ def test_what_joints_add_to_bodies_moves_with_them(tmp_path: Path) -> None:
     assert {f"/linkage/bodies/{part}/mesh" for part in ("rack/rack", "pinion/wheel", "pinion/spoke")} <= found
     *_, teeth = statics(path, "/linkage/bodies/rack/rack/mesh", STRIPS)  # after the lines that fill it
     *_, rim = statics(path, "/linkage/bodies/pinion/wheel/mesh", STRIPS)
-    assert 0.0 < np.ptp(np.array(teeth)[:, 1]) < np.ptp(np.array(rim)[:, 1])
+    assert len(teeth) > 10
+    assert np.ptp(np.array(rim)[:, 1]) == pytest.approx(16.0)
 
 
 def test_a_gap_breaks_the_curves_and_turns_the_linkage_grey(run_with_gap: Run, tmp_path: Path) -> None:
