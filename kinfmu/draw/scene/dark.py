@@ -10,6 +10,7 @@ from kinfmu.draw.scene import palette
 
 _COLOUR = re.compile(r'(fill|stroke)(: |=")(#[0-9a-f]{6})')
 _LOWEST, _HIGHEST = 0.09, 0.93  # lightness of white and of black on dark pages
+_LEAST, _MOST = 4.5, 9.0  # contrast to dark paper of colours that stay: of curves, not of areas
 _SCOPE = ":root:is(svg,.kinfmu)"  # an image, or a page of kinfmu that holds it
 
 
@@ -32,11 +33,14 @@ def with_dark_colours(svg: str) -> str:
 def on_dark(colour: palette.Colour) -> palette.Colour:
     """Return the colour on dark paper of what has a colour on white paper.
 
-    That of a body's stroke has the same role; others keep their hue, and their lightness is turned round.
+    That of a body's stroke has the same role. Others keep their hue, and their lightness is turned round, unless they
+    are of a lightness that both papers allow.
     """
     known = _of_roles().get(colour)
     if known is not None:
         return known
+    if len({*colour}) > 1 and _LEAST <= palette.contrast(colour, palette.DARK) <= _MOST:
+        return colour
     hue, lightness, saturation = colorsys.rgb_to_hls(*(value / 255.0 for value in colour))
     red, green, blue = colorsys.hls_to_rgb(hue, _HIGHEST - (_HIGHEST - _LOWEST) * lightness, saturation)
     return round(255 * red), round(255 * green), round(255 * blue)
