@@ -13,6 +13,7 @@ from kinfmu.draw.scene import palette, strokes
 from kinfmu.draw.scene.instant import Instant
 from kinfmu.draw.scene.joints import Slide, cam_shapes, place, racks_of, rods, slides, wheels
 from kinfmu.draw.scene.loads import BETWEEN, lengths_between, load_shapes
+from kinfmu.draw.scene.placing import world
 from kinfmu.draw.scene.shape import Shape, bar_frame, cylinder_frames, die_frame, points_of, ribs, rim
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.drivers import DistanceDriver, Driver
@@ -26,6 +27,7 @@ _SIDES = ((0.0, -1.0), (-1.0, 0.0), (1.0, 0.0), (0.0, 1.0))  # of a support; bel
 _BARREL, _OF_SHORTEST = 0.62, 0.9  # length of the barrel: of the usual length, and at most of the shortest one
 _SMALLEST = 0.3  # of the usual length, smallest barrel if the shortest length is very small
 _GUIDED, _FREE = 0.1, 0.12  # of the barrel: with the rod in the longest pose; without the piston
+_POSES = 24  # of a run, that decide the size of details
 _STEEP = 0.9  # sine of a rail's angle, above which the ground is on the side away from the mechanism
 
 
@@ -33,7 +35,7 @@ def shapes(shown: Instant) -> list[Shape]:
     """Return everything to draw of the bodies whose poses are known, but for pins, arrows and paths."""
     sliding = slides(shown)
     box = _box(shown)
-    size = float(np.ptp(box, axis=0).max()) / strokes.UNITS or 1.0
+    size = _detail(shown)
     in_world = [*_cams(shown), *wheels(shown, size), *_slides(shown, sliding, box, size), *_supports(shown)]
     acting = load_shapes(shown, box)
     return [*_links(shown, sliding), *_between(shown), *(_in_frame(shown, shape) for shape in in_world), *acting]
@@ -175,6 +177,17 @@ def _points(shown: Instant, body: str) -> FloatArray:
     """Return the points (k, 2) of a body in the world as drawn; none if its pose is unknown."""
     names = [name for name in shown.body_points if body_of(name) == body and body in shown.poses]
     return np.array([shown.point(name) for name in names]).reshape(-1, 2)
+
+
+def _detail(shown: Instant) -> float:
+    """Return the usual size of details in pictures of the whole run [length]."""
+    count = max(map(len, shown.poses.values()), default=1)
+    some = slice(None, None, max(count // _POSES, 1))
+    points = [(name, at) for name, at in shown.body_points.items() if body_of(name) in shown.poses]
+    tracks = np.array([world(shown.poses[body_of(name)][some], at) for name, at in points]).reshape(-1, 2)
+    if not len(tracks):
+        return 1.0
+    return float((np.nanmax(tracks, axis=0) - np.nanmin(tracks, axis=0)).max()) / strokes.UNITS or 1.0
 
 
 def _box(shown: Instant) -> FloatArray:
