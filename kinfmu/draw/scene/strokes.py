@@ -100,7 +100,14 @@ def look() -> dict[str, Any]:
         name: [{key: value for key, value in stroke._asdict().items() if value or key == "order"} for stroke in strokes]
         for name, strokes in STROKES.items()
     }
-    sizes = {"bar": BAR, "longEnough": _LONG_ENOUGH, "finest": _FINEST, "always": _ALWAYS, "thinnest": _THINNEST}
+    sizes = {
+        "units": UNITS,
+        "bar": BAR,
+        "longEnough": _LONG_ENOUGH,
+        "finest": _FINEST,
+        "always": _ALWAYS,
+        "thinnest": _THINNEST,
+    }
     return {"strokes": rows, "roles": palette.ROLES, **sizes}
 
 

@@ -1,6 +1,6 @@
 // The drawing of a linkage: shapes, pins, names, curves, arrows, marks.
 
-import { GREY, inkOf, LOOK, POINT, tint, widthOf } from "./pen.js";
+import { GREY, inkOf, LOOK, tint, widthOf } from "./pen.js";
 import { distance, distanceToSegment, outline, placed, symbol } from "./geometry.js";
 import { gravity, loads } from "./loads.js";
 import { marks } from "./marks.js";
@@ -39,6 +39,7 @@ export function foresee(linkage, view, theme, show, spots) {
     spots.foresee(frames);
 }
 
+const [UNIT, LEAST_UNIT] = [4 / 3, 0.95]; // [px] of a point of the table of strokes, less in small views
 const NO_PEN = { line() {}, circle() {}, text() {} };
 const NOTHING_MORE = { curves: [], arrows: [], legend: [], held: null, isGhost: false };
 
@@ -66,8 +67,9 @@ class Painter {
         this.names = new Names(pen, view, theme, spots);
         this.handles = [];
         this.fine = linkage.fineness;
-        this.width = POINT * LOOK.bar * this.fine; // of a link
-        this.size = POINT * (LOOK.always + (1 - LOOK.always) * this.fine); // of a unit of details
+        this.unit = Math.min(Math.max(Math.min(view.width, view.height) / LOOK.units, LEAST_UNIT), UNIT); // [px] of a point
+        this.width = this.unit * LOOK.bar * this.fine; // of a link
+        this.size = this.unit * (LOOK.always + (1 - LOOK.always) * this.fine); // of a unit of details
     }
 
     ink(colour) {
@@ -78,10 +80,10 @@ class Painter {
     look({ line, fill, width = 0, of_link: ofLink = 0, dash }, colour) {
         const own = this.isGhost ? GREY : colour;
         return {
-            width: Math.max(POINT * width + ofLink * this.width, POINT * LOOK.thinnest),
+            width: Math.max(this.unit * width + ofLink * this.width, this.unit * LOOK.thinnest),
             colour: tint(line, own, this.theme),
             fill: fill ? tint(fill, own, this.theme) : null,
-            dash: dash ? dash.map((length) => POINT * length) : null,
+            dash: dash ? dash.map((length) => this.unit * length) : null,
         };
     }
 

@@ -18,8 +18,6 @@ export function css([r, g, b], alpha = 1) {
 // The table of strokes and the roles of their colours, as kinfmu/draw/scene/strokes.py has them.
 export const LOOK = {};
 
-export const POINT = 4 / 3; // [px] of a printer's point, in which the table has widths
-
 // Return the colour of a stroke: of a role of the table, for a thing of a colour.
 export function tint(role, colour, theme) {
     return css(mix(colour, ...LOOK.roles[role][theme.isDark ? 1 : 0]));
