@@ -1,4 +1,4 @@
-"""Names of a recording's linkage that are always shown: of supports, and of bodies where they have room; gravity."""
+"""Names of a recording's linkage that are always shown: of supports, and of bodies that others leave free; gravity."""
 
 from __future__ import annotations
 

@@ -61,8 +61,8 @@ def trail_time(run: Run, scene: Scene, point: str) -> float:
 class Linkage:
     """The linkage of a placed run, logged under the entity `root`: all in `colour`, or each body in its own.
 
-    width: factor of the lines' widths; layer: higher layers cover lower ones. Where the run has no numbers, the last
-    pose that closed stays, in grey, with a notice; before the first pose nothing is drawn.
+    width: factor of the lines' widths; layer: higher layers cover lower ones, by lines without areas. Where the run has
+    no numbers, the last pose that closed stays, in grey, with a notice; before the first pose nothing is drawn.
     """
 
     rec: rr.RecordingStream
@@ -142,14 +142,14 @@ class Linkage:
             return f"{own}/blocks" if shape.kind == "block" else own
         return own if shape.is_bar or shape.kind in _OWN else f"{own}/{shape.kind}/{shape.name}"
 
-    def _lines(self, one: Painted) -> Iterator[Line]:
+    def _lines(self, one: Painted) -> Iterator[RecordedLine]:
         """Yield the lines of a stroke: those that fill its area, then its own."""
         tinted = one._replace(shape=replace(one.shape, colour=self.colour)) if self.colour else one
         line, area = tinted.colours(is_dark=True)
         radius = 0.5 * self.sizes.width(one.stroke)
-        if area:
+        if area and not self.layer:
             yield from filled(one.points, area, radius)
-        yield Line(np.vstack([one.points, one.points[: int(one.is_closed)]]), radius, line)
+        yield RecordedLine(np.vstack([one.points, one.points[: int(one.is_closed)]]), radius, line)
 
     def _points(self, path: str, frame: str) -> None:
         """Log pins with the names of their joints, which show when pointed at, and points of interest."""
@@ -244,7 +244,7 @@ def pieces_between_gaps(points: FloatArray) -> list[FloatArray]:
     return [piece for piece in pieces if len(piece) > 1]
 
 
-class Line(NamedTuple):
+class RecordedLine(NamedTuple):
     """A line of a recording: points (k, 2) in its frame; radius [length], or a negative one [points of the screen]."""
 
     points: FloatArray
@@ -252,7 +252,7 @@ class Line(NamedTuple):
     colour: palette.Colour
 
 
-def filled(points: FloatArray, colour: palette.Colour, radius: float) -> list[Line]:
+def filled(points: FloatArray, colour: palette.Colour, radius: float) -> list[RecordedLine]:
     """Return lines along the longest side of an area (k, 2), which fill it: the viewer fills no areas.
 
     radius: of the line around the area, up to which the lines may reach beyond it.
@@ -269,7 +269,7 @@ def filled(points: FloatArray, colour: palette.Colour, radius: float) -> list[Li
         crossed = (a[:, 1] > y) != (b[:, 1] > y)
         (x_a, y_a), (x_b, y_b) = a[crossed].T, b[crossed].T
         xs = np.sort(x_a + (y - y_a) / (y_b - y_a) * (x_b - x_a)).reshape(-1, 2)
-        found += [Line(np.column_stack([ends, [y, y]]) @ turn, radius, colour) for ends in xs]
+        found += [RecordedLine(np.column_stack([ends, [y, y]]) @ turn, radius, colour) for ends in xs]
     return found
 
 
@@ -311,7 +311,9 @@ class Frames:
             ),
         )
 
-    def lines(self, path: str, lines: Sequence[Line], order: float, label: str | None, *, shown: bool = False) -> None:
+    def lines(
+        self, path: str, lines: Sequence[RecordedLine], order: float, label: str | None, *, shown: bool = False
+    ) -> None:
         """Log lines that are fixed in their frame, from the first pose on; grey where the run has no numbers.
 
         Later lines cover earlier ones. label: their name, if they have one; shown: True if it is always shown.

@@ -14,7 +14,7 @@ from kinfmu.draw.scene.scene import Scene
 from kinfmu.draw.scene.shape import Shape
 from kinfmu.draw.scene.strokes import STROKES
 from kinfmu.log.viewer.ground import MARGIN
-from kinfmu.log.viewer.linkage import Line, Linkage, filled
+from kinfmu.log.viewer.linkage import Linkage, RecordedLine, filled
 from kinfmu.log.viewer.timeline import send
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class _Part(NamedTuple):
     name: str
     pose: FloatArray
     stretch: FloatArray
-    lines: list[Line]
+    lines: list[RecordedLine]
 
 
 def log_loads(linkage: Linkage, with_arrow: Collection[str] = ()) -> None:
@@ -55,7 +55,7 @@ def _parts(shape: Shape, linkage: Linkage) -> Iterator[_Part]:
     second = first + distance[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
     keeps, size = np.ones(len(angle)), linkage.sizes.detail
     poses = {"first": (first, 0.0, keeps), "last": (second, 1.0, keeps), "between": (first, np.nan, distance)}
-    found: dict[str, list[Line]] = {}
+    found: dict[str, list[RecordedLine]] = {}
     for strip in shape.strips:
         part, length, along, across = strip.points.T
         (name,) = [key for key, (_, end, _) in poses.items() if (part == end).all()] or ["between"]
@@ -66,7 +66,7 @@ def _parts(shape: Shape, linkage: Linkage) -> Iterator[_Part]:
             area = palette.tint(stroke.fill, linkage.colour or shape.colour, is_dark=True)
             found.setdefault(name, []).extend(filled(points, area, 0.5 * size))
         line = np.vstack([points, points[:1]]) if stroke.fill else points
-        found.setdefault(name, []).append(Line(line, -_LOAD_RADIUS * stroke.width, colour))
+        found.setdefault(name, []).append(RecordedLine(line, -_LOAD_RADIUS * stroke.width, colour))
     for name, lines in found.items():
         at, _, stretch = poses[name]
         yield _Part(name, np.column_stack([at, angle]), stretch, lines)
