@@ -1,4 +1,4 @@
-"""Colours on dark paper: of strokes by their role, of everything else with enough contrast; the style sheet of an SVG."""
+"""Colours on dark paper: of strokes by their role, of everything else with enough contrast; style sheets of SVG."""
 
 from __future__ import annotations
 
