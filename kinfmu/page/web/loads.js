@@ -21,6 +21,7 @@ export function loads(painter) {
             const [row] = LOOK.strokes[stroke];
             pen.line(line, { ...painter.look(row, load.colour), closed: Boolean(row.fill) });
             painter.names.coverAll(line, 3);
+            line.slice(1).forEach((b, k) => painter.symbols.push({ table: "loads", name: load.name, ends: [line[k], b] }));
             all.push(...line);
         }
         const middle = [0, 1].map((axis) => all.reduce((sum, p) => sum + p[axis], 0) / all.length);
