@@ -244,7 +244,7 @@ def _darken(figure: Figure) -> None:
         for key in ("facecolor", "edgecolor") if isinstance(artist, Patch) else ("color",):
             *rgb, alpha = to_rgba(getattr(artist, f"get_{key}")())
             red, green, blue = (round(255.0 * value) for value in rgb)
-            getattr(artist, f"set_{key}")((*ink(on_dark((red, green, blue))), alpha))
+            getattr(artist, f"set_{key}")((*ink(on_dark((red, green, blue), is_area=key == "facecolor")), alpha))
 
 
 def _picture(sheet: Sheet, dots_per_inch: float) -> Image:

@@ -30,6 +30,8 @@ def test_a_stroke_has_the_same_role_on_dark_paper(role: str) -> None:
 def test_curves_and_texts_are_seen_on_dark_paper() -> None:
     for k in range(12):
         assert palette.contrast(on_dark(curve_colour(k)), palette.DARK) > palette.LEAST_CONTRAST
+    assert on_dark((68, 1, 84), is_area=True) == (68, 1, 84)  # an area of a scale of colours
+    assert palette.contrast(on_dark((246, 222, 222), is_area=True), palette.DARK) < palette.LEAST_CONTRAST
     for colour in (INK, GREY):
         assert palette.contrast(on_dark(colour), palette.DARK) > 4.5
 
@@ -41,6 +43,7 @@ def test_a_figure_has_no_paper_and_a_rule_for_every_colour(tmp_path: Path) -> No
     rules = {(key, light): dark for key, light, of, dark in RULE.findall(text) if key == of}
     drawn = set(re.findall(r"(fill|stroke): (#\w{6})", text.partition("</style>")[2]))
     assert rules.keys() == drawn
+    assert "text{fill:#e8edf3}" in text
     assert ("stroke", palette.hexadecimal(palette.lighter(palette.body(0)))) in rules
     paper = text.partition("</style>")[2].partition('id="patch_1"')[2].partition("</g>")[0]
     assert "fill: none" in paper
