@@ -41,10 +41,8 @@ def on_dark(colour: palette.Colour, *, is_area: bool = False) -> palette.Colour:
     known = _of_roles().get(colour)
     if known is not None:
         return known
-    allowed = (
-        max(colour) + min(colour) < 2 * _PALE if is_area else _LEAST <= palette.contrast(colour, palette.DARK) <= _MOST
-    )
-    if len({*colour}) > 1 and allowed:
+    of_lines = _LEAST <= palette.contrast(colour, palette.DARK) <= _MOST
+    if len({*colour}) > 1 and (max(colour) + min(colour) < 2 * _PALE if is_area else of_lines):
         return colour
     hue, lightness, saturation = colorsys.rgb_to_hls(*(value / 255.0 for value in colour))
     red, green, blue = colorsys.hls_to_rgb(hue, _HIGHEST - (_HIGHEST - _LOWEST) * lightness, saturation)
