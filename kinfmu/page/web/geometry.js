@@ -77,6 +77,13 @@ export function symbol({ at, along: [x, y], length }, points, scale, size, flips
     });
 }
 
+// Return whether a plate is so narrow that bars of a width along its edges meet.
+export function isSlim(points, width) {
+    const sides = points.map((p, k) => [p, points[(k + 1) % points.length]]);
+    const area = 0.5 * Math.abs(sides.reduce((sum, [p, q]) => sum + p[0] * q[1] - q[0] * p[1], 0));
+    return area < width * Math.max(...sides.map((side) => distance(...side)));
+}
+
 function cross(o, a, b) {
     return (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]);
 }
