@@ -20,7 +20,7 @@ from kinfmu.errors import StudyError, suggestion
 from kinfmu.mechanism import Mechanism, toml_file
 from kinfmu.mechanism.number import DisplayUnit, display_unit
 from kinfmu.mechanism.valid import quoted
-from kinfmu.run.tables import table_package
+from kinfmu.run.tables import Column, table_package
 from kinfmu.units import quantity_in
 
 
@@ -180,6 +180,14 @@ class StudyRows:
         for name in self.units:
             if name != REASON:
                 yield name, self[name]
+
+    def shown_columns(self) -> list[Column]:
+        """Return all columns but that of reasons, in the units in which summary and pictures show them."""
+        found = []
+        for name, values in self.columns():
+            unit, factor = self.display_unit(name)
+            found.append(Column(name, unit, values if factor == 1.0 else values / factor))
+        return found
 
     def to_arrow(self) -> Any:
         """Return the rows as a pyarrow.Table, with the unit of each column in the metadata of its field.
