@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.arrays import FloatArray, IntArray
+from kinfmu.codegen.lanes.stage import address_of
 from kinfmu.motion.history import Extreme, cut_places, larger, weights_at
 from kinfmu.motion.quantities import QuantityNames, QuantityRead, path_of
 from kinfmu.motion.quintic import compiled
@@ -287,8 +288,7 @@ class ExtremesReader:
     def _address(self, array: NDArray[Any]) -> int:
         array = np.ascontiguousarray(array)
         self._kept.append(array)
-        place: int = array.__array_interface__["data"][0]
-        return place
+        return address_of(array)
 
     def extremes(self) -> Extremes:
         """Return what was found."""

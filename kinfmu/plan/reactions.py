@@ -16,7 +16,8 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from kinfmu.mechanism.body import GROUND_NAME
-from kinfmu.mechanism.force_names import reaction_names_of, shaking_names
+from kinfmu.mechanism.force_names import reaction_names_of as reaction_names_of
+from kinfmu.mechanism.force_names import shaking_names
 from kinfmu.mechanism.joints import CamOscillating, CamTranslating, Joint, Revolute, Translational
 from kinfmu.mechanism.joints.cam import Cam
 from kinfmu.mechanism.quantities.placement import Placement, body_of
@@ -30,15 +31,6 @@ from kinfmu.plan.plan import SolvePlan
 from kinfmu.plan.steps import Assignment
 from kinfmu.plan.structure import RowTracer
 from kinfmu.units import CoordinateName
-
-__all__ = [
-    "follower_of",
-    "known_contacts",
-    "reaction_names_of",
-    "reaction_steps",
-    "shaking_steps",
-    "supports",
-]
 
 Pair = tuple[Node, Node]
 

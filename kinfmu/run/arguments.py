@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cached_property
 from typing import Any, NamedTuple
 
 from kinfmu.codegen.python import load_model
 from kinfmu.errors import RequestError
 from kinfmu.mechanism import Mechanism
-from kinfmu.mechanism.expression import Expression
-from kinfmu.mechanism.parameters import in_order, parameter_values
+from kinfmu.mechanism.parameters import parameter_values
 from kinfmu.mechanism.valid import LARGEST_NUMBER, is_number, quoted
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.equations.graph import evaluate
@@ -107,15 +105,6 @@ class Arguments:
             return setting.values[self._places[name]]
         return (*setting.constants, *setting.load_constants)[self._constant_places[name]]
 
-    @cached_property
-    def _derived(self) -> tuple[tuple[str, Expression], ...]:
-        """Parameters that follow from others by expressions, each after those in its expression."""
-        parameters = self.mechanism.parameters
-        expressions = {
-            name: p.expression for name, p in parameters.items() if p.expression and name not in self._places
-        }
-        return tuple((name, expressions[name]) for name in in_order(parameters, expressions) if name in expressions)
-
     def _read(self, given: Settings) -> dict[str, float]:
         """Return the numbers of settings of which some are text, or refuse them."""
         for name in given:
@@ -159,9 +148,9 @@ class Arguments:
 
     def info(self, setting: Setting, engine: str) -> dict[str, str]:
         mechanism = self.mechanism
-        values: dict[str, Any] = dict(zip(self._places, setting.values or self.written, strict=True))
-        for name, expression in self._derived if setting.values else ():
-            values[name] = expression.value(values)
+        values: dict[str, Any] = {}
+        if setting.values:
+            values = parameter_values(mechanism.parameters, dict(zip(self._places, setting.values, strict=True)))
         return {
             "name": mechanism.name,
             "title": mechanism.title,

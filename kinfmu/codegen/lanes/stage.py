@@ -246,15 +246,3 @@ def empty_results(rows: int, n: int, of: Callable[[int], FloatArray] = np.empty)
     whole = of(rows * pitch + LINE)
     first = -address_of(whole) // ITEM % LINE
     return whole[first : first + rows * pitch].reshape(rows, pitch)[:, :n]
-
-
-__all__ = [
-    "Given",
-    "Strided",
-    "address_of",
-    "empty_results",
-    "is_printable",
-    "load_native_stage",
-    "stage_source",
-    "strided_columns",
-]

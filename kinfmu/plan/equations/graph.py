@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -219,15 +219,16 @@ class Graph:
         return [d[target] for target in targets]
 
 
-def reachable(targets: Iterable[Node]) -> list[Node]:
-    """Return the targets and all nodes they are made of, arguments first."""
+def reachable(targets: Iterable[Node], known: Container[Node] = ()) -> list[Node]:
+    """Return the targets and all nodes they are made of, arguments first; of what known ones are made nothing."""
     found: dict[int, Node] = {}
     stack = list(targets)
     while stack:
         node = stack.pop()
         if node.id not in found:
             found[node.id] = node
-            stack.extend(node.args)
+            if node not in known:
+                stack.extend(node.args)
     return [found[number] for number in sorted(found)]
 
 
