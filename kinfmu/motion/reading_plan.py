@@ -15,8 +15,7 @@ from kinfmu.codegen.python import load_model
 from kinfmu.errors import RequestError
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.measures import Reading
-from kinfmu.mechanism.opened import parameters_behind
-from kinfmu.mechanism.parameters import parameter_values
+from kinfmu.mechanism.parameters import parameter_values, parameters_behind
 from kinfmu.mechanism.quantities.arithmetic import Value, atan2_like, cos, sin, sqrt
 from kinfmu.motion.breaks import has_breaks
 from kinfmu.motion.extremes import Channels, Extremes, SamplesNeededError
@@ -275,5 +274,5 @@ def points_of_designs(mechanism: Mechanism, given: Mapping[str, FloatArray]) -> 
 
 def dependent_numbers(mechanism: Mechanism, given: Collection[str]) -> list[tuple[str | int, ...]]:
     """Return the paths of the numbers that change with parameters, directly or through other parameters."""
-    changing = set(given)
-    return [place for place, one in mechanism.expressions.items() if changing & parameters_behind(mechanism, one)]
+    behind = {place: parameters_behind(mechanism.parameters, one) for place, one in mechanism.expressions.items()}
+    return [place for place, names in behind.items() if names.intersection(given)]

@@ -220,7 +220,7 @@ class Graph:
 
 
 def reachable(targets: Iterable[Node], known: Container[Node] = ()) -> list[Node]:
-    """Return the targets and all nodes they are made of, arguments first; of what known ones are made nothing."""
+    """Return the targets and all nodes they are made of, arguments first; nothing that known ones are made of."""
     found: dict[int, Node] = {}
     stack = list(targets)
     while stack:
