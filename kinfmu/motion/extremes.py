@@ -85,9 +85,7 @@ class Channels:
     def find(self, names: QuantityNames, points: Any, of: Any, order: int) -> tuple[tuple[int, ...], int]:
         """Return the columns of a quantity or a point, and the order of its derivative with that of its name.
 
-        Raises:
-            SamplesNeededError: Its derivatives are not those of columns.
-
+        Raise a SamplesNeededError if its derivatives are not those of columns.
         """
         quantities: tuple[QuantityRead, ...] = (of,)
         if isinstance(of, str) and order and of in points:

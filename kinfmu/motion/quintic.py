@@ -69,14 +69,10 @@ def maxima(x: FloatArray, rows: Rows, signs: Sequence[float]) -> list[tuple[Floa
 
         f_0, f_0 + h v_0 / 5, f_0 + 2 h v_0 / 5 + h^2 a_0 / 20   and the same from the other end
 
-    Args:
-        x: (n,) arguments.
-        rows: (m, n) values, rates and accelerations.
-        signs: 1 for the largest value of the quantity, -1 for that of its negative.
+    Both are (m,), for each sign.
 
-    Returns:
-        Largest values and their places, (m,) each, for each sign.
-
+    x: (n,) arguments. rows: (m, n) values, rates and accelerations. signs: 1 for the largest value of the quantity, -1
+    for that of its negative.
     """
     if _compiled:
         return _compiled_maxima(x, rows, signs)

@@ -41,10 +41,7 @@ def reaction_steps(plan: SolvePlan, wanted: Container[str] | None = None) -> For
     Where redundant rows share a load, the steps give one of the possible distributions. What the unknown contact of a
     cam loads lacks its force.
 
-    Args:
-        plan: The plan, as `Mechanics` takes it.
-        wanted: Names of those of joints that are wanted, without those on the ground. Default: all.
-
+    wanted: Names of those of joints that are wanted, without those on the ground. Default: all.
     """
     mechanics = Mechanics(plan)
     multipliers = _Multipliers(plan, mechanics).of_row
@@ -180,10 +177,7 @@ def known_contacts(joints: Sequence[Joint]) -> Iterator[tuple[int, Supports]]:
 def carried(mechanics: Mechanics, efforts: Mapping[int, Sequence[Node]]) -> dict[tuple[int, int], Node]:
     """Return what contacts add to the reactions of supports, by the numbers of joint and row [N, N m].
 
-    Args:
-        mechanics: Masses and loads of a plan.
-        efforts: By the number of a joint, what its rows transmit [N, N m]; of cams that nothing loads 0.
-
+    efforts: By the number of a joint, what its rows transmit [N, N m]; of cams that nothing loads 0.
     """
     added: dict[tuple[int, int], Node] = {}
 
@@ -304,10 +298,7 @@ def _turned(a: Pair) -> Pair:
 def shaking_steps(plan: SolvePlan, wanted: Container[str] | None = None) -> ForceSteps:
     """Return the steps to shaking force and moment alone; they solve nothing.
 
-    Args:
-        plan: The plan, as `Mechanics` takes it.
-        wanted: Names of those that are wanted. Default: all.
-
+    wanted: Names of those that are wanted. Default: all.
     """
     mechanics = Mechanics(plan, coefficients="given")
     nodes = shaking_nodes(plan, mechanics)  # of loads too, whose slopes are along symbols of known coordinates

@@ -55,10 +55,8 @@ class Arguments:
     def setting(self, given: Settings) -> Setting:
         """Return parameters and law constants as numbers.
 
-        Raises:
-            RequestError: A name is unknown or a value is invalid.
-            MechanismError: The mechanism cannot have these values.
-
+        Raise a RequestError if a name is unknown or a value is invalid, a MechanismError if the mechanism cannot have
+        these values.
         """
         if not given:
             return Setting(given, (), *self._split(self._constants_written), starts_elsewhere=False)
@@ -95,10 +93,7 @@ class Arguments:
     def number(self, name: str, value: float | str) -> float:
         """Return the value of a parameter or law constant as a number.
 
-        Raises:
-            RequestError: The name is unknown.
-            MechanismError: The value is invalid.
-
+        Raise a RequestError if the name is unknown, a MechanismError if the value is invalid.
         """
         setting = self.setting({name: value})
         if name in self._places:

@@ -382,9 +382,7 @@ class Model:
     def _new_solver(self, values: Vector, starting: Vector | None, tolerance: float) -> Solver:
         """Return a solver with parameters set. starting: constants of laws whose start must be reached; None: none.
 
-        Raises:
-            UnreachedError: Continuation does not reach the parameters, or the start of the laws.
-
+        Raise an UnreachedError if continuation does not reach the parameters, or the start of the laws.
         """
         if not values and starting is None:
             return Solver(load_model(self.plan), tolerance)

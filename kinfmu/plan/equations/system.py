@@ -45,10 +45,7 @@ def row_code(residual: Callable[[Sequence[Node], Node], Sequence[Any]], count: i
 
     Values are equal to the bit to those of the formulas, up to the sign of a zero.
 
-    Args:
-        residual: The rows, as a function of coordinates and target.
-        count: Number of coordinates.
-
+    residual: The rows, as a function of coordinates and target.
     """
     graph = Graph()
     coordinates = [graph.symbol(f"q{k}") for k in range(count)]
