@@ -22,7 +22,6 @@ from kinfmu.codegen.newton import (
     determinant,
     is_small,
     jacobian_text,
-    opposite_solution,
     outright,
     outright_rates,
     right_side,
@@ -163,7 +162,7 @@ class LaneUnit:
         steps = [f"d{k}" for k in range(len(block.unknowns))]
         r, evaluated = right_side(writer, "r", block.residuals, block.entries)
         jacobian = jacobian_text(writer, block)
-        values = [text.replace(" / det", " * per_det") for text in solution(jacobian, r, "det")]
+        values = solution(jacobian, r, "* per_det")
         lines += [*evaluated, f"per_det = 1.0 / ({determinant(jacobian)})"]
         lines += [f"{one} = {text}" for one, text in zip(steps, values, strict=True)]
         for name, one in zip(block.unknowns, steps, strict=True):
@@ -203,7 +202,7 @@ class LaneUnit:
             lines.append(f"per_det = 1.0 / hold[{self.cached(None)}][i]")
         z = [identifier(name.derivative(order)) for name in block.unknowns]
         jacobian = [[writer.expression(entry) if many else "" for entry in row] for row in block.jacobian]
-        values = opposite_solution(jacobian, b, "* per_det")
+        values = solution(jacobian, b, "* per_det", is_opposite=True)
         return lines + [f"{one} = {text}" for one, text in zip(z, values, strict=True)]
 
 
