@@ -113,6 +113,7 @@ def test_rows_in_messages_are_joints_and_drivers(chromium: Browser) -> None:
         "row AB.length closes on another branch only": "joint AB closes on another branch only",
         "rows C.x, lift.length close on another branch only": "joint C and driver lift close on another branch only",
         "redundant row C.x does not close": "joint C does not close",
+        "2 cannot be reached: the limit is lift = 99.9999994 mm": "2 cannot be reached: the limit is lift = 100 mm",
         "where rows C.x, C.y are dependent": "where the equations of joint C are dependent",
     }
     code = (Path(kinfmu.page.__file__).parent / "web" / "numbers.js").read_text("utf-8").replace("export ", "")

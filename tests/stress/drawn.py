@@ -29,6 +29,9 @@ class Pose(NamedTuple):
     phi: Jet
 
 
+Poses = Callable[[Numbers, Sequence[Jet], Closing], dict[str, Pose]]
+
+
 @dataclass(frozen=True)
 class Frame:
     """Where the mechanism stands: as it is sketched, then scaled, turned to an exact direction, and moved."""
@@ -63,11 +66,11 @@ class Sketch:
     body. kinds: of the drivers, 'angle' or 'length'. joints: other than the pins, drivers: at start values, both in a
     frame. marks: driver values where loops may be singular, of a turn if it is an angle. period: of the closed form,
     in turns, 0 if it does not go round; reach: values to draw the start from; gap: by how much a length contradicts
-    the closed form.
+    the closed form. later: poses whose law takes place at a larger argument, by so much.
     """
 
     points: Mapping[str, Mapping[str, tuple[Exact, Exact]]]
-    poses: Callable[[Numbers, Sequence[Jet], Closing], dict[str, Pose]]
+    poses: Poses
     drivers: Callable[[Frame, Sequence[float]], tuple[Driver, ...]]
     joints: Callable[[Frame], tuple[Joint, ...]] = lambda _: ()
     kinds: tuple[str, ...] = ("angle",)
@@ -76,6 +79,7 @@ class Sketch:
     reach: tuple[float, float] = (0.0, TURN)
     is_level: bool = False  # its angles count from the world's axis: it is not turned
     gap: Exact = 0
+    later: Callable[[float], Poses] | None = None
 
 
 class Exactly(NamedTuple):
@@ -227,9 +231,9 @@ class DrawnLaw:
         """The law that kinfmu is given."""
         return MotionSequence(tuple(self.segments), self.start, self.begin, self.repeat)
 
-    def value(self, numbers: Numbers, x: Jet) -> Jet:
-        """The law's value, with the derivatives of a jet."""
-        at = numbers.number(Fraction(self.begin))
+    def value(self, numbers: Numbers, x: Jet, later: float = 0.0) -> Jet:
+        """The law's value, with the derivatives of a jet; of a law that begins later."""
+        at = numbers.number(Fraction(self.begin) + Fraction(later))
         value = x * numbers.number(0) + numbers.number(Fraction(self.start))
         if self.repeat:
             whole = sum(numbers.number(Fraction(segment.duration)) for segment in self.segments)

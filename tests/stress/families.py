@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from random import Random
 
 import numpy as np
@@ -867,9 +868,9 @@ def led_by_laws(rng: Draw) -> Sketch:
         else:
             points[f"{body}2"] = {f"{name}2": point for name, point in given.items()}
 
-    def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
+    def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing, later: float = 0.0) -> dict[str, Pose]:
         moving = led(numbers, u[0], closing)
-        followed = law.value(numbers, moving[leader].phi)
+        followed = law.value(numbers, moving[leader].phi, later)
         moved = standing(numbers, *aside, u[0])
         for body, pose in other.poses(numbers, [followed], closing).items():
             moving[f"{body}2"] = Pose(pose.at + moved, pose.phi)
@@ -879,7 +880,17 @@ def led_by_laws(rng: Draw) -> Sketch:
         return (Coupling("law", AngleBetween(leader), AngleBetween("crank2"), law.law),)
 
     driven = "cam" if first is None else "crank"
-    return Sketch(points, poses, _turns(driven), joints, marks=tuple(marks), period=0, reach=reach, is_level=True)
+    return Sketch(
+        points,
+        poses,
+        _turns(driven),
+        joints,
+        marks=tuple(marks),
+        period=0,
+        reach=reach,
+        is_level=True,
+        later=lambda by: partial(poses, later=by),
+    )
 
 
 def _turning(function: Callable[[Array], Array], places: Array) -> list[float]:

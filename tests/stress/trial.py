@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from tests.stress.families import FAMILIES, STARTS_ANYWHERE, Draw, RedrawError
 from tests.stress.jets import DIGITS, SCREENING, Numbers
 from tests.stress.patterns import Started, drawn_steps, started
 
+EPS = np.finfo(float).eps
 WRONG = 1e-9  # of the column's largest magnitude
 ROUNDINGS = 64.0  # of the driver values: what they change in the exact motion, an `ok` sample may be off by, too
 SUMS = 4.0  # roundings of the largest driver value, or of a turn: begin, periods and segments of a law are taken off it
@@ -236,31 +237,43 @@ class Trial:
     def _rounded(self, k: int, outputs: Iterable[str]) -> Floats:
         """(3,) how much rounding may change q, qd, qdd of a sample, as errors are measured.
 
-        Roundings of its driver values, and those of the sums in which a law takes them, in which small values are
-        rounded as large ones. Where a rise ends, all rests beyond: a few roundings of the sums reach into the rise.
+        Roundings of its driver values, and those of the sums in which a law takes them, or a solved angle, in which
+        small values are rounded as large ones. Where a rise ends, all rests beyond: a few roundings of the sums reach
+        into the rise.
         """
-        turns = [TURN if kind == "angle" else 0.0 for kind in self.drawn.sketch.kinds]
+        sketch = self.drawn.sketch
+        turns = [TURN if kind == "angle" else 0.0 for kind in sketch.kinds]
         largest = np.fmax(np.abs(self.inputs[0]).max(axis=0), turns)
-        of_sums = self._changes(k, outputs, SUMS * np.finfo(float).eps * largest)
-        return np.fmax(of_sums, ROUNDINGS * self._changes(k, outputs, np.spacing(self.inputs[0][k])))
+        of_sums = self._changes(k, outputs, SUMS * EPS * largest)
+        of_values = ROUNDINGS * self._changes(k, outputs, np.spacing(self.inputs[0][k]))
+        return np.fmax(np.fmax(of_sums, of_values), self._changes(k, outputs, 0.0 * largest, float(SUMS * EPS * TURN)))
 
-    def _changes(self, k: int, outputs: Iterable[str], shifts: Floats) -> Floats:
-        """(3,) how much shifts of the driver values change q, qd, qdd of a sample: up or down, what changes more."""
-        drivers = len(shifts)
-        u, ud, udd = (np.repeat(table[[k]], 2 * drivers + 1, axis=0) for table in self.inputs)
-        for driver, shift in enumerate(shifts):
-            u[driver + 1, driver] += shift
-            u[drivers + driver + 1, driver] -= shift
-        columns = self.drawn.exactly(DIGITS, u, ud, udd).columns
+    def _changes(self, k: int, outputs: Iterable[str], shifts: Floats, later: float = 0.0) -> Floats:
+        """(3,) how much shifts of the driver values, or of the law, change q, qd, qdd of a sample: up or down, what
+        changes more.
+        """
+        here = self._exact(k, 0.0 * shifts)
+        steps = [(shift, 0.0) for shift in np.diag(shifts) if shift.any()] + [(0.0 * shifts, later)]
+        sides = [[self._exact(k, sign * shift, sign * by) for sign in (1.0, -1.0)] for shift, by in steps]
         changes = np.zeros(3)
         for name in outputs:
-            for order, exact in enumerate((columns[name].d0, columns[name].d1, columns[name].d2)):
-                values = np.broadcast_to(exact, (2 * drivers + 1,))
-                sides = np.abs(np.asarray(values[1:] - values[0], dtype=float)).reshape(2, drivers)
-                change = sides.max(axis=0).sum()
-                scale = max(self._largest(name, order, ud, udd)[0], abs(float(values[0])))
+            for order, value in enumerate(here[name]):
+                change = sum(max(abs(float(side[name][order] - value)) for side in pair) for pair in sides)
+                scale = max(self._largest(name, order, *self._rates(k))[0], abs(float(value)))
                 changes[order] = max(changes[order], change / scale if change else 0.0)
         return changes
+
+    def _rates(self, k: int) -> tuple[Floats, Floats]:
+        """(1, d) speeds and accelerations of the drivers at a sample."""
+        return self.inputs[1][[k]], self.inputs[2][[k]]
+
+    def _exact(self, k: int, shift: Floats, later: float = 0.0) -> dict[str, tuple[Any, Any, Any]]:
+        """The exact q, qd, qdd of a sample, with shifted driver values, and a law that begins later."""
+        drawn = self.drawn
+        if later and drawn.sketch.later is not None:
+            drawn = replace(drawn, sketch=replace(drawn.sketch, poses=drawn.sketch.later(later)))
+        columns = drawn.exactly(DIGITS, self.inputs[0][[k]] + shift, *self._rates(k)).columns
+        return {name: tuple(np.ravel(part)[0] for part in (jet.d0, jet.d1, jet.d2)) for name, jet in columns.items()}
 
     def _confirm(self, run: Run, expected: Expected, which: NDArray[np.int64], size: float, verdict: Verdict) -> None:
         """A share of the samples, all that look wrong and all where long doubles do not decide are judged again by 50

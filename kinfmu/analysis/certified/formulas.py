@@ -10,7 +10,7 @@ from operator import add, mul, neg, sub
 from typing import TypeVar
 
 from kinfmu.plan import Block, SolvePlan
-from kinfmu.plan.equations.graph import Graph, Node, reachable, symbols
+from kinfmu.plan.equations.graph import ExactGraph, Node, reachable, symbols
 
 TIME = "time"
 WAY = "way along a direction"
@@ -59,7 +59,7 @@ class PlanRows:
 
     def __init__(self, plan: SolvePlan) -> None:
         self.plan = plan
-        self.graph = Graph()
+        self.graph = ExactGraph()
         self._equals = _Equals(self.graph)
         self._given: dict[str, Node] = {}
         self._copies: dict[Node, Node] = {}
@@ -213,7 +213,7 @@ class _Equals:
     1e-30.
     """
 
-    def __init__(self, graph: Graph) -> None:
+    def __init__(self, graph: ExactGraph) -> None:
         self._random = random.Random(1980)  # noqa: S311  no secrets
         self._values: dict[Node, int] = {}
         zero = graph.constant(0.0)

@@ -16,6 +16,7 @@ from kinfmu.draw.scene.shape import Shape, points_of
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.joints import CamFlatFace, CamRoller, Coordinate, Gear, PointOnLine, RackAndPinion, Translational
+from kinfmu.mechanism.joints.joint import Joint
 from kinfmu.mechanism.quantities.placement import body_of, unit_vector
 from kinfmu.motion.cams import CAM_JOINTS, CamJoint, PlacedCam, placed_cam
 from kinfmu.motion.cams.critical import cut_depths
@@ -25,6 +26,7 @@ from kinfmu.motion.cams.traced import ComplexArray, given_curve, pairs, traced
 _BELT = 0.3  # of the distance of the axles: radius of a belt's larger pulley, since files state only the ratio
 _BEYOND = 0.35  # of the pinion's radius, additional length at both ends of a rack
 _ANGLES = np.linspace(0.0, 2.0 * np.pi, 361)[:-1]  # [rad], points of a curve
+_ON_LINE = 1e-6  # of its points' distance; a point that is nearer is on the line
 _TOUCH = 1e-9  # of the radius; deeper cuts are more than rounding
 _OVERHANG = 0.15  # of the contact's range, by which a flat face is longer on either side
 
@@ -33,13 +35,15 @@ _OVERHANG = 0.15  # of the contact's range, by which a flat face is longer on ei
 class Slide:
     """A line fixed in one body, the holder, and the point of another that stays on it.
 
-    origin: a point of the line, 'body.point', or 'ground' if it has no name; point: the sliding point; ends: of its
-    path over the run in the holder's frame, (2, 2); turns: True for a pin, which can turn, False for a block.
+    origin: a point of the line, 'body.point', or 'ground' if it has no name; point: the sliding point; along: unit
+    vector (2,) in the holder's frame; ends: of its path over the run in that frame, (2, 2), without a run of the slot
+    as points of the holder show it; turns: True for a pin, which can turn, False for a block.
     """
 
     name: str
     origin: str
     point: str
+    along: FloatArray
     ends: FloatArray
     turns: bool
 
@@ -63,15 +67,15 @@ def slides(shown: Instant) -> list[Slide]:
             track = shown.track(joint.of)
             ends = np.array([np.nanmin(track, axis=0), np.nanmax(track, axis=0)])
             ends[:, across] = joint.value
-            lines.append(Slide(joint.name, GROUND_NAME, joint.of, ends, turns=True))
+            lines.append(Slide(joint.name, GROUND_NAME, joint.of, np.eye(2)[1 - across], ends, turns=True))
         elif isinstance(joint, PointOnLine):
             a, b = joint.between
-            lines.append(Slide(joint.name, a, b, _ends(shown, a, b, joint.axis), turns=True))
+            lines.append(_slide(shown, joint, a, b, joint.axis))
         elif isinstance(joint, Translational):
             a, b, axis = *joint.between, joint.axis
             if _is_block(shown, body_of(a)) and not _is_block(shown, body_of(b)):  # the line is that of the rod
                 a, b, axis = b, a, axis - joint.angle
-            lines.append(Slide(joint.name, a, b, _ends(shown, a, b, axis), turns=False))
+            lines.append(_slide(shown, joint, a, b, axis))
     return lines
 
 
@@ -82,27 +86,40 @@ def rods(shown: Instant, sliding: Sequence[Slide]) -> dict[str, FloatArray]:
         if slide.holder != GROUND_NAME:
             origin = np.array(shown.body_points[slide.origin])
             line = [origin, *slide.ends]
-            along = slide.ends[1] - slide.ends[0]
-            order = np.argsort([float(point @ along) for point in line])
+            order = np.argsort([float(point @ slide.along) for point in line])
             lines.setdefault(slide.holder, []).append(np.array([line[order[0]], line[order[-1]]]))
     return {body: np.array(ends) for body, ends in lines.items()}
 
 
-def _ends(shown: Instant, a: str, b: str, axis: float) -> FloatArray:
-    """Return the ends (2, 2) of the path of b along an axis [rad] through a, in the frame of a's body."""
-    e = np.array(unit_vector(axis))
+def _slide(shown: Instant, joint: Joint, a: str, b: str, axis: float) -> Slide:
+    """Return the slide of b along an axis [rad] through a, in the frame of a's body."""
+    turns, e = isinstance(joint, PointOnLine), np.array(unit_vector(axis))
     origin = np.array(shown.body_points[a])
     distance = (seen_from(shown.poses[body_of(a)], shown.track(b)) - origin) @ e
-    return np.array([origin + np.nanmin(distance) * e, origin + np.nanmax(distance) * e])
+    low, high = float(np.nanmin(distance)), float(np.nanmax(distance))
+    if len(distance) == 1 and turns:
+        low, high = _slot(shown, a, e, float(distance[0]))
+    return Slide(joint.name, a, b, e, np.array([origin + low * e, origin + high * e]), turns)
+
+
+def _slot(shown: Instant, a: str, e: FloatArray, at: float) -> tuple[float, float]:
+    """Return from where to where a slot is drawn without a run, from a point a along e (2,); at: the place of its pin.
+
+    It ends at a, and at the next point of its body beyond the pin. A pin that slides from a itself has all of its link.
+    """
+    body = next(one for one in shown.mechanism.bodies if one.name == body_of(a))
+    away = points_of(body) - shown.body_points[a]
+    near = _ON_LINE * (float(np.abs(away).max(initial=0.0)) + abs(at))
+    on_line = [float(along) for along in away[np.abs(away @ [-e[1], e[0]]) <= near] @ e]
+    if abs(at) > near:
+        end = min((along for along in on_line if along / at > 1.0 + _ON_LINE), key=abs, default=at)
+        return min(0.0, end), max(0.0, end)
+    return (0.0, 0.0) if body.name == GROUND_NAME else (min(on_line), max(on_line))
 
 
 def place(shown: Instant, slide: Slide) -> tuple[FloatArray, FloatArray]:
     """Return the place of the sliding point, and the unit vector of its line."""
-    first, last = slide.ends
-    along = last - first
-    if not np.hypot(*along) > 0.0:
-        along = np.array([1.0, 0.0])
-    ends = shown.placed(slide.holder, np.array([[0.0, 0.0], along / np.hypot(*along)]))
+    ends = shown.placed(slide.holder, np.array([[0.0, 0.0], slide.along]))
     return shown.point(slide.point), ends[1] - ends[0]
 
 

@@ -26,13 +26,14 @@ from kinfmu.mechanism.valid import quoted
 from kinfmu.page.editor.text_edits import edited_text
 from kinfmu.plan import localized
 from kinfmu.plan.equations.assembly import MOST_DENSE, closed_start
-from kinfmu.plan.equations.closing import CLOSED, close, followed
+from kinfmu.plan.equations.closing import CLOSED, close, closed_up_to, followed
 from kinfmu.plan.equations.part import Part
 from kinfmu.plan.equations.redundancy import Redundancy, find_redundancy
 from kinfmu.plan.equations.start_poses import is_in_world_coordinates, law_targets, start_from_poses
 from kinfmu.plan.equations.system import System
 
 AS_DRAWN = 1e-9  # of the size; start poses that close this well are the drawn poses, to the bit
+_STEPS = 10  # on the way of a driver
 PLACEHOLDER = "_"  # stands for the bodies of a file that has only the ground, which is no mechanism yet
 
 Pose = tuple[float, float, float]
@@ -184,6 +185,19 @@ class Drawing:
         except KinfmuError:
             return start
         return q if gap <= CLOSED else start
+
+    def reached(self, driver: str, value: float) -> float:
+        """Return how far a driver gets from the drawn pose on its way to a value, in steps, with the others at rest."""
+        u, q = law_targets(self.system), self._drawn
+        number = [one.name for one in self.mechanism.drivers].index(driver)
+        begin = last = float(u[number])
+        for step in range(1, _STEPS + 1):
+            u[number] = begin + step / _STEPS * (value - begin)
+            q, gap = close(self.system, q, u)
+            if gap > closed_up_to(self.system):
+                break
+            last = float(u[number])
+        return last
 
     @cached_property
     def placement(self) -> Placement:

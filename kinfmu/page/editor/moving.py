@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
-from kinfmu.errors import MechanismError
+from kinfmu.errors import MechanismError, listed
+from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.drivers import Driver
 from kinfmu.mechanism.edits import Place
 from kinfmu.mechanism.joints import (
@@ -21,12 +22,15 @@ from kinfmu.mechanism.joints import (
 )
 from kinfmu.mechanism.joints.joint import Joint
 from kinfmu.mechanism.laws import ConstantValue, Law, Polynomial
+from kinfmu.mechanism.loads import Load
 from kinfmu.mechanism.members import LENGTH
 from kinfmu.mechanism.quantities.placement import Placement, body_of
 from kinfmu.page.editor.drawing import Spot
 from kinfmu.page.editor.pen import OperationArguments, Pen
+from kinfmu.page.editor.tables import references
 
 _KEYS = {Distance: "length", Coordinate: "value", RackAndPinion: "offset", CamTranslating: "offset"}
+_SQUARE = 1e-9  # cosine of lines at right angles
 _CHANGED = 1e-12  # of the size; numbers that differ by less stay as they are written
 
 
@@ -34,69 +38,123 @@ def move(pen: Pen, values: OperationArguments) -> None:
     """Move a point with all that is pinned to it."""
     point = pen.drawing.point(values.text("point"), f"{values.name}: point")
     to = values.spot("to")
-    kept = []
-    if values.has("keep"):
-        for pair in values.entries("keep"):
-            if not isinstance(pair, list) or len(pair) != 2 or not all(isinstance(one, str) for one in pair):
-                raise values.wrong("keep", "a list of pairs of points")
-            kept.append([pen.drawing.point(one, f"{values.name}: keep") for one in pair])
-    carry(pen, point, _kept(pen, values, point, to, kept))
+    if values.truth("exact") and not pen.is_same(near := _on_lines(pen, _moved_with(pen, point), to), to):
+        place = ", ".join(f"{x:.6g}" for x in near)
+        raise values.error(f"{point} slides on a line, on which {place} is the nearest place; move that line first")
+    carry(pen, point, to)
 
 
 def length(pen: Pen, values: OperationArguments) -> None:
-    """Move the second of two points along their line, to a distance from the first."""
+    """Move one of two points to a distance from the other: not the one on the ground, and first one that slides.
+
+    It moves along the line of both, with a slot that nothing else holds; else along the line on which it slides.
+    """
     first, second = (pen.drawing.point(one, f"{values.name}: between") for one in values.texts("between", 2))
-    value = values.number("value")
+    value, pins = values.number("value"), pen.drawing.pins
     if not value > 0.0:
         raise values.error(f"value = {value!r} must be positive")
-    a, b = pen.spot(first), pen.spot(second)
-    if second in _moved_with(pen, first) or pen.is_same(a, b):
+    if second in pins[first] or pen.is_same(pen.spot(first), pen.spot(second)):
         raise values.error(f"{first} and {second} are in one place, so their line has no direction")
-    part = value / math.dist(a, b)
-    carry(pen, second, (a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])))
+
+    def rank(end: str) -> tuple[bool, bool]:
+        return GROUND_NAME in map(body_of, pins[end]), not _lines_under(pen, pins[end])
+
+    end, other = (first, second) if rank(first) < rank(second) else (second, first)
+    lines = _lines_under(pen, pins[end])
+    if len(lines) > 1:
+        raise values.error(f"{end} slides on the lines of joints {listed(line.joint for line in lines)}; free it first")
+    (x, y), (to_x, to_y) = pen.spot(other), pen.spot(end)
+    part = value / math.dist((x, y), (to_x, to_y))
+    to = (x + part * (to_x - x), y + part * (to_y - y))
+    places = {}
+    for line in lines:
+        places = _slot_through(pen, line, to)
+        if not places:
+            foot, across = line.split(pen.spot(other))
+            if value < abs(across):
+                text = f"{abs(across):.6g} {pen.drawing.mechanism.length_unit} from {other}"
+                raise values.error(f"{end} slides on the line of joint '{line.joint}', {text}; move that line first")
+            half, now = math.sqrt(value * value - across * across), line.split(pen.spot(end))[0]
+            to = line.place(min((foot + half, foot - half), key=lambda along: abs(along - now)))
+    _put_places(pen, dict.fromkeys(pins[end], to) | places)
 
 
-def _kept(pen: Pen, values: OperationArguments, point: str, to: Spot, kept: list[list[str]]) -> Spot:
-    """Return the place nearest to another one at which lengths from points that do not move stay."""
-    moved = _moved_with(pen, point)
-    circles: dict[Spot, float] = {}
-    for a, b in kept:
-        if (a in moved) != (b in moved):
-            fixed, end = map(pen.spot, (b, a) if a in moved else (a, b))
-            circles.setdefault(fixed, math.dist(fixed, end))
-    if len(circles) > 2:
-        raise values.error(f"{point} is held by {len(circles)} lengths that stay, so it cannot move; release one")
-    if not circles:
-        return to
-    (centre, radius), *others = circles.items()
-    spot = pen.spot(point)
-    if not others:
-        away = math.dist(centre, to)
-        if away == 0.0:
-            return spot
-        part = radius / away
-        return centre[0] + part * (to[0] - centre[0]), centre[1] + part * (to[1] - centre[1])
-    other = others[0][0]
-    d_x, d_y = other[0] - centre[0], other[1] - centre[1]
-    across = 2.0 * ((spot[0] - centre[0]) * -d_y + (spot[1] - centre[1]) * d_x) / math.dist(centre, other) ** 2
-    mirrored = spot[0] + across * d_y, spot[1] - across * d_x
-    return min(spot, mirrored, key=lambda place: math.dist(place, to))  # two lengths allow these two places
+class _Line(NamedTuple):
+    """A line on which a point slides: of a joint and a body, through a place, in a direction of the world."""
+
+    joint: str
+    body: str
+    through: Spot
+    along: Spot
+
+    def split(self, spot: Spot) -> Spot:
+        """Return how far a place is along the line from where it begins, and across it."""
+        (x, y), (e_x, e_y) = self.through, self.along
+        d_x, d_y = spot[0] - x, spot[1] - y
+        return d_x * e_x + d_y * e_y, d_y * e_x - d_x * e_y
+
+    def place(self, along: float, across: float = 0.0) -> Spot:
+        """Return the place so far along the line and across it."""
+        (x, y), (e_x, e_y) = self.through, self.along
+        return x + along * e_x - across * e_y, y + along * e_y + across * e_x
+
+
+def _lines_under(pen: Pen, group: frozenset[str]) -> list[_Line]:
+    """Return the lines on which points slide, and which begin in other points."""
+    found = []
+    for joint in pen.drawing.mechanism.joints:
+        if isinstance(joint, PointOnLine | Translational):
+            origin, held = joint.between
+            if isinstance(joint, Translational) and body_of(held) == GROUND_NAME:
+                origin, held = held, origin
+            if held in group and origin not in group:
+                found.append(_Line(joint.name, body_of(origin), pen.spot(origin), _direction(pen, joint)))
+    return found
+
+
+def _slot_through(pen: Pen, line: _Line, to: Spot) -> dict[str, Spot]:
+    """Return places of the points of a slot that is moved to a place; none if it is on the ground or holds others."""
+    mechanism = pen.drawing.mechanism
+    splits = {one: line.split(pen.spot(one)) for one in mechanism.body_points if body_of(one) == line.body}
+    own = {one: along for one, (along, across) in splits.items() if pen.is_same((0.0, across), (0.0, 0.0))}
+    members: list[Joint | Driver | Load] = [*mechanism.joints, *mechanism.drivers, *mechanism.loads]
+    holding = (one for one in members if one.name != line.joint and not _slides_across(pen, one, line.along))
+    held = {one for member in holding for one in references(member)}
+    if line.body == GROUND_NAME or held & own.keys():
+        return {}
+    return {one: line.place(along, line.split(to)[1]) for one, along in own.items()}
+
+
+def _slides_across(pen: Pen, member: Joint | Driver | Load, along: Spot) -> bool:
+    """Return whether a joint is a slide at right angles to a direction."""
+    if not isinstance(member, PointOnLine | Translational):
+        return False
+    e_x, e_y = _direction(pen, member)
+    return abs(e_x * along[0] + e_y * along[1]) <= _SQUARE
+
+
+def _direction(pen: Pen, joint: PointOnLine | Translational) -> Spot:
+    """Return the direction of the line of a slide in the world."""
+    e_x, e_y = pen.drawing.placement.direction(body_of(joint.between[0]), float(joint.axis))
+    return float(e_x), float(e_y)
 
 
 def carry(pen: Pen, point: str, to: Spot) -> None:
     """Move a point to a place, with all that is pinned to it; lengths, offsets and drivers follow."""
-    drawing = pen.drawing
     moved = _moved_with(pen, point)
-    to = _on_lines(pen, moved, to)
-    places = dict.fromkeys(moved, to)
-    shift = (to[0] - pen.spot(point)[0], to[1] - pen.spot(point)[1])
-    for joint in drawing.mechanism.joints:  # pins on a line whose point moves
+    _put_places(pen, dict.fromkeys(moved, _on_lines(pen, moved, to)))
+
+
+def _put_places(pen: Pen, places: dict[str, Spot]) -> None:
+    """Move points to places, pins on lines whose points move with them; lengths, offsets and drivers follow."""
+    drawing, moved = pen.drawing, frozenset(places)
+    for joint in drawing.mechanism.joints:
         if isinstance(joint, PointOnLine | Translational):
             origin, held = joint.between
             if origin in moved and held not in moved:
                 n_x, n_y = drawing.placement.direction(body_of(origin), float(joint.axis) + 0.5 * math.pi)
-                across = float(n_x) * shift[0] + float(n_y) * shift[1]
-                x, y = pen.spot(held)
+                (x, y), (to_x, to_y), (was_x, was_y) = pen.spot(held), places[origin], pen.spot(origin)
+                across = float(n_x) * (to_x - was_x) + float(n_y) * (to_y - was_y)
                 places |= dict.fromkeys(_moved_with(pen, held) - moved, (x + across * n_x, y + across * n_y))
     local = {one: drawing.seen_from(body_of(one), spot) for one, spot in places.items()}
     for one in drawing.mechanism.body_points:  # in the order of the file
@@ -122,14 +180,8 @@ def _moved_with(pen: Pen, point: str) -> frozenset[str]:
 
 def _on_lines(pen: Pen, moved: frozenset[str], to: Spot) -> Spot:
     """Return the place on the line of a slide, elsewhere than in its point, on which a moved point stays."""
-    for joint in pen.drawing.mechanism.joints:
-        if isinstance(joint, PointOnLine | Translational):
-            origin, held = joint.between
-            if held in moved and origin not in moved:
-                e_x, e_y = pen.drawing.placement.direction(body_of(origin), float(joint.axis))
-                x, y = pen.spot(origin)
-                along = (to[0] - x) * float(e_x) + (to[1] - y) * float(e_y)
-                return x + along * float(e_x), y + along * float(e_y)
+    for line in _lines_under(pen, moved):
+        return line.place(line.split(to)[0])
     return to
 
 

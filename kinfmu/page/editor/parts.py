@@ -7,15 +7,19 @@ from typing import Any
 
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.drivers import AngleDriver, RelativeAngleDriver
+from kinfmu.mechanism.joints import Revolute
 from kinfmu.mechanism.quantities.placement import body_of, point_of
 from kinfmu.mechanism.valid import check_name, quoted
-from kinfmu.page.editor.drawing import Spot, written_angle, written_number
+from kinfmu.page.editor.drawing import Drawing, Spot, written_angle, written_number
 from kinfmu.page.editor.moving import carry
 from kinfmu.page.editor.pen import OperationArguments, Pen, written_spot
 
 _RUN = {"start": 0, "stop": 2, "step": 0.01}  # [s], of files without a run: one turn of a motor
 _SPEED = "30 rpm"
 _STROKE = 0.25  # of the drawn length of a cylinder
+_LARGE = 60  # coordinates of a drawing; with more, finding a stroke takes too long
+_FREE = 0.8  # of the way to a dead centre, which a cylinder goes
+_SHORT = 0.5  # of a stroke; with less the other direction is looked at
 _CYLINDER_TIME = 2  # [s]
 _FORCE = 10.0  # [N]
 _STIFFNESS = "1 N/mm"
@@ -134,8 +138,7 @@ def slider(pen: Pen, values: OperationArguments) -> None:
     if body_of(moved) == holder:
         raise values.error(f"{moved} is a point of {holder}; a slide is between two bodies")
     at = pen.add_point(holder, pen.spot(moved), point_of(moved))
-    if at in pen.drawing.pins.get(moved, ()):
-        raise values.error(f"{moved} is pinned to {at}; delete that joint first")
+    _unpin(pen, moved, holder)
     line = {"between": [at, moved], "axis": _axis(pen, values, holder, along)}
     if is_block:
         poses = pen.drawing.poses
@@ -143,6 +146,13 @@ def slider(pen: Pen, values: OperationArguments) -> None:
         pen.put(("joints", pen.free_name(point_of(moved))), {"type": "translational", **line, **turn})
     else:
         pen.put(("joints", pen.free_name(point_of(moved))), {"type": "point_on_line", **line})
+
+
+def _unpin(pen: Pen, point: str, body: str) -> None:
+    """Remove the pin between a point that is to slide and a body."""
+    for joint in pen.drawing.mechanism.joints:
+        if isinstance(joint, Revolute) and point in joint.between and body in joint.bodies():
+            pen.remove(("joints", joint.name))
 
 
 def _axis(pen: Pen, values: OperationArguments, holder: str, along: Spot) -> str:
@@ -179,6 +189,7 @@ def slot(pen: Pen, values: OperationArguments) -> None:
     normal = (-along[1] / length, along[0] / length)
     off = (x - a[0]) * normal[0] + (y - a[1]) * normal[1]
     shift = (0.0, 0.0) if abs(off) <= _ON_LINE * length else (off * normal[0], off * normal[1])
+    _unpin(pen, moved, body)
     first, _ = (pen.add_point(body, (end[0] + shift[0], end[1] + shift[1])) for end in (a, b))
     line = {"between": [first, moved], "axis": _axis(pen, values, body, along)}
     pen.put(("joints", pen.free_name(point_of(moved))), {"type": "point_on_line", **line})
@@ -199,14 +210,28 @@ def _rounded(value: float) -> float | int:
 
 
 def cylinder(pen: Pen, values: OperationArguments) -> None:
-    """Add a driver of the distance of two points."""
+    """Add a driver of the distance of two points; its stroke is one that the drawing allows."""
     ends, length = _ends(pen, values)
     rise = values.number("stroke") if values.has("stroke") else _rounded(_STROKE * length)
     if rise == 0.0:
         raise values.error("stroke = 0 must be other than 0")
     law = {"law": "3-4-5", "start": written_number(length), "rise": written_number(rise), "duration": _CYLINDER_TIME}
-    pen.put(("drivers", pen.numbered_name("cylinder")), {"type": "distance", "between": ends, **law})
+    name = pen.numbered_name("cylinder")
+    pen.put(("drivers", name), {"type": "distance", "between": ends, **law})
+    if not values.has("stroke"):
+        stroke = _possible_stroke(pen.drawing.with_edits(pen.edits), name, length, rise)
+        pen.put(("drivers", name, "rise"), _rounded(stroke))
     _add_run(pen)
+
+
+def _possible_stroke(drawing: Drawing, driver: str, length: float, wanted: float) -> float:
+    """Return the stroke of a cylinder, out or else in, that ends well before a dead centre; the wanted one at most."""
+    best = 0.0
+    if len(drawing.system.coordinates) <= _LARGE:
+        for stroke in (wanted, -wanted):
+            if abs(best) < _SHORT * wanted:
+                best = max(best, _FREE * (drawing.reached(driver, length + stroke / _FREE) - length), key=abs)
+    return best if abs(best) >= _SHORT * _SHORT * wanted else wanted
 
 
 def gear(pen: Pen, values: OperationArguments) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import count, product
 from string import ascii_uppercase
@@ -21,6 +22,7 @@ from kinfmu.page.editor.drawing import Drawing, Spot, written_number
 from kinfmu.units import Quantity, factors
 
 TABLES = ("bodies", "joints", "drivers", "loads", "points", "parameters", "measures")
+_LETTER = re.compile(r"[A-Z]\d*$")
 SAME = 1e-9  # of the size; places that are nearer are one place
 
 
@@ -187,8 +189,10 @@ class Pen:
         return {name for table in TABLES for name in document.get(table, {})}
 
     def free_name(self, wanted: str) -> str:
-        """Return a name, with a number if it is in use."""
+        """Return a name; if it is in use, the next letter in place of a letter, else the name with a number."""
         taken = self.names()
+        if wanted in taken and _LETTER.match(wanted):
+            return self.letter()
         return next(name for name in _numbered(wanted) if name not in taken)
 
     def numbered_name(self, word: str) -> str:

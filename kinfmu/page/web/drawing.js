@@ -9,14 +9,14 @@ import { grouped, niceStep, number } from "./numbers.js";
 import { BUTTONS } from "./view.js";
 
 // Draw a pose; show: what is switched on; view: from the plane to pixels; spots: of names in the frames before. Returns the
-// handles { driver, body, at } of drivers, and whether names have no place.
+// handles { driver, body, at } of drivers, whether names have no place, and the lines { table, name, ends } of symbols.
 export function draw(pen, linkage, view, theme, show, extra, spots) {
     const painter = painted(pen, linkage, view, theme, show, extra, spots);
     if (show.names) {
         painter.names.draw();
         if (extra.pointer) painter.names.drawAt(extra.pointer.at, extra.pointer.reach);
     }
-    return { handles: painter.handles, hasHidden: painter.names.hidden.length > 0 };
+    return { handles: painter.handles, hasHidden: painter.names.hidden.length > 0, symbols: painter.symbols };
 }
 
 // Return a factor for the widths of lines, less than 1 if links are short compared with the linkage.
@@ -59,6 +59,7 @@ function painted(pen, linkage, view, theme, show, extra, spots) {
     painter.pins(extra.held);
     if (show.loads) gravity(painter);
     marks(painter, show, extra);
+    for (const [at, radius] of extra.covered || []) painter.names.coverCircle(at, radius);
     return painter;
 }
 
@@ -67,7 +68,7 @@ class Painter {
         Object.assign(this, { pen, linkage, view, theme, isGhost });
         this.pose = linkage.pose;
         this.names = new Names(pen, view, theme, spots);
-        this.handles = [];
+        [this.handles, this.symbols] = [[], []];
         this.fine = linkage.fineness;
         this.width = Math.max(4, Math.min(15, 13 * this.fine));
         this.size = Math.max(0.55, Math.min(1.15, 1.15 * this.fine));

@@ -44,7 +44,7 @@ export class Editor {
 
     get box() {
         if (!this.isShown) return null;
-        const [x0, y0, x1, y1] = this.sketch.box();
+        const [x0, y0, x1, y1] = this.sketch.extent();
         const least = this.sketch.data.box ? 0.1 * Math.max(x1 - x0, y1 - y0) || 50 : 0;
         return [x0 - least, y0 - least, x1 + least, y1 + least];
     }
@@ -130,6 +130,8 @@ export class Editor {
             });
             return button;
         });
+        const { selection } = this;
+        if (machine?.tool === "move" && !machine.picks.length && selection) options.push(this.deleteButton(`Delete ${selection.kind === "point" ? `pin ${selection.point}` : selection.body || selection.name}`));
         const number = machine?.number ? ` Ratio ${machine.number}.` : "";
         $("draw-bar").hidden = !text;
         $("draw-bar").replaceChildren(element("p", { textContent: text + number, className: refusal ? "refused" : "", role: "status" }), ...options);
@@ -143,7 +145,7 @@ export class Editor {
         if (!name) return null;
         if (name.kind === "point") return sketch.numberOfPoint(name.point) < 0 ? null : hit(sketch, sketch.point(sketch.numberOfPoint(name.point)), ONE_PIN * sketch.size);
         if (name.kind === "body") return sketch.body(name.body) < 0 ? null : { ...name, bodies: [name.body] };
-        return sketch.lines.some((line) => line.table === name.table && line.name === name.name) ? name : null;
+        return sketch.data[name.table].some((one) => one.name === name.name) ? name : null;
     }
 
     // Make operations after those that wait; return whether they were made.
@@ -358,7 +360,7 @@ export class Editor {
     }
 
     #typeSelected(selection, found) {
-        if (selection.kind === "point" && found.at) this.operate([{ do: "move", point: selection.point, to: found.at }]);
+        if (selection.kind === "point" && found.at) this.operate([{ do: "move", point: selection.point, to: found.at, exact: true }]);
         else if (selection.kind === "body" && found.value > 0) {
             const between = this.sketch.data.points.map((_, k) => this.sketch.nameOf(k)).filter((name) => name.split(".")[0] === selection.body).slice(0, 2);
             this.operate([{ do: "length", between, value: found.value }]);
@@ -389,6 +391,13 @@ export class Editor {
 
     deleteSelected() {
         this.operate(deletions(this.selection));
+    }
+
+    // Return a button that deletes what is selected.
+    deleteButton(textContent) {
+        const button = element("button", { textContent });
+        button.addEventListener("click", () => this.deleteSelected());
+        return button;
     }
 
     // Draw in place of the mechanism that moves; return whether that is the editor's.

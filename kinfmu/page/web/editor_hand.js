@@ -27,7 +27,7 @@ export class EditorHand {
         const { editor } = this;
         const { machine } = editor;
         const tool = toolOf(machine.tool);
-        const options = { reach: here.reach, step: editor.step, base: editor.base, isFree: here.isFree || machine.tool in OF_PICTURE, isAngled: here.isAngled, hasMembers: tool?.hasMembers || (machine.tool === "move" && !machine.picks.length) };
+        const options = { symbols: editor.painter.symbols, reach: here.reach, step: editor.step, base: editor.base, isFree: here.isFree || machine.tool in OF_PICTURE, isAngled: here.isAngled, hasMembers: tool?.hasMembers || (machine.tool === "move" && !machine.picks.length) };
         return snapped(editor.sketch, here.p, options);
     }
 
@@ -176,7 +176,7 @@ export class EditorHand {
     placeField() {
         const { editor, field, here, isTouch } = this;
         const { machine, selection } = editor;
-        const isWaiting = machine && (machine.tool !== "move" || selection);
+        const isWaiting = machine && (machine.tool !== "move" || (selection && selection.kind !== "member"));
         const isInBar = Boolean(isTouch && isWaiting);
         if (isInBar !== (field.parentElement === $("draw-bar"))) (isInBar ? $("draw-bar") : $("stage")).append(field);
         if (document.activeElement !== field && !field.value) field.hidden = !isInBar;

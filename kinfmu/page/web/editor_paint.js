@@ -8,6 +8,7 @@ import { Spots } from "./names.js";
 import { GROUND, measured, ONE_PIN } from "./editor_places.js";
 import { Sketch } from "./editor_sketch.js";
 
+const MOTOR = 19; // [px] radius of the arc of a motor
 const PALE = 0.62; // of what is half-drawn
 
 export class EditorPainter {
@@ -15,6 +16,7 @@ export class EditorPainter {
         this.editor = editor;
         this.page = editor.page;
         this.spots = new Spots();
+        this.symbols = []; // of loads and motors: their lines { table, name, ends } in the plane
         this.layer = new OffscreenCanvas(1, 1); // of what is drawn lighter
     }
 
@@ -37,8 +39,12 @@ export class EditorPainter {
             [layer.width, layer.height] = [context.canvas.width, context.canvas.height]; // and without what was drawn before
             target.setTransform(context.getTransform());
         }
-        draw(new CanvasPen(target), shown, view, theme, show, extra, this.spots);
+        const motors = this.#motors(shown);
+        extra.covered = motors.map(({ at }) => [at, MOTOR]);
+        const { symbols } = draw(new CanvasPen(target), shown, view, theme, show, extra, this.spots);
         this.#marks(new CanvasPen(target), shown);
+        symbols.push(...motors.flatMap((motor) => this.#motor(new CanvasPen(target), motor)));
+        this.symbols = symbols.map((one) => ({ ...one, ends: one.ends.map((p) => view.plane(p)) }));
         if (layer) {
             context.save();
             context.resetTransform();
@@ -53,7 +59,7 @@ export class EditorPainter {
         [$("undo").disabled, $("redo").disabled] = [!editor.canUndo(false), !editor.canUndo(true)];
     }
 
-    // Draw points that no joint holds, places on the ground without a joint, motors and locks.
+    // Draw points that no joint holds, places on the ground without a joint, and locks.
     #marks(pen, sketch) {
         const { view, theme } = this.page;
         const { data } = sketch;
@@ -71,24 +77,28 @@ export class EditorPainter {
             }
             pen.circle(x, y, size, { width: 1.6, colour: theme.ink, fill: theme.paper });
         }
-        for (const driver of data.drivers) if (driver.kind === "angle") this.#motor(pen, sketch, driver);
         for (const body of this.editor.locked) {
             const line = sketch.lines.find((one) => one.body === body);
             if (line) lock(pen, view.pixel([0, 1].map((k) => 0.7 * line.ends[0][k] + 0.3 * line.ends[1][k])), theme);
         }
     }
 
-    #motor(pen, sketch, { pivot, body }) {
-        const { view, theme } = this.page;
-        const own = sketch.data.points.findIndex((point) => point.body === body);
-        const number = pivot ?? own;
-        if (number < 0) return;
-        const [x, y] = view.pixel(sketch.point(number));
-        const arc = Array.from({ length: 25 }, (_, k) => -0.5 + (4.4 * k) / 24).map((angle) => [x + 19 * Math.cos(angle), y - 19 * Math.sin(angle)]);
+    // Return the drivers of angles, each with the pixel at its pivot.
+    #motors(sketch) {
+        const { data } = sketch;
+        const found = data.drivers.filter(({ kind }) => kind === "angle").map(({ name, pivot, body }) => ({ name, number: pivot ?? data.points.findIndex((one) => one.body === body) }));
+        return found.filter(({ number }) => number >= 0).map(({ name, number }) => ({ name, at: this.page.view.pixel(sketch.point(number)) }));
+    }
+
+    // Draw the arc of a motor, and return its lines.
+    #motor(pen, { name, at: [x, y] }) {
+        const { theme } = this.page;
+        const arc = Array.from({ length: 25 }, (_, k) => -0.5 + (4.4 * k) / 24).map((angle) => [x + MOTOR * Math.cos(angle), y - MOTOR * Math.sin(angle)]);
         pen.line(arc, { width: 2.2, colour: theme.accent });
         const [tip, before] = [arc[24], arc[21]];
         const [dx, dy] = [(tip[0] - before[0]) / distance(tip, before), (tip[1] - before[1]) / distance(tip, before)];
         pen.line([[tip[0] + 7 * dx, tip[1] + 7 * dy], [tip[0] - 5 * dy, tip[1] + 5 * dx], [tip[0] + 5 * dy, tip[1] - 5 * dx]], { width: 1, colour: theme.accent, fill: theme.accent, closed: true });
+        return arc.slice(1).map((b, k) => ({ table: "drivers", name, ends: [arc[k], b] }));
     }
 
     // Mark what is selected, what findings are about, and what is under the pointer.
@@ -106,7 +116,7 @@ export class EditorPainter {
         const { view } = this.page;
         if (target.kind === "point") pen.circle(...view.pixel(target.at), 11, { width: 2.5, colour });
         const isOwn = (line) => (target.kind === "body" ? line.body === target.body : line.table === target.table && line.name === target.name);
-        if (target.kind !== "point") for (const { ends } of sketch.lines.filter(isOwn)) pen.line(ends.map((p) => view.pixel(p)), { width: 3, colour, alpha: 0.9 });
+        if (target.kind !== "point") for (const { ends } of [...sketch.lines, ...this.symbols].filter(isOwn)) pen.line(ends.map((p) => view.pixel(p)), { width: 3, colour, alpha: 0.9 });
     }
 
     #preview(pen, sketch) {

@@ -3,7 +3,6 @@
 import { distance } from "./geometry.js";
 import { element } from "./elements.js";
 import { number } from "./numbers.js";
-import { deletions } from "./editor_tools.js";
 import { GROUND } from "./editor_places.js";
 
 const UNITS = ["mm", "cm", "m", "in"];
@@ -62,9 +61,7 @@ export class DrawPanel {
         if (target.kind === "body") rows.push(...this.#body(target.body));
         if (isPin && target.points.length > 1) rows.push(element("p", { className: "quiet", textContent: `Points: ${target.points.join(", ")}` }));
         for (const { name, place } of this.#members(target, bodies)) rows.push(this.#member(name, place));
-        const remove = element("button", { textContent: "Delete", id: "delete-selected" });
-        remove.addEventListener("click", () => editor.operate(deletions(target)));
-        rows.push(element("div", { className: "edits" }, remove));
+        rows.push(element("div", { className: "edits" }, editor.deleteButton("Delete")));
         selected.replaceChildren(...rows);
     }
 
@@ -87,10 +84,13 @@ export class DrawPanel {
     // Return the joints, drivers, loads and points of interest of what is selected: { name, place }.
     #members(target, bodies) {
         const { data } = this.editor.sketch;
-        const numbers = target.kind === "point" ? target.points.map((name) => this.editor.sketch.numberOfPoint(name)) : [];
-        const isHere = (one) => one.points?.some((k) => numbers.includes(k)) || (target.kind === "body" && (one.body === target.body || one.frame === target.body));
+        const isBody = target.kind === "body";
+        const numbers = data.points.map((_, k) => k).filter((k) => (isBody ? data.points[k].body === target.body : target.points?.includes(this.editor.sketch.nameOf(k))));
+        const drawn = new Set(data.shapes.filter(({ frame }) => isBody && frame === target.body).map(({ name }) => name)); // as gears and cams
+        const isHere = (one) => one.points?.some((k) => numbers.includes(k)) || drawn.has(one.name) || (isBody && (one.body === target.body || one.frame === target.body));
         const drivers = data.drivers.filter((one) => isHere(one) || (target.kind === "point" && bodies.includes(one.body)));
-        return [["joints", data.joints.filter(isHere)], ["drivers", drivers], ["loads", data.loads.filter(isHere)], ["points", data.interest.filter(({ point }) => numbers.includes(point)).map(({ name }) => ({ name, type: "of interest" }))]].flatMap(([table, all]) => all.map(({ name, type }) => ({ name: `${name} (${type.replaceAll("_", " ")})`, place: [table, name] })));
+        const kind = ({ type, points = [] }, table) => [type.replaceAll("_", " "), ...(table === "joints" && points.length ? [points.map((k) => data.points[k].body).join("\u2013")] : [])].join(", ");
+        return [["joints", data.joints.filter(isHere)], ["drivers", drivers], ["loads", data.loads.filter(isHere)], ["points", data.interest.filter(({ point }) => numbers.includes(point)).map(({ name }) => ({ name, type: "of interest" }))]].flatMap(([table, all]) => all.map((one) => ({ name: `${one.name} (${kind(one, table)})`, place: [table, one.name] })));
     }
 
     #member(name, place) {

@@ -100,6 +100,15 @@ export class Sketch {
         return this.data.box?.flat() || EMPTY_BOX;
     }
 
+    // Return the box of all points, wheels and cams.
+    extent() {
+        const [x0, y0, x1, y1] = this.box();
+        const round = this.shapes.filter(({ kind, radius }) => radius || kind === "cam");
+        const places = round.flatMap(({ frame, points, radius = 0 }) => points.map((p) => placed(this.bodyPose(this.body(frame)), ...p)).flatMap(([x, y]) => [[x - radius, y - radius], [x + radius, y + radius]]));
+        const [xs, ys] = [0, 1].map((axis) => places.map((p) => p[axis]));
+        return [Math.min(x0, ...xs), Math.min(y0, ...ys), Math.max(x1, ...xs), Math.max(y1, ...ys)];
+    }
+
     // Return the least number of the points that revolute joints hold together with a point.
     heldWith(point) {
         if (!this.held) {

@@ -43,7 +43,7 @@ export const TOOLS = [
     { id: "spring", key: "n", label: "Spring", hints: ["Click one end of the spring.", "Click its other end."], accepts: [anywhere, elsewhere], make: two("spring") },
     { id: "force", key: "f", label: "Force", hints: ["Click where the force acts.", "Click where it points."], accepts: [onLink, elsewhere], make: ([at, to]) => [{ do: "force", at: ownPlace(at), to: to.at }] },
     { id: "interest", key: "i", label: "Point", hints: ["Click a link that gets a point, or a pin.", "Click where the point is; it may be next to the link."], accepts: [onLink, anywhere], isEarly: (target) => target.kind === "point", options: [["interest", "Show its path"], ["corner", "Corner only"]], make: pointed },
-    { id: "delete", key: "x", label: "Delete", hints: ["Click what to delete: of a pin its joint, then the pin."], accepts: [(target) => (target.kind === "free" ? "There is nothing to delete." : "")], hasMembers: true, make: ([target]) => deletions(target) },
+    { id: "delete", key: "x", label: "Delete", hints: ["Click what to delete: of a pin what holds it on the ground, its joints, then the pin."], accepts: [(target) => (target.kind === "free" ? "There is nothing to delete." : "")], hasMembers: true, make: ([target]) => deletions(target) },
 ];
 export const toolOf = (id) => TOOLS.find((tool) => tool.id === id);
 
@@ -72,9 +72,10 @@ function sliding([from, to], { option }) {
 }
 
 function slotted([pin, from, to]) {
-    const own = ownPlace(pin);
-    const [body] = moving(pin);
-    return [{ do: "slot", point: own.point || own, body: moving(from).find((one) => one !== body) || GROUND, from: from.at, to: to.at }];
+    const bodies = moving(pin);
+    const body = bodies.length > 1 && bodies.find((one) => from.bodies.includes(one)) || moving(from).find((one) => one !== bodies[0]) || GROUND;
+    const own = ownPlace({ ...pin, bodies: bodies.filter((one) => one !== body) });
+    return [{ do: "slot", point: own.point || own, body, from: from.at, to: to.at }];
 }
 
 function pointed([link, place], { option }) {
@@ -86,7 +87,8 @@ function pointed([link, place], { option }) {
 export function deletions(target) {
     if (target.kind === "member") return [{ do: "delete", place: [target.table, target.name] }];
     if (target.kind === "body") return [{ do: "delete", place: ["bodies", target.body] }];
-    if (target.joints.length) return target.joints.map((name) => ({ do: "delete", place: ["joints", name] }));
+    const joints = target.onGround?.length ? target.onGround : target.joints;
+    if (joints.length) return joints.map((name) => ({ do: "delete", place: ["joints", name] }));
     const [body, point] = target.point.split(".");
     return [{ do: "delete", place: ["bodies", body, ...(target.isEnd ? [] : ["points", point])] }];
 }

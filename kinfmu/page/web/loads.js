@@ -25,6 +25,7 @@ export function loads(painter) {
             });
             pen.line(line, { width: solid ? 0.5 : 1.8, colour: ink, closed: Boolean(area), fill: area ? (solid ? ink : theme.paper) : null });
             painter.names.coverAll(line, 3);
+            line.slice(1).forEach((b, k) => painter.symbols.push({ table: "loads", name: load.name, ends: [line[k], b] }));
             all.push(...line);
         }
         const middle = [0, 1].map((axis) => all.reduce((sum, p) => sum + p[axis], 0) / all.length);

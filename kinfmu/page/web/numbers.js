@@ -38,9 +38,11 @@ export function withStop(text) {
 const ROWS = /(?:redundant )?\b(rows?) ([\w.]+(?:, [\w.]+)*) (do not close|does not close|closes?|are dependent)/gi;
 const VERBS = { "do not close": "does not close", close: "closes" }; // of several, of one
 
-// Return a message in which "rows C.x, C.y do not close" is "joint C does not close"; drivers: their names.
+// Return a message in which "rows C.x, C.y do not close" is "joint C does not close", with a limit in few digits; drivers:
+// their names.
 export function ofJoints(message, drivers = []) {
-    return message.replace(ROWS, (_, __, rows, verb) => {
+    const short = message.replace(/the limit is .*/, (text) => text.replace(/\d+\.\d+/g, (digits) => number(Number(digits), 6)));
+    return short.replace(ROWS, (_, __, rows, verb) => {
         const owners = [...new Set(rows.split(", ").map((row) => row.split(".")[0]))];
         const kinds = [["joint", owners.filter((name) => !drivers.includes(name))], ["driver", owners.filter((name) => drivers.includes(name))]];
         const named = kinds.filter(([, names]) => names.length).map(([kind, names]) => `${kind}${names.length > 1 ? "s" : ""} ${listed(names)}`).join(" and ");

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
+from fractions import Fraction
 from functools import partial
 from typing import Any
 
@@ -64,7 +65,7 @@ class Node:
         if b.constant == 0.0:
             return a
         if a.constant is not None and b.constant is not None:
-            return self.graph.constant(a.constant + b.constant)
+            return self.graph.of_constants("+", a, b)
         if b.op == "neg":
             return a - b.args[0]
         if a.op == "neg":
@@ -80,7 +81,7 @@ class Node:
         if a is b:
             return self.graph.constant(0.0)
         if a.constant is not None and b.constant is not None:
-            return self.graph.constant(a.constant - b.constant)
+            return self.graph.of_constants("-", a, b)
         if b.op == "neg":
             return a + b.args[0]
         if a.op == "neg":
@@ -113,7 +114,7 @@ class Node:
             if x.op == "neg":
                 return -(x.args[0] * y)
         if a.constant is not None and b.constant is not None:
-            return self.graph.constant(a.constant * b.constant)
+            return self.graph.of_constants("*", a, b)
         return self.graph.node("*", a, b)
 
     def __truediv__(self, other: Any) -> Node:
@@ -121,7 +122,7 @@ class Node:
         if a.constant == 0.0 or b.constant == 1.0:
             return a
         if a.constant is not None and b.constant is not None:
-            return self.graph.constant(a.constant / b.constant)
+            return self.graph.of_constants("/", a, b)
         if a.op == "neg":
             return -(a.args[0] / b)
         if b.constant == -1.0:
@@ -172,10 +173,13 @@ class Graph:
 
     def function(self, name: str, *args: Node, value: Content = None) -> Node:
         """Return one of FUNCTIONS of nodes; `value`: data and order of a curve."""
-        numbers = [arg.constant for arg in args if arg.constant is not None]
-        if len(numbers) == len(args):
-            return self.constant(_operation(name, value)(*numbers))
+        if all(arg.constant is not None for arg in args):
+            return self.of_constants(name, *args, value=value)
         return self._intern(name, args, value)
+
+    def of_constants(self, op: str, *args: Node, value: Content = None) -> Node:
+        """Return an operation on constants: a constant again."""
+        return self.constant(_result(op, args, value))
 
     def derivative(
         self, targets: Sequence[Node], rates: Mapping[Node, Node], still: Collection[Node] = ()
@@ -219,6 +223,17 @@ class Graph:
         return [d[target] for target in targets]
 
 
+class ExactGraph(Graph):
+    """A graph whose operations on constants are constants only where nothing is rounded."""
+
+    def of_constants(self, op: str, *args: Node, value: Content = None) -> Node:
+        if op in _RATIONAL:
+            result = _result(op, args, value)
+            if math.isfinite(result) and _RATIONAL[op](*(Fraction(arg.constant or 0.0) for arg in args)) == result:
+                return self.constant(result)
+        return self._intern(op, args, value)
+
+
 def reachable(targets: Iterable[Node], known: Container[Node] = ()) -> list[Node]:
     """Return the targets and all nodes they are made of, arguments first; nothing that known ones are made of."""
     found: dict[int, Node] = {}
@@ -255,6 +270,16 @@ def _operation(op: str, value: Content) -> Callable[..., float]:
     return partial(curve_value, *value) if isinstance(value, tuple) else _OPERATIONS[op]
 
 
+def _result(op: str, args: Sequence[Node], value: Content) -> float:
+    return _operation(op, value)(*(arg.constant or 0.0 for arg in args))
+
+
+_RATIONAL: dict[str, Callable[..., Fraction]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+}
 _OPERATORS = frozenset(("+", "-", "*", "/", "neg"))
 FUNCTIONS = ("sin", "cos", "sqrt", "floor", "atan2", "curve")
 _OPERATIONS: dict[str, Callable[..., float]] = {

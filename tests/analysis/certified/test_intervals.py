@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from kinfmu.analysis.certified import intervals
-from kinfmu.analysis.certified.intervals import Intervals, angle, cosine, curve, root, sine, whole
+from kinfmu.analysis.certified.intervals import Intervals, angle, cosine, curve, enclosed, root, sine, whole
 from kinfmu.mechanism.laws.rise import RISES, SimpleHarmonic
+from kinfmu.plan.equations.graph import ExactGraph
 from kinfmu.solver.python.curve import curve as curve_value
 
 COUNT = 1500
@@ -133,3 +134,17 @@ def test_without_outward_rounding_an_enclosure_would_be_wrong(monkeypatch: pytes
         monkeypatch.setattr(intervals, name, lambda x: x)
     with pytest.raises(AssertionError):
         test_operations_of_two_intervals_enclose_100_digits("+")
+
+
+def test_constants_that_would_be_rounded_stay_operations() -> None:
+    """d/dx of 0.1 x 0.3 is 0.1 times 0.3, not the double next to it."""
+    graph = ExactGraph()
+    x = graph.symbol("x")
+    targets = (x * 0.1) * 0.3, (x * 0.5) * 3.0, 0.1 * x / 0.3 + 0.2 * graph.function("sin", graph.constant(1.0)) * x
+    slopes = graph.derivative(targets, {x: graph.constant(1.0)})
+    ten, thirty, fifth = (mp.mpf(value) for value in (0.1, 0.3, 0.2))
+    exact = ten * thirty, mp.mpf(1.5), ten / thirty + fifth * mp.sin(1)
+    for found, expected in zip(enclosed(slopes, {}, (1,)), exact, strict=True):
+        assert found.low <= expected <= found.high
+        assert found.high - found.low < 1e-14
+    assert slopes[1].constant == 1.5

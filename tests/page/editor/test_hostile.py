@@ -37,7 +37,7 @@ EACH = (  # an operation of each kind that is possible on the four-bar, with all
     {"do": "force", "at": POINT, "vector": [1, 2]},
     {"do": "force", "at": POINT, "to": [1, 2]},
     {"do": "interest", "at": POINT, "name": "tip"},
-    {"do": "move", "point": "crank.C", "to": [5, 45], "keep": [["crank.A", "crank.C"]]},
+    {"do": "move", "point": "crank.C", "to": [5, 45]},
     {"do": "length", "between": ["crank.A", "crank.C"], "value": 45},
     {"do": "set", "place": ["bodies", "crank", "mass"], "value": 2},
     {"do": "values", "values": {"bodies.crank.points.C.y": 41}},
@@ -129,7 +129,7 @@ REQUIRED = [
     (operation, key)
     for operation in EACH
     for key in operation
-    if key not in ("do", "joint", "on", "block", "stroke", "ratio", "rise", "stiffness", "kind", "keep")
+    if key not in ("do", "joint", "on", "block", "stroke", "ratio", "rise", "stiffness", "kind")
     and (operation["do"], key) not in {("bar", "body"), ("interest", "name"), ("replace", "name")}
 ]
 

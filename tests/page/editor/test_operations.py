@@ -189,23 +189,134 @@ def test_numbers_keep_their_units_and_parameters_are_not_overwritten() -> None:
         drawn({"do": "move", "point": "crank.C", "to": [5, 45]}, begin=Drawing.of(with_parameter, Path()))
 
 
-def test_lengths_that_stay_hold_a_moved_pin() -> None:
-    drawing = drawn(*FOURBAR)
-    one = drawn({"do": "move", "point": "crank.C", "to": [30, 30], "keep": [["crank.A", "crank.C"]]}, begin=drawing)
-    assert one.at("crank.C") == pytest.approx((math.sqrt(800), math.sqrt(800)))
-    keep = [["crank.A", "crank.C"], ["coupler.C", "coupler.D"]]
-    both = drawn({"do": "move", "point": "crank.C", "to": [40, -5], "keep": keep}, begin=drawing)
-    assert math.dist(both.at("crank.C"), (0, 0)) == pytest.approx(40)
-    assert math.dist(both.at("crank.C"), (120, 80)) == pytest.approx(math.dist((0, 40), (120, 80)))
-    assert both.at("crank.C") != drawing.at("crank.C")
-
-
 def test_a_slider_that_is_moved_takes_its_line_along() -> None:
     begin = (bar(("ground", 0, 0), (30, 0), "crank"), bar("crank.B", (120, 0), "rod"))
     slider = {"do": "slider", "point": "rod.C", "along": [1, 0]}
     drawing = drawn(*begin, slider, {"do": "motor", "body": "crank"}, {"do": "move", "point": "rod.C", "to": [110, 15]})
     assert drawing.at("rod.C") == drawing.at("ground.C") == (110, 15)
     assert answer(drawing)["badge"]["isComplete"]
+
+
+SLIDER_CRANK = (
+    bar(("ground", 0, 0), (30, 0), "crank"),
+    bar("crank.B", (120, 40), "rod"),
+    {"do": "slider", "point": "rod.C", "along": [1, 1]},
+    {"do": "motor", "body": "crank"},
+)
+LEVER = (
+    bar(("ground", 0, 100), (40, 100), "crank"),
+    bar(("ground", 0, 0), (80, 200), "lever"),
+    {"do": "slot", "point": "crank.B", "body": "lever", "from": [0, 0], "to": [80, 200]},
+    {"do": "motor", "body": "crank"},
+)
+YOKE = (
+    bar(("ground", 0, 0), (40, 0), "crank"),
+    bar((40, -60), (40, 60), "yoke"),
+    {"do": "slot", "point": "crank.B", "body": "yoke", "from": [40, -60], "to": [40, 60]},
+    {"do": "slider", "point": {"body": "yoke", "at": [40, -20]}, "along": [1, 0], "block": True},
+    {"do": "motor", "body": "crank"},
+)
+
+
+def length(a: str, b: str, value: float) -> Operation:
+    return {"do": "length", "between": [a, b], "value": value}
+
+
+@pytest.mark.parametrize("ends", [("rod.B", "rod.C"), ("rod.C", "rod.B")])
+def test_a_typed_length_moves_the_slider_and_not_its_rail(ends: tuple[str, str]) -> None:
+    before = drawn(*SLIDER_CRANK)
+    after = drawn(length(*ends, 110), begin=before)
+    assert math.dist(after.at("rod.B"), after.at("rod.C")) == pytest.approx(110, rel=1e-12)
+    for point in ("ground.C", "crank.B"):
+        assert after.at(point) == before.at(point)
+    (x, y), (x0, y0) = after.at("rod.C"), after.at("ground.C")
+    assert y - y0 == pytest.approx(x - x0, abs=1e-9)
+    assert answer(after)["badge"]["isComplete"]
+
+
+def test_a_typed_length_moves_the_end_that_is_not_on_the_ground() -> None:
+    after = drawn(length("rocker.D", "rocker.B", 90), begin=drawn(*FOURBAR))
+    assert after.at("rocker.B") == (100, 0)
+    assert math.dist(after.at("rocker.D"), (100, 0)) == pytest.approx(90, rel=1e-12)
+
+
+def test_a_typed_length_moves_a_pin_along_its_slot_or_the_slot_if_nothing_else_holds_it() -> None:
+    before = drawn(*LEVER)
+    after = drawn(length("crank.A", "crank.B", 50), begin=before)
+    assert math.dist(after.at("crank.A"), after.at("crank.B")) == pytest.approx(50, rel=1e-12)
+    assert [after.at(f"lever.{name}") for name in "CD"] == [before.at(f"lever.{name}") for name in "CD"]
+    yoke = drawn(*YOKE, length("crank.A", "crank.B", 30))
+    assert yoke.at("crank.B") == (30, 0)
+    assert [yoke.at(f"yoke.{name}") for name in "CDE"] == [(30, -60), (30, 60), (30, -20)]
+    assert answer(after)["badge"]["isComplete"]
+    assert answer(yoke)["badge"]["isComplete"]
+
+
+@pytest.mark.parametrize(
+    ("operation", "text"),
+    [
+        (
+            length("crank.A", "crank.B", 20),
+            "length: crank.B slides on the line of joint 'B', 37.1391 mm from crank.A; move that line first",
+        ),
+        (
+            {"do": "move", "point": "crank.B", "to": [50, 100], "exact": True},
+            "move: crank.B slides on a line, on which 41.3793, 103.448 is the nearest place; move that line first",
+        ),
+    ],
+)
+def test_what_is_typed_and_a_line_forbids_is_one_line(operation: Operation, text: str) -> None:
+    with pytest.raises(MechanismError) as raised:
+        drawn(operation, begin=drawn(*LEVER))
+    assert str(raised.value) == text
+
+
+@pytest.mark.parametrize(
+    "slide",
+    [
+        {"do": "slider", "point": "crank.C", "on": "lever", "along": [2, 5]},
+        {"do": "slot", "point": "crank.C", "body": "lever", "from": [0, 0], "to": [80, 200]},
+    ],
+    ids=["slider", "slot"],
+)
+def test_a_pin_that_is_to_slide_along_its_own_link_is_freed_from_it(slide: Operation) -> None:
+    drawing = drawn(bar((0, 0), (80, 200), "lever"), bar((0, 100), ("lever", 40, 100), "crank"), slide)
+    assert [joint.type for joint in drawing.mechanism.joints] == ["point_on_line"]
+    assert drawn_lines(drawing, "slot") == [([[0, 0], [80, 200]], None)]
+
+
+def drawn_lines(drawing: Drawing, kind: str) -> list[Any]:
+    """Return the points and the directions of the shapes of a kind."""
+    shapes = [shape for shape in answer(drawing)["sketch"]["shapes"] if shape["kind"] == kind]
+    return [(shape["points"], shape.get("direction")) for shape in shapes]
+
+
+def test_slots_are_drawn_from_end_to_end_and_sliders_along_their_rails() -> None:
+    assert drawn_lines(drawn(*LEVER), "slot") == [([[0, 0], [80, 200]], None)]
+    assert drawn_lines(drawn(*YOKE), "slot") == [([[40, -60], [40, 60]], None)]
+    ((_, direction),) = drawn_lines(drawn(*SLIDER_CRANK), "die")
+    assert direction == pytest.approx([math.sqrt(0.5)] * 2, abs=1e-6)
+    along = {"do": "slider", "point": "crank.B", "on": "lever", "along": [2, 5]}
+    assert drawn_lines(drawn(*LEVER[:2], along), "slot") == [([[0, 0], [80, 200]], None)]
+    on_ground = {"do": "slot", "point": "crank.B", "body": "ground", "from": [20, 100], "to": [70, 100]}
+    ((ends, _),) = drawn_lines(drawn(LEVER[0], on_ground), "rail")
+    assert ends == [[20, 100], [70, 100]]
+
+
+@pytest.mark.parametrize(
+    ("foot", "rise"), [((0, -60), 29), ((-50, 0), -24), ((-90, -68), -41)], ids=["free", "near", "next to it"]
+)
+def test_the_stroke_of_a_cylinder_stays_away_from_a_dead_centre(foot: tuple[float, float], rise: float) -> None:
+    arm = (100, 0) if rise > 0 else (40, 30)
+    to = {"do": "cylinder", "from": {"at": list(foot)}, "to": {"point": "arm.B"}}
+    drawing = drawn(bar(("ground", 0, 0), arm, "arm"), to)
+    assert drawing.document["drivers"]["cylinder_1"]["rise"] == rise
+    assert check(drawing.mechanism).notes == ()
+
+
+def test_a_second_pin_at_a_place_has_the_next_letter() -> None:
+    drawing = drawn(*FOURBAR[:4], bar("crank.C", (60, -20)))
+    assert [joint.name for joint in drawing.mechanism.joints] == ["A", "C", "F"]
 
 
 def test_pins_that_are_apart_are_brought_together() -> None:

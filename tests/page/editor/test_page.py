@@ -71,12 +71,72 @@ def test_members_at_a_pin_are_deleted_one_by_one(hand: DrawingHand) -> None:
     hand.tool("move")
     hand.click((120, 80))
     members = hand.page.tab.locator("#draw-panel .selected span.wide")
-    assert members.all_inner_texts() == ["D (revolute)", "D_2 (of interest)"]
-    hand.button("[aria-label='Delete D_2 (of interest)']")
-    assert members.all_inner_texts() == ["D (revolute)"]
-    hand.button("[aria-label='Delete D (revolute)']")
+    assert members.all_inner_texts() == ["D (revolute, coupler\u2013rocker)", "E (of interest)"]
+    hand.button("[aria-label='Delete E (of interest)']")
+    hand.button("[aria-label^='Delete D (revolute']")
     assert members.all_inner_texts() == []
     assert hand.page.errors == []
+
+
+def test_what_is_selected_is_deleted_by_a_button_or_a_key(hand: DrawingHand) -> None:
+    ground = {"do": "ground", "at": {"point": "coupler.D"}}
+    force = {"do": "force", "at": {"point": "coupler.D"}, "to": [150, 120]}
+    operations = json.dumps([ground, {"do": "motor", "body": "rocker"}, force])
+    assert hand.get(f"e.operate({operations})")
+
+    def counts() -> list[int]:
+        found: list[int] = hand.get("['drivers', 'loads', 'joints', 'bodies'].map((all) => e.sketch.data[all].length)")
+        return found
+
+    def select_symbol(name: str) -> None:
+        ends = hand.get(f"e.painter.symbols.filter((one) => one.name === '{name}').at(-1).ends[0]")
+        hand.click(tuple(ends))
+
+    hand.wait()
+    assert counts() == [2, 1, 5, 4]
+    select_symbol("motor_2")
+    hand.button("#draw-bar button:has-text('Delete motor_2')")
+    assert counts() == [1, 1, 5, 4]
+    select_symbol("motor")
+    hand.press("Delete")
+    select_symbol("force_1")
+    hand.press("Delete")
+    assert counts() == [0, 0, 5, 4]
+    hand.click((60, 60))
+    members = hand.page.tab.locator("#draw-panel .selected span.wide")
+    assert members.all_inner_texts() == [
+        "C (revolute, crank\u2013coupler)",
+        "D (revolute, coupler\u2013rocker)",
+        "E (revolute, ground\u2013coupler)",
+    ]
+    hand.click((120, 80))
+    hand.button("#draw-bar button:has-text('Delete pin ground.D')")
+    assert hand.get("e.sketch.data.joints.map((joint) => joint.name)") == ["A", "C", "D", "B"]
+    hand.click((100, 0))
+    hand.button("#draw-bar button:has-text('Delete pin ground.B')")
+    hand.click((110, 40))
+    hand.press("Delete")
+    hand.click((60, 60))
+    hand.button("#draw-panel .selected .edits button")
+    assert counts() == [0, 0, 1, 2]
+    assert hand.page.errors == []
+
+
+def test_the_name_of_a_pin_is_off_the_arc_of_its_motor(hand: DrawingHand) -> None:
+    drawn_at = """() => {
+        const own = CanvasRenderingContext2D.prototype.fillText;
+        const found = [];
+        CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
+            if (text === "A") found.push([x, y]);
+            own.call(this, ...arguments);
+        };
+        window.kinfmu.editor.painter.paint(window.kinfmu.canvas.getContext("2d"));
+        CanvasRenderingContext2D.prototype.fillText = own;
+        return found;
+    }"""
+    ((x, y),) = hand.page.tab.evaluate(drawn_at)
+    pivot = hand.get("k.view.pixel([0, 0])")
+    assert ((x - pivot[0]) ** 2 + (y - pivot[1]) ** 2) ** 0.5 > 19 + 6
 
 
 def test_all_is_undone_and_made_again(chromium: Browser, tmp_path: Path) -> None:

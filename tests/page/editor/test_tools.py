@@ -66,6 +66,28 @@ def test_clicks_snap_to_pins_then_links_then_the_grid() -> None:
     assert free["at"] == [33, 21.4]
 
 
+def test_places_on_a_link_are_on_the_grid_and_stay_on_the_link() -> None:
+    slanted = sketch(a={"P": (0, -20), "Q": (90, 70)}, b={"R": (0, 60), "S": (90, 80)})
+    both, across = called(
+        ["editor_places", "snapped", [slanted, (46, 27.3), NEAR | {"step": 5}]],
+        ["editor_places", "snapped", [slanted, (31.2, 66.5), NEAR | {"step": 5}]],
+    )
+    assert both["at"] == [45, 25]
+    assert across["at"][0] == 30
+    assert across["at"][1] == pytest.approx(60 + 20 / 3, abs=1e-11)
+
+
+def test_motors_and_forces_are_members_that_can_be_clicked() -> None:
+    symbols = [{"table": "drivers", "name": "motor", "ends": [[-10, -10], [10, -10]]}]
+    arc, pin, none = called(
+        ["editor_places", "snapped", [FOUR_BAR, (6, -9), NEAR | {"hasMembers": True, "symbols": symbols}]],
+        ["editor_places", "snapped", [FOUR_BAR, (1, -1), NEAR | {"hasMembers": True, "symbols": symbols}]],
+        ["editor_places", "snapped", [FOUR_BAR, (6, -9), NEAR | {"symbols": symbols}]],
+    )
+    assert (arc["kind"], arc["table"], arc["name"]) == ("member", "drivers", "motor")
+    assert (pin["kind"], none["kind"]) == ("point", "free")
+
+
 def test_a_pin_on_the_ground_and_a_crossing_are_found() -> None:
     crossed = sketch(a={"P": (0, 0), "Q": (100, 0)}, b={"R": (50, -50), "S": (50, 50)})
     ground, crossing = called(
@@ -180,6 +202,7 @@ def test_tools_make_their_operations() -> None:
     slot = {"do": "slot", "point": "crank.B", "body": "rod", "from": [30, 5], "to": [60, 5]}
     assert made("slot", pin("crank.B"), rod, free(60, 5)) == [slot]
     assert made("slot", pin("crank.B"), free(0, 5), free(60, 5))[0]["body"] == "ground"
+    assert made("slot", pin("rod.B", "crank.B"), rod, free(60, 5)) == [slot]
     ends = {"from": {"at": [0, 0]}, "to": {"body": "rod", "at": [30, 5]}}
     assert made("cylinder", free(0, 0), rod) == [{"do": "cylinder", **ends}]
     assert made("spring", free(0, 0), rod) == [{"do": "spring", **ends}]
