@@ -14,6 +14,7 @@ import kinfmu
 from kinfmu import Run
 from kinfmu.solver.python import Status
 from tests.analysis.linkages import pushed_crank
+from tests.log.sheets import read_xlsx
 from tests.mechanisms import fourbar, reference_fourbar
 
 LOCKED_AT_90_DEGREES = (4.0, 3.0, 2.5, 2.5)
@@ -75,14 +76,15 @@ def test_the_margin_falls_to_zero_where_a_row_of_a_block_vanishes() -> None:
     assert run.status[-1] == Status.NEAR_SINGULAR
 
 
-@pytest.mark.parametrize("suffix", ["csv", "npz", "parquet"])
+@pytest.mark.parametrize("suffix", ["csv", "npz", "parquet", "xlsx"])
 def test_tables_have_gaps_where_runs_have(locked: Run, suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f"run.{suffix}"
     kinfmu.log.write_table(locked, path)
     table = _read[suffix](path)
     np.testing.assert_array_equal(table["solver.status"], locked.status)
     for column in locked.columns():
-        np.testing.assert_array_equal(np.isnan(table[column.name]), np.isnan(column.values), column.name)
+        empty = ~np.isfinite(column.values) if suffix == "xlsx" else np.isnan(column.values)  # no cell holds inf
+        np.testing.assert_array_equal(np.isnan(table[column.name]), empty, column.name)
 
 
 def test_logs_have_gaps_where_runs_have(locked: Run, tmp_path: Path) -> None:
@@ -123,4 +125,13 @@ def _parquet(path: Path) -> dict[str, np.ndarray]:
     return {name: table[name].to_numpy().astype(float) for name in table.column_names}
 
 
-_read: dict[str, Callable[[Path], dict[str, np.ndarray]]] = {"csv": _csv, "npz": _npz, "parquet": _parquet}
+def _xlsx(path: Path) -> dict[str, np.ndarray]:
+    return {name.split(" [")[0]: values for name, values in read_xlsx(path).items()}
+
+
+_read: dict[str, Callable[[Path], dict[str, np.ndarray]]] = {
+    "csv": _csv,
+    "npz": _npz,
+    "parquet": _parquet,
+    "xlsx": _xlsx,
+}

@@ -31,6 +31,8 @@ LARGEST = 600  # coordinates; a larger mechanism takes too long
 NEAR = 0.1  # of the size; points that are nearer may be one pin
 _APART = 30.0  # cost of a distance between points to be joined, by the size
 _COINCIDE = 1e-3  # of the size; points that are nearer are in one place
+_NEXT_TO = 0.05  # of the size; points without joints that are nearer belong in one place
+_SLIDES = 0.1  # of the size, in the run: the travel of a slide without a speed
 _MOST_POINTS = 400  # every pair is compared
 _MOST_PAIRS = 40  # the nearest ones are tried
 _FACTORS = (1000.0, 0.001, 25.4, 1.0 / 25.4)  # slips between m and mm, and between inches and mm
@@ -467,7 +469,8 @@ def completion(case: Case) -> tuple[tuple[Edit, ...], list[str]]:
     """Return pins of points in one place, then drivers, that together hold all that is free, and them in words."""
     free, edits, words = case.free, list[Edit](), list[str]()
     for _, a, b in _pairs(case):
-        if free.shape[1] < 2 or case.distance(a, b) > _COINCIDE * case.size:
+        reach = _NEXT_TO if not {a, b} & case.joined else _COINCIDE
+        if free.shape[1] < 2 or case.distance(a, b) > reach * case.size:
             continue
         probe = System(
             replace(case.system.mechanism, joints=(Revolute("pin", (a, b)),), drivers=(), measures=()), case.size
@@ -504,7 +507,8 @@ def other_drivers(case: Case, drivers: Iterable[Driver]) -> Iterator[Remedy]:
             if case.free.shape[1] and np.linalg.norm(_gradient(case, candidate) @ case.free) <= 1e-3:
                 continue
             is_same, keys, start = candidate.type == driver.type, _keys(candidate), _value(case, candidate)
-            table = {**case.document["drivers"][driver.name], **keys, "law": driver.law.type} if is_same else keys
+            written = case.document["drivers"][driver.name]
+            table = {**written, **keys, "law": driver.law.type} if is_same else keys | _speed(case, candidate)
             cost = 1.3 + 0.3 * (not is_same) - 0.5 * (driver.name in candidate.bodies()) + 0.01 * number
             cost += 0.3 * (abs(_off(candidate, law_start - start)) > _FITS and not is_own_start)
             if "start" in table and is_own_start:
@@ -577,8 +581,19 @@ def _keys(driver: Driver) -> dict[str, Any]:
         value = getattr(driver, field.name)
         if field.name not in ("name", "law") and value != field.default:
             keys[field.name] = list(value) if isinstance(value, tuple) else value
+    if isinstance(driver, SlideDriver) and "axis" in keys:
+        keys["axis"] = f"{math.degrees(keys['axis']):.12g} deg"
     keys["law"] = driver.law.type
     return keys
+
+
+def _speed(case: Case, driver: Driver) -> dict[str, Any]:
+    """Return the speed of a new driver: one turn, or a tenth of the size, over the run."""
+    run = case.mechanism.run
+    duration = run.stop - run.start
+    if driver.quantity.kind == "angle":
+        return {"speed": f"{60.0 / duration:.6g} rpm"}
+    return {"speed": float(f"{_SLIDES * case.size / duration:.2g}")}
 
 
 def _value(case: Case, driver: Driver) -> float:
@@ -591,6 +606,7 @@ def _driver_put(case: Case, driver: Driver, others: Sequence[Edit]) -> Put:
     keys, start = _keys(driver), _value(case, driver)
     if abs(start) > 1e-6:
         keys["start"] = degrees_text(start) if driver.quantity.kind == "angle" else case.rounded(start)
+    keys |= _speed(case, driver)
     taken = {edit.place[1] for edit in others}
     name = case.new_name(driver.name, "drivers")
     while name in taken:

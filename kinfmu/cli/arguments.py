@@ -47,9 +47,15 @@ class _File(ArgumentType):
 
 
 class InputFile(_File):
-    """An existing file."""
+    """An existing file; or_folder: or a folder."""
+
+    def __init__(self, *suffixes: str, or_folder: bool = False) -> None:
+        super().__init__(*suffixes)
+        self.or_folder = or_folder
 
     def read(self, text: str) -> Path:
+        if self.or_folder and Path(text).is_dir():
+            return Path(text)
         path = existing(text)
         _check_suffix(path, self.suffixes)
         return path

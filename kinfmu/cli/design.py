@@ -5,13 +5,16 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
+from typing import Any
 
 import click
 
 from kinfmu.cli.arguments import InputFile, OutputFile, names_in
 from kinfmu.cli.check import FIGURES
 from kinfmu.cli.group import Progress, main, note, on_interrupt, warn
+from kinfmu.cli.settings import CSV, XLSX, csv_form, table_options
 from kinfmu.errors import KinfmuError
+from kinfmu.files import suffix_of
 
 
 @main.command(epilog="Example: kinfmu fit curve.toml -o fitted.toml --figure fitted.svg")
@@ -85,6 +88,18 @@ def fit(file: Path, output: Path | None, picture: Path | None, starts: int, seed
 )
 @click.option("--figure", "picture", type=OutputFile(*FIGURES), help="Draw the results into a .svg, .png or .pdf file.")
 @click.option("--measures", metavar="NAMES", help="Only these measures in the figure, such as stroke,swing.")
+@click.option(
+    "--table",
+    type=OutputFile(CSV, XLSX),
+    help="Also write the results for a spreadsheet, .xlsx or .csv, in the units of the summary.",
+)
+@click.option(
+    "--recordings",
+    metavar="FOLDER",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Also record designs, at most 24, for the Rerun viewer: kinfmu review FOLDER compares them.",
+)
+@table_options
 def study(
     file: Path,
     output: Path | None,
@@ -94,6 +109,9 @@ def study(
     restart: bool,
     picture: Path | None,
     measures: str | None,
+    table: Path | None,
+    recordings: Path | None,
+    **of_table: Any,
 ) -> None:
     """Measure many designs: parameters on a grid, in ranges, or with tolerances.
 
@@ -103,6 +121,9 @@ def study(
     from kinfmu.design.study import read_study, run_study
     from kinfmu.design.study.parts import folder_of
 
+    if table is None and any(of_table.values()):
+        raise click.UsageError("--lengths, --units, --separator and --decimal need --table")
+    form = csv_form(suffix_of(table or CSV), (CSV, XLSX), of_table)
     if workers is not None and dask not in (None, "local"):
         raise click.UsageError("--workers is for this machine; the Dask cluster has its own")
     defined = read_study(file, engine=engine)
@@ -127,6 +148,22 @@ def study(
         raise
     click.echo(str(result))
     click.echo(f"\nresults: {target}")
+    if table is not None:
+        from kinfmu.log.table import write_sheet
+        from kinfmu.run.tables import in_lengths
+
+        own = result.mechanism.length_unit
+        write_sheet([in_lengths(one, own, of_table["lengths"]) for one in result.shown_columns()], table, **form)
+        click.echo(f"table: {table}")
+    if recordings is not None:
+        from kinfmu.design.study.recordings import write_recordings
+        from kinfmu.log.viewer.package import without_pandas
+
+        with without_pandas():
+            count = len(write_recordings(defined, result, recordings))
+        click.echo(
+            f"recordings of {count} designs: {recordings}; to compare them: kinfmu review {quote(str(recordings))}"
+        )
     if picture is not None:
         result.figure(picture, tuple(names_in(measures) or ()))
         click.echo(f"figure: {picture}")

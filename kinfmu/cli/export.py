@@ -48,7 +48,7 @@ class Format(NamedTuple):
     also: tuple[str, ...] = ()
 
 
-TABLES = Format("tables", (".csv", ".parquet", ".npz"), write_table, ("columns",), also=("svaj", "degrees"))
+TABLES = Format("tables", (".csv", ".xlsx", ".parquet", ".npz"), write_table, ("columns",), also=("svaj", "degrees"))
 PLOTS = Format(
     "plots",
     (".svg", ".png", ".pdf"),
@@ -86,8 +86,8 @@ _LABELS = {  # of parameters, in messages, before their values where these are s
     "--columns",
     metavar="NAMES",
     help="Columns of a table or a plot, with the names of simulate --channels: coupler.x, 'coupler.*', q, crank_angle, "
-    "solver.margin, -error. A table always contains time and status. Default: all columns; for plots angles, "
-    "points of interest (if there are none, all coordinates), efforts and energies.",
+    "solver.margin, -error. A table always contains time and status. Default: all columns; for plots the six panels "
+    "that show most of the motion, with a line that names the others.",
 )
 @click.option(
     "--x",
@@ -104,10 +104,10 @@ _LABELS = {  # of parameters, in messages, before their values where these are s
     "cam joint's lift, or write them as a table.",
 )
 @click.option(
-    "--degrees",
-    is_flag=True,
-    help="Angles in deg, and their rates in time: in tables, and in plots, where driver values and those of --x always "
-    "are.",
+    "--degrees/--radians",
+    default=None,
+    help="Unit of angles, and of their rates in time. Default: degrees in plots, where driver values and those of --x "
+    "always have them, and in .xlsx; radians in other tables and --svaj.",
 )
 @click.option(
     "--start", metavar="VALUE", help="First sample: time [s], or driver value of solve --angle, such as 30deg."
@@ -140,11 +140,12 @@ def export(run: str, output: Path, cam: str | None, settings: tuple[tuple[str, s
     A page (.html) is the mechanism, to be dragged in a browser, with the parameters and the time of the run; it is one
     file, works offline, and computes with the compiled code of the FMU.
 
-    RUN is a record (.mcap) of simulate or solve. Tables in Parquet and npz contain the units. Plots (.svg, .png, .pdf)
+    RUN is a record (.mcap) of simulate or solve. Tables but .csv always contain the units. Plots (.svg, .png, .pdf)
     show coordinates, velocities and accelerations against time, or against the driver of a solve --angle. With --x,
     --overlay or --polar, exactly the named columns are curves. OTHER is a second run for the same plot. A .gif or
     .mp4 shows the moving linkage, a .dxf the pose at a value as a CAD drawing. With --cam, a mechanism or a record
-    gives the profile of a cam as .csv, .dxf or a figure. --set is for mechanisms: a record has the values of its run.
+    gives the profile of a cam as a table, .dxf or a figure. --set is for mechanisms: a record has the values of its
+    run.
     """
     is_record = suffix_of(run) == RECORD
     if settings and is_record:
@@ -195,7 +196,7 @@ def _others_than(*valid: str) -> list[str]:
 
 def _check_options_of_cam(joint: str) -> None:
     """Raise a UsageError for options that do not belong to the profile of a cam."""
-    of_table = ("degrees", "units", "separator", "decimal")
+    of_table = ("degrees", "lengths", "units", "separator", "decimal")
     others = _others_than("run", "output", "cam", "tolerance", "settings", *of_table)
     if others:
         raise click.UsageError(f"--cam {joint} excludes {listed(map(_label, others))}")

@@ -12,7 +12,7 @@ import click
 
 from kinfmu.cli.arguments import STANDARD_OUTPUT, driver_value, names_in, on_axis
 from kinfmu.cli.group import errors_of, patience
-from kinfmu.cli.settings import checked_settings, csv_form
+from kinfmu.cli.settings import CSV, XLSX, checked_settings, csv_form, has_degrees
 from kinfmu.errors import KinfmuError, RequestError, listed
 from kinfmu.files import errors_of_writing, suffix_of, write_whole
 from kinfmu.mechanism import gallery
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Options = Mapping[str, Any]  # of the command, by the names of its parameters; `form` of a CSV file, `run`: as given
 PAGES = (".html",)
-CAM_FORMATS = (".csv", ".dxf", ".svg", ".png", ".pdf")
+CAM_FORMATS = (CSV, XLSX, ".dxf", ".svg", ".png", ".pdf")
 _FINE = 1e-5  # of the largest distance of the profile from the axle
 
 
@@ -33,16 +33,21 @@ def write_table(run: Run, output: Path, options: Options) -> None:
     from kinfmu.log.table import columns_of, write_columns
     from kinfmu.log.table import write_table as written
     from kinfmu.motion.motion_curve import svaj_columns
-    from kinfmu.run.tables import csv_lines
+    from kinfmu.run.tables import csv_lines, in_lengths
 
-    names, degrees, form = names_in(options["columns"]), options["degrees"], options["form"]
-    columns = svaj_columns(run, options["svaj"], degrees=degrees) if options["svaj"] else None
+    names, form, lengths = names_in(options["columns"]), options["form"], options["lengths"]
+    degrees, svaj = has_degrees(suffix_of(output), options), options["svaj"]
+    columns = (
+        [in_lengths(one, run.length_unit, lengths) for one in svaj_columns(run, svaj, degrees=degrees)]
+        if svaj
+        else None
+    )
     if output == STANDARD_OUTPUT:
-        _print(csv_lines(columns or columns_of(run, names, degrees=degrees), **form))
+        _print(csv_lines(columns or columns_of(run, names, degrees=degrees, lengths=lengths), **form))
     elif columns:
         write_columns(run, columns, output, **form)
     else:
-        written(run, output, names, degrees=degrees, **form)
+        written(run, output, names, degrees=degrees, lengths=lengths, **form)
 
 
 def write_plot(run: Run, output: Path, options: Options) -> None:
@@ -52,7 +57,7 @@ def write_plot(run: Run, output: Path, options: Options) -> None:
 
     degrees, other = options["degrees"], options["other"]
     if options["svaj"]:
-        svaj(run, output, options["svaj"], degrees=degrees)
+        svaj(run, output, options["svaj"], degrees=bool(degrees))
         return
     how: dict[str, Any] = {"x": names_in(options["across"]) or (), "overlaid": options["overlay"]}
     if other is not None:
@@ -123,10 +128,15 @@ def write_cam(shown: str, output: Path, joint: str, settings: Sequence[tuple[str
     suffix = ".csv" if output == STANDARD_OUTPUT else suffix_of(output)
     if suffix not in CAM_FORMATS:
         raise click.UsageError(f"{output}: the profile of a cam is written as {listed(CAM_FORMATS)}")
-    form, degrees, tolerance = csv_form(suffix, (".csv",), options), options["degrees"], options["tolerance"]
-    if degrees and suffix != ".csv":
+    is_table = suffix in (CSV, XLSX)
+    form, degrees, tolerance = (
+        csv_form(suffix, (CSV, XLSX), options),
+        has_degrees(suffix, options),
+        options["tolerance"],
+    )
+    if degrees and not is_table:
         about = "its figure has angles in deg" if suffix != ".dxf" else "a drawing has no angles"
-        raise click.UsageError(f"--degrees: of a cam only for .csv, not {suffix}; {about}")
+        raise click.UsageError(f"--degrees: of a cam only for {CSV}, {XLSX}, not {suffix}; {about}")
     if tolerance is not None and suffix != ".dxf":
         raise click.UsageError(f"--tolerance {tolerance}: only for .dxf, not {suffix}")
     from kinfmu.analysis import cam_profile
@@ -153,10 +163,18 @@ def write_cam(shown: str, output: Path, joint: str, settings: Sequence[tuple[str
             within = within or _FINE * float(np.hypot(*(profile.profile - profile.axle).T).max())
             profile = cam_profile(mechanism, joint, tolerance=within)
             about = f" ({len(profile.angle)} corners, within {within:.3g} {unit} of the curve)"
-    if output == STANDARD_OUTPUT:
-        _print(profile.csv_lines(degrees=degrees, **form))
-    elif suffix == ".csv":
-        profile.write_csv(output, degrees=degrees, **form)
+    if is_table:
+        from kinfmu.log.table import write_sheet
+        from kinfmu.run.tables import Column, csv_lines, in_lengths
+
+        columns = [
+            in_lengths(Column(name, own, values + 0.0), unit, options["lengths"])
+            for name, own, values in profile.columns(degrees=degrees)
+        ]
+        if output == STANDARD_OUTPUT:
+            _print(csv_lines(columns, **form))
+        else:
+            write_sheet(columns, output, **form)
     else:
         from kinfmu.draw import cam
 

@@ -42,7 +42,7 @@ def recover(run: Path, output: Path | None) -> None:
 
 
 @main.command(epilog="Example: kinfmu review logs/crank_rocker.mcap --screenshot run.png --at 0.5")
-@click.argument("run", type=InputFile(".mcap", ".rrd"))
+@click.argument("run", type=InputFile(".mcap", ".rrd", or_folder=True))
 @click.argument("other", required=False, type=InputFile(".mcap"))
 @click.option("--save", type=OutputFile(".rrd"), help="Write the recording (.rrd) without opening the viewer.")
 @click.option("--screenshot", type=OutputFile(".png"), help="Write a picture of the viewer (.png); needs no screen.")
@@ -54,7 +54,8 @@ def recover(run: Path, output: Path | None) -> None:
 def review(run: Path, other: Path | None, save: Path | None, screenshot: Path | None, at: str | None) -> None:
     """Show a run in the Rerun viewer, or compare two.
 
-    RUN and OTHER are records (.mcap) of simulate or solve; RUN may be a recording (.rrd).
+    RUN and OTHER are records (.mcap) of simulate or solve. RUN may be a recording (.rrd), or the folder of study
+    --recordings, whose designs are compared.
     """
     from kinfmu.log import review as reviewed
     from kinfmu.log.viewer.package import without_pandas
@@ -69,4 +70,5 @@ def review(run: Path, other: Path | None, save: Path | None, screenshot: Path | 
     with without_pandas():
         recording = reviewed(run, other, save=save, screenshot=screenshot, at=place, report=note)
     made = [str(path) for path in (recording, screenshot) if path is not None]
-    click.echo(f"written: {listed(made)}")
+    if made:
+        click.echo(f"written: {listed(made)}")

@@ -11,7 +11,7 @@ import click
 from kinfmu.cli.arguments import ArgumentType
 from kinfmu.cli.group import note
 from kinfmu.errors import MechanismError, RequestError, listed
-from kinfmu.units import Quantity, in_turns, looks_like_degrees
+from kinfmu.units import METRES, Quantity, in_turns, looks_like_degrees
 
 if TYPE_CHECKING:
     from kinfmu.mechanism import Mechanism
@@ -147,13 +147,18 @@ def _note_degrees(name: str, value: float) -> None:
         note(f"{name} = {value:.12g} rad, {in_turns(value)}; write {name}={value:.12g}deg for degrees")
 
 
-CSV = ".csv"
+CSV, XLSX = ".csv", ".xlsx"
 SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t"}
 
 
 def table_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add --units, --separator and --decimal, which `csv_form` checks."""
+    """Add --lengths, --units, --separator and --decimal, which `csv_form` checks."""
     for option in (
+        click.option(
+            "--lengths",
+            type=click.Choice(list(METRES)),
+            help="Unit of lengths in a table. Default: that of the mechanism.",
+        ),
         click.option("--decimal", type=click.Choice([".", ","]), help="Decimal sign of a CSV file; default: a point."),
         click.option(
             "--separator",
@@ -171,6 +176,11 @@ def table_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
+def has_degrees(suffix: str, options: Mapping[str, Any]) -> bool:
+    """Return True if a table has angles in degrees: if --degrees asks for them, and workbooks unless --radians does."""
+    return bool(suffix == XLSX if options["degrees"] is None else options["degrees"])
+
+
 def csv_form(suffix: str, tables: tuple[str, ...], options: Mapping[str, Any]) -> dict[str, Any]:
     """Return the form of a CSV file, as arguments of `write_table`; raise a UsageError for other files.
 
@@ -180,9 +190,9 @@ def csv_form(suffix: str, tables: tuple[str, ...], options: Mapping[str, Any]) -
         options: Of the command, with those of `table_options`.
 
     """
-    units, separator, decimal = (options[name] for name in ("units", "separator", "decimal"))
+    units, separator, decimal, lengths = (options[name] for name in ("units", "separator", "decimal", "lengths"))
     of_csv = [f"--{name} '{options[name]}'" for name in ("separator", "decimal") if options[name]]
-    asked = of_csv + ["--units"] * units
+    asked = of_csv + ["--units"] * units + [f"--lengths {lengths}"] * bool(lengths)
     if suffix not in tables and asked:
         valid = tables[0] if len(tables) == 1 else f"tables, {listed(tables)}"
         raise click.UsageError(f"{listed(asked)}: only for {valid}, not {suffix}")

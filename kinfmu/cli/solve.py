@@ -19,7 +19,18 @@ from kinfmu.cli.arguments import (
     outputs_option,
 )
 from kinfmu.cli.group import errors_of, main, note, on_interrupt, report, warn
-from kinfmu.cli.settings import TOLERANCE, Settings, checked_settings, csv_form, set_option, table_options, tolerance_of
+from kinfmu.cli.settings import (
+    CSV,
+    TOLERANCE,
+    XLSX,
+    Settings,
+    checked_settings,
+    csv_form,
+    has_degrees,
+    set_option,
+    table_options,
+    tolerance_of,
+)
 from kinfmu.errors import listed
 from kinfmu.files import suffix_of
 from kinfmu.mechanism import gallery
@@ -28,7 +39,7 @@ from kinfmu.units import Quantity, in_turns, looks_like_degrees
 if TYPE_CHECKING:
     from kinfmu.mechanism.drivers import Driver
 
-TABLES = (".csv", ".parquet", ".npz")
+TABLES = (CSV, XLSX, ".parquet", ".npz")
 RECORD = ".mcap"
 HALF_TURN = math.pi  # [rad]; a longer step between samples is probably a wrapped angle
 
@@ -72,7 +83,11 @@ HALF_TURN = math.pi  # [rad]; a longer step between samples is probably a wrappe
     show_default=True,
     help="native: compiled C, for long sweeps; auto: chosen by the number of samples.",
 )
-@click.option("--degrees", is_flag=True, help="Angles of a table in deg, and their rates in time.")
+@click.option(
+    "--degrees/--radians",
+    default=None,
+    help="Unit of angles in a table, and of their rates in time. Default: degrees in .xlsx, else radians.",
+)
 @table_options
 @set_option
 @on_interrupt("stopped before the run was complete: nothing was written")
@@ -83,7 +98,7 @@ def solve(
     angle: str | None,
     speed: str | None,
     wrap: bool,
-    degrees: bool,
+    degrees: bool | None,
     settings: tuple[tuple[str, str], ...],
     outputs: str | None,
     engine: str,
@@ -137,7 +152,8 @@ def solve(
     else:
         from kinfmu.log import write_table
 
-        write_table(run, output, degrees=degrees, **form)
+        in_degrees = has_degrees(suffix_of(output), {"degrees": degrees})
+        write_table(run, output, degrees=in_degrees, lengths=of_table["lengths"], **form)
     report(run, f"written to {output}", by_samples=angle is not None)
 
 

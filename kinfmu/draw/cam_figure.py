@@ -92,7 +92,7 @@ def _figure(profile: CamProfile) -> Figure:
         bottom = _BOTTOM + (1 - k) * (_FIGURE - _PLOT[1])
         plot = made.add_axes((left, bottom / height, _PLOT[0] / width, _PLOT[1] / height))
         (_pressure if k == 0 else _curvature)(plot, profile, across)
-        degree_ticks(plot, 9)
+        degree_ticks(plot.xaxis, 9)
         plot.margins(x=0.01)
         plot.set_xlabel("angle of the cam [deg]", fontsize=SMALL, color=ink(GREY), labelpad=1.0)
     return made

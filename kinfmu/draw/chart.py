@@ -11,17 +11,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.arrays import FloatArray
+from kinfmu.arrays import FloatArray, finite
 from kinfmu.draw.scene import palette
 from kinfmu.draw.scene.palette import Colour
 from kinfmu.draw.sheet import FONT, GREY, INK, ink
 from kinfmu.errors import FigureError, RequestError, suggestion
 from kinfmu.run import Run
-from kinfmu.run.axis import DEGREE, axis_of, rates_per
-from kinfmu.units import CoordinateName, degrees_of, unit_of
+from kinfmu.run.axis import DEGREE, ROUND_OFF, axis_of, rates_per
+from kinfmu.units import CoordinateName, ForceName, degrees_of, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 LIGHT: Colour = (228, 228, 228)
@@ -29,6 +30,9 @@ SMALL = 8.0  # [pt]
 _PLAIN = (-2, 5)  # powers of ten of the largest number from which and below which axes have plain numbers
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _DEGREES = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0, 360.0, 720.0, 1440.0)  # steps of ticks
+
+
+_GREEK = {"phi": "φ", "omega": "ω", "alpha": "\N{GREEK SMALL LETTER ALPHA}"}
 
 
 class Look(NamedTuple):
@@ -110,8 +114,8 @@ class Abscissa:
 
     @property
     def label(self) -> str:
-        """The name with its unit, such as 'crank.phi [deg]'."""
-        return labelled(self.name, self.unit)
+        """The name with its unit, such as 'crank.φ [deg]'."""
+        return labelled(symbol(self.name), self.unit)
 
     @property
     def is_angle(self) -> bool:
@@ -147,6 +151,12 @@ def unit_in(run: Run, name: str) -> str:
     return units[name]
 
 
+def symbol(column: str) -> str:
+    """Return the name of a column with Greek letters, such as 'crank.φ' for 'crank.phi'."""
+    owner, dot, noun = column.rpartition(".")
+    return f"{owner}{dot}{_GREEK.get(noun, noun)}"
+
+
 def labelled(name: str, unit: str) -> str:
     """Return 'coupler.ax [m/s2]' with a raised 2; numbers have no unit."""
     return f"{name} [{raised(unit)}]" if unit not in ("", "1") else name
@@ -172,14 +182,23 @@ def label_size(label: str, longest: int, size: float) -> float:
     return size * min(1.0, longest / max(1, *map(len, label.split("\n"))))
 
 
-def degree_ticks(axes: Axes, most: int) -> None:
-    """Give a horizontal axis of degrees at most this many steps, such as 30, 45 or 90 deg."""
+def degree_ticks(axis: Axis, most: int) -> None:
+    """Give an axis of degrees at most this many steps, such as 30, 45 or 90 deg."""
     from matplotlib.ticker import MultipleLocator
 
-    low, high = axes.get_xlim()
+    low, high = axis.get_view_interval()
     step = next((step for step in _DEGREES if abs(high - low) <= most * step), 0.0)
     if step and abs(high - low) >= 2.0 * step:  # else those that matplotlib chooses
-        axes.xaxis.set_major_locator(MultipleLocator(step))
+        axis.set_major_locator(MultipleLocator(step))
+
+
+def round_ticks(axis: Axis, most: int, unit: str) -> None:
+    """Give an axis with a linear scale at most this many steps of 1, 2 or 5 times a power of ten, or as of degrees."""
+    from matplotlib.ticker import MaxNLocator
+
+    axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 5, 10]))
+    if unit == "deg":
+        degree_ticks(axis, most)
 
 
 def raised(unit: str) -> str:
@@ -187,7 +206,35 @@ def raised(unit: str) -> str:
     return unit.replace("2", "\N{SUPERSCRIPT TWO}").replace("3", "\N{SUPERSCRIPT THREE}")
 
 
+def repeats_effort(run: Run, name: ForceName) -> bool:
+    """Return True for a bias effort that equals its effort to round-off, as at constant speeds, in a run with both."""
+    effort = f"{name.owner}.{name.noun.removeprefix('bias_')}"
+    if not name.noun.startswith("bias_") or {name, effort} & run.absent:
+        return False
+    own, other = run[name], run[effort]
+    largest = float(np.max(np.abs(other), initial=0.0, where=np.isfinite(other)))
+    return bool(np.all(~run.good | (np.abs(own - other) <= ROUND_OFF * largest) | ~np.isfinite(own)))
+
+
+def equal_below(curves: Sequence[FloatArray]) -> list[int]:
+    """Return for each curve (n,) how many later ones look the same; drawn wider by these, it stays visible."""
+    known = np.concatenate([finite(values) for values in curves])
+    seen = _SEEN * float(np.ptp(known)) if len(known) else 0.0
+
+    def are_equal(one: FloatArray, other: FloatArray) -> bool:
+        apart = np.abs(one - other)
+        return bool(np.array_equal(np.isnan(one), np.isnan(other)) and np.all(apart[np.isfinite(apart)] <= seen))
+
+    step = max(len(curves[0]) // _FEW, 1)  # a few samples tell most curves apart
+    return [
+        sum(are_equal(one[::step], other[::step]) and are_equal(one, other) for other in curves[k + 1 :])
+        for k, one in enumerate(curves)
+    ]
+
+
 LOST: palette.Colour = (246, 222, 222)
+_SEEN = 2e-3  # of the range of all curves, by which two must differ to be seen apart
+_FEW = 50  # samples
 _BINS = 1500  # of a long run; each shows its least and its greatest value
 MOST_CURVES = 4  # of a panel
 WIDTH, HEIGHT = 4.4, 2.4  # [in] of a panel
@@ -212,7 +259,7 @@ def curves(axes: Axes, run: Run, columns: Sequence[str] = (), x: str = "", *, de
         rows = np.union1d(rows_of(values), rows_of(across.values))
         is_curve = np.isfinite(values).sum() > 1
         axes.plot(across.values[rows], values[rows], marker="" if is_curve else "o", label=name)
-    axes.set_xlabel(across.label)
+    axes.set_xlabel(labelled(across.name, across.unit))
     unit = raised(shown)
     label = f"{names[0]} [{unit}]" if len(names) == 1 else f"[{unit}]"
     axes.set_ylabel(label if axes.get_ylabel() in ("", label) else f"[{unit}]")
@@ -271,12 +318,21 @@ def overview(run: Run) -> Figure:
     figure = Figure(figsize=(WIDTH * max(len(panels), 1), HEIGHT), layout="constrained", facecolor="white")
     for index, names in enumerate(panels, start=1):
         axes = figure.add_subplot(1, len(panels), index)
-        curves(axes, run, names[:MOST_CURVES])
+        curves(axes, run, names[:MOST_CURVES], degrees=True)
         dress(axes, "")
-        axes.set_ylabel("rad" if names[0].is_angle else run.length_unit)
+        unit = "deg" if names[0].is_angle else run.length_unit
+        axes.set_ylabel(unit)
+        round_ticks(axes.xaxis, 6, axis_of(run).unit)
+        round_ticks(axes.yaxis, 6, unit)
         more = f"and {len(names) - MOST_CURVES} more" if len(names) > MOST_CURVES else None
         axes.legend(
-            title=more, fontsize=7.0, title_fontsize=7.0, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0)
+            labels=[symbol(name) for name in names[:MOST_CURVES]],
+            title=more,
+            fontsize=7.0,
+            title_fontsize=7.0,
+            frameon=False,
+            loc="upper left",
+            bbox_to_anchor=(1.0, 1.0),
         )
     return figure
 

@@ -15,14 +15,16 @@ from kinfmu.draw.chart import (
     SMALL,
     Abscissa,
     abscissa,
-    degree_ticks,
     dress,
+    equal_below,
     gaps,
     label_size,
     labelled,
     numbers,
     powers_of_ten,
+    round_ticks,
     rows_of,
+    symbol,
     unit_in,
 )
 from kinfmu.draw.scene import palette
@@ -46,6 +48,7 @@ _TICK = 36.0  # [pt] for a number along the horizontal axis of an equal panel
 _LEFT, _RIGHT, _TOP, _BOTTOM, _GAP = 60.0, 24.0, 34.0, 34.0, 16.0  # [pt] around and between panels
 _LEGEND_LINE, _LEGEND_COLUMNS = 12.0, 3  # [pt]; names in a line of a legend
 _WIDE, _NARROW = 3.6, 1.2  # [pt], curves of the first of two runs and of the second one or of a single one
+_WIDER = 2.4  # [pt] of a curve for each equal one above it
 LOGARITHMIC = ("solver.residual", "solver.margin", "solver.error_", "watch.")  # columns on a scale of powers of ten
 LEAST = 1e-18  # smallest value on such a scale: zeros have no logarithm
 _ROOM = 0.25  # of the range of the values, between the centre and the least value if that is negative
@@ -254,6 +257,7 @@ def _panel(axes: Any, shown: Overlay, panel: Sequence[str]) -> None:
     unit, factor = shown.unit(panel[0])
     is_log = is_logarithmic(panel[0])
     everything = []
+    equal = equal_below([shown.runs[0][column] for column in panel]) if len(shown.xs) <= 1 else [0] * len(panel)
     for number, run in enumerate(shown.runs):
         is_wide = len(shown.runs) == 2 and number == 0
         for index, column in enumerate(panel):
@@ -267,8 +271,9 @@ def _panel(axes: Any, shown: Overlay, panel: Sequence[str]) -> None:
             look: dict[str, Any] = {"color": ink(palette.lighter(colour) if is_wide else colour)}
             if np.isfinite(values).sum() < 2:
                 look |= {"marker": "o", "markersize": 3.0}
-            label = column if number == len(shown.runs) - 1 else "_"
-            axes.plot(along[rows], values[rows], linewidth=_WIDE if is_wide else _NARROW, label=label, **look)
+            label = symbol(column) if number == len(shown.runs) - 1 else "_"
+            width = _WIDE if is_wide else _NARROW + _WIDER * equal[index]
+            axes.plot(along[rows], values[rows], linewidth=width, label=label, **look)
             everything.append((along, values))
     if shown.polar:
         _legend(axes, shown, panel, radial_scale(axes, everything))
@@ -289,11 +294,14 @@ def _scales(axes: Any, shown: Overlay, panel: Sequence[str], values: FloatArray,
         shown_values = range_of(values)
         if shown_values:
             axes.set_ylim(*shown_values)
+        round_ticks(axes.yaxis, 5, unit)
         unit = numbers(axes, unit)
+    else:
+        round_ticks(axes.yaxis, 9, unit)
     if x.is_angle:
         axes.margins(x=0.01)
-        degree_ticks(axes, 9)
-    name = panel[0] if len(panel) == 1 else ""
+    round_ticks(axes.xaxis, 9, x.unit)
+    name = symbol(panel[0]) if len(panel) == 1 else ""
     label = labelled(name, unit).strip()
     axes.set_ylabel(label, fontsize=label_size(label, _LONGEST, SMALL), color=grey, labelpad=3.0, parse_math=False)
     if x.is_axis and not any(name.startswith("solver.status") for name in panel):

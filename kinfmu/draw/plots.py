@@ -8,20 +8,23 @@ from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 
-from kinfmu.arrays import FloatArray
+from kinfmu.arrays import FloatArray, finite
 from kinfmu.draw.chart import (
     LOST,
     SMALL,
     axis_label,
     curves,
-    degree_ticks,
     dress,
     gaps,
     label_size,
     numbers,
     powers_of_ten,
+    raised,
+    repeats_effort,
+    round_ticks,
     rows_of,
     span,
+    symbol,
 )
 from kinfmu.draw.overlay import (
     LEAST,
@@ -34,7 +37,7 @@ from kinfmu.draw.overlay import (
     values_of,
 )
 from kinfmu.draw.scene import palette
-from kinfmu.draw.sheet import FONT, GREY, INK, TITLE_EDGE, TITLE_LINE, ink, title_lines, titled_figure
+from kinfmu.draw.sheet import FONT, GREY, INK, TITLE_EDGE, TITLE_FONT, TITLE_LINE, ink, title_lines, titled_figure
 from kinfmu.draw.writing import check_suffix, check_target, write
 from kinfmu.errors import FigureError, RequestError, listed
 from kinfmu.run import Run
@@ -47,12 +50,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_COORDINATES = 30  # more make a sheet too large to print
+MOST_PANELS = 6  # of a plot for which no columns are named
 _ABREAST = 3  # columns of panels in a row, at most
 _WIDTH, _HEIGHT = 244.0, 96.0  # [pt], of a panel with its margins
 _LEFT, _RIGHT, _TOP, _BOTTOM = 64.0, 22.0, 44.0, 34.0  # [pt] around all panels; the last tick has half its number there
 _BETWEEN, _GAP, _BLOCK_GAP = 68.0, 14.0, 52.0  # [pt] between coordinates, their panels, and rows of coordinates
 _FORCES: palette.Colour = (185, 28, 28)  # that of driving arrows in drawings
 _LABEL = 42.0  # [pt] from an axis to its name
+_NOTE = 12.0  # [pt] of a line below all panels
 _LONGEST = 20  # letters of a name with its unit that fit next to a panel in one line
 
 
@@ -66,7 +71,7 @@ def plot(
     x: str | Sequence[str] = (),
     overlaid: bool = False,
     polar: bool = False,
-    degrees: bool = False,
+    degrees: bool | None = None,
     other: Run | None = None,
     names: tuple[str, str] = ("A", "B"),
 ) -> None: ...
@@ -93,18 +98,19 @@ def plot(
     x: str | Sequence[str] = (),
     overlaid: bool = False,
     polar: bool = False,
-    degrees: bool = False,
+    degrees: bool | None = None,
     other: Run | None = None,
     names: tuple[str, str] = ("A", "B"),
 ) -> Axes | None:
     """Draw `run` over its axis, usually time, or over any column, into a file or into Axes of matplotlib.
 
-    In a file, each coordinate has three panels: position, velocity and acceleration, in rad and the mechanism's unit of
+    In a file, each coordinate has three panels: position, velocity and acceleration, in deg and the mechanism's unit of
     length; so has each driver whose inputs are named. Diagnostics that are named have a panel each; residuals, margin
     and errors on a scale of powers of ten. With masses or loads, efforts and energies have a panel each, and so have
-    reactions that are named, in SI units. Samples without numbers are gaps on a tinted background; a panel of a column
-    that was not kept has the text "not kept". The same run gives the same bytes. Into Axes, each column is a curve with
-    its name as the label, in your settings of matplotlib; several calls draw several runs into the same Axes.
+    reactions that are named, in SI units. Constants have no panels: a line below states their values. Samples without
+    numbers are gaps on a tinted background; a panel of a column that was not kept has the text "not kept". The same run
+    gives the same bytes. Into Axes, each column is a curve with its name as the label, in your settings of matplotlib;
+    several calls draw several runs into the same Axes.
 
     With `x`, `overlaid` or `polar` the named columns themselves are the curves, those of one unit in one panel. Angles
     along the horizontal axis are in degrees. Positions over positions, such as coupler curves, have equal
@@ -114,14 +120,14 @@ def plot(
         run: The run.
         path: The .svg, .png or .pdf file.
         columns: Of a file: names such as 'coupler.x', 'coupler.*', 'q', '-crank.phi' or 'reactions', as in tables.
-            Default: angles of bodies, points of interest, efforts and energies; of bodies that do not turn,
-            and without points of interest, all coordinates. With `ax`: columns of one unit, such as
+            Default: six panels, of points of interest, sliding and turning bodies and the first effort, and a line that
+            names what else moves. With `ax`: columns of one unit, such as
             'coupler.vx', with * for any letters. Default: all generalized coordinates, if they have one unit.
         ax: Axes to draw into, in place of a file.
         x: The column along the horizontal axis, or one for each curve. Default: time, or the driver's value.
         overlaid: True: curves of one unit in one panel.
         polar: True: the horizontal axis, an angle, is the polar angle.
-        degrees: True: angles in deg, and angular rates in deg/s and deg/s2.
+        degrees: True: angles in deg, and angular rates in deg/s and deg/s2; False: in rad. Default: True in a file.
         other: A second run, drawn narrow over the first one, which is wide.
         names: Of the two runs, for the title.
 
@@ -142,23 +148,38 @@ def plot(
     if ax is not None:
         if overlaid or polar or other is not None or len(xs) > 1:
             raise FigureError("overlaid, polar, other and several x are for files; call plot again to add curves to ax")
-        return curves(ax, run, columns, *xs, degrees=degrees)
+        return curves(ax, run, columns, *xs, degrees=bool(degrees))
     path = Path(str(path))
     check_suffix(path)
     runs = (run,) if other is None else (run, other)
     check_comparable(runs)
+    degrees = degrees is not False
     if xs or overlaid or polar:
         shown = overlay(runs, names, columns, xs, degrees=degrees, polar=polar)
         write(path, lambda: overlay_sheet(shown))
     else:
-        stacks = _chosen(run, columns, path)
-        write(path, lambda: _sheet(runs, stacks, names, degrees=degrees))
+        stacks, notes = _chosen(runs, columns, path, degrees=degrees)
+        write(path, lambda: _sheet(runs, stacks, names, notes, degrees=degrees))
     return None
 
 
-def _chosen(run: Run, columns: Sequence[str], path: Path) -> list[Stack]:
-    """Return the stacks of panels to plot."""
-    stacks = stacks_of(run, columns)
+def _chosen(runs: Sequence[Run], columns: Sequence[str], path: Path, *, degrees: bool) -> tuple[list[Stack], list[str]]:
+    """Return the stacks of panels to plot, and lines on what has no panel."""
+    run = runs[0]
+    found = stacks_of(run, columns)
+    wanted = [panel.column for stack in found for panel in stack.panels]
+    if not len(run) or not found:
+        raise FigureError(f"{path}: the run has no {'samples' if found else 'coordinates'} to plot")
+    if all(column in run.absent for column in wanted):
+        raise FigureError(
+            f"{path}: the run does not keep {listed(wanted[:3])}{', ...' if len(wanted) > 3 else ''}; "
+            "keep them: --channels all, or their names"
+        )
+    stacks, constant = moving(runs, found, keeps_one=bool(columns))
+    notes = [_constants(run, constant, degrees=degrees)]
+    if not columns:
+        stacks, others = main_panels(run, stacks or found)
+        notes.append(f"not drawn: {', '.join(map(symbol, others))}" if others else "")
     if len(stacks) > MOST_COORDINATES:
         what = (
             "coordinates" if all(isinstance(s.panels[0].name, CoordinateName) for s in stacks) else "columns of panels"
@@ -167,19 +188,102 @@ def _chosen(run: Run, columns: Sequence[str], path: Path) -> list[Stack]:
             f"{path}: {len(stacks)} {what} are too many for one sheet, which holds {MOST_COORDINATES}; choose some "
             f"of them by name, such as {stacks[0].panels[0].column}"
         )
-    if not len(run) or not stacks:
-        raise FigureError(f"{path}: the run has no {'samples' if stacks else 'coordinates'} to plot")
-    wanted = [panel.column for stack in stacks for panel in stack.panels]
-    if all(column in run.absent for column in wanted):
-        raise FigureError(
-            f"{path}: the run does not keep {listed(wanted[:3])}{', ...' if len(wanted) > 3 else ''}; "
-            "keep them: --channels all, or their names"
-        )
-    return stacks
+    return stacks, [*filter(None, notes)]
+
+
+def moving(runs: Sequence[Run], stacks: Sequence[Stack], *, keeps_one: bool) -> tuple[list[Stack], list[Panel]]:
+    """Return stacks without the panels of constants, and the first of these of each stack.
+
+    keeps_one: True: a stack of constants alone keeps its first panel.
+    """
+    found, constant = [], []
+    for stack in stacks:
+        held = [all(_is_constant(run, panel) for run in runs) for panel in stack.panels]
+        panels = tuple(panel for panel, is_held in zip(stack.panels, held, strict=True) if not is_held)
+        if not panels and keeps_one:
+            panels = stack.panels[:1]
+        elif any(held):
+            constant.append(stack.panels[held.index(True)])
+        if panels:
+            found.append(stack._replace(panels=panels))
+    return found, constant
+
+
+def _is_constant(run: Run, panel: Panel) -> bool:
+    """Return True for a column of several numbers that are equal to round-off."""
+    known = finite(values_of(run, panel.column)) if panel.column not in run.absent else np.empty(0)
+    if len(known) < 2:
+        return False
+    size = max(float(np.abs(known).max()), _usual(run, axis_of(run), panel))
+    return bool(np.ptp(known) <= ROUND_OFF * size)
+
+
+def _constants(run: Run, panels: Sequence[Panel], *, degrees: bool) -> str:
+    """Return 'constant: crank.ω = 6 deg/s, rod.φ = 0 deg', '' without any."""
+    found = []
+    for panel in panels:
+        unit, factor = degrees_of(panel.unit) if degrees else (panel.unit, 1.0)
+        value = float(finite(values_of(run, panel.column))[0])
+        value *= abs(value) > ROUND_OFF * _usual(run, axis_of(run), panel)
+        if panel.order and value == 1.0 and axis_of(run).per != "time":
+            continue  # of the driver over itself
+        text = f"{float(f'{value * factor + 0.0:.4g}'):.12g}".replace("-", "\N{MINUS SIGN}")
+        found.append(f"{symbol(panel.column)} = {text} {raised('' if unit == '1' else unit)}".rstrip())
+    return f"constant: {', '.join(found)}" if found else ""
+
+
+def main_panels(run: Run, stacks: Sequence[Stack]) -> tuple[list[Stack], list[str]]:
+    """Return the stacks of at most MOST_PANELS panels that show most of a motion, and names of what else moves.
+
+    First are points of interest, then bodies that slide, turn, or do both; last is what follows a driver at a constant
+    ratio. The first effort has its place behind the first coordinate.
+    """
+    kept = [stack._replace(panels=panels) for stack in stacks if (panels := _kept_panels(run, stack))]
+    coordinates = sorted((one for one in kept if _is_coordinate(one)), key=lambda stack: _rank(run, stack))
+    forces = [one for one in kept if not _is_coordinate(one)]
+    first = [forces[0]._replace(panels=forces[0].panels[:2])] if forces else []
+    shown: list[Stack] = []
+    for stack in (*coordinates[:1], *first, *coordinates[1:], *forces[len(first) :]):
+        free = MOST_PANELS - sum(len(one.panels) for one in shown)
+        if free:
+            shown.append(stack._replace(panels=stack.panels[:free]))
+    drawn = {panel.column for stack in shown for panel in stack.panels}
+    names = [stack.title if _is_coordinate(stack) else panel.column for stack in kept for panel in stack.panels]
+    columns = [panel.column for stack in kept for panel in stack.panels]
+    left = dict.fromkeys(name for name, column in zip(names, columns, strict=True) if column not in drawn)
+    return shown, [name for name in left if name not in drawn]
+
+
+def _is_coordinate(stack: Stack) -> bool:
+    return isinstance(stack.panels[0].name, CoordinateName)
+
+
+def _kept_panels(run: Run, stack: Stack) -> tuple[Panel, ...]:
+    """Return the panels of a stack that the run keeps, without bias efforts that repeat their efforts."""
+    return tuple(
+        panel
+        for panel in stack.panels
+        if panel.column not in run.absent
+        and not (isinstance(panel.name, ForceName) and repeats_effort(run, panel.name))
+    )
+
+
+def _rank(run: Run, stack: Stack) -> tuple[bool, int]:
+    """Return the rank of a coordinate: lower ones are drawn first."""
+    name = next(output for output in run.outputs if output == stack.title)
+    is_point = name in run.outputs[run.coordinate_count :] and bool(run.names)
+    turns = any(other.is_angle and other.owner == name.owner for other in run.names)
+    follows = len(stack.panels) == 1 and not is_point and name.derivative(1) not in run.absent
+    return follows, 0 if is_point else 2 if name.is_angle else 3 if turns else 1
 
 
 def _sheet(
-    runs: Sequence[Run], stacks: Sequence[Stack], names: tuple[str, str] = ("A", "B"), *, degrees: bool = False
+    runs: Sequence[Run],
+    stacks: Sequence[Stack],
+    names: tuple[str, str] = ("A", "B"),
+    notes: Sequence[str] = (),
+    *,
+    degrees: bool = False,
 ) -> Figure:
     axis = axis_of(runs[0])
     abreast = -(-len(stacks) // -(-len(stacks) // _ABREAST))  # rows of about the same length
@@ -187,9 +291,13 @@ def _sheet(
     blocks = [max(len(stack.panels) for stack in row) * _HEIGHT + _BLOCK_GAP for row in rows]
     width = _LEFT + abreast * _WIDTH - _BETWEEN + _RIGHT
     title = title_lines(sheet_title(runs, names), width - 2.0 * TITLE_EDGE)
+    below = [line for note in notes for line in title_lines(note, (width - 2.0 * TITLE_EDGE) * TITLE_FONT / SMALL)]
     above = _TOP + max(len(title) - 1, 0) * TITLE_LINE
-    height = above + sum(blocks) - _BLOCK_GAP - _GAP + _BOTTOM
+    height = above + sum(blocks) - _BLOCK_GAP - _GAP + _BOTTOM + len(below) * _NOTE
     made = titled_figure(width, height, title)
+    if below:
+        look: dict[str, Any] = {"fontsize": SMALL, "va": "bottom", "color": ink(GREY), "parse_math": False}
+        made.text(TITLE_EDGE / width, 0.5 * TITLE_EDGE / height, "\n".join(below), linespacing=1.25, **look)
     for index, stack in enumerate(stacks):
         row, column = divmod(index, abreast)
         left = _LEFT + column * _WIDTH
@@ -202,7 +310,7 @@ def _sheet(
             _panel(axes, runs, panel, degrees=degrees)
         for axes in panels[:-1]:
             axes.tick_params(labelbottom=False)
-        panels[0].set_title(stack.title, fontsize=FONT + 1.0, loc="left", color=ink(INK), parse_math=False)
+        panels[0].set_title(symbol(stack.title), fontsize=FONT + 1.0, loc="left", color=ink(INK), parse_math=False)
         panels[-1].set_xlabel(axis.label, fontsize=SMALL, color=ink(GREY), labelpad=1.0)
         for axes in panels:
             axes.yaxis.set_label_coords(-_LABEL / (_WIDTH - _BETWEEN), 0.5)
@@ -232,17 +340,16 @@ def _panel(axes: Axes, runs: Sequence[Run], panel: Panel, *, degrees: bool) -> N
     dress(axes, "")
     run, axis, known = runs[0], axis_of(runs[0]), np.concatenate(everything)
     axes.set_xlim(*span(np.concatenate([axis_of(one).values for one in runs]), 0.01))
-    if axis.unit == "deg":
-        degree_ticks(axes, 6)
+    round_ticks(axes.xaxis, 6, axis.unit)
     if is_log:
         powers_of_ten(axes, np.maximum(np.abs(known), LEAST))
     else:
         limits = _shown(run, axis, panel, known)
         if limits:
             axes.set_ylim(limits[0] * factor, limits[1] * factor)
-        axes.locator_params(axis="y", nbins=4)
+        round_ticks(axes.yaxis, 5, unit)
         unit = numbers(axes, unit)
-    label = axis_label(panel.label, unit, _LONGEST)
+    label = axis_label(symbol(panel.label), unit, _LONGEST)
     axes.set_ylabel(label, fontsize=label_size(label, _LONGEST, SMALL), color=ink(GREY), labelpad=3.0)
     is_kept = all(panel.column not in one.absent for one in runs)
     if not is_kept or (is_force and not len(known)):

@@ -91,7 +91,7 @@ def _sheet(run: Run, across: Abscissa, name: str, table: FloatArray, units: list
         axes.locator_params(axis="y", nbins=4)
         unit = numbers(axes, unit)
         if across.is_angle:
-            degree_ticks(axes, 9)
+            degree_ticks(axes.xaxis, 9)
         axes.set_ylabel(labelled(letter, unit), fontsize=SMALL, color=ink(GREY))
         axes.yaxis.set_label_coords(-50.0 / _WIDTH, 0.5)
         axes.tick_params(labelbottom=order == len(LETTERS) - 1)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from kinfmu.analysis import Report, check
-from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism import Mechanism, gallery
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.mechanism.opened import opened
 from kinfmu.page.describe import describe, module_data, written_file
@@ -147,14 +147,34 @@ def page_of(data: Mapping[str, Any], script: str = "") -> str:
 
     """
     text = json.dumps({**data, "solver": solver()}, separators=(",", ":"), allow_nan=False)
+    code = "\n".join([*(_script(name) for name in _SCRIPTS), f"{{\n{script}\n}}"])  # names of its own
     return _filled(
         (_WEB / "index.html").read_text("utf-8"),
         {
             "title": html.escape(str(data["name"])),
             "style": (_WEB / "style.css").read_text("utf-8"),
             "data": packed(text.encode()),
-            "script": "\n".join([*(_script(name) for name in _SCRIPTS), f"{{\n{script}\n}}"]),  # names of its own
+            "script": packed(code.encode()),
         },
+    )
+
+
+@cache
+def gallery_page() -> str:
+    """Return the page of a server that links the pages of the mechanisms of the gallery, gallery/NAME."""
+    titles = {name: gallery.load(name).title for name in gallery.names()}
+    cards = "\n".join(
+        f'<a class="button" href="gallery/{name}"><b>{name}</b>{html.escape(title)}</a>'
+        for name, title in titles.items()
+    )
+    text = (_WEB / "index.html").read_text("utf-8")
+    head = _filled(text[: text.index("<body>")], {"title": "Gallery", "style": (_WEB / "style.css").read_text("utf-8")})
+    header = (
+        '<header><div class="name"><h1>Gallery</h1></div><a class="button" href=".">Back to the mechanism</a></header>'
+    )
+    dark = 'if (matchMedia("(prefers-color-scheme: dark)").matches) document.documentElement.dataset.theme = "dark";'
+    return (
+        f'{head}<body>\n<script>{dark}</script>\n{header}\n<main class="gallery">\n{cards}\n</main>\n</body>\n</html>\n'
     )
 
 

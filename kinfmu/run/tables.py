@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import io
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from datetime import UTC, datetime
 from functools import lru_cache
 from importlib import import_module
+from math import isfinite
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from numpy.typing import NDArray
 
 from kinfmu.errors import MissingPackageError, RequestError
-from kinfmu.units import CoordinateName, ForceName, InputName, SignalName, degrees_of, force_sizes
+from kinfmu.units import METRES, CoordinateName, ForceName, InputName, SignalName, degrees_of, force_sizes
 
 
 class Column(NamedTuple):
@@ -43,13 +46,62 @@ def csv_lines(
     """
     if len(separator) != 1 or len(decimal) != 1 or separator == decimal:
         raise RequestError(f"separator = {separator!r} and decimal = {decimal!r} must be two different characters")
-    names = [f"{column.name} [{column.unit}]" if units else column.name for column in columns]
+    names = [_with_unit(column) if units else column.name for column in columns]
     yield separator.join(_quoted(name, separator) for name in names) + "\n"
     for start in range(0, len(columns[0].values), ROWS):
         block = (column.values[start : start + ROWS].tolist() for column in columns)
         for row in zip(*block, strict=True):
             line = separator.join(map(repr, row)) + "\n"
             yield line if decimal == "." else line.replace(".", decimal)
+
+
+def _with_unit(column: Column) -> str:
+    return f"{column.name} [{column.unit}]"
+
+
+MOST_ROWS, MOST_COLUMNS = 1_048_576, 16_384  # of a spreadsheet, with the row of names
+
+
+def workbook(columns: Sequence[Column], name: str) -> bytes:
+    """Return columns as an .xlsx workbook: names with units in a first row that stays in sight, numbers below it.
+
+    Cells without a finite number are empty. Equal columns give equal bytes.
+
+    Args:
+        columns: The columns.
+        name: Of the file, in messages.
+
+    Raises:
+        RequestError: There are too many rows or columns for a spreadsheet.
+        MissingPackageError: XlsxWriter is not installed.
+
+    """
+    try:
+        from xlsxwriter import Workbook
+    except ImportError:
+        raise MissingPackageError(f"{name}: writing .xlsx needs XlsxWriter: pip install 'kinfmu[xlsx]'") from None
+    rows = len(columns[0].values)
+    if rows >= MOST_ROWS or len(columns) > MOST_COLUMNS:
+        raise RequestError(
+            f"{name}: {rows} rows of {len(columns)} columns; a spreadsheet holds {MOST_ROWS - 1} of {MOST_COLUMNS}: "
+            "write .csv, or choose fewer"
+        )
+    file = io.BytesIO()
+    with Workbook(file, {"constant_memory": True}) as book:
+        book.set_properties({"created": datetime(1980, 1, 1, tzinfo=UTC)})
+        sheet = book.add_worksheet()
+        sheet.freeze_panes(1, 0)
+        bold = book.add_format({"bold": True})
+        for k, column in enumerate(columns):
+            sheet.set_column(k, k, max(len(_with_unit(column)) + 1, 9))
+            sheet.write_string(0, k, _with_unit(column), bold)
+        for start in range(0, rows, ROWS):
+            block = (column.values[start : start + ROWS].tolist() for column in columns)
+            for number, row in enumerate(zip(*block, strict=True), start + 1):
+                for k, value in enumerate(row):
+                    if isfinite(value):
+                        sheet.write_number(number, k, value)
+    return file.getvalue()
 
 
 def _quoted(name: str, separator: str) -> str:
@@ -61,6 +113,14 @@ def in_degrees(column: Column) -> Column:
     """Return a column with angles, and their rates in time, in degrees; other columns as they are."""
     unit, factor = degrees_of(column.unit)
     return column if unit == column.unit else Column(column.name, unit, column.values * factor)
+
+
+def in_lengths(column: Column, own: str, unit: str | None) -> Column:
+    """Return a column of lengths, in the unit `own`, or of their rates, in another unit; other columns as they are."""
+    base, slash, per = column.unit.partition("/")
+    if unit in (None, own) or base != own or per.startswith(own):
+        return column
+    return Column(column.name, f"{unit}{slash}{per}", column.values * (METRES[own] / METRES[str(unit)]))
 
 
 class Tabular(ABC):

@@ -13,7 +13,7 @@ from kinfmu.arrays import FloatArray, IntArray
 from kinfmu.run import Event, Run
 from kinfmu.run.axis import axis_of
 from kinfmu.solver.python.pose import Status
-from kinfmu.units import InputName
+from kinfmu.units import InputName, degrees_of, unit_of
 
 _WHEN = re.compile(r"^at t = \S+ s: ")
 _LEVELS = {Status.OK: "info", Status.BRIDGED: "info", Status.NEAR_SINGULAR: "warning"}  # the others: "error"
@@ -25,6 +25,9 @@ MEANINGS = {
     Status.INCONSISTENT: "inconsistent: a constraint set aside as redundant does not hold",
     Status.NOT_CONVERGED: "not converged",
 }
+
+
+_REASONS = MEANINGS | {Status.BRIDGED: "bridged: the equations are singular there, so poses are interpolated across"}
 
 
 class Worst(NamedTuple):
@@ -93,12 +96,37 @@ def _moment(event: Event) -> float:
 
 
 def notable_events(run: Run) -> list[Event]:
-    """Return changes of status and the run's own events in order of time, each failure once.
+    """Return each series of samples that are not ok, and the run's own events, in order of time, each failure once.
 
-    A first sample of status ok has no entry. The times at the beginning of texts are removed: `t` has them.
+    The times at the beginning of texts are removed: `t` has them.
     """
-    found = [*unexplained(status_events(run), run.events), *run.events]
+    found = [*unexplained(_series(run), run.events), *run.events]
     return sorted((event._replace(text=_WHEN.sub("", event.text)) for event in found), key=lambda event: event.t)
+
+
+def _series(run: Run) -> Iterator[Event]:
+    """Yield an event for each series of samples of one status that is not ok: how many, up to where, and why."""
+    found = list(changes(run))
+    ends = [change.row for change in found[1:]] + [len(run)]
+    for change, end in zip(found, ends, strict=False):  # a run without samples has no change
+        last = end - 1
+        if change.status is Status.OK:
+            continue
+        count = last - change.row + 1
+        upto = f", up to {axis_of(run).place(float(run.t[last]))}" if count > 1 else ""
+        at = _driver_values(run, change.row, last)
+        which = f"{count} sample{'' if count == 1 else 's'}{upto}{at}"
+        yield Event(change.t, _LEVELS.get(change.status, "error"), f"{which}, {_REASONS[change.status]}")
+
+
+def _driver_values(run: Run, first: int, last: int) -> str:
+    """Return ' (crank 0 to 2 deg)' for samples of a run over time with one driver; else ''."""
+    names = [name for name in run.input_names[::3] if name not in run.absent]
+    if not axis_of(run).is_time or len(names) != 1:
+        return ""
+    unit, factor = degrees_of(unit_of(names[0].quantity, run.length_unit))
+    begin, end = (f"{run[names[0]][row] * factor + 0.0:.6g}" for row in (first, last))
+    return f" ({names[0].driver} {begin}{f' to {end}' if end != begin else ''} {unit})"
 
 
 def sentence(run: Run) -> str:

@@ -134,9 +134,25 @@ def test_a_pin_written_as_fixed_becomes_a_pin(name: str) -> None:
 
 def test_a_slide_is_driven_along_its_axis() -> None:
     bodies = [Body("ground", {"G": (0, 0)}), Body("block", {"P": (0, 0)})]
-    first, *_ = checked(Mechanism("slide", bodies, [Translational("rail", ("ground.G", "block.P"), 0.5)]))
-    keys = {"type": "slide", "between": ["ground.G", "block.P"], "axis": 0.5, "law": "constant_speed"}
-    assert first.edits == (Put(("drivers", "rail"), keys),)
+    first, *_ = checked(Mechanism("slide", bodies, [Translational("rail", ("ground.G", "block.P"), 0.5 * math.pi)]))
+    keys = {"type": "slide", "between": ["ground.G", "block.P"], "axis": "90 deg", "law": "constant_speed"}
+    assert first.edits == (Put(("drivers", "rail"), keys | {"speed": 0.1}),)
+    assert 'axis = "90 deg"' in first.toml_lines()
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.05])
+def test_pins_next_to_each_other_are_joined_before_drivers_are_added(apart: float) -> None:
+    whole = fourbar(4, 1, 3.5, 3)
+    joints = tuple(joint for joint in whole.joints if joint.name != "Q")
+    bodies = [
+        replace(body, points=body.points | {"Q": (body.points["Q"][0] + apart, body.points["Q"][1])})
+        if body.name == "rocker"
+        else body
+        for body in whole.bodies
+    ]
+    first, *_ = checked(replace(whole, bodies=tuple(bodies), joints=joints, drivers=()))
+    assert first.text == "join coupler.Q and rocker.Q and drive crank: these are free"
+    assert 'speed = "60 rpm"' in first.toml_lines()  # a turn in the run
 
 
 def test_two_drivers_on_one_freedom_one_drives_the_other_freedom() -> None:

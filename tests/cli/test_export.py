@@ -20,6 +20,7 @@ from kinfmu.log import read, write_mcap
 from kinfmu.mechanism.toml_text import text as toml_text
 from tests.cli.conftest import Command, read_csv
 from tests.log.runs import fourbar
+from tests.log.sheets import read_xlsx
 from tests.motion.cams import followers
 
 
@@ -58,7 +59,7 @@ def test_plots_and_moving_pictures_are_made_of_a_record(
     monkeypatch.setattr(animation, "MOST", 3)
     assert command("export", record, "-o", "run.svg", "--columns", "coupler.x,rocker.phi").exit_code == 0
     text = (tmp_path / "run.svg").read_text(encoding="utf-8")
-    assert "rocker.phi" in text
+    assert "rocker.φ" in text
     assert "coupler.y" not in text
     assert command("export", record, "-o", "run.gif").exit_code == 0
     assert (tmp_path / "run.gif").read_bytes().startswith(b"GIF89a")
@@ -81,11 +82,11 @@ def test_coordinates_of_a_plot_are_chosen_as_columns_of_a_table_are(
 ) -> None:
     assert command("export", record, "-o", "run.svg", "--columns", "coupler.*,rocker.phi").exit_code == 0
     words = re.findall(r">([\w.]+)</text>", (tmp_path / "run.svg").read_text(encoding="utf-8"))
-    assert [word for word in words if word in read(record).outputs] == [
+    assert [word for word in words if word[:1].isalpha() and "." in word] == [
         "coupler.x",
         "coupler.y",
-        "coupler.phi",
-        "rocker.phi",
+        "coupler.φ",
+        "rocker.φ",
     ]
 
 
@@ -107,7 +108,10 @@ def test_a_column_that_is_not_there_is_reported(record: Path, refuses: Callable[
     assert message.startswith(expected)
     assert not (tmp_path / "run.csv").exists()
     message = refuses("export", record, "-o", "run.gif", "--columns", "coupler.x")
-    assert message == "--columns coupler.x: only for tables and plots, .csv, .parquet, .npz, .svg, .png, .pdf, not .gif"
+    assert (
+        message
+        == "--columns coupler.x: only for tables and plots, .csv, .xlsx, .parquet, .npz, .svg, .png, .pdf, not .gif"
+    )
     message = refuses("export", record, "-o", "run.svg", "--columns", "cupler.x")
     expected = "the run has no coordinate 'cupler.x'; did you mean 'coupler.x'?; coordinates: crank.phi, "
     assert message.startswith(expected)
@@ -180,7 +184,7 @@ def test_a_table_is_printed_and_its_names_have_units(
     assert (printed.exit_code, printed.stdout, printed.stderr) == (0, written, "")
     assert command("export", record, "-o", "run.npz", "--units").exit_code == 0  # such tables always hold them
     message = refuses("export", record, "-o", "run.svg", "--units")
-    assert message == "--units: only for tables, .csv, .parquet, .npz, not .svg"
+    assert message == "--units: only for tables, .csv, .xlsx, .parquet, .npz, not .svg"
     assert "channel 'cupler.x' is not known" in refuses("export", record, "-o", "-", "--columns", "cupler.x")
 
 
@@ -255,20 +259,25 @@ def test_a_pose_is_drawn_for_cad(record: Path, command: Command, refuses: Callab
     assert "'noon' is not a number" in refuses("export", record, "-o", "run.dxf", "--at", "noon")
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".npz"])
+@pytest.mark.parametrize("suffix", [".csv", ".xlsx", ".parquet", ".npz"])
 @pytest.mark.parametrize("way", ["export", "solve"])
 @pytest.mark.few(2)
 def test_tables_of_every_format_have_angles_in_degrees(way: str, suffix: str, command: Command) -> None:
     assert command("solve", "crank_rocker", "-o", "run.mcap").exit_code == 0
     run = kinfmu.log.read("run.mcap")
     source = ("export", "run.mcap") if way == "export" else ("solve", "crank_rocker")
-    result = command(*source, "-o", f"run{suffix}", "--degrees", "--units")
+    how = ("--lengths", "m") if suffix == ".xlsx" else ("--degrees", "--units", "--lengths", "m")
+    result = command(*source, "-o", f"run{suffix}", *how)
     assert result.exit_code == 0, result.output
     if suffix == ".csv":
         with Path("run.csv").open(encoding="utf-8") as file:
             header, *rows = csv.reader(file)
         units = dict(re.fullmatch(r"(\S+) \[(.*)\]", name).groups() for name in header)  # type: ignore[union-attr]
         table = dict(zip(units, np.array(rows, dtype=float).T, strict=True))
+    elif suffix == ".xlsx":
+        sheet = read_xlsx(Path("run.xlsx"))
+        units = dict(re.fullmatch(r"(\S+) \[(.*)\]", name).groups() for name in sheet)  # type: ignore[union-attr]
+        table = dict(zip(units, sheet.values(), strict=True))
     elif suffix == ".npz":
         with np.load("run.npz") as arrays:
             units = dict(zip(arrays["kinfmu.columns"].tolist(), arrays["kinfmu.units"].tolist(), strict=True))
@@ -280,8 +289,10 @@ def test_tables_of_every_format_have_angles_in_degrees(way: str, suffix: str, co
     assert [column.name for column in run.columns()] == [*units]
     for name, unit, values in run.columns():
         is_angle = unit in ("rad", "rad/s", "rad/s2")
-        assert units[name] == (unit.replace("rad", "deg") if is_angle else unit)
-        np.testing.assert_allclose(table[name], np.degrees(values) if is_angle else values, rtol=1e-14)
+        is_length = unit in ("mm", "mm/s", "mm/s2")
+        assert units[name] == (unit.replace("rad", "deg") if is_angle else unit.replace("mm", "m"))
+        shown = np.degrees(values) if is_angle else 1e-3 * values if is_length else values
+        np.testing.assert_allclose(table[name], shown, rtol=1e-14)
 
 
 @pytest.mark.parametrize(("separator", "decimal"), [(";", ","), ("tab", ","), ("|", "."), (",", ".")])
@@ -319,7 +330,7 @@ def test_forms_of_tables_that_do_not_fit_are_wrong_usage(record: Path, refuses: 
     message = refuses("solve", "fourbar", "-o", "run.npz", "--separator", ";")
     assert message == "--separator ';': only for .csv, not .npz"
     message = refuses("solve", "fourbar", "-o", "run.mcap", "--degrees")
-    assert message == "--degrees: only for tables, .csv, .parquet, .npz; export writes those of a record"
+    assert message == "--degrees: only for tables, .csv, .xlsx, .parquet, .npz; export writes those of a record"
     with pytest.raises(RequestError, match="must be two different characters"):
         kinfmu.log.write_table(kinfmu.log.read(record), "run.csv", decimal=",")
 
@@ -381,6 +392,13 @@ def test_the_angles_of_the_table_of_a_cam_are_in_degrees_on_request(tmp_path: Pa
     np.testing.assert_array_equal(degrees[:, lengths], radians[:, lengths])
 
 
+def test_the_profile_of_a_cam_is_a_workbook_in_degrees_and_any_unit_of_length(tmp_path: Path) -> None:
+    assert export("cam_roller", "--cam", "pitch", "-o", str(tmp_path / "cam.xlsx"), "--lengths", "cm").exit_code == 0
+    table, profile = read_xlsx(tmp_path / "cam.xlsx"), kinfmu.analysis.cam_profile(kinfmu.load("cam_roller"), "pitch")
+    np.testing.assert_array_equal(table["cam_angle [deg]"], np.arange(361.0))
+    np.testing.assert_allclose(table["x [cm]"], 0.1 * profile.profile[:, 0], rtol=1e-14)
+
+
 def test_the_profile_of_a_cam_takes_values_of_parameters(tmp_path: Path) -> None:
     text = toml_text(followers.lifted_roller(8.0)).replace("roller_radius = 8.0", 'roller_radius = "roller"')
     path = tmp_path / "tappet.toml"
@@ -406,11 +424,14 @@ def test_the_profile_of_a_cam_takes_values_of_parameters(tmp_path: Path) -> None
     ("arguments", "message"),
     [
         (("--cam", "pitsch", "-o", "a.csv"), "--cam: 'pitsch' is not a cam joint of cam_roller; did you mean 'pitch'?"),
-        (("--cam", "pitch", "-o", "a.gif"), "a.gif: the profile of a cam is written as .csv, .dxf, .svg, .png, .pdf"),
-        (("--cam", "pitch", "-o", "a.svg", "--units"), "--units: only for .csv, not .svg"),
+        (
+            ("--cam", "pitch", "-o", "a.gif"),
+            "a.gif: the profile of a cam is written as .csv, .xlsx, .dxf, .svg, .png, .pdf",
+        ),
+        (("--cam", "pitch", "-o", "a.svg", "--units"), "--units: only for tables, .csv, .xlsx, not .svg"),
         (
             ("--cam", "pitch", "-o", "a.svg", "--degrees"),
-            "--degrees: of a cam only for .csv, not .svg; its figure has angles in deg",
+            "--degrees: of a cam only for .csv, .xlsx, not .svg; its figure has angles in deg",
         ),
         (("--cam", "pitch", "-o", "a.csv", "--tolerance", "1mm"), "--tolerance 1mm: only for .dxf, not .csv"),
         (("--cam", "pitch", "-o", "a.dxf", "--tolerance", "0mm"), "--tolerance 0mm: must be a positive length"),

@@ -9,12 +9,15 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import kinfmu
 from kinfmu.cli import main
 from tests.cli.test_command_line import on_a_terminal
 from tests.design.study.linkage import write
+from tests.log.sheets import read_xlsx
 
 GRID = 'mechanism = "hoeken.toml"\nparameters.base = { from = 40, to = 300, count = 3 }\n'
 LONG = 'mechanism = "hoeken.toml"\ndesigns = 5000\nparameters.base = { from = 40, to = 50 }\n'
@@ -24,14 +27,18 @@ def test_it_prints_a_summary_and_writes_table_and_figure(tmp_path: Path, monkeyp
     write(tmp_path, GRID)
     monkeypatch.chdir(tmp_path)
     command = ["study", "study.toml", "--workers", "1", "--figure", "study.svg", "--measures", "swing"]
+    command += ["--table", "study.xlsx", "--lengths", "m"]
     result = CliRunner().invoke(main, command)
     assert (result.exit_code, result.stderr) == (0, "")
     lines = result.stdout.splitlines()
     assert lines[0] == "hoeken: 3 designs (on a grid) over base; one turn of crank at 3.14159 rad/s"
     assert lines[2].split() == ["measure", "unit", "nominal", "mean", "deviation", "min", "max", "failures"]
     assert lines[3].split()[-1] == "2"
-    assert lines[-4].startswith("2 of 3 designs lack a measure, the first is design 1: ")
-    assert lines[-2:] == ["results: study.parquet", "figure: study.svg"]
+    assert lines[-5].startswith("2 of 3 designs lack a measure, the first is design 1: ")
+    assert lines[-3:] == ["results: study.parquet", "table: study.xlsx", "figure: study.svg"]
+    table, results = read_xlsx(tmp_path / "study.xlsx"), kinfmu.StudyResult.read(tmp_path / "study.parquet")
+    np.testing.assert_allclose(table["base [m]"], 1e-3 * results["base"], rtol=1e-15)
+    np.testing.assert_allclose(table["swing [deg]"], np.degrees(results["swing"]), rtol=1e-15)
     assert "fastest" not in (tmp_path / "study.svg").read_text()
 
 
@@ -41,6 +48,7 @@ def test_it_prints_a_summary_and_writes_table_and_figure(tmp_path: Path, monkeyp
         (["study.tml"], "its name must end in .toml"),
         (["stud.toml"], "there is no such file; did you mean 'study.toml'?"),
         (["study.toml", "-o", "a.npz"], "its name must end in one of .parquet, .csv"),
+        (["study.toml", "--decimal", ","], "--lengths, --units, --separator and --decimal need --table"),
         (["study.toml", "--workers", "0"], "0 is not in the range x>=1"),
         (["study.toml", "--workers", "2", "--dask", "tcp://a:1"], "--workers is for this machine"),
     ],

@@ -38,6 +38,7 @@ NOT_RUN = {  # beginnings of the commands and blocks that no page runs in the te
     "kinfmu build fourbar --platforms all": "zig compiles for minutes; tests/fmu/native/test_build.py",
     "kinfmu simulate mine.toml --live": "opens the viewer; tests/log/viewer/test_reviewing.py",
     "kinfmu review logs/fourbar.mcap --screenshot": "needs a graphics driver; tests/log/viewer/test_reviewing.py",
+    "kinfmu review designs": "opens the viewer; tests/design/study/test_recordings.py",
     "kinfmu study tolerances.toml --dask": "needs a cluster; tests/design/study/test_workers.py",
     "from OMSimulator import": "OMSimulator is not installed",
     "from pyfmi import": "PyFMI is not installed",

@@ -117,7 +117,7 @@ def draw_pages() -> None:
             tab.goto(path.as_uri())
             tab.wait_for_function("window.kinfmu && !window.kinfmu.isAsked")
             tab.evaluate("() => window.kinfmu.refresh(() => window.kinfmu.move(0, 2.2))")
-            tab.wait_for_function("!window.kinfmu.isAsked")
+            tab.wait_for_timeout(1000)  # until names are at free places
             tab.screenshot(path=DOCS / picture)
         program.close()
 
@@ -126,7 +126,7 @@ def draw_editor() -> None:
     """Draw the editor while the last link of a four-bar is drawn."""
     with tempfile.TemporaryDirectory() as name, browser(Path(name)) as chromium:
         os.environ["KINFMU_STATES"] = str(Path(name, "states"))
-        with drawing_hand(chromium, Path(name), color_scheme="light", reduced_motion="reduce") as hand:
+        with drawing_hand(chromium, Path(name), color_scheme="light") as hand:
             hand.page.resize(DESKTOP)
             hand.tool("ground")
             hand.click((0, 0), (140, 0))

@@ -180,11 +180,11 @@ def test_pictures_are_there_of_a_size_to_load_and_made_by_the_script(page: str, 
 def test_studies(request: pytest.FixtureRequest, tmp_path: Path) -> None:
     assert list(files("studies.md")) == ["hoeken.toml", "tolerances.toml", "lengths.toml"]
     followed = follow("studies.md", tmp_path)
-    report, on_a_grid, _ = followed.outputs.values()
+    report, _, on_a_grid, _ = followed.outputs.values()
     accept("studies.md", followed.commented(with_outputs(page_text("studies.md"), report)), request)
     assert "42 designs (on a grid)" in on_a_grid
     made = {path.name for path in tmp_path.iterdir()}
-    assert {"tolerances.svg", "lengths.png", "swing.svg", "tolerances.parquet", "lengths.parquet"} <= made
+    assert {"designs", "tolerances.svg", "lengths.png", "swing.svg", "tolerances.parquet", "lengths.parquet"} <= made
 
 
 @pytest.mark.long

@@ -89,9 +89,9 @@ def test_each_curve_may_have_its_own_x(run: Run) -> None:
 def test_columns_of_one_unit_share_a_panel_over_an_angle_in_degrees(run: Run) -> None:
     angles, lengths = sheet([run], ["rocker.phi", "A.x", "coupler.phi"], ["crank.phi"], degrees=True).axes
     np.testing.assert_allclose(angles.lines[0].get_xydata(), np.column_stack([run.t, run.t]), atol=1e-12)
-    assert [text.get_text() for text in angles.get_legend().get_texts()] == ["rocker.phi", "coupler.phi"]
+    assert [text.get_text() for text in angles.get_legend().get_texts()] == ["rocker.φ", "coupler.φ"]
     assert (angles.get_ylabel(), lengths.get_ylabel()) == ("[deg]", "A.x [m]")
-    assert lengths.get_xlabel() == "crank.phi [deg]"
+    assert lengths.get_xlabel() == "crank.φ [deg]"
     assert set(np.diff(lengths.get_xticks())) == {45.0}
 
 

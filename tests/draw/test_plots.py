@@ -17,9 +17,18 @@ from matplotlib.figure import Figure
 import kinfmu
 from kinfmu.arrays import FloatArray
 from kinfmu.draw import plot
-from kinfmu.draw.chart import axis_label, degree_ticks, gaps, label_size, numbers, rows_of
+from kinfmu.draw.chart import (
+    axis_label,
+    degree_ticks,
+    equal_below,
+    gaps,
+    label_size,
+    numbers,
+    round_ticks,
+    rows_of,
+)
 from kinfmu.draw.overlay import overlay, overlay_sheet
-from kinfmu.draw.plots import _sheet, _shown, _title_of, stacks_of, usual_coordinates
+from kinfmu.draw.plots import _sheet, _shown, _title_of, main_panels, moving, stacks_of, usual_coordinates
 from kinfmu.draw.svaj_figure import _sheet as _svaj_sheet
 from kinfmu.draw.svaj_figure import driver_axis
 from kinfmu.errors import FigureError, RequestError
@@ -39,20 +48,80 @@ def test_each_coordinate_is_three_panels_with_its_numbers_and_units(run: Run) ->
         "x [m]",
         "vx [m/s]",
         "ax [10⁻⁶ m/s²]",
-        "phi [rad]",
-        "omega [rad/s]",
-        "alpha [10⁻⁶ rad/s²]",
+        "φ [rad]",
+        "ω [rad/s]",
+        "\N{GREEK SMALL LETTER ALPHA} [10⁻⁶ rad/s²]",
     ]
-    assert [panel.get_title(loc="left") for panel in panels] == ["coupler.x", "", "", "rocker.phi", "", ""]
+    assert [panel.get_title(loc="left") for panel in panels] == ["coupler.x", "", "", "rocker.φ", "", ""]
     for panel, name in zip(panels, ("coupler.x", "coupler.vx", "coupler.ax"), strict=False):
         np.testing.assert_array_equal(panel.lines[0].get_xydata(), np.column_stack([run.t, run[name]]))
 
 
-def test_angles_and_points_of_interest_are_plotted_if_no_columns_are_named(run: Run, tmp_path: Path) -> None:
+def written(path: Path) -> list[str]:
+    """The texts of a figure."""
+    return re.findall(r">([^<>]+)</text>", path.read_text(encoding="utf-8"))
+
+
+def test_without_names_six_panels_are_drawn_and_lines_name_what_is_constant_and_what_else_moves(
+    run: Run, tmp_path: Path
+) -> None:
     plot(run, tmp_path / "run.svg")
-    words = re.findall(r">([\w.]+)</text>", (tmp_path / "run.svg").read_text(encoding="utf-8"))
-    chosen = ["crank.phi", "coupler.phi", "rocker.phi", "A.x", "A.y"]  # not the origin of the coupler's frame
-    assert [word for word in words if word in run.outputs] == chosen
+    texts = written(tmp_path / "run.svg")
+    assert [text for text in texts if text in run.outputs] == ["A.x", "A.y"]
+    assert "constant: crank.ω = 1 deg/s, coupler.φ = 0 deg, rocker.ω = 1 deg/s" in texts
+    assert "not drawn: crank.φ, rocker.φ" in texts
+    plot(run, tmp_path / "rad.svg", degrees=False)
+    assert any("crank.ω = 0.01745 rad/s" in text for text in written(tmp_path / "rad.svg"))
+
+
+def drawn(run: Run) -> tuple[dict[str, list[str]], list[str]]:
+    """The columns of the panels by title, and the names of what else moves."""
+    stacks, others = main_panels(run, moving([run], stacks_of(run, []), keeps_one=False)[0])
+    return {stack.title: [panel.column for panel in stack.panels] for stack in stacks}, others
+
+
+def test_the_first_effort_and_what_slides_are_among_the_six_panels() -> None:
+    shown, others = drawn(kinfmu.solve(kinfmu.load("engine"), np.linspace(0.0, 0.04, 101)))
+    assert shown == {
+        "piston.y": ["piston.y", "piston.vy", "piston.ay"],
+        "crank": ["crank.torque", "crank.power"],
+        "rod.phi": ["rod.phi"],
+    }
+    assert others == ["crank.phi", "rod.x", "rod.y", "crank.reduced_inertia", "kinetic_energy", "potential_energy"]
+    shown, others = drawn(kinfmu.solve(kinfmu.load("jansen_leg"), np.linspace(0.0, 1.0, 101)))
+    assert list(shown) == ["foot.x", "foot.y"]
+    names = ("crank", "upper_rod", "upper_triangle", "lower_rod", "lower_rocker", "link", "leg")
+    assert others == [f"{name}.phi" for name in names]
+
+
+def test_constants_have_no_panels_unless_all_that_is_named_is_constant(run: Run, tmp_path: Path) -> None:
+    plot(run, tmp_path / "run.svg", ["rocker.phi"])
+    texts = written(tmp_path / "run.svg")
+    assert {"φ [deg]", "constant: rocker.ω = 1 deg/s"} <= {*texts}
+    assert not any(text.startswith(("ω [", "not drawn")) for text in texts)
+    plot(run, tmp_path / "run.svg", ["rocker.x"])
+    assert {"rocker.x", "x [m]"} <= {*written(tmp_path / "run.svg")}
+    stacks, constant = moving([run], stacks_of(run, ["coupler.phi", "A.x"]), keeps_one=False)
+    assert ([stack.title for stack in stacks], [panel.column for panel in constant]) == (["A.x"], ["coupler.phi"])
+
+
+def test_equal_curves_of_a_panel_are_wider_below() -> None:
+    rising, falling = np.linspace(0.0, 1.0, 11), np.linspace(1.0, 0.0, 11)
+    assert equal_below([rising, falling, rising + 1e-4, rising]) == [2, 0, 1, 0]
+    gap = np.where(np.arange(11) == 3, np.nan, rising)
+    assert equal_below([rising, gap, gap + 0.0]) == [0, 1, 0]
+
+
+def test_ticks_are_steps_of_1_2_or_5() -> None:
+    axes = Figure().subplots()
+    for low, high in ((0.0, 180.0), (0.1, 0.8), (-3.3, 11.0), (1e-6, 7e-6)):
+        axes.set_ylim(low, high)
+        round_ticks(axes.yaxis, 5, "mm")
+        step = float(np.diff(axes.get_yticks())[0])
+        assert f"{step:.9e}"[:11] in ("1.000000000", "2.000000000", "5.000000000")
+    axes.set_ylim(0.0, 100.0)
+    round_ticks(axes.yaxis, 5, "deg")
+    assert np.diff(axes.get_yticks())[0] == 30.0
 
 
 def test_without_points_of_interest_all_coordinates_are_plotted_and_sliders_always(run: Run) -> None:
@@ -120,7 +189,7 @@ def test_names_of_axes_stay_off_each_other_and_within_the_sheet(name: str) -> No
 def test_ticks_of_degrees_are_round(span: float, most: int) -> None:
     axes = Figure().subplots()
     axes.set_xlim(-0.01 * span, 1.01 * span)
-    degree_ticks(axes, most)
+    degree_ticks(axes.xaxis, most)
     steps = np.diff(axes.get_xticks())
     assert np.ptp(steps) < 1e-9
     assert steps[0] in (0.2, 0.25, 0.5, 1, 2, 5, 10, 15, 30, 45, 60, 90, 180, 360)
@@ -199,7 +268,7 @@ def test_what_cannot_be_plotted_is_reported(run: Run, tmp_path: Path) -> None:
     table = np.zeros((181, 31))
     wide = dataclasses.replace(run, outputs=names, coordinate_count=31, values=table, rates=table, accelerations=table)
     with pytest.raises(FigureError, match="31 coordinates are too many for one sheet, which holds 30; choose some"):
-        plot(wide, tmp_path / "run.svg")
+        plot(wide, tmp_path / "run.svg", ["q"])
     with pytest.raises(FigureError, match="the run has no samples to plot"):
         plot(fourbar(np.array([])), tmp_path / "run.svg")
     with pytest.raises(FigureError, match="the run has no samples to plot"):

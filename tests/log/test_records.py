@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import dataclasses
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,17 +13,18 @@ import pytest
 from mcap.reader import NonSeekingReader, make_reader
 
 import kinfmu
-from kinfmu.errors import LogError
+from kinfmu.errors import LogError, MissingPackageError, RequestError
 from kinfmu.log import McapLog, read, write_mcap, write_rrd, write_table
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.headless import executable
-from kinfmu.run import Event, Run
+from kinfmu.run import Event, Run, tables
 from kinfmu.run.channels import select
 from kinfmu.run.tables import ROWS
 from kinfmu.run.verdict import notable_events, sentence
 from kinfmu.solver.python.pose import Status
 from tests.gallery_members import every_member
 from tests.log.runs import fourbar, with_gap, without_samples
+from tests.log.sheets import read_xlsx
 from tests.log.test_mcap import assert_same
 
 
@@ -79,7 +81,7 @@ def test_npz_carries_units(any_run: Run, tmp_path: Path) -> None:
         assert str(file["kinfmu.mechanism"]) == any_run.mechanism_text
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".npz", ".parquet"])
+@pytest.mark.parametrize("suffix", [".csv", ".npz", ".parquet", ".xlsx"])
 def test_negative_zeros_are_written_as_zero(suffix: str, run: Run, tmp_path: Path) -> None:
     path = tmp_path / f"run{suffix}"
     write_table(dataclasses.replace(run, values=np.where(run.values == 0.0, -0.0, run.values)), path)
@@ -89,6 +91,8 @@ def test_negative_zeros_are_written_as_zero(suffix: str, run: Run, tmp_path: Pat
     if suffix == ".npz":
         with np.load(path) as file:
             column = file["coupler.phi"]
+    elif suffix == ".xlsx":
+        column = read_xlsx(path)["coupler.phi [rad]"]
     else:
         column = pytest.importorskip("pyarrow.parquet").read_table(path)["coupler.phi"].to_numpy()
     assert not column.any()
@@ -96,8 +100,36 @@ def test_negative_zeros_are_written_as_zero(suffix: str, run: Run, tmp_path: Pat
 
 
 def test_an_unknown_kind_of_table_is_refused(run: Run, tmp_path: Path) -> None:
-    with pytest.raises(LogError, match=r"'\.xls' is not a known format of tables; known: \.csv, \.parquet, \.npz"):
+    with pytest.raises(LogError, match=r"'\.xls' is not a known format of tables; known: \.csv, \.xlsx, \.par"):
         write_table(run, tmp_path / "run.xls")
+
+
+def test_a_workbook_holds_numbers_under_names_with_units(run_with_gap: Run, tmp_path: Path) -> None:
+    for name in ("a.xlsx", "b.xlsx"):
+        write_table(run_with_gap, tmp_path / name, lengths="mm")
+    assert (tmp_path / "a.xlsx").read_bytes() == (tmp_path / "b.xlsx").read_bytes()
+    table = read_xlsx(tmp_path / "a.xlsx")
+    for name, unit, values in run_with_gap.columns():
+        is_length = unit in ("m", "m/s", "m/s2")
+        shown = table[f"{name} [{'m' if is_length else ''}{unit}]"]
+        np.testing.assert_allclose(shown, 1e3 * values if is_length else values, rtol=1e-15)
+    assert {"coupler.x [mm]", "coupler.vx [mm/s]", "coupler.ax [mm/s2]", "crank.omega [rad/s]"} <= {*table}
+
+
+def test_a_table_that_no_spreadsheet_holds_is_refused_and_leaves_nothing(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tables, "MOST_ROWS", 100)
+    with pytest.raises(
+        RequestError, match=r"run\.xlsx: 181 rows of \d+ columns; a spreadsheet holds 99 of 16384: write"
+    ):
+        write_table(run, tmp_path / "run.xlsx")
+    monkeypatch.setitem(sys.modules, "xlsxwriter", None)
+    with pytest.raises(
+        MissingPackageError, match=r"run\.xlsx: writing \.xlsx needs XlsxWriter: pip install 'kinfmu\[xlsx\]'$"
+    ):
+        write_table(run, tmp_path / "run.xlsx")
+    assert not list(tmp_path.iterdir())
 
 
 def test_missing_folders_are_made(run: Run, tmp_path: Path) -> None:
@@ -163,7 +195,7 @@ def test_the_verdict_counts_samples_by_status(run_with_gap: Run) -> None:
 
 def test_events_are_in_order_of_time_with_their_levels(run_with_gap: Run) -> None:
     found = [(event.t, event.level) for event in notable_events(run_with_gap)]
-    assert found == [(0, "info"), (1, "info"), (100, "error"), (121, "info"), (180, "info")]
+    assert found == [(0, "info"), (100, "error"), (180, "info")]
 
 
 def test_a_failure_is_reported_once_with_its_reason_and_without_its_time(run: Run) -> None:
@@ -175,7 +207,10 @@ def test_a_failure_is_reported_once_with_its_reason_and_without_its_time(run: Ru
 def test_a_failure_that_no_event_explains_is_reported_by_its_status(run: Run) -> None:
     failed = dataclasses.replace(with_gap(run, 100, 120), events=(Event(99.0, "error", "something else"),))
     failures = [event.text for event in notable_events(failed) if event.level == "error"]
-    assert failures == ["something else", "outside: the drivers cannot take the mechanism there"]
+    assert failures == [
+        "something else",
+        "21 samples, up to 120 s (crank 100 to 120 deg), outside: the drivers cannot take the mechanism there",
+    ]
 
 
 def test_a_run_whose_samples_are_all_ok_has_no_events() -> None:
@@ -184,7 +219,15 @@ def test_a_run_whose_samples_are_all_ok_has_no_events() -> None:
 
 def test_near_singular_samples_are_a_warning(run: Run) -> None:
     near = dataclasses.replace(run, status=np.where(run.t == 5.0, Status.NEAR_SINGULAR, Status.OK))
-    assert [(event.t, event.level) for event in notable_events(near)] == [(5.0, "warning"), (6.0, "info")]
+    assert [(event.t, event.level) for event in notable_events(near)] == [(5.0, "warning")]
+
+
+def test_bridged_samples_are_one_line_that_states_which_and_why() -> None:
+    run = kinfmu.solve(kinfmu.load("fourbar"), crank_angle=np.radians(np.arange(-2.0, 20.0)))
+    (event,) = notable_events(run)
+    assert event.text == (
+        "5 samples, up to crank = 2 deg, bridged: the equations are singular there, so poses are interpolated across"
+    )
 
 
 def test_the_card_states_mechanism_run_verdict_and_events(run_with_gap: Run) -> None:
@@ -209,4 +252,4 @@ def test_text_from_outside_cannot_break_the_card(run: Run) -> None:
 
 def test_the_card_lists_the_first_events_and_counts_the_others(run: Run) -> None:
     long = dataclasses.replace(run, events=tuple(Event(float(k), "info", f"event {k}") for k in range(100)))
-    assert "* and 91 more, in the log\n" in card(long)
+    assert "* and 90 more, in the log\n" in card(long)

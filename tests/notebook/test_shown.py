@@ -138,7 +138,7 @@ def test_a_run_shows_verdict_plot_events_and_ranges() -> None:
     assert f"t = 0 to 180 s; {sentence(run)}" in shown.text
     assert "181 samples: 158 ok, 2 bridged, 21 outside" in shown.text
     (picture,) = shown.images
-    assert {"A.x", "crank.phi", "t [s]"} <= set(re.split("[<>]", picture))
+    assert {"A.x", "crank.φ", "t [s]", "deg"} <= set(re.split("[<>]", picture))
     assert ["100 s", "error"] in [cells[:2] for cells in shown.rows]
     good = run["coupler.x"][run.good]
     assert shown.row("coupler.x") == ["m", f"{good[0]:.6g}", f"{good.min():.6g}", f"{good.max():.6g}"]

@@ -226,7 +226,8 @@ class Browser:
     @contextmanager
     def tab(self, **options: Any) -> Iterator[Opened]:
         """Yield an empty page."""
-        context = self._chromium.new_context(viewport=DESKTOP, accept_downloads=True, **options)
+        usual = {"viewport": DESKTOP, "accept_downloads": True, "reduced_motion": "reduce"}
+        context = self._chromium.new_context(**(usual | options))
         try:
             opened = Opened(context.new_page())
             opened.tab.on("console", lambda message: opened.errors.append(message.text))

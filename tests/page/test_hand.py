@@ -95,7 +95,7 @@ def test_banner_names_the_joint_and_goes_with_what_it_was_about(chromium: Browse
             banner = page.tab.text_content("#banner")
             assert banner.startswith("Stops here: joint C does not close: gap ")
             if after == "value":
-                field = page.tab.get_by_label("rocker.Q x mm", exact=True)
+                field = page.tab.get_by_label("rocker length mm", exact=True)
                 field.fill("51")
                 field.press("Enter")
             else:
@@ -143,6 +143,8 @@ def test_arrows_of_velocities_end_in_the_view_and_plots_name_a_whole_turn(
             assert all(0 < x < width and 0 < y < height for x, y in heads), k
         page.get("window.texts = []")
         page.get(WATCH_TEXTS)
+        if size:
+            page.tab.click("#sheet")
         page.tab.click("#tab-plots")
         page.settle()
         assert ["360\u00b0", True] in page.get("window.texts")

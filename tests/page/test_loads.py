@@ -151,7 +151,7 @@ def test_gravity_is_not_drawn_over_other_things(chromium: Browser) -> None:
 
 @pytest.mark.long
 def test_the_page_of_a_loaded_mechanism_stays_small() -> None:
-    assert len(text_of("excavator_loaded").encode()) <= 300_000
+    assert len(text_of("excavator_loaded").encode()) <= 200_000
 
 
 @pytest.mark.long

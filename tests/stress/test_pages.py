@@ -113,7 +113,7 @@ def test_a_length_that_leads_to_another_branch_is_taken_over_before_the_change_p
     with chromium.open(page(kinfmu.load("fourbar_chain"))) as shown:
         shown.move(beyond)
         kept = shown.get("Array.from(k.linkage.pose.q)")
-        shown.get(f"k.setValue('{name}', 0.98 * k.design.values.get('{name}'))")
+        shown.get(f"k.setValues({{ '{name}': 0.98 * k.design.values.get('{name}') }})")
         shown.settle()
         banner = shown.tab.inner_text("#banner")
         assert banner.startswith("Another branch: ")
@@ -157,6 +157,7 @@ def test_fingers_drag_zoom_and_press(chromium: Browser) -> None:
         shown.tab.wait_for_timeout(300)
         assert shown.get("k.isPlaying")
         shown.tab.tap("#play")
+        shown.tab.tap("#sheet")
         shown.tab.tap("#tab-plots")
         assert shown.tab.is_visible("#plots")
         assert shown.tab.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]

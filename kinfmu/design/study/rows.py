@@ -180,6 +180,15 @@ class StudyRows(Tabular):
         for name, unit in self.units.items():
             yield Column(name, unit, self[name])
 
+    def shown_columns(self) -> list[Column]:
+        """Return all columns but that of reasons, in the units in which summary and pictures show them."""
+        found = []
+        for name, _, values in self.columns():
+            if name != REASON:
+                unit, factor = self.display_unit(name)
+                found.append(Column(name, unit, values if factor == 1.0 else values / factor))
+        return found
+
     def to_arrow(self) -> Any:
         """Return the rows as a pyarrow.Table, with the unit of each column in the metadata of its field.
 

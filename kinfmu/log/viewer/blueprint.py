@@ -1,4 +1,4 @@
-"""Layout of a recording on the screen: linkage, card and log on the left, plots on the right."""
+"""Layout of a recording on the screen: linkage and card on the left, tabs of motion and solver on the right."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+import numpy as np
+
+from kinfmu.arrays import finite
 from kinfmu.draw.scene.forces import Arrows, arrows
 from kinfmu.draw.scene.scene import Scene
 from kinfmu.log.viewer.linkage import trail_path, trail_time, view_box
@@ -19,12 +22,14 @@ from kinfmu.run.verdict import notable_events
 if TYPE_CHECKING:
     import rerun.blueprint as rrb
 
+Corner = Literal["RightTop", "LeftTop", "RightBottom", "LeftBottom"]
 SHORTEST_SHOW, LONGEST_SHOW = 5.0, 30.0  # [s], limits of the time to play the whole run
 SWEEP_SHOW = 10.0  # [s] to play a run that has no time
 EDGE = 0.01  # of the run's time, left free before and after the curves
-LABEL = 31.0  # [points], half of the label of a tick such as +100 ms; most runs end at a tick
+AFTER = 0.13  # of the run's time, left free after them for half of the label of a tick such as +100 ms at the end
 LEGEND_EDGE, LETTER = 34.0, 7.0  # [points]; width of a legend around its names, and of a letter
-ABREAST = 4  # most plots of efforts and signals in a row
+LEGEND_EDGE_Y, LEGEND_LINE = 14.0, 23.0  # [points]; height of a legend around its names, and of one
+ABREAST = 3  # most plots of efforts and signals in a row
 FEW = 4  # plots of two runs, up to which they are wide
 WIDTH, HEIGHT = 870.0, 820.0  # [points], of all plots and states on a usual screen
 NUMBERS, CAPTION = 65.0, 44.0  # [points] of a plot: width of the numbers of y, height of the title and of those of x
@@ -33,7 +38,7 @@ CUT_OFF = 3.0  # [points]; of a label nearer to the end of an axis almost half i
 FREE_Y = 0.025  # of the length of an axis, left free below and above its curves
 LABELLED = 21.0  # [points]; Rerun labels the multiples of that power of ten whose distance is at least this, in grey
 STATUS, LANES = 0.13, 0.17  # of the height of the right side, for the states of one run and of two
-LEAST_LEGEND, MOST_LEGEND = 0.15, 0.8  # of the run's time, left free after the curves for the legend
+LOG = 0.25  # of this height
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,26 +65,30 @@ def single(
     curves: Mapping[tuple[str, str], Group],
     forces: Sequence[Group],
     solver: Sequence[Group],
+    *,
+    is_dataset: bool = False,
 ) -> rrb.Blueprint:
-    """Return the layout of one run: linkages on the left, each in a view of its own; plots on the right.
+    """Return the layout of one run, or of each in a dataset: linkages on the left, in views of their own; plots right.
 
-    There is one row per order, with one column per unit. Efforts, energies and signals, then the solver's diagnostics
-    are below the curves.
+    The tab 'motion' has one row per order, with one column per unit, and efforts, energies and signals below; curves
+    that are all constant have no plot. The tab 'solver' has states, log and diagnostics; it is the one in front if a
+    sample is not ok. Of a dataset 'motion' is in front, and the list of its recordings is open.
     """
     import rerun.blueprint as rrb
 
     rows = _rows([_alone(curves.get((order, kind))) for kind in KINDS] for order in ORDERS)
     rows += _abreast(_known(map(_alone, forces)))
-    shares = [2.0] * len(rows)
-    if solver:
-        rows.append(_known(map(_alone, solver)))
-        shares.append(1.5)
     has_motion = bool(run.outputs) or any(one.scene for one in drawn)
-    right = _stacked(rows, shares, timeline, [run], [""] if has_motion else [])
+    tabs = [_stacked(rows, timeline, [run], name="motion")] if rows else []
+    if has_motion or solver:
+        has_log = is_dataset or bool(notable_events(run))
+        tabs.append(_solver_tab(_abreast(_known(map(_alone, solver)), 2), timeline, run, has_log=has_log))
+    right = rrb.Tabs(*tabs, active_tab=0 if rows and (is_dataset or is_ok(run)) else len(tabs) - 1)
     linked = [linkage_view([one.root], timeline, [one.run], [one.scene], one.title, one.arrows) for one in drawn]
     linkages = (linked[0] if len(linked) == 1 else rrb.Grid(*linked)) if has_motion and linked else None
-    left = _left(linkages, [""], [run])
-    return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), timeline, [run])
+    left = _left(linkages)
+    content = rrb.Horizontal(left, right, column_shares=[1, 1.25])
+    return arranged(content, timeline, [run], is_dataset=is_dataset)
 
 
 def compared(
@@ -99,17 +108,16 @@ def compared(
 
     overlaid = [[_of_both((order, kind), curves) for kind in KINDS] for order in ORDERS]
     of_loads = [_of_both(path, loads) for path in dict.fromkeys([*loads[0], *loads[1]])]
-    both = _rows(overlaid) + _abreast(_known(of_loads), ABREAST - 1)
+    both = _rows(overlaid) + _abreast(_known(of_loads))
     moved = [[_apart(difference.get((order, kind))) for kind in KINDS] for order in ORDERS]
-    most = 2 if len(loaded) <= FEW else ABREAST - 1  # titles of comparisons are long
+    most = 2 if len(loaded) <= FEW else ABREAST  # titles of comparisons are long
     forces = _abreast(_known([_of_both(group.path, loads) for group in loaded]), most)
     forces += _abreast(_known(map(_apart, loaded)), most)
     tabs = {"B - A": _rows(overlaid)[:1] + _rows(moved) if difference else forces}
     tabs |= {"B - A of forces": forces if difference else [], "A and B": both}
     shown = [(name, rows) for name, rows in tabs.items() if rows] or [("A and B", both)]
     stacks = [
-        _stacked(rows, [2.0] * len(rows), timeline, runs, ["/a", "/b"] if k == 0 else [], name)
-        for k, (name, rows) in enumerate(shown)
+        _stacked(rows, timeline, runs, ["/a", "/b"] if k == 0 else [], name) for k, (name, rows) in enumerate(shown)
     ]
     left = _left(linkage_view(["/a/linkage", "/b/linkage"], timeline, runs, scenes), ["/a", "/b"], runs)
     right = rrb.Tabs(*stacks) if len(stacks) > 1 else stacks[0]
@@ -123,15 +131,21 @@ class Plot(NamedTuple):
     groups: Sequence[tuple[str, Group]]
 
 
+def is_ok(run: Run) -> bool:
+    """Return True if every sample has status 'ok'."""
+    return not run.status.any()
+
+
 def _alone(group: Group | None) -> Plot | None:
-    """Return a plot of a group of the only run, if there is one."""
-    return Plot(group.title, [("", group)]) if group else None
+    """Return a plot of a group of the only run, if there is one that moves."""
+    return Plot(group.title, [("", group)]) if group and not group.is_constant else None
 
 
 def _of_both(key: Any, found: Sequence[Mapping[Any, Group]]) -> Plot | None:
-    """Return a plot of a group of both runs; None if neither has it."""
+    """Return a plot of a group of both runs; None if neither has it, or it moves in neither."""
     pair = [(root, of[key]) for root, of in zip(("/a", "/b"), found, strict=True) if key in of]
-    return Plot(f"{pair[0][1].title} of A (wide) and B", pair) if pair else None
+    moves = not all(group.is_constant for _, group in pair)
+    return Plot(f"{pair[0][1].title} of A (wide) and B", pair) if moves else None
 
 
 def _apart(group: Group | None) -> Plot | None:
@@ -149,53 +163,73 @@ def _rows(rows: Iterable[Iterable[Plot | None]]) -> list[list[Plot]]:
 
 
 def _abreast(plots: Sequence[Plot], most: int = ABREAST) -> list[list[Plot]]:
-    """Return rows of at most so many plots, of about the same length, and of fewer where legends would hide curves."""
-    fitting = [k for k in range(1, most + 1) if all(_legend_part(plot, WIDTH / k) < MOST_LEGEND for plot in plots)]
-    most = max(fitting, default=1)
+    """Return rows of at most so many plots, of about the same length."""
     abreast = -(-len(plots) // -(-len(plots) // most)) if plots else 1
     return [list(plots[k : k + abreast]) for k in range(0, len(plots), abreast)]
 
 
 def _stacked(
     rows: Sequence[Sequence[Plot]],
-    shares: Sequence[float],
     timeline: Timeline,
     runs: Sequence[Run],
-    roots: Sequence[str],
+    roots: Sequence[str] = (),
     name: str | None = None,
 ) -> rrb.Container:
-    """Return rows of plots, with these shares of the height, and below them the states of the runs with these roots."""
+    """Return rows of plots of one height, and below them the states of the runs with these roots."""
     import rerun.blueprint as rrb
 
-    lanes = (0.0, STATUS, LANES)[len(roots)]
-    height = HEIGHT * (1.0 - lanes) / (sum(shares) or 1.0)
-    views: list[rrb.Container | rrb.View] = [
-        rrb.Horizontal(*[plot(*one, timeline, runs, WIDTH / len(row), share * height) for one in row])
-        for row, share in zip(rows, shares, strict=True)
-    ]
+    lanes = LANES if roots else 0.0
+    views = _plots(rows, timeline, runs, HEIGHT * (1.0 - lanes))
+    shares = [1.0] * len(rows)
     if roots:
         views.append(status_view(roots, timeline, runs))
-        shares = [*shares, lanes / (1.0 - lanes) * sum(shares) or 1.0]
-    return rrb.Vertical(*views, row_shares=list(shares), name=name)
+        shares.append(lanes / (1.0 - lanes) * len(rows) or 1.0)
+    return rrb.Vertical(*views, row_shares=shares, name=name)
 
 
-def _left(linkage: rrb.View | rrb.Container | None, roots: Sequence[str], runs: Sequence[Run]) -> rrb.Container:
-    """Return the left side: linkage, if there is one, card, and the log if there are events.
+def _plots(
+    rows: Sequence[Sequence[Plot]], timeline: Timeline, runs: Sequence[Run], height: float
+) -> list[rrb.Container | rrb.View]:
+    """Return rows of plots that share a height [points]."""
+    import rerun.blueprint as rrb
+
+    each = height / max(len(rows), 1)
+    return [rrb.Horizontal(*[plot(*one, timeline, runs, WIDTH / len(row), each) for one in row]) for row in rows]
+
+
+def _solver_tab(rows: Sequence[Sequence[Plot]], timeline: Timeline, run: Run, *, has_log: bool) -> rrb.Container:
+    """Return the states of the solver, the log, and its diagnostics."""
+    import rerun.blueprint as rrb
+
+    above: list[rrb.Container | rrb.View] = [status_view([""], timeline, [run])]
+    shares = [STATUS]
+    if has_log:
+        above.append(log_view([""]))
+        shares.append(LOG)
+    free = 1.0 - sum(shares)
+    views = [*above, *_plots(rows, timeline, [run], HEIGHT * free)]
+    return rrb.Vertical(*views, row_shares=[*shares, *[free / max(len(rows), 1)] * len(rows)], name="solver")
+
+
+def _left(
+    linkage: rrb.View | rrb.Container | None, roots: Sequence[str] = (), runs: Sequence[Run] = ()
+) -> rrb.Container:
+    """Return the left side: linkage, if there is one, card, and the log of two runs if there are events.
 
     The log does not wrap its texts, so it gets the full width; the card wraps them.
     """
     import rerun.blueprint as rrb
 
+    log = [log_view(roots)] if any(notable_events(run) for run in runs) else []
     if linkage is None:
-        views = [card_view(), *([log_view(roots)] if any(notable_events(run) for run in runs) else [])]
-        return rrb.Vertical(*views)
-    if any(notable_events(run) for run in runs):
-        return rrb.Vertical(linkage, card_view(), log_view(roots), row_shares=[1.5, 0.9, 0.6])
-    return rrb.Vertical(linkage, card_view(), row_shares=[1.7, 1.0])
+        return rrb.Vertical(card_view(), *log)
+    return rrb.Vertical(linkage, card_view(), *log, row_shares=[1.5, 0.9, 0.6] if log else [1.7, 1.0])
 
 
-def arranged(content: rrb.Container, timeline: Timeline, runs: Sequence[Run]) -> rrb.Blueprint:
-    """Return the blueprint of the content, with Rerun's own panels collapsed, ready to play."""
+def arranged(
+    content: rrb.Container, timeline: Timeline, runs: Sequence[Run], *, is_dataset: bool = False
+) -> rrb.Blueprint:
+    """Return the blueprint of the content, with Rerun's own panels collapsed but for the list of a dataset, to play."""
     import rerun.blueprint as rrb
 
     length = max((float(run.t.max() - run.t.min()) for run in runs if len(run)), default=0.0)
@@ -212,17 +246,14 @@ def arranged(content: rrb.Container, timeline: Timeline, runs: Sequence[Run]) ->
             fps=speed if timeline.parts else None,
         ),
         rrb.SelectionPanel(state="collapsed"),
-        rrb.BlueprintPanel(state="collapsed"),
+        rrb.BlueprintPanel(state="expanded" if is_dataset else "collapsed"),
         auto_views=False,
         auto_layout=False,
     )
 
 
-def time_axis(timeline: Timeline, runs: Sequence[Run], after: float = EDGE) -> rrb.TimeAxis:
-    """Return an axis over the whole runs; Rerun's default is half a minute around the cursor.
-
-    after: part of the runs' time that is left free after the curves.
-    """
+def time_axis(timeline: Timeline, runs: Sequence[Run]) -> rrb.TimeAxis:
+    """Return the axis of all plots, over the whole runs; Rerun's default is half a minute around the cursor."""
     import rerun as rr
     import rerun.blueprint as rrb
 
@@ -230,7 +261,7 @@ def time_axis(timeline: Timeline, runs: Sequence[Run], after: float = EDGE) -> r
     stop = max((float(run.t.max()) for run in runs if len(run)), default=0.0)
     length = stop - start or 1.0
     boundary = rr.encodings.TimeRangeBoundary.absolute
-    first, last = timeline.number(start - EDGE * length), timeline.number(stop + after * length)
+    first, last = timeline.number(start - EDGE * length), timeline.number(stop + AFTER * length)
     shown = rr.TimeRange(start=boundary(**first), end=boundary(**last))
     return rrb.TimeAxis(view_range=shown)
 
@@ -243,21 +274,58 @@ def plot(
     width: float = WIDTH / 2,
     height: float = HEIGHT / 4,
 ) -> rrb.TimeSeriesView:
-    """Return a plot of curves with a legend; groups: (root entity, group); width, height: of the plot [points]."""
+    """Return a plot of curves, with a legend if there is a corner in which it hides none of them.
+
+    groups: (root entity, group); width, height: of the plot [points].
+    """
     import rerun.blueprint as rrb
 
-    has_legend = sum(len(group.names) for _, group in groups) > 1  # a long legend scrolls
-    after = min(max(_legend_part(Plot(title, groups), width), LEAST_LEGEND), MOST_LEGEND)
     ranges = [group.extent for _, group in groups if group.extent]
     low, high = min((low for low, _ in ranges), default=0.0), max((high for _, high in ranges), default=0.0)
+    shown = with_two_labels(low, high, height - CAPTION) if ranges else None
+    corner = free_corner([group for _, group in groups], runs, shown, width - NUMBERS, height - CAPTION)
     return rrb.TimeSeriesView(
         name=title,
         origin="/",
         contents=[f"{root}/{group.path}" for root, group in groups],
-        axis_x=time_axis(timeline, runs, after if has_legend else LABEL / (width - NUMBERS)),
-        axis_y=rrb.ScalarAxis(range=with_two_labels(low, high, height - CAPTION)) if ranges else None,
-        plot_legend=rrb.PlotLegend(corner="RightTop", visible=has_legend),
+        axis_x=time_axis(timeline, runs),
+        axis_y=rrb.ScalarAxis(range=shown) if shown else None,
+        plot_legend=rrb.PlotLegend(corner=corner or "RightTop", visible=corner is not None),
     )
+
+
+CORNERS: tuple[Corner, ...] = ("RightTop", "LeftTop", "RightBottom", "LeftBottom")
+
+
+def free_corner(
+    groups: Sequence[Group], runs: Sequence[Run], shown: tuple[float, float] | None, width: float, height: float
+) -> Corner | None:
+    """Return the corner of a plot in which a legend hides no curve; None without one, and for a single curve.
+
+    shown: range of the values, None for that of the curves; width, height: of the plot without its numbers [points].
+    """
+    names = [name for group in groups for name in group.names]
+    wide = (LEGEND_EDGE + LETTER * max(map(len, names), default=0)) / width
+    high = (LEGEND_EDGE_Y + LEGEND_LINE * len(names)) / height
+    if len(names) < 2 or wide > 1.0 or high > 1.0:
+        return None
+    times = [run.t for run in runs if len(run)] or [np.zeros(1)]
+    start, stop = min(float(t.min()) for t in times), max(float(t.max()) for t in times)
+    begin, length = start - EDGE * (stop - start), (1.0 + EDGE + AFTER) * (stop - start) or 1.0
+    known = np.concatenate([finite(group.values) for group in groups])
+    low, top = shown or ((float(known.min()), float(known.max())) if len(known) else (0.0, 1.0))
+    boxes = {corner: (corner.startswith("Right"), corner.endswith("Top")) for corner in CORNERS}
+    for group in groups:
+        count = len(group.values)
+        t = next((t for t in times if count % len(t) == 0), np.linspace(start, stop, count))
+        x = (np.resize(t, count) - begin) / length  # of a dataset the values of all runs are below each other
+        y = (group.values - low) / (top - low or 1.0)
+        for corner, (is_right, is_top) in list(boxes.items()):
+            rows = (x >= 1.0 - wide) if is_right else (x <= wide)
+            inside = y[rows] >= 1.0 - high if is_top else y[rows] <= high
+            if inside.any():
+                del boxes[corner]
+    return next(iter(boxes), None)
 
 
 def with_two_labels(low: float, high: float, height: float) -> tuple[float, float]:
@@ -279,13 +347,6 @@ def with_two_labels(low: float, high: float, height: float) -> tuple[float, floa
     bottom, top = min(bottom, below - EDGE_Y * step), max(top, above + EDGE_Y * step)
     margin = FREE_Y * (top - bottom)
     return min(bottom, low - margin), max(top, high + margin)
-
-
-def _legend_part(plot: Plot, width: float) -> float:
-    """Return the part of the run's time that the legend hides in a plot of this width [points], 0 without a legend."""
-    names = [name for _, group in plot.groups for name in group.names]
-    legend = LEGEND_EDGE + LETTER * max(map(len, names), default=0)
-    return legend / max(width - NUMBERS - legend, 1.0) if len(names) > 1 else 0.0
 
 
 def linkage_view(

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from typing import NamedTuple
 
 from kinfmu.errors import MechanismError
+from kinfmu.log.viewer.series import Group
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
 from kinfmu.run.components import is_of_mechanisms, other_mechanisms
 from kinfmu.run.verdict import MEANINGS, counts, notable_events, worst_residual
-from kinfmu.units import Quantity, factors
+from kinfmu.units import Quantity, degrees_of, factors, unit_of
 
 MOST_EVENTS = 12  # listed on the card; the log has all
 _WORDS = {"generation_tool": "FMU made by", "parameters": "parameters set"}
@@ -28,8 +29,8 @@ _DIGITS = (6, 9, 12, 15, 17)
 _ROUNDING = 1e-14  # relative; closer numbers are equal
 
 
-def card(run: Run, note: str = "") -> str:
-    """Return the card as Markdown; note: one more sentence, such as what could not be drawn."""
+def card(run: Run, note: str = "", groups: Iterable[Group] = ()) -> str:
+    """Return the card as Markdown; note: one more sentence, such as what could not be drawn; groups: all curves."""
     axis = axis_of(run)
     title = run.info.get("title") or run.info.get("name") or "Run"
     lines = [f"### {plain(title)}", "", _period(run), ""]
@@ -57,7 +58,13 @@ def card(run: Run, note: str = "") -> str:
         if key not in _UNSHOWN and value and not is_of_mechanisms(key)
     }
     lines += _table("about", about)
-    lines += _table("constant", {name: f"{value:g}" for name, value in run.fixed.items()})
+    constants = {}
+    for name, value in run.fixed.items():
+        unit, factor = degrees_of(unit_of(name.quantity(), run.length_unit))
+        constants[str(name)] = f"{value * factor + 0.0:.6g} {unit}"
+    for group in groups:
+        constants |= {name: f"{value + 0.0:.6g} {group.unit}" for name, value in group.constants.items()}
+    lines += _table("constant", constants)
     return "\n".join(lines) + "\n"
 
 
@@ -65,7 +72,7 @@ def _period(run: Run) -> str:
     if not len(run):
         return "No samples."
     axis = axis_of(run)
-    units = f"Lengths in {run.length_unit}, angles in rad. {axis.rates}".strip() if run.outputs else ""
+    units = f"Lengths in {run.length_unit}, angles in deg. {axis.rates}".strip() if run.outputs else ""
     if len(run) == 1:
         return f"One sample, at {axis.place(float(run.t[0]))}. {units}".rstrip()
     return f"{len(run)} samples, {axis.range()}. {units}".rstrip()

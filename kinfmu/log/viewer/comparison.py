@@ -25,7 +25,7 @@ from kinfmu.log.viewer.timeline import Timeline, decimated, timeline_of
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
 from kinfmu.run.verdict import sentence
-from kinfmu.units import CoordinateName, ForceName, SignalName, unit_of
+from kinfmu.units import CoordinateName, ForceName, SignalName, degrees_of, unit_of
 
 MOST_LISTED = 6  # coordinates that a line names
 MOST_PERCENT = 1000  # of a difference; a larger part states only that the value in A is small
@@ -104,7 +104,7 @@ def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = 
                 log_group(rec, look.root, timeline, drawn, group, look.curves)
             log_status(rec, look.root, timeline, timeline.placed(run))
         for group in (*differences.values(), *load_differences):
-            log_group(rec, "/difference", timeline, apart or a, group)
+            log_group(rec, "/difference", timeline, apart or a, group, _LOOKS[1].curves)
         decimation = [
             f"{look.name}: {text}"
             for run, drawn, look in zip((a, b), shown, _LOOKS, strict=True)
@@ -164,7 +164,8 @@ def _card(a: Run, b: Run, difference: Run | None, names: tuple[str, str], notes:
     apart, equal = [], []
     visible = [_visible(a, difference, table) for table in ("values", "rates", "accelerations")]
     for k, name in enumerate(difference.outputs):
-        largest = [_largest(table[:, k]) for table in visible]
+        units = [degrees_of(unit_of(name.quantity(order, axis_of(a).per), a.length_unit)) for order in range(3)]
+        largest = [_largest(table[:, k], *unit) for table, unit in zip(visible, units, strict=True)]
         if set(largest) <= {"0", "-"} and "0" in largest:
             equal.append(plain(name))
         else:
@@ -223,9 +224,12 @@ def _differ(run: Run) -> str:
     return "The times differ" if axis.is_time else f"The values of {axis.name} differ"
 
 
-def _largest(column: FloatArray) -> str:
+def _largest(column: FloatArray, unit: str, factor: float) -> str:
     known = np.abs(column[np.isfinite(column)])
-    return f"{known.max():.2g}" if len(known) else "-"
+    if not len(known):
+        return "-"
+    largest = float(f"{known.max() * factor:.2g}")
+    return f"{largest:.6g} {unit}" if largest else "0"
 
 
 class Apart(NamedTuple):

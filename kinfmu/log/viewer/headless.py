@@ -7,7 +7,7 @@ import re
 import socket
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,8 +41,12 @@ class Shot:
     reports: tuple[str, ...]
 
 
-def shoot(path: str | Path, at: Cursor | CursorOn | None = None, size: tuple[int, int] = (1600, 900)) -> Shot:
+def shoot(
+    path: str | Path | Sequence[Path], at: Cursor | CursorOn | None = None, size: tuple[int, int] = (1600, 900)
+) -> Shot:
     """Show a recording in an invisible viewer, at the cursor `at` if given, and return a picture of the settled view.
+
+    Of several recordings, which are a dataset, the picture shows their table.
 
     A LogError whose data hold `no_graphics` means that the machine has no graphics driver.
     """
@@ -57,16 +61,21 @@ class Viewer:
     def __init__(self, client: ViewerClient) -> None:
         self._client = client
 
-    def show(self, path: str | Path, at: Cursor | CursorOn | None = None) -> None:
-        """Show a recording, which replaces the one before, at the cursor `at` if given."""
+    def show(self, path: str | Path | Sequence[Path], at: Cursor | CursorOn | None = None) -> None:
+        """Show a recording, which replaces the one before, at the cursor `at` if given; of several their table."""
+        paths = [path] if isinstance(path, str | Path) else path
         client, deadline = self._client, time.monotonic() + SETTLE_TIME
         if client.get_state().recordings:
             client.close("all")
-        client.open(str(Path(path).resolve()))
+        opened = client.open([str(Path(path).resolve()) for path in paths])
         while (state := client.get_state()).loading or not state.views:
             if time.monotonic() > deadline:
-                raise LogError(f"{path}: the viewer shows nothing of it after {SETTLE_TIME:.0f} s")
+                raise LogError(f"{paths[0]}: the viewer shows nothing of it after {SETTLE_TIME:.0f} s")
             time.sleep(_POLL)
+        if len(paths) > 1:
+            _, dataset, _ = opened.store_ids[0].split(":", 2)
+            client.set_location(f"{state.catalog_url}/entry/{dataset}")
+            return
         if callable(at):
             shown = state.recordings[0]
             at = at(next(line for line in shown.timelines if line.name == shown.current_timeline))

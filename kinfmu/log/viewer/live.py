@@ -21,14 +21,23 @@ import numpy as np
 from kinfmu.arrays import FloatArray
 from kinfmu.errors import LogError
 from kinfmu.log.cdr import check_times
-from kinfmu.log.viewer.blueprint import Drawn, single
-from kinfmu.log.viewer.card import card
+from kinfmu.log.viewer.blueprint import Drawn
 from kinfmu.log.viewer.headless import executable, last_error
 from kinfmu.log.viewer.linkage import APPLICATION, Linkage
 from kinfmu.log.viewer.marks import FORCES, log_arrows, log_loads
 from kinfmu.log.viewer.package import require_viewer
-from kinfmu.log.viewer.rerun_file import drawn_linkages, left_out, log_card, log_group, log_status
-from kinfmu.log.viewer.series import Group, accuracy, efforts, error_estimates, groups, iterations, margin, signals
+from kinfmu.log.viewer.rerun_file import content_of, drawn_linkages, log_group, log_status
+from kinfmu.log.viewer.series import (
+    Group,
+    accuracy,
+    efforts,
+    error_estimates,
+    groups,
+    iterations,
+    margin,
+    reactions,
+    signals,
+)
 from kinfmu.log.viewer.timeline import decimated, timeline_of
 from kinfmu.run import Run
 
@@ -112,7 +121,7 @@ class LiveView:
         self._flush()
 
     def end(self, run: Run, reason: str) -> None:  # noqa: ARG002  the card has the events and the verdict
-        """Show the layout of the whole run, its card, and the arrows of forces, whose scale is that of the whole run.
+        """Show the layout of the whole run, its card, reactions, and arrows of forces to the scale of the whole run.
 
         Args:
             run: The whole run.
@@ -121,20 +130,16 @@ class LiveView:
         """
         if not self._is_connected:
             return
-        timeline = timeline_of([run])
-        shown = timeline.placed(decimated(run))
-        drawn, note = drawn_linkages(shown)
-        solver = [
-            group for group in (accuracy(shown), error_estimates(shown), margin(shown), iterations(shown)) if group
-        ]
-        forces = [*efforts(shown), *signals(shown)]
-        for one in drawn:
+        content = content_of(run, timeline_of([run]))
+        for one in content.drawn:
             if one.scene:
-                linkage = Linkage(self._stream, one.root, timeline, one.run, one.scene)
+                linkage = Linkage(self._stream, one.root, content.timeline, one.run, one.scene)
                 linkage.log_paths(one.scene.paths)
                 log_loads(linkage, log_arrows(linkage, one.arrows))
-        log_card(self._stream, card(run, " ".join([*left_out(run, shown), note]).strip()))
-        self._stream.send_blueprint(single(timeline, shown, drawn, groups(shown), forces, solver))
+        for group in reactions(content.shown):
+            log_group(self._stream, "", content.timeline, content.shown, group)
+        content.log_card(self._stream)
+        self._stream.send_blueprint(content.layout())
         self._flush()
 
     def _flush(self) -> None:

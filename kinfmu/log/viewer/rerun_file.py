@@ -4,7 +4,7 @@
     /linkage/...        bodies with what joints add to them, pins, bars, cylinders, supports, rails; y up
     /linkage/paths/...  paths of points of interest over the run; /linkage/trails/...: over the last moments
     /position/angle     and /position/length, /velocity/..., /acceleration/...: one entity for each kind of quantity,
-                        one curve a coordinate, in rad and the mechanism's unit of length
+                        one curve a coordinate, in deg and the mechanism's unit of length
     /forces/torque      efforts of drivers, with /forces/force, /forces/power, /forces/energy [N m, N, W, J]
     /reactions/force    sizes of the forces of joints; /reactions/torque: moments; with shaking force and moment
     /signals/0          outputs of FMUs that are not kinfmu's, an entity for each unit
@@ -23,8 +23,9 @@ for the next. Other runs belong to another application.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 from uuid import uuid4
@@ -39,7 +40,7 @@ from kinfmu.errors import LogError
 from kinfmu.files import temporary_folder
 from kinfmu.log.cdr import check_times
 from kinfmu.log.target import replacing
-from kinfmu.log.viewer.blueprint import Drawn, single
+from kinfmu.log.viewer.blueprint import Drawn, is_ok, single
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.linkage import APPLICATION, Linkage
 from kinfmu.log.viewer.marks import log_arrows, log_loads
@@ -87,25 +88,59 @@ def write_rrd(run: Run, path: str | Path) -> None:
     """
     require_viewer(f"{path}: a recording")
     check_times(run.t)  # reports invalid times before a file is made
-    timeline = timeline_of([run])
-    shown = timeline.placed(decimated(run))
-    drawn, note = drawn_linkages(shown)
-    curves = groups(shown)
-    solver = [group for group in (accuracy(shown), error_estimates(shown), margin(shown), iterations(shown)) if group]
-    forces = [*efforts(shown), *reactions(shown), *signals(shown)]
+    content = content_of(run, timeline_of([run]))
     name = run.info.get("title") or run.info.get("name") or Path(path).stem
-    layout = single(timeline, shown, drawn, curves, forces, solver)
-    with recording(path, name, layout, application([shown], [*curves.values(), *forces])) as rec:
-        rec.send_property("kinfmu", _properties(run))
-        for one in drawn:
+    application_id = application([content.shown], [*content.curves.values(), *content.forces])
+    with recording(path, name, content.layout(), application_id) as rec:
+        content.log(rec)
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedRun:
+    """What the recording of a run holds.
+
+    shown: its samples on the timeline, fewer of long runs; note: what is not drawn; curves, forces, solver: groups.
+    """
+
+    run: Run
+    timeline: Timeline
+    shown: Run
+    drawn: Sequence[Drawn]
+    note: str
+    curves: Mapping[tuple[str, str], Group]
+    forces: Sequence[Group]
+    solver: Sequence[Group]
+
+    def log(self, rec: rr.RecordingStream) -> None:
+        """Log all of it."""
+        rec.send_property("kinfmu", _properties(self.run))
+        for one in self.drawn:
             if one.scene:
-                linkage = Linkage(rec, one.root, timeline, one.run, one.scene)
+                linkage = Linkage(rec, one.root, self.timeline, one.run, one.scene)
                 linkage.log()
                 log_loads(linkage, log_arrows(linkage, one.arrows))
-        for group in (*curves.values(), *forces, *solver):
-            log_group(rec, "", timeline, shown, group)
-        log_status(rec, "", timeline, timeline.placed(run))
-        log_card(rec, card(run, " ".join([*left_out(run, shown), note]).strip()))
+        for group in (*self.curves.values(), *self.forces, *self.solver):
+            log_group(rec, "", self.timeline, self.shown, group)
+        log_status(rec, "", self.timeline, self.timeline.placed(self.run))
+        self.log_card(rec)
+
+    def log_card(self, rec: rr.RecordingStream) -> None:
+        """Log the card alone."""
+        note = " ".join([*left_out(self.run, self.shown), self.note]).strip()
+        log_card(rec, card(self.run, note, [*self.curves.values(), *self.forces]))
+
+    def layout(self) -> rrb.Blueprint:
+        """Return the layout of this run."""
+        return single(self.timeline, self.shown, self.drawn, self.curves, self.forces, self.solver)
+
+
+def content_of(run: Run, timeline: Timeline) -> RecordedRun:
+    """Return what the recording of a run holds."""
+    shown = timeline.placed(decimated(run))
+    drawn, note = drawn_linkages(shown)
+    solver = [group for group in (accuracy(shown), error_estimates(shown), margin(shown), iterations(shown)) if group]
+    forces = [*efforts(shown), *reactions(shown), *signals(shown)]
+    return RecordedRun(run, timeline, shown, drawn, note, groups(shown), forces, solver)
 
 
 def drawn_linkages(run: Run) -> tuple[list[Drawn], str]:
@@ -138,10 +173,14 @@ def application(runs: Sequence[Run], groups: Iterable[Group]) -> str:
 
     The viewer keeps one layout per application, so recordings that need another layout get another id.
     """
-    ranges = [(group.path, group.extent) for group in groups]
+    ranges = [(group.path, group.extent, group.is_constant) for group in groups]
     spans = [(float(run.t.min()), float(run.t.max())) for run in runs if len(run)]
     facts = repr(
-        (spans, ranges, [(run.mechanism_text, run.outputs, run.axis, bool(notable_events(run))) for run in runs])
+        (
+            spans,
+            ranges,
+            [(run.mechanism_text, run.outputs, run.axis, bool(notable_events(run)), is_ok(run)) for run in runs],
+        )
     )
     parts = [name for run in runs for name in component_runs(run)]
     facts += repr(parts) if parts else ""  # each has a view
@@ -150,12 +189,17 @@ def application(runs: Sequence[Run], groups: Iterable[Group]) -> str:
 
 
 @contextmanager
-def recording(path: str | Path, name: str, layout: rrb.Blueprint, application: str) -> Iterator[rr.RecordingStream]:
-    """Yield a recording; its complete file replaces `path` when the block ends."""
+def recording(
+    path: str | Path, name: str, layout: rrb.Blueprint, application: str, identifier: str = ""
+) -> Iterator[rr.RecordingStream]:
+    """Yield a recording; its complete file replaces `path` when the block ends.
+
+    identifier: of the recording. Default: one that no other has.
+    """
     import rerun as rr
 
     with replacing(path) as temporary, _path_in_utf8(temporary) as saved:
-        rec = rr.RecordingStream(application, recording_id=f"{_in_utf8(Path(path).stem)}-{uuid4()}")
+        rec = rr.RecordingStream(application, recording_id=identifier or f"{_in_utf8(Path(path).stem)}-{uuid4()}")
         rec.set_log_time_enabled(False)  # wall-clock time is not needed and takes 16 bytes a row
         rec.set_log_tick_enabled(False)
         try:
@@ -172,9 +216,12 @@ def recording(path: str | Path, name: str, layout: rrb.Blueprint, application: s
 
 
 def log_group(
-    rec: rr.RecordingStream, root: str, timeline: Timeline, run: Run, group: Group, width: float = 1.5
+    rec: rr.RecordingStream, root: str, timeline: Timeline, run: Run, group: Group, width: float | None = None
 ) -> None:
-    """Log the curves of a group: lines with gaps where they are NaN, or points if a sample lies between two gaps."""
+    """Log the curves of a group: lines with gaps where they are NaN, or points if a sample lies between two gaps.
+
+    width: of all lines [points]. Default: that of `Group.widths`.
+    """
     import rerun as rr
 
     path = f"{root}/{group.path}"
@@ -186,7 +233,7 @@ def log_group(
         look = rr.SeriesLines(
             names=names,
             colors=colours,
-            widths=[width] * len(names),
+            widths=group.widths() if width is None else [width] * len(names),
             interpolation_mode="StepAfter" if group.is_stepped else "Linear",
         )
     rec.log(path, look, static=True)

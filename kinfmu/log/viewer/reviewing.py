@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING
@@ -42,7 +42,8 @@ def review(
     """Make the recording of a run and open the viewer on it, or only `save` it, or take a `screenshot`.
 
     Args:
-        run: An .mcap file, or an .rrd file to be shown unchanged.
+        run: An .mcap file, or an .rrd file to be shown unchanged; or a folder of .rrd files, such as those of the
+            designs of a study, to be compared as a dataset.
         other: A second .mcap file to compare with. Default: none.
         save: The .rrd file to write. Default: in the folder of the run, with its name and the suffix .rrd.
         screenshot: The .png file to write. Default: none.
@@ -52,7 +53,7 @@ def review(
         report: Called with a line on the common coordinates if the two runs do not have the same. Default: none.
 
     Returns:
-        The path of the recording; None if only a screenshot was taken.
+        The path of the recording; None of a folder, and if only a screenshot was taken.
 
     Raises:
         RequestError: Invalid files or time.
@@ -61,6 +62,9 @@ def review(
 
     """
     run = Path(run)
+    if run.is_dir():
+        _review_dataset(run, other or save or at, screenshot)
+        return None
     _check(run, other, save, screenshot, at)
     require_viewer(f"{run}: a review")
     moment: Cursor | CursorOn | None
@@ -75,7 +79,7 @@ def review(
                     moment = _record(run, other, recording, at, report)
                 except LogError as error:  # under the user's file name
                     raise LogError(str(error).replace(str(recording), str(screenshot)), **error.data) from None
-            _shoot(recording, screenshot, moment)
+            _shoot([recording], screenshot, moment)
         return None
     if suffix_of(run) == ".rrd":
         recording, moment = run, _on_shown(at)
@@ -83,10 +87,27 @@ def review(
         recording = Path(save) if save else run.with_name(_default_path(run, other))
         moment = _record(run, other, recording, at, report)
     if screenshot:
-        _shoot(recording, screenshot, moment)
+        _shoot([recording], screenshot, moment)
     elif not save:
         _open(recording)
     return recording
+
+
+def _review_dataset(folder: Path, other: object, screenshot: str | Path | None) -> None:
+    """Open the viewer on the recordings of a folder, or take a picture of their table."""
+    recordings = sorted(folder.glob("*.rrd"))
+    if other is not None:
+        raise RequestError(f"{folder}: a folder of recordings is shown as it is; only a screenshot can be asked for")
+    if len(recordings) < 2:
+        raise RequestError(f"{folder}: holds {len(recordings)} recordings (.rrd); a dataset has two or more")
+    require_viewer(f"{folder}: a review")
+    if screenshot:
+        if suffix_of(screenshot) != ".png":
+            raise RequestError(f"{screenshot}: the name must end in .png")
+        _shoot(recordings, screenshot, None)
+        return
+    _need_display(folder)
+    _open(*recordings)
 
 
 def _check(
@@ -168,9 +189,9 @@ def _on_shown(at: Place | None) -> CursorOn | None:
     return cursor
 
 
-def _shoot(recording: Path, screenshot: str | Path, at: Cursor | CursorOn | None) -> None:
-    """Write a picture of the recording; LogError for a view that cannot show its data."""
-    shot = shoot(recording, at)
+def _shoot(recordings: Sequence[Path], screenshot: str | Path, at: Cursor | CursorOn | None) -> None:
+    """Write a picture of the recording, or of the table of several; LogError for a view that cannot show its data."""
+    shot = shoot(recordings if len(recordings) > 1 else recordings[0], at)
     with replacing(screenshot) as temporary:
         temporary.write_bytes(shot.png)
     if shot.reports:
@@ -185,11 +206,11 @@ def _need_display(run: Path) -> None:
         )
 
 
-def _open(recording: Path) -> None:
-    """Start the viewer and leave it running; a viewer that is already open shows the recording instead."""
+def _open(*recordings: Path) -> None:
+    """Start the viewer and leave it running; a viewer that is already open shows the recordings instead."""
     with TemporaryFile() as complaints:
         viewer = subprocess.Popen(  # noqa: S603  # our own arguments
-            [executable(), "--bind", "127.0.0.1", str(recording.resolve())],
+            [executable(), "--bind", "127.0.0.1", *(str(recording.resolve()) for recording in recordings)],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=complaints,
@@ -201,4 +222,4 @@ def _open(recording: Path) -> None:
             _VIEWERS.append(viewer)
             return
         if code:
-            raise LogError(f"{recording}: the viewer could not be opened: {last_error(complaints)}")
+            raise LogError(f"{recordings[0]}: the viewer could not be opened: {last_error(complaints)}")

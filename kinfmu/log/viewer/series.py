@@ -9,17 +9,20 @@ from functools import cached_property
 import numpy as np
 
 from kinfmu.arrays import FloatArray, finite
+from kinfmu.draw.chart import equal_below, repeats_effort
 from kinfmu.draw.scene import palette
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of, shown_range
-from kinfmu.units import ForceName, Quantity, unit_of
+from kinfmu.units import Quantity, degrees_of, unit_of
 
 ORDERS = ("position", "velocity", "acceleration")
 KINDS = ("angle", "length")
 SAME = 1e-9  # difference of two curves that look the same, of the largest value
 SMALLEST = 1e-17  # drawn in place of 0 on a logarithmic axis; smaller than round-off
+_TITLES_OF = {"angle": ("angle", "angular velocity", "angular acceleration"), "length": ORDERS}
 _TITLES = {"force": "joint force", "torque": "joint moment"}
 _SHAKING = "shaking_"
+_WIDTH, _WIDER = 1.5, 3.0  # [points] of a curve, and more for each equal one above it
 _OUTLIERS = (
     99.0  # percent of the samples that the axis shows at least: forces may grow without bound at singular points
 )
@@ -56,6 +59,33 @@ class Group:
         return float(np.floor(low / digit - 1.0) * digit), float(np.ceil(high / digit + 1.0) * digit)
 
     @property
+    def unit(self) -> str:
+        """The unit in the title, '' without one."""
+        return self.title.rpartition("[")[2].rstrip("]") if self.title.endswith("]") else ""
+
+    @cached_property
+    def constants(self) -> dict[str, float]:
+        """The values of curves of several numbers that are equal to round-off, by name; none of diagnostics."""
+        if self.path.startswith("solver/"):
+            return {}
+        found, usual = dict[str, float](), max(map(abs, self.shown or (0.0,)))
+        for name, column in zip(self.names, self.values.T, strict=True):
+            known = finite(column)
+            largest = float(np.abs(known).max(initial=0.0))
+            if len(known) > 1 and np.ptp(known) <= SAME * max(largest, usual):
+                found[name] = float(known[0]) if largest > SAME * usual else 0.0
+        return found
+
+    @property
+    def is_constant(self) -> bool:
+        """True if no curve moves, so that a plot would show straight lines only."""
+        return len(self.constants) == len(self.names)
+
+    def widths(self) -> list[float]:
+        """Return the widths of the curves [points]: wider where a later one looks the same, so that both are seen."""
+        return [_WIDTH + _WIDER * below for below in equal_below(list(self.values.T))]
+
+    @property
     def is_scattered(self) -> bool:
         """True if a value has no neighbour, so that a line would not show it."""
         known = np.pad(np.isfinite(self.values).any(axis=1), 1)
@@ -77,15 +107,17 @@ def groups(run: Run) -> dict[tuple[str, str], Group]:
             if not kept:
                 continue
             values = np.where(run.good[:, None], table[:, kept], np.nan)
+            unit, factor = degrees_of(unit_of(Quantity(kind, order, axis.per), run.length_unit))
+            values *= factor
             if order == 0:
-                size = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
+                size = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values))) / factor
             found[ORDERS[order], kind] = Group(
                 path=f"{ORDERS[order]}/{kind}",
-                title=_title(Quantity(kind, order, axis.per), run.length_unit),
+                title=f"{_TITLES_OF[kind][order]} [{unit}]",
                 names=tuple(run.outputs[k].derivative(order) for k in kept),
                 colours=tuple(colours[run.outputs[k]] for k in kept),
                 values=values,
-                shown=shown_range(values, size / (axis.span or 1.0) ** order),
+                shown=shown_range(values, factor * size / (axis.span or 1.0) ** order),
             )
     return found
 
@@ -100,7 +132,7 @@ def efforts(run: Run) -> list[Group]:
         columns = [
             k
             for k, name in enumerate(run.force_names)
-            if name.quantity.kind == kind and name not in run.absent and not _hides_effort(run, name)
+            if name.quantity.kind == kind and name not in run.absent and not repeats_effort(run, name)
         ]
         if not columns or run.forces is None:
             continue
@@ -139,22 +171,6 @@ def signals(run: Run) -> list[Group]:
             )
         )
     return found
-
-
-def _hides_effort(run: Run, name: ForceName) -> bool:
-    """Return True for a bias effort that equals its effort to round-off, in a run that keeps both."""
-    effort = f"{name.owner}.{name.noun.removeprefix('bias_')}"
-    if not name.noun.startswith("bias_") or effort in run.absent:
-        return False
-    own, other = run[name], run[effort]
-    largest = float(np.max(np.abs(other), initial=0.0, where=np.isfinite(other)))
-    return bool(np.all(~run.good | (np.abs(own - other) <= SAME * largest) | ~np.isfinite(own)))
-
-
-def _title(quantity: Quantity, length_unit: str) -> str:
-    """Return a title such as 'angular velocity [rad/s]'."""
-    words = {"angle": ("angle", "angular velocity", "angular acceleration"), "length": ORDERS}[quantity.kind]
-    return f"{words[quantity.order]} [{unit_of(quantity, length_unit)}]"
 
 
 def accuracy(run: Run) -> Group | None:

@@ -4,5 +4,6 @@ from __future__ import annotations
 
 from kinfmu.mechanism.imports.drawing import Imported, imported
 from kinfmu.mechanism.imports.pmks import is_pmks_link
+from kinfmu.mechanism.imports.sketch import UNDRIVEN, notes_of
 
-__all__ = ["Imported", "imported", "is_pmks_link"]
+__all__ = ["UNDRIVEN", "Imported", "imported", "is_pmks_link", "notes_of"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
-from itertools import combinations
+from itertools import combinations, takewhile
 from typing import Any, NamedTuple
 
 from kinfmu.errors import MechanismError, some
@@ -16,10 +16,19 @@ from kinfmu.mechanism.valid import check_number, is_line, quoted
 from kinfmu.units import METRES
 
 MOST_PARTS = 1000  # pins, and links, of a drawing; in larger ones the search for rigid groups would take minutes
+UNDRIVEN = "nothing drives it: add a table [drivers.NAME]"
 GRAVITY = "-9.81 m/s2"
 _SAMPLES = 200  # of the run of an imported mechanism
+_NOTES, _NOTE = "# Left out, or chosen:", "#   "  # at the head of a file
 _LONGEST_NAME = 80  # characters, so that numbers can follow
 _REFERENCES = ("between", "of", "carrier", "at", "axes")
+
+
+def notes_of(text: str) -> tuple[str, ...]:
+    """Return the notes at the head of the text of an imported file; none of another one."""
+    _, head, rest = text.partition(f"{_NOTES}\n")
+    lines = takewhile(lambda line: line.startswith(_NOTE), rest.splitlines())
+    return tuple(line.removeprefix(_NOTE) for line in lines) if head else ()
 
 
 class DrawnPin(NamedTuple):
@@ -208,7 +217,7 @@ class Sketch:
         if self._renamed:
             self.notes.append(f"names made valid: {some(self._renamed)}")
         if not drivers:
-            self.notes.append("nothing drives it: add a table [drivers.NAME]")
+            self.notes.append(UNDRIVEN)
         elif mobility < drivers:
             self.notes.append(
                 f"degrees of freedom by count: {mobility}, drivers: {drivers}; it moves only if links are redundant, "
@@ -217,7 +226,7 @@ class Sketch:
         mechanism = mechanism_of(self._document(), None)
         head = [f"# Imported from {self._source}.", *_HEAD]
         if self.notes:
-            head += ["# Left out, or chosen:", *(f"#   {_shown(note)}" for note in self.notes)]
+            head += [_NOTES, *(f"{_NOTE}{_shown(note)}" for note in self.notes)]
         return "\n".join([*head, "", text(mechanism, as_written=True)])
 
     def _document(self) -> dict[str, Any]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,7 @@ from kinfmu.analysis import check
 from kinfmu.analysis.doctor import advice
 from kinfmu.draw.scene.instant import Instant
 from kinfmu.errors import KinfmuError, MobilityError
+from kinfmu.mechanism.imports import UNDRIVEN, notes_of
 from kinfmu.mechanism.quantities.placement import body_of
 from kinfmu.page.describe import drawn
 from kinfmu.page.editor.drawing import AS_DRAWN, PLACEHOLDER, Drawing
@@ -20,9 +23,12 @@ from kinfmu.plan import plan_from
 from kinfmu.plan.equations.assembly import SINGULAR
 from kinfmu.plan.equations.redundancy import Redundancy
 
+Finding = dict[str, Any]  # a line, or a change that helps: its text, and "edits" or "operations"
+
 _LARGE = 60  # coordinates
 _MOST_EDITS = 3  # that are offered for a problem
 _MOST_NOTES = 5  # of one kind in an answer
+_NEXT_TO = 0.05  # of the size; points without joints that are nearer belong in one place
 
 
 def answer(drawing: Drawing) -> dict[str, Any]:
@@ -33,10 +39,10 @@ def answer(drawing: Drawing) -> dict[str, Any]:
         "name": drawing.mechanism.name,
         "text": drawing.text,
         "badge": badge,
-        "findings": _findings(drawing, problem),
+        "findings": _findings(drawing, problem) + _import_notes(drawing),
         "sketch": sketch(drawing),
         "view": None,
-        "isViewComing": badge["isComplete"],
+        "isViewComing": badge["isComplete"] or (problem is not None and drawing.has_bodies),
     }
 
 
@@ -120,34 +126,48 @@ def _badge(drawing: Drawing, problem: KinfmuError | None) -> dict[str, Any]:
     return {"mobility": mobility, "drivers": drivers, "text": text, "isComplete": problem is None and drivers > 0}
 
 
-def _findings(drawing: Drawing, problem: KinfmuError | None) -> list[dict[str, Any]]:
-    """Return lines on what is missing, with operations that would help."""
-    if not drawing.has_bodies:
+def _findings(drawing: Drawing, problem: KinfmuError | None, advised: Iterable[Finding] = ()) -> list[Finding]:
+    """Return lines on what is missing, with operations that would help; advised: those that were tried."""
+    if not drawing.has_bodies or problem is None:
         return []
-    found: list[dict[str, Any]] = []
-    if problem is not None:
-        unpinned = _unpinned(drawing)
-        pins = [edit for one in unpinned for edit in one["edits"]]  # what is left open by mistake comes first
-        found = [{"kind": "problem", "text": str(problem), "edits": [*pins, *_help(drawing)][:_MOST_EDITS]}, *unpinned]
-    return found
+    unpinned = _unpinned(drawing)
+    edits = [edit for one in unpinned for edit in one["edits"]]  # what is left open by mistake comes first
+    pins = [{*edit["operations"][0]["points"]} for edit in edits]
+    edits += [edit for edit in (*advised, *_help(drawing)) if not any(_is_pin(edit, points) for points in pins)]
+    return [{"kind": "problem", "text": str(problem), "edits": edits[:_MOST_EDITS]}, *unpinned]
 
 
-def _unpinned(drawing: Drawing) -> list[dict[str, Any]]:
+def _is_pin(edit: Finding, points: set[str]) -> bool:
+    """Return whether what an edit does is only to pin points together."""
+    changes = edit["operations"][0].get("edits", [])
+    value = changes[0].get("value") if len(changes) == 1 else None
+    return isinstance(value, dict) and {*value.get("between", ())} == points
+
+
+def _unpinned(drawing: Drawing) -> list[Finding]:
     """Return a line for each place where points of two bodies meet that no joint holds together."""
     held = {frozenset(map(body_of, joint.between)) for joint in drawing.mechanism.joints if hasattr(joint, "between")}
     points = [*drawing.mechanism.body_points]
     places = np.array([drawing.at(point) for point in points]).reshape(-1, 2)
-    near = cKDTree(places).query_pairs(AS_DRAWN * drawing.size) if points else ()
+    near = cKDTree(places).query_pairs(_NEXT_TO * drawing.size) if points else ()
     found = []
-    for k, j in sorted(near):
+    for apart, k, j in sorted((math.dist(places[k], places[j]), k, j) for k, j in near):
         a, b = points[k], points[j]
-        if body_of(a) != body_of(b) and b not in drawing.pins[a] and frozenset((body_of(a), body_of(b))) not in held:
+        is_open = max(len(drawing.pins[a]), len(drawing.pins[b])) == 1  # what is pinned nearby may belong there
+        if body_of(a) == body_of(b) or b in drawing.pins[a] or frozenset((body_of(a), body_of(b))) in held:
+            continue
+        if apart <= AS_DRAWN * drawing.size or is_open:
+            where = (
+                "in one place"
+                if apart <= AS_DRAWN * drawing.size
+                else f"{apart:.2g} {drawing.mechanism.length_unit} apart"
+            )
             pin = {"text": f"pin {a} and {b}", "operations": [{"do": "pin", "points": [a, b]}]}
-            found.append({"kind": "note", "text": f"{a} and {b} are in one place and not joined", "edits": [pin]})
+            found.append({"kind": "note", "text": f"{a} and {b} are {where} and not joined", "edits": [pin]})
     return found[:_MOST_NOTES]
 
 
-def _help(drawing: Drawing) -> list[dict[str, Any]]:
+def _help(drawing: Drawing) -> list[Finding]:
     """Return operations that may complete a drawing: motors of bodies that are pinned to the ground."""
     redundancy, mechanism = drawing.redundancy, drawing.mechanism
     if not isinstance(redundancy, Redundancy) or redundancy.mobility <= len(mechanism.drivers):
@@ -170,16 +190,23 @@ def view(drawing: Drawing) -> dict[str, Any]:
 
     """
     report = check(drawing.mechanism)
-    notes = [{"kind": "note", "text": line, "edits": []} for line in report.notes]
-    problem = []
-    if report.problem is not None:
-        problem = [{"kind": "problem", "text": str(report.problem), "edits": _advised(drawing)}]
-        if report.plan is None:
-            return {"view": None, "findings": problem + notes}
-    return {"view": page_data(drawing.mechanism, report), "findings": problem + notes}
+    notes = _import_notes(drawing) + _notes(report.notes)
+    advised = _advised(drawing) if report.problem is not None else []
+    findings = _findings(drawing, report.problem, advised) + notes
+    is_stuck = report.problem is not None and report.plan is None
+    return {"view": None if is_stuck else page_data(drawing.mechanism, report), "findings": findings}
 
 
-def _advised(drawing: Drawing) -> list[dict[str, Any]]:
+def _import_notes(drawing: Drawing) -> list[Finding]:
+    """Return lines on what an import has left out or chosen, as long as the file has them."""
+    return _notes(f"import: {line}" for line in notes_of(drawing.text) if line != UNDRIVEN)
+
+
+def _notes(lines: Iterable[str]) -> list[Finding]:
+    return [{"kind": "note", "text": line, "edits": []} for line in lines]
+
+
+def _advised(drawing: Drawing) -> list[Finding]:
     """Return changes after which a drawing moves, as operations."""
     return [
         {"text": f"{one.text}: {one.leads_to}", "operations": [{"do": "edit", "edits": one.as_json()["edits"]}]}

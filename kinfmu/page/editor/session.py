@@ -3,7 +3,8 @@
 A folder of the user's own holds the text of every state and a list of them: `states.json` names the texts in order, the
 current one, and what the file held when it was last read or saved. Everything is written to a temporary file that then
 takes the place of the older one, the texts before the list, so that a list never names a text that is not there. A
-state is an undo step. Several processes on one file share the folder: each looks at the list before it answers.
+state is an undo step; those of a drawing that is saved are removed a month after the last one. Several processes on one
+file share the folder: each looks at the list before it answers.
 """
 
 from __future__ import annotations
@@ -11,8 +12,10 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shutil
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -25,6 +28,7 @@ from kinfmu.page.editor.drawing import Drawing, new_text
 from kinfmu.page.editor.operations import changed
 
 MOST_STATES = 1000  # that can be undone
+KEPT = 30 * 86400.0  # [s] after the last step, of a drawing that is saved
 _LIST = "states.json"
 
 
@@ -65,6 +69,15 @@ class Session:
         self._drawings: dict[str, Drawing] = {}
         with self._alone():
             self._take_file(self._read(), is_begin=True)
+        _remove_old(self._own.parent, but=self._own)
+
+    def close(self) -> None:
+        """Remove the states if nothing is unsaved and there is nothing to undo or redo."""
+        with self._alone():
+            states = self._read()
+            is_begun = len(states.texts) == 1 and self._on_disk()[1] in (self._text(states), None)
+            if is_begun and (states.saved or self._text(states) == new_text(self.path.stem)):
+                shutil.rmtree(self._own, ignore_errors=True)
 
     # ---- what there is
 
@@ -222,6 +235,7 @@ class Session:
             try:
                 self._folder.mkdir(parents=True, exist_ok=True, mode=0o700)
                 with lock_folder(self._own):
+                    self._folder.mkdir(parents=True, exist_ok=True, mode=0o700)  # another process may have closed it
                     yield
             except OSError as error:
                 raise KinfmuError(
@@ -283,6 +297,19 @@ class Session:
 
 def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _remove_old(folder: Path, but: Path) -> None:
+    """Remove the states of drawings that were not used for `KEPT` and whose files have what was drawn."""
+    for own in folder.iterdir():
+        states = own / "states"
+        with suppress(OSError, ValueError, KeyError, TypeError, IndexError):
+            if own == but or time.time() - (states / _LIST).stat().st_mtime < KEPT:
+                continue
+            with lock_folder(own):
+                found = json.loads((states / _LIST).read_text("utf-8"))
+                if (states / found["texts"][found["at"]]).read_bytes() == Path(found["file"]).read_bytes():
+                    shutil.rmtree(own, ignore_errors=True)
 
 
 def states_folder() -> Path:

@@ -1,6 +1,6 @@
 // The page of `kinfmu play`: it follows the file, and asks the server for FMUs and for a copy of the file.
 
-const SERVED = Number("{{served version}}"); // of the page
+const SERVED = Number(document.documentElement.dataset.version); // of the page
 const KEPT = "kinfmu-kept"; // what is shown, across a reload
 
 started.then((page) => {
@@ -9,8 +9,9 @@ started.then((page) => {
 
 async function serve(page) {
     if (page.isEditable) page.editor = await editorOf(page);
-    if (page.linkage) takeBack(page);
-    else page.editor.choose("link");
+    page.linkGallery("gallery");
+    takeBack(page);
+    if (!page.linkage) page.editor.choose("link");
     const style = "padding: 10px 14px; color: var(--ink); overflow-wrap: anywhere; font-size: 14px; ";
     const line = element("div", { id: "file-problem", role: "alert", hidden: true });
     line.style = `${style}border-bottom: 1px solid var(--bad); background: var(--bad-back)`;
@@ -34,18 +35,22 @@ async function serve(page) {
         const isDrawn = Boolean(page.editor?.sketch);
         if (isDrawn) page.editor.follow(editor, wasBusy && !isBusy);
         else if (version !== SERVED) {
-            keep(page);
+            page.address.write();
             location.reload();
             return;
         }
         wasBusy = isBusy;
         tell(problem && `The file cannot be used as it is: ${problem}`, isBusy && !isDrawn);
     });
-    states.addEventListener("error", () => {
+    page.whenEnded = () => {
         buttons.forEach((button) => (button.disabled = true));
-        tell("kinfmu play has ended. This page goes on working; it no longer follows the file.");
+        tell(`kinfmu play has ended. ${page.editor?.isShown ? "What was drawn until then is kept; start it again to go on." : "This page goes on working; it no longer follows the file."}`);
+    };
+    states.addEventListener("error", page.whenEnded);
+    window.addEventListener("pagehide", () => {
+        states.close();
+        keep(page);
     });
-    window.addEventListener("pagehide", () => states.close());
 }
 
 // Return the editor, whose script is packed: pages of many mechanisms stay small.
@@ -93,6 +98,14 @@ function serverButtons(page) {
             download(`${linkage.data.name}.html`, await (await post("page")).blob(), "text/html");
             return `Made: ${linkage.data.name}.html, which works offline.`;
         }),
+        add("Animation of the run (GIF)", "save-gif", "Drawing the animation\u2026", async () => {
+            download(`${linkage.data.name}.gif`, await (await post("gif")).blob(), "image/gif");
+            return `Made: ${linkage.data.name}.gif.`;
+        }),
+        add("Pose as shown (DXF)", "save-dxf", "Drawing\u2026", async () => {
+            download(`${linkage.data.name}.dxf`, await (await post(`dxf?${[...linkage.u].map((value) => `values=${value}`).join("&")}`)).blob(), "image/vnd.dxf");
+            return `Made: ${linkage.data.name}.dxf.`;
+        }),
         add("Mechanism file, into the folder of the file", "keep-file", "Saving\u2026", async () => `Saved: ${await (await post("file")).text()}`),
     ];
     part.after(note);
@@ -102,10 +115,11 @@ function serverButtons(page) {
 // ---- what stays across a reload, apart from the address
 
 function keep(page) {
-    page.address.write();
+    if (page.linkage) page.address.write();
     const { scale, x, y, isFitted } = page.view;
     const tab = document.querySelector("#tabs [aria-selected=true]")?.id;
-    const kept = { show: page.show, locked: [...page.design.locked], tab, isPlaying: page.isPlaying, view: isFitted ? null : { scale, x, y, isFitted } };
+    const locked = [page.design, page.editor].map((one) => [...(one?.locked || [])]);
+    const kept = { at: location.pathname, show: page.show, locked, tab, hasPlots: !$("plots").hidden, isPlaying: page.isPlaying && !page.motion.oncePace, view: isFitted ? null : { scale, x, y, isFitted } };
     try {
         sessionStorage.setItem(KEPT, JSON.stringify(kept));
     } catch {
@@ -121,14 +135,17 @@ function takeBack(page) {
     } catch {
         // Without storage there is nothing to take back.
     }
-    if (!kept) return;
+    if (kept?.at !== location.pathname) return; // of another server
+    kept.locked[1].forEach((body) => page.editor?.locked.add(body));
+    if (!page.linkage) return;
     for (const [name, value] of Object.entries(kept.show)) {
         const box = $(`show-${name}`);
         if (box && box.checked !== value) box.click();
     }
-    kept.locked.filter((name) => page.design.byName.has(name)).forEach((name) => page.design.locked.add(name));
+    page.design.lock(kept.locked[0]);
     if (kept.view) Object.assign(page.view, kept.view);
     $(kept.tab)?.click();
+    if (kept.hasPlots) $("tab-plots").click();
     page.values.update();
     if (kept.isPlaying) page.motion.play(true);
     page.refresh();

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import secrets
 import threading
+from collections.abc import Sequence
 from functools import partial
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -18,13 +19,16 @@ from types import TracebackType
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
+import numpy as np
+
 import kinfmu
+from kinfmu.draw import animate, dxf
 from kinfmu.errors import KinfmuError
 from kinfmu.files import temporary_folder
-from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism import Mechanism, gallery
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.page.editor import StaleState, answer, view
-from kinfmu.page.html import page
+from kinfmu.page.html import gallery_page, page
 from kinfmu.page.player.source import PlaySource
 
 ADDRESS = "127.0.0.1"
@@ -32,6 +36,7 @@ LARGEST_BODY = 4_000_000  # [bytes] of a mechanism file, or of operations on one
 HEARTBEAT = 10.0  # [s]; a closed page is noticed when this line cannot be sent
 SILENCE = 30.0  # [s] that a request may take to arrive
 MOST_COPIES = 1000
+_FRAMES = 201  # of an animation, and poses on the way to one that is drawn
 
 _SECURITY = {
     "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval'; "
@@ -129,6 +134,31 @@ class PlayServer:
         with self._building, temporary_folder() as folder:
             return kinfmu.build(mechanism, folder, fmi=fmi).read_bytes()
 
+    def export(self, mechanism: Mechanism, suffix: str, values: Sequence[float] = ()) -> bytes:
+        """Return what `kinfmu export` writes of a mechanism; one file is made at a time.
+
+        Args:
+            mechanism: The mechanism.
+            suffix: ".gif": its run; ".dxf": a pose.
+            values: Driver values of that pose.
+
+        Raises:
+            KinfmuError: It cannot be written, or the pose is unreachable.
+
+        """
+        with self._building, temporary_folder() as folder:
+            path = folder / f"{mechanism.name}{suffix}"
+            if suffix == ".gif":
+                animate(kinfmu.solve(mechanism, np.linspace(mechanism.run.start, mechanism.run.stop, _FRAMES)), path)
+            else:
+                starts = [float(driver.law.at(mechanism.run.start)) for driver in mechanism.drivers]
+                inputs = [str(driver.inputs()[0]) for driver in mechanism.drivers]
+                path_of = [np.linspace(start, value, _FRAMES) for start, value in zip(starts, values, strict=True)]
+                given: dict[str, Any] = dict(zip(inputs, path_of, strict=True))
+                run = kinfmu.solve(mechanism, **given)
+                dxf(run.part(np.arange(len(run)) == len(run) - 1), path)
+            return path.read_bytes()
+
     def drawing(self) -> tuple[int, dict[str, Any]]:
         """Return the number of the current state of the drawing, and the answer to a page.
 
@@ -196,13 +226,19 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Answer with the page, the changes of its file, or its drawing."""
-        self._answer({"": self._page, "changes": self._changes, "editor": self._editor, "editor/view": self._view})
+        members = {f"gallery/{name}": partial(self._member, name) for name in gallery.names()}
+        answers: dict[str, object] = {"": self._page, "changes": self._changes, "editor": self._editor}
+        self._answer(answers | {"editor/view": self._view, "gallery": self._gallery} | members)
 
     def do_POST(self) -> None:
         """Answer with an FMU, a page, the name of a file that was saved, or the drawing after a change."""
         changes = {f"editor/{name}": partial(self._edit, name) for name in ("operations", "undo", "redo", "save")}
         answers: dict[str, object] = {"fmu2": partial(self._fmu, 2), "fmu3": partial(self._fmu, 3), "file": self._file}
-        answers["page"] = self._page_of_file
+        answers |= {
+            "page": self._page_of_file,
+            "gif": partial(self._export, ".gif"),
+            "dxf": partial(self._export, ".dxf"),
+        }
         self._answer(answers | changes)
 
     def log_message(self, format: str, *args: object) -> None:  # noqa: A002  the name that http.server has
@@ -254,6 +290,13 @@ class _Handler(BaseHTTPRequestHandler):
     def _page(self) -> None:
         self._send(HTTPStatus.OK, "text/html", self.server.play.source.page().encode())
 
+    def _gallery(self) -> None:
+        self._send(HTTPStatus.OK, "text/html", gallery_page().encode())
+
+    def _member(self, name: str) -> None:
+        script = 'started.then((page) => page.linkGallery("../gallery"));'
+        self._send(HTTPStatus.OK, "text/html", page(gallery.load(name), script=script).encode())
+
     def _changes(self) -> None:
         """Send the state now and after every change, as server-sent events."""
         source = self.server.play.source
@@ -274,6 +317,16 @@ class _Handler(BaseHTTPRequestHandler):
         mechanism, _ = self._mechanism()
         self._send(HTTPStatus.OK, "application/zip", self.server.play.build_fmu(mechanism, fmi))
 
+    def _export(self, suffix: str) -> None:
+        mechanism, _ = self._mechanism()
+        try:
+            values = [float(value) for value in parse_qs(urlsplit(self.path).query).get("values", [])]
+        except ValueError:
+            values = []
+        if suffix == ".dxf" and not (len(values) == len(mechanism.drivers) and np.isfinite(values).all()):
+            raise Refusal(HTTPStatus.BAD_REQUEST, "values= is required: a number for each driver")
+        self._send(HTTPStatus.OK, "application/octet-stream", self.server.play.export(mechanism, suffix, values))
+
     def _page_of_file(self) -> None:
         mechanism, _ = self._mechanism()
         self._send(HTTPStatus.OK, "text/html", page(mechanism).encode())
@@ -289,8 +342,8 @@ class _Handler(BaseHTTPRequestHandler):
         (asked,) = parse_qs(urlsplit(self.path).query).get("state", [""])[:1]
         try:
             self._send(HTTPStatus.OK, "application/json", self.server.play.view(asked))
-        except StaleState as problem:
-            raise Refusal(HTTPStatus.CONFLICT, str(problem)) from None
+        except StaleState:
+            self._send(HTTPStatus.NO_CONTENT, "text/plain", b"")  # its page knows the newer state soon
 
     def _edit(self, what: str) -> None:
         """Change the drawing; a change of another state than the current one is answered with the current one."""

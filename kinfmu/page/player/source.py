@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -116,7 +117,7 @@ class PlaySource:
     def page(self) -> str:
         """Return the page of the last valid content of the file; it knows its version."""
         with self._news:
-            return self._page.replace("{{served version}}", str(self._state.version))
+            return self._page.replace("<html", f'<html data-version="{self._state.version}"', 1)
 
     @property
     def is_closed(self) -> bool:
@@ -128,6 +129,9 @@ class PlaySource:
         with self._news:
             self._closed.set()
             self._news.notify_all()
+        if self._session is not None:
+            with suppress(KinfmuError):
+                self._session.close()
 
     def wait(self, seen: int, seconds: float) -> State | None:
         """Return the state when it is another than change number `seen`; None if none came in time."""

@@ -78,6 +78,7 @@ function connect(model, page) {
     };
     const changes = { "change:values": takeValues, "change:drivers": takeDrivers };
     for (const [name, take] of Object.entries(changes)) model.on(name, take);
+    page.motion.play(false); // what a page shows when it opens
     takeValues();
     takeDrivers();
     reportSoon();

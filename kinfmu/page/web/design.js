@@ -19,6 +19,11 @@ export class Design {
         return this.failure === "";
     }
 
+    // Lock values, of these names, that this mechanism has.
+    lock(names) {
+        for (const name of names) if (this.byName.has(name)) this.locked.add(name);
+    }
+
     // Set values of some parameters; they are one step to undo after `commit`.
     set(changes) {
         for (const [name, value] of Object.entries(changes)) this.values.set(name, value);

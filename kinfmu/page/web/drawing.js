@@ -11,11 +11,14 @@ import { BUTTONS } from "./view.js";
 // Draw a pose; show: what is switched on; view: from the plane to pixels; spots: of names in the frames before. Returns the
 // handles { driver, body, at } of drivers, whether names have no place, and the lines { table, name, ends } of symbols.
 export function draw(pen, linkage, view, theme, show, extra, spots) {
+    const { pose } = linkage;
+    linkage.pose = extra.pose ?? pose; // of values that do not close
     const painter = painted(pen, linkage, view, theme, show, extra, spots);
     if (show.names) {
         painter.names.draw();
         if (extra.pointer) painter.names.drawAt(extra.pointer.at, extra.pointer.reach);
     }
+    linkage.pose = pose;
     return { handles: painter.handles, hasHidden: painter.names.hidden.length > 0, symbols: painter.symbols };
 }
 

@@ -13,6 +13,8 @@ import { Session } from "./editor_session.js";
 import { Sketch } from "./editor_sketch.js";
 
 const PATIENT = 400; // [ms] before the badge states that an answer takes longer
+const IDLE = 800; // [ms] without a step, before changes of a drawing that is not complete are tried
+const ELSEWHERE = 0.3; // of the size; a drawing whose edges move by more is another one
 const PICTURES = ["image/png", "image/jpeg"];
 
 export class Editor {
@@ -79,8 +81,8 @@ export class Editor {
     }
 
     async open() {
-        const { message } = await this.session.load();
-        if (message) this.tell(message);
+        const answer = await this.session.load();
+        if (answer.message) this.#answered(answer);
     }
 
     // Draw what another window or program has made: the number of the drawing's state; isFile: its file was read again.
@@ -174,14 +176,20 @@ export class Editor {
 
     undo(isRedo) {
         if (this.machine) this.machine.picks = [];
-        this.session.next(async () => this.#answered(await this.session.step(isRedo ? "redo" : "undo")));
+        this.session.next(async () => {
+            const before = this.sketch.box();
+            const isMade = this.#answered(await this.session.step(isRedo ? "redo" : "undo"));
+            const [x0, y0, x1, y1] = this.sketch.box();
+            const apart = Math.max(...[x0, y0, x1, y1].map((x, k) => Math.abs(x - before[k])));
+            if (isMade && apart > ELSEWHERE * Math.hypot(x1 - x0, y1 - y0)) this.page.fit(); // of an import
+        });
     }
 
     save(more = {}) {
         this.session.next(async () => {
-            const { status, message } = await this.session.step("save", more);
-            if (status === 409 && this.session.answer.isFileChanged) this.#tellOfFile(message);
-            else this.tell(message);
+            const answer = await this.session.step("save", more);
+            if (answer.status === 409 && this.session.answer.isFileChanged) this.#tellOfFile(answer.message);
+            else this.#answered(answer);
         });
     }
 
@@ -190,7 +198,8 @@ export class Editor {
     }
 
     #answered({ status, message }) {
-        this.tell(status === 409 ? `${message} The last step was not made; what is shown is the newer state.` : message);
+        if (!status) this.page.whenEnded();
+        else this.tell(status === 409 ? `${message} The last step was not made; what is shown is the newer state.` : message);
         return !message;
     }
 
@@ -226,7 +235,7 @@ export class Editor {
         $("name").textContent = breakable(answer.name);
         document.title = answer.name;
         const { badge } = answer;
-        $("badge").textContent = badge.text + (answer.isViewComing && !this.isPlayable ? "\u2026" : "");
+        $("badge").textContent = badge.text + (badge.isComplete && answer.isViewComing && !this.isPlayable ? "\u2026" : "");
         $("badge").title = `Mobility ${badge.mobility ?? "unknown"}, drivers ${badge.drivers}`;
         $("badge").hidden = false;
         $("badge").classList.toggle("complete", badge.isComplete);
@@ -238,7 +247,10 @@ export class Editor {
         this.#changed();
         if (isFirst) page.fit();
         const isKnown = isFirst && page.linkage && answer.isSaved;
-        if (answer.isViewComing && isOther && !isKnown) this.#view(wasPlayable);
+        clearTimeout(this.advising);
+        if (!answer.isViewComing || !isOther || isKnown) return;
+        if (badge.isComplete) this.#view(wasPlayable);
+        else this.advising = setTimeout(() => this.#view(wasPlayable), IDLE);
     }
 
     // Show the mechanism that moves, as soon as the server has it.

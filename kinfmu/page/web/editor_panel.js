@@ -13,7 +13,9 @@ export class DrawPanel {
         this.editor = editor;
         this.root = root;
         this.parts = Object.fromEntries(["findings", "selected", "mechanism", "picture", "file"].map((name) => [name, element("section", { className: name })]));
-        root.append(...Object.values(this.parts));
+        const { findings, selected, ...more } = this.parts;
+        const isOpen = window.matchMedia("(min-width: 821px)").matches;
+        root.append(findings, selected, element("details", { open: isOpen }, element("summary", { textContent: "Mechanism, picture, file" }), ...Object.values(more)));
         this.#picture();
     }
 

@@ -27,16 +27,19 @@ const KEYS = [
     ["<kbd>Alt</kbd>, <kbd>Shift</kbd> with a click", "nothing snaps; links snap to steps of 15\u00b0"],
     ["<kbd>Esc</kbd>", "leaves a link half-way, then the tool"],
     ["<kbd>Space</kbd>, <kbd>V</kbd>", "play the mechanism; draw again"],
-    ["<kbd>Del</kbd>, <kbd>Ctrl</kbd>+<kbd>S</kbd>, <kbd>Home</kbd>", "delete what is selected, save, fit to view"],
+    ["<kbd>Del</kbd>, <kbd>Ctrl</kbd>+<kbd>S</kbd>", "delete what is selected; save"],
+    ["<kbd>Ctrl</kbd>+<kbd>Z</kbd>, <kbd>Ctrl</kbd>+<kbd>Y</kbd>", "undo, redo"],
+    ["<kbd>+</kbd> <kbd>-</kbd>, <kbd>Home</kbd>", "zoom, as the wheel or two fingers; fit to view"],
     ["Middle button, or two fingers", "move the view"],
 ];
+const OF_PAGE = ["<kbd>V</kbd>", "draws: changes the mechanism itself"];
 
 // Add the parts; what they do is the editor's.
 export function buildEditor(editor) {
     const { page } = editor;
     document.head.append(element("style", { textContent: EDITOR_STYLE }));
     const header = document.querySelector("header");
-    const tools = element("div", { id: "draw-tools", role: "toolbar", "aria-label": "Drawing tools", hidden: true });
+    const tools = element("nav", { id: "draw-tools", "aria-label": "Drawing tools", hidden: true });
     for (const { id, key, label, hints } of TOOLS) {
         const button = element("button", { title: `${hints[0]} (${key.toUpperCase()})`, "aria-pressed": "false" });
         button.dataset.tool = id;
@@ -55,12 +58,13 @@ export function buildEditor(editor) {
     button.innerHTML = `${PEN}<span>Draw</span>`;
     button.addEventListener("click", () => (editor.machine && editor.isPlayable ? editor.leave() : editor.choose(editor.sketch && !editor.sketch.data.points.length ? "link" : "move")));
     $("edit").before(button, element("span", { id: "badge", role: "status", hidden: true }));
-    $("stage").append(element("div", { id: "draw-banner", role: "alert", hidden: true }), element("div", { id: "draw-bar", hidden: true }));
+    $("stage").append(element("div", { id: "draw-banner", role: "alert", hidden: true }));
+    $("stage").after(element("div", { id: "draw-bar", hidden: true }));
     const panel = element("div", { id: "draw-panel", hidden: true });
     document.querySelector("aside").append(panel);
     Object.assign($("keys-title"), { tabIndex: -1, autofocus: true }); // the dialog begins at its top
-    for (const [head, text] of KEYS) {
-        const row = element("tr");
+    for (const [head, text] of [OF_PAGE, ...KEYS]) {
+        const row = element("tr", { className: head === OF_PAGE[0] ? "" : "of-drawing" });
         row.innerHTML = `<td>${head}</td><td>${text}</td>`;
         document.querySelector("#keys table").append(row);
     }

@@ -1,7 +1,5 @@
 // What the editor asks of the server: operations on the mechanism file, and the answers that are drawn.
 
-const ENDED = "kinfmu play has ended. What was drawn until then is kept; start it again to go on.";
-
 export class Session {
     // take: is called with each answer
     constructor(take) {
@@ -32,7 +30,7 @@ export class Session {
     async view() {
         const { state } = this;
         const { status, text } = await fetched(`editor/view?state=${state}`);
-        if (this.state !== state || status === 409) return null;
+        if (this.state !== state || status === 204) return null;
         return status === 200 ? JSON.parse(text) : { view: null, message: text };
     }
 
@@ -58,6 +56,6 @@ async function fetched(path, body = null) {
         const answer = await fetch(path, body ? { method: "POST", body: JSON.stringify(body) } : {});
         return { status: answer.status, text: await answer.text() };
     } catch {
-        return { status: 0, text: ENDED };
+        return { status: 0, text: "kinfmu play has ended" };
     }
 }

@@ -16,6 +16,11 @@ export function element(tag, properties = {}, ...children) {
     return made;
 }
 
+// Give an element a label, unless it has it: screen readers speak each change.
+export function describe(one, label) {
+    if (one.ariaLabel !== label) one.ariaLabel = label;
+}
+
 // Return how a unit is shown and edited: angles in degrees.
 export function shownUnit(unit) {
     return unit.startsWith("rad") ? { unit: unit.replace("rad", "deg"), factor: DEGREE } : { unit, factor: 1 };

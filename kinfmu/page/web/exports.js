@@ -42,7 +42,7 @@ export function table(linkage, over) {
     const { x, columns } = sampled(linkage, over, all, over === "time" && samples ? samples.t.length - 1 : undefined);
     const isAngle = over === "driver" && linkage.data.drivers[0].kind === "angle";
     const unit = over === "time" ? "s" : isAngle ? "deg" : linkage.data.unit;
-    const head = [over === "time" ? (linkage.hasTime ? `time [${unit}]` : "sample") : `${linkage.data.drivers[0].inputs[0]} [${unit}]`, ...all.map((one) => `${one.label} [${one.unit}]`)];
+    const head = [over === "time" ? (linkage.hasTime ? `time [${unit}]` : "sample") : `${linkage.data.drivers[0].inputs[0]} [${unit}]`, ...all.map((one) => `${one.id} [${one.unit}]`)];
     const lines = [head.map((text) => (text.includes(",") ? `"${text}"` : text)).join(",")];
     x.forEach((at, k) => {
         const first = isAngle ? (at * 180) / Math.PI : at;

@@ -179,6 +179,9 @@ export class Hand {
 
 export function keyboard(page) {
     const isField = (target) => target.closest?.("input, select, textarea, dialog[open], [role=tab]") || target.tagName === "CANVAS" && target !== page.canvas;
+    document.addEventListener("click", (event) => {
+        if (event.detail) event.target.closest("button")?.blur(); // a click by hand; the keys then are those of the page
+    }, true); // before a dialog opens, which gives the focus back
     document.addEventListener("keydown", (event) => {
         const key = event.key.toLowerCase();
         if ((event.ctrlKey || event.metaKey) && (key === "z" || key === "y")) {
@@ -186,7 +189,8 @@ export function keyboard(page) {
             page.undo(key === "y" || event.shiftKey);
             return;
         }
-        if (isField(event.target) || event.ctrlKey || event.metaKey || event.altKey) return;
+        const isSlider = event.target.type === "range";
+        if ((isField(event.target) && !(isSlider && key === " ")) || event.ctrlKey || event.metaKey || event.altKey) return;
         const { linkage } = page;
         if (!linkage) return;
         const k = page.driver;
@@ -215,7 +219,7 @@ export function keyboard(page) {
             f: () => page.fit(), e: () => page.toggleMode(), "?": () => $("keys").showModal(),
             w: () => pan(0, 40), s: () => pan(0, -40), a: () => pan(40, 0), d: () => pan(-40, 0),
         };
-        if (event.target === page.canvas || event.target === document.body) acts[" "] = () => page.motion.play();
+        if (event.target === page.canvas || event.target === document.body || isSlider) acts[" "] = () => page.motion.play();
         const act = acts[key] && ((key.startsWith("arrow") || key === "home") && event.target !== page.canvas && event.target !== document.body ? null : acts[key]);
         if (!act) return;
         event.preventDefault();

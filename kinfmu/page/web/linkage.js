@@ -3,7 +3,7 @@
 import { changePointsOf, comesTo, partingOf, rangesOf } from "./ranges.js";
 import { compiled, Engine, isGood } from "./engine.js";
 import { CAMS, axlesOf, formsOf } from "./forms.js";
-import { TURN, placed } from "./geometry.js";
+import { distance, TURN, placed } from "./geometry.js";
 import { dialOf } from "./marks.js";
 import { grouped } from "./numbers.js";
 
@@ -13,6 +13,8 @@ const TOUR = 24; // steps of a tour of the motion
 const FORCES = 90; // poses of a run that decide the scale of forces
 const USUAL = 0.99; // part of the forces that are not outliers
 const LAW = 400; // times at which the laws are tabled
+const TO_CLOSING = 16; // of the way to values that do not close
+const OPEN = 1e-6; // of the size; a larger gap of a pin is drawn
 export const PER_TURN = 360; // samples of plots and tables over a driver, as for the measures of kinfmu check
 
 // Return driver values, speeds and accelerations between the samples of a record.
@@ -27,6 +29,11 @@ function between({ t, columns }, at) {
     const value = (all) => (typeof all === "number" ? all : part === 1 ? all[high] : all[low] + part * (all[high] - all[low]));
     const [u, ud, udd] = [0, 1, 2].map((order) => Float64Array.from(columns, (one) => value(one[order])));
     return { u, ud, udd };
+}
+
+// Return the number of each coordinate of a module.
+function indexOf({ outputs, fixed }) {
+    return new Map([...outputs.map((output) => output.name), ...fixed].map((name, k) => [name, k]));
 }
 
 // Return the mechanism of the data of a page, with its engines.
@@ -72,10 +79,14 @@ export class Linkage {
         this.which = which;
         [this.shown, this.probe] = this.engines[which];
         this.part = this.data.modules[which];
-        this.index = new Map([...this.part.outputs.map((output) => output.name), ...this.part.fixed].map((name, k) => [name, k]));
+        this.index = indexOf(this.part);
         this.count = this.part.outputs.length; // the coordinates after these never move
-        this.triples = this.bodies.map((body) => ["x", "y", "phi"].map((axis) => this.index.get(`${body}.${axis}`) ?? -1));
+        this.triples = this.#triplesOf(this.index);
         this.locals = Float64Array.from(this.shown.points());
+    }
+
+    #triplesOf(index) {
+        return this.bodies.map((body) => ["x", "y", "phi"].map((axis) => index.get(`${body}.${axis}`) ?? -1));
     }
 
     // ---- pose
@@ -318,6 +329,30 @@ export class Linkage {
         const [, rows, gap] = message.match(/: rows (.*) leave a gap of (.*)$/) || []; // of the pose from which all are followed
         if (rows) return `at the pose as written, rows ${rows} do not close: gap ${gap}`;
         return message.includes("beyond a singular point") ? `${here.text}, beyond a singular point` : `${message}; ${here.text}`;
+    }
+
+    // Return for values (a Map) that do not close { values, pose, gaps }: the last values on the way to them that close, and
+    // with them the pose of all bodies with the points as set; gaps: pairs of places of one pin. Null if that is unknown.
+    closing(values) {
+        const which = this.#whichFor(values);
+        const [, probe] = this.engines[which];
+        const at = (part) => new Map([...this.bound].map(([name, from]) => [name, from + part * (values.get(name) - from)]));
+        const isReached = (part) => probe.bind(this.#vector(which, at(part))).ok && isGood(probe.at(this.u, this.rates.ud, this.rates.udd));
+        const before = isReached(0) && Float64Array.from(probe.points());
+        let [low, high] = [0, 1];
+        for (let k = 0; before && k < TO_CLOSING; k++) {
+            const middle = 0.5 * (low + high);
+            if (isReached(middle)) low = middle;
+            else high = middle;
+        }
+        const isKnown = low > 0 && isReached(low);
+        const locals = isKnown && probe.points().map((x, k) => x + ((x - before[k]) * (1 - low)) / low);
+        const pose = isKnown && { ...this.pose, q: this.poseOf(probe).q, locals, triples: this.#triplesOf(indexOf(this.data.modules[which])) };
+        probe.bind(this.#vector(which, this.bound));
+        if (!isKnown) return null;
+        const pins = this.data.joints.filter(({ type, points }) => type === "revolute" && points);
+        const gaps = pins.map(({ points }) => points.map((point) => this.point(point, pose))).filter(([a, b]) => distance(a, b) > OPEN * this.data.size);
+        return gaps.length ? { values: at(low), pose, gaps } : null;
     }
 
     // ---- curves and ranges, by the engine that is not shown

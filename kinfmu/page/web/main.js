@@ -4,12 +4,12 @@ import { Address, Design } from "./design.js";
 import { arrows } from "./marks.js";
 import { CanvasPen, THEMES } from "./pen.js";
 import { draw, fineness, foresee } from "./drawing.js";
-import { $, breakable, element } from "./elements.js";
+import { $, breakable, describe, element, shownUnit } from "./elements.js";
 import { unpacked } from "./engine.js";
 import { Frames, Motion } from "./motion.js";
 import { Hand, keyboard } from "./hand.js";
 import { linkageOf } from "./linkage.js";
-import { ofJoints, withStop } from "./numbers.js";
+import { number, ofJoints, withStop } from "./numbers.js";
 import { PATIENCE, Spots } from "./names.js";
 import { filesPanel, Plots, showPanel } from "./panels.js";
 import { Transport } from "./transport.js";
@@ -17,6 +17,7 @@ import { Values } from "./values.js";
 import { View } from "./view.js";
 
 const TRACE = 600; // points of a trace
+const RESTS = 150; // [ms] after the last change of a value
 
 class Page {
     // linkage: null without a mechanism that moves; solver: unpacked, for the mechanisms that `take` is given
@@ -25,11 +26,13 @@ class Page {
         this.view = new View();
         this.show = { names: true, curves: true, traces: false, velocity: false, acceleration: false, centres: false, limits: true, loads: true, forces: false, shaking: false, grid: true };
         this.handles = []; // of drivers, as drawn
+        this.open = null; // what is known of values that do not close, as Linkage.closing returns it
         this.hasHidden = false; // names without a place
         this.now = performance.now(); // [ms] of the frame
         this.mode = "move";
         this.editor = null; // in which the mechanism is drawn by hand, if the page is served for that
         this.whenTaken = () => {}; // what else is made anew for another mechanism
+        this.whenEnded = () => {}; // states that the server of the page does not answer
         this.canvas = $("drawing");
         this.context = this.canvas.getContext("2d");
         this.frames = new Frames((now, work) => this.frame(now, work));
@@ -37,6 +40,7 @@ class Page {
         this.#theme(storedTheme());
         this.#header();
         this.#tabs();
+        this.#folds();
         this.hand = new Hand(this);
         keyboard(this);
         if (linkage) this.take(linkage);
@@ -50,7 +54,9 @@ class Page {
         const isFirst = !this.linkage;
         if (this.isPlaying) this.motion.play(false);
         this.linkage = linkage;
+        const locked = this.design?.locked || [];
         this.design = new Design(linkage);
+        this.design.lock(locked);
         this.show.transmission ??= data.loops.length > 0 && data.loops.length < 4;
         this.drawn = data.interest.map(({ point, colour }) => ({ point, colour })); // points with curves
         this.curves = [];
@@ -104,6 +110,7 @@ class Page {
             this.traces.clear();
             this.plots.refresh();
         }
+        this.#findOpen();
         this.values.update();
         this.transport.setRanges();
         this.refresh();
@@ -135,7 +142,7 @@ class Page {
         const curves = this.drawn.map(({ colour }, k) => ({ line: this.curves[k] || [], colour }));
         if (this.show.traces) for (const [point, line] of this.traces) curves.push({ line, colour: this.drawn.find((one) => one.point === point)?.colour || [90, 90, 90], isTrace: true });
         const { found, legend } = arrows(this);
-        return { curves, arrows: found, legend, held: this.hand.place, pointer: this.hand.pointer, isGhost: !this.design.isOk };
+        return { curves, arrows: found, legend, held: this.hand.place, pointer: this.hand.pointer, isOnPins: this.mode === "move", gaps: this.open?.gaps || [], pose: this.open?.pose, isGhost: !this.design.isOk };
     }
 
     #trace() {
@@ -151,14 +158,15 @@ class Page {
     #readouts() {
         this.transport.update();
         const { design, linkage, motion } = this;
-        if (!this.isPlaying) this.canvas.setAttribute("aria-label", `Drawing of the mechanism at ${this.transport.pose()}. Arrow keys move the driver, space plays, question mark lists all keys.`);
+        if (!this.isPlaying) describe(this.canvas, `Drawing of the mechanism at ${this.transport.pose()}. Arrow keys move the driver, space plays, question mark lists all keys.`);
         const note = linkage.leftOut.length ? `Not drawn with these values: ${linkage.leftOut.join("; ")}. The lines of kinfmu check hold for the saved file.` : "";
         if ($("note").textContent !== note) [$("note").textContent, $("note").hidden] = [note, !note]; // screen readers speak it
         $("undo").disabled = !design.past.length && !this.editor?.canUndo(false);
         $("redo").disabled = !design.future.length && !this.editor?.canUndo(true);
         $("reset").disabled = !design.changes().length;
         const head = design.isInvalid ? "Not valid: " : design.isOtherBranch ? "Another branch: " : "Does not close: ";
-        if (!design.isOk) this.#banner(head, `${withStop(this.inWords(design.failure))} The last good pose is shown in grey.`);
+        const shown = this.open ? "In grey with these values, as far as it closes; the gap is red." : "The last good pose is shown in grey.";
+        if (!design.isOk) this.#banner(head, `${withStop(this.inWords(design.failure))} ${shown}`, this.#wayBack());
         else this.#banner("Stops here: ", motion.blocked && withStop(this.inWords(motion.blocked)));
     }
 
@@ -167,13 +175,46 @@ class Page {
         return ofJoints(failure, this.linkage.data.drivers.map((driver) => driver.name));
     }
 
-    #banner(head, text) {
+    // back: { label, changes } of a button that sets values
+    #banner(head, text, back = null) {
         const banner = $("banner");
-        const shown = text ? head + text : "";
+        const shown = text ? head + text + (back?.label || "") : "";
         if (banner.dataset.text === shown) return;
         banner.dataset.text = shown;
         banner.hidden = !shown;
         banner.replaceChildren(element("b", { textContent: head }), document.createTextNode(text));
+        if (!back) return;
+        const button = element("button", { textContent: back.label });
+        button.addEventListener("click", () => {
+            this.setValues(back.changes);
+            this.commit();
+        });
+        banner.append(button);
+    }
+
+    // Return the value of the panel that closes, next to one that does not: { label, changes }; null if that is unknown.
+    #wayBack() {
+        const { design, linkage, open } = this;
+        if (!open) return null;
+        const names = [...design.values.keys()].filter((name) => design.values.get(name) !== linkage.bound.get(name));
+        const [row] = this.values.rows.filter(({ one }) => names.every((name) => one.names.includes(name))).sort((a, b) => a.one.names.length - b.one.names.length);
+        if (!row) return null;
+        const [before, closing, tried] = [linkage.bound, open.values, design.values].map((values) => row.one.read(values) * row.factor);
+        const step = 10 ** Math.floor(Math.log10(Math.abs(tried - before)) - 1);
+        const towards = tried > before ? Math.floor : Math.ceil;
+        const rounded = Number((towards(closing / step) * step).toPrecision(9));
+        const value = (rounded - before) * (tried - before) > 0 ? rounded : closing;
+        return { label: `closes ${tried > before ? "up to" : "from"} ${number(value, 9)} ${shownUnit(row.one.unit).unit}`.trim(), changes: row.one.changes(value / row.factor, design.values) };
+    }
+
+    // Find how far values that do not close are from closing, when they rest.
+    #findOpen() {
+        this.open = null;
+        clearTimeout(this.opening);
+        if (this.design.isOk || this.design.isOtherBranch || this.design.isInvalid) return;
+        this.opening = setTimeout(() => {
+            if (!this.design.isOk) this.refresh(() => (this.open = this.linkage.closing(this.design.values)));
+        }, RESTS);
     }
 
     // ---- motion
@@ -196,11 +237,11 @@ class Page {
 
     // ---- design
 
-    setValue(name, value) {
+    setValues(changes) {
         this.refresh(() => {
-            this.design.set({ [name]: value });
+            this.design.set(changes);
             this.#taken();
-        }, `value ${name}`);
+        }, `value ${Object.keys(changes)}`);
     }
 
     // Make the values since the last commit one step to undo, after the work that waits.
@@ -232,7 +273,9 @@ class Page {
 
     // Take over values that did not close before, at a pose where they may.
     recover() {
-        if (!this.design.isOk && this.design.set({})) this.reshape();
+        if (this.design.isOk) return;
+        if (this.design.set({})) this.reshape();
+        else this.#findOpen();
     }
 
     // ---- parts of the page
@@ -269,6 +312,13 @@ class Page {
         $("edit").addEventListener("click", () => this.toggleMode());
     }
 
+    // Add a way to the gallery, where the page is served.
+    linkGallery(href) {
+        const link = element("a", { href, className: "button", title: "Mechanisms of the gallery", "aria-label": "Gallery" });
+        link.innerHTML = '<svg viewBox="0 0 20 20"><path d="M3.5 3.5h5v5h-5zM11.5 3.5h5v5h-5zM3.5 11.5h5v5h-5zM11.5 11.5h5v5h-5z"/></svg>';
+        $("theme").before(link);
+    }
+
     fit() {
         this.view.fit(this.editor?.box ?? this.linkage.box());
         this.isToForesee = true;
@@ -283,6 +333,8 @@ class Page {
     toggleMode() {
         this.mode = this.mode === "move" ? "lengths" : "move";
         $("edit").setAttribute("aria-pressed", String(this.mode === "lengths"));
+        document.body.classList.toggle("lengths", this.mode === "lengths"); // shows the locks
+        this.refresh();
         if (this.mode === "lengths") this.hint("Drag a pin. Lock values in the panel to keep them.");
         else this.hand.leavePin();
     }
@@ -303,13 +355,9 @@ class Page {
                 one.tabIndex = isChosen ? 0 : -1;
                 $(one.getAttribute("aria-controls")).hidden = !isChosen;
             }
-            if (tab.id === "tab-plots") this.plots?.draw();
         };
         tabs.forEach((tab, k) => {
-            tab.addEventListener("click", (event) => {
-                choose(tab);
-                if (event.detail) tab.blur(); // a click by hand; the keys then are those of the page
-            });
+            tab.addEventListener("click", () => choose(tab));
             tab.addEventListener("keydown", (event) => {
                 const way = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
                 if (!way) return;
@@ -318,6 +366,18 @@ class Page {
                 next.focus();
             });
         });
+    }
+
+    // Open or close the plots, or on a small page the panels, by their buttons.
+    #folds() {
+        const fold = (id, open) => $(id).addEventListener("click", () => {
+            const isOpen = $(id).getAttribute("aria-expanded") !== "true";
+            $(id).setAttribute("aria-expanded", String(isOpen));
+            open(isOpen);
+            this.refresh();
+        });
+        fold("tab-plots", (isOpen) => ($("plots").hidden = !isOpen));
+        fold("sheet", (isOpen) => document.body.classList.toggle("sheet", isOpen));
     }
 
     #resize() {
@@ -348,6 +408,7 @@ async function start() {
         const solver = await unpacked(data.solver);
         window.kinfmu = new Page(data.modules && (await linkageOf(data, solver)), solver);
         window.kinfmu.isEditable = data.isEditable;
+        if (data.modules && !location.hash && window.matchMedia("(prefers-reduced-motion: no-preference)").matches) window.kinfmu.motion.showOnce();
         return window.kinfmu;
     } catch (error) {
         $("banner").hidden = false;

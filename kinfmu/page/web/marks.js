@@ -6,12 +6,20 @@ import { centres, transmissions } from "./instants.js";
 import { degrees, number } from "./numbers.js";
 import { css } from "./pen.js";
 
-export function marks(painter, show, { arrows, legend }) {
-    if (show.limits) driverMarks(painter);
+export function marks(painter, show, { arrows, legend, isOnPins = true, gaps = [] }) {
+    if (show.limits) driverMarks(painter, isOnPins);
+    for (const ends of gaps) gapMark(painter, ends);
     if (show.transmission) transmissionMarks(painter);
     if (show.centres) centreMarks(painter);
     for (const one of arrows) arrow(painter, one);
     legend.forEach((one, k) => scale(painter, one, k));
+}
+
+// Draw the places of a pin that do not meet.
+function gapMark({ pen, theme, dot }, ends) {
+    const [a, b] = ends.map(dot);
+    pen.line([a, b], { width: 3, colour: theme.bad, dash: [7, 5] });
+    for (const p of [a, b]) pen.circle(...p, 7, { width: 2.5, colour: theme.bad });
 }
 
 // Draw a line of the legend: an arrow of a round force and its size.
@@ -100,16 +108,17 @@ export function dialOf(linkage, k) {
     const turn = linkage.bodyPose(body)[2] - linkage.u[k] + (tx || ty ? Math.atan2(ty, tx) : 0);
     const [low, high] = linkage.ranges[k];
     const on = (u, r) => [centre[0] + r * Math.cos(u + turn), centre[1] + r * Math.sin(u + turn)];
-    return { body, reach: Math.max(Math.hypot(tx, ty), ...outer), low, span: Math.min(high - low, TURN), on };
+    return { body, far: tx || ty ? far : null, reach: Math.max(Math.hypot(tx, ty), ...outer), low, span: Math.min(high - low, TURN), on };
 }
 
-// Mark the range of a turning driver, its limits and change points on its circle, with a handle at its value.
-function driverMarks(painter) {
+// Mark the range of a turning driver, its limits and change points on its circle, with a handle on the outer pin of its body;
+// without one, or where lengths are changed, at its value on the circle.
+function driverMarks(painter, isOnPins) {
     const { linkage, pen, theme, view } = painter;
     linkage.data.drivers.forEach((_, k) => {
         const dial = dialOf(linkage, k);
         if (!dial) return;
-        const { body, low, span } = dial;
+        const { body, far, low, span } = dial;
         const radius = Math.max(dial.reach * view.scale, 24) + 16;
         const on = (u, r) => painter.dot(dial.on(u, r / view.scale));
         pen.line(Array.from({ length: 73 }, (_, i) => on(low + (span * i) / 72, radius)), { width: 1.4, colour: theme.quiet, dash: [2, 4] });
@@ -120,9 +129,11 @@ function driverMarks(painter) {
         };
         for (const limit of linkage.limits) if (limit.driver === k) mark(limit.at, theme.bad, `limit ${degrees(limit.at, 1)}`);
         for (const point of linkage.changePoints) if (point.driver === k) mark(point.at, theme.accent, `change point ${degrees(point.at, 1)}`);
-        const p = on(linkage.u[k], radius);
-        pen.circle(...p, 7, { width: 2, colour: theme.paper, fill: theme.accent });
-        painter.names.boxes.add([p[0] - 8, p[1] - 8, p[0] + 8, p[1] + 8]);
+        const isOnPin = far !== null && isOnPins;
+        const p = isOnPin ? painter.dot(linkage.point(far)) : on(linkage.u[k], radius);
+        if (isOnPin) for (const style of [{ width: 6, colour: theme.paper }, { width: 3.4, colour: theme.accent }]) pen.circle(...p, 9, style);
+        else pen.circle(...p, 7, { width: 2, colour: theme.paper, fill: theme.accent });
+        painter.names.boxes.add([p[0] - 9, p[1] - 9, p[0] + 9, p[1] + 9]);
         painter.handles.push({ driver: k, body, at: p });
     });
 }

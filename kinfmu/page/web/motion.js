@@ -1,14 +1,20 @@
 // Motion over time, and the loop of frames in which it is drawn.
 
+const ONCE = 6; // [s] of the motion that a page shows when it opens
+const TOUCHES = ["pointerdown", "keydown", "wheel"];
+
 export class Motion {
     constructor(page) {
         this.page = page;
         this.linkage = page.linkage;
         this.isPlaying = false;
         this.blocked = ""; // why the last move stopped
+        this.hasStopped = false; // a play, where it cannot go on
+        this.oncePace = 0; // of the motion that is shown once
     }
 
     play(isPlaying = !this.isPlaying) {
+        this.oncePace = 0;
         this.isPlaying = isPlaying;
         this.page.transport.showPlaying(isPlaying);
         if (!isPlaying) {
@@ -18,6 +24,7 @@ export class Motion {
         const { linkage } = this;
         this.page.isToForesee = true;
         this.clock = null;
+        if (this.hasStopped) this.#restart();
         if (linkage.data.over) {
             this.page.refresh();
             return;
@@ -27,6 +34,37 @@ export class Motion {
         const law = linkage.driven(linkage.t).u;
         this.glide = linkage.u.map((value, k) => linkage.apart(k, value, law[k]));
         this.page.refresh();
+    }
+
+    // Move once through the motion, slowly, and back to its start; whatever the hand does ends it.
+    showOnce() {
+        if (this.page.linkage.data.over) return;
+        this.play(true);
+        const { from } = this.linkage.data.run;
+        this.oncePace = (this.#end(from) - from) / ONCE;
+        const end = ({ key, target }) => {
+            for (const kind of TOUCHES) window.removeEventListener(kind, end, true);
+            if (this.oncePace && key !== " " && !target.closest?.("#play")) this.play(false); // these stop it themselves
+        };
+        for (const kind of TOUCHES) window.addEventListener(kind, end, true);
+    }
+
+    #endOnce() {
+        this.#restart();
+        this.play(false);
+    }
+
+    #restart() {
+        const { over, run } = this.linkage.data;
+        if (over) this.move(over.driver, over.from);
+        else this.arrive(this.linkage.goToTime(run.from));
+    }
+
+    // Stop a play that cannot go on.
+    #stop() {
+        if (!this.blocked) return;
+        this.hasStopped = true;
+        this.play(false);
     }
 
     // Go on in time to the frame that the browser shows now.
@@ -39,8 +77,12 @@ export class Motion {
             this.#advanceDriver(elapsed * this.page.transport.speed);
             return;
         }
-        let t = linkage.t + elapsed * this.page.transport.pace;
+        let t = linkage.t + elapsed * (this.oncePace || this.page.transport.pace);
         if (t > this.#end(linkage.t)) {
+            if (this.oncePace) {
+                this.#endOnce();
+                return;
+            }
             t = from + ((t - from) % (to - from));
             if (!this.#repeats()) this.glide = null;
         }
@@ -49,7 +91,8 @@ export class Motion {
             if (this.glide.every((gap) => Math.abs(gap) < 1e-9)) this.glide = null;
         }
         this.arrive(linkage.goToTime(t, this.glide));
-        if (this.blocked) this.play(false);
+        if (this.blocked && this.oncePace) this.#endOnce();
+        else this.#stop();
     }
 
     // Go on along the values of the driver, all of them in the time of the run; after the last one it starts again.
@@ -58,13 +101,16 @@ export class Motion {
         const { run } = this.linkage.data;
         const part = (this.linkage.u[driver] - from) / (to - from) + elapsed / (run.to - run.from);
         this.move(driver, from + (to - from) * (part > 1 ? 0 : Math.max(part, 0)));
-        if (this.blocked) this.play(false);
+        this.#stop();
     }
 
     // Note whether a pose was reached; values that did not close before may close there.
     arrive(isReached) {
         this.blocked = isReached ? "" : this.linkage.failure;
-        if (isReached) this.page.recover();
+        if (isReached) {
+            this.hasStopped = false;
+            this.page.recover();
+        }
         return isReached;
     }
 

@@ -14,7 +14,7 @@ export class Plots {
         this.all = quantities(page.linkage);
         this.byId = new Map(this.all.map((one) => [one.id, one]));
         this.over = page.linkage.data.drivers.length === 1 ? "driver" : "time";
-        this.list = element("div");
+        this.list = element("div", { className: "plots" });
         this.plots = [];
         const choice = element("select", { "aria-label": "Horizontal axis" });
         if (!page.linkage.data.over) choice.append(element("option", { value: "time", textContent: page.linkage.hasTime ? "time" : "sample" }));
@@ -134,7 +134,7 @@ export function filesPanel(page, root) {
     add("Drawing as shown (SVG)", "save-svg", () => download(`${name}.svg`, drawing(linkage, page.view, page.show, page.extra()), "image/svg+xml"));
     root.append(element("h2", { textContent: "Save" }), buttons);
     const { command } = buildCommand(linkage, design);
-    const code = element("code", { textContent: command });
+    const code = element("code", { textContent: command, tabIndex: 0 });
     root.append(
         element("h2", { textContent: "Build the FMU" }),
         element("p", { className: "quiet", textContent: "Save the mechanism file, then type in its folder:" }),

@@ -1,5 +1,6 @@
 // Plots of quantities over time or the driver, with one cursor for all.
 
+import { describe } from "./elements.js";
 import { transmissions } from "./instants.js";
 import { PER_TURN } from "./linkage.js";
 import { degrees, niceStep, number } from "./numbers.js";
@@ -8,18 +9,13 @@ import { FONT } from "./pen.js";
 const OUTSIDE = 0.01; // part of the values on either side that may be outside the plot
 const MARGIN = { left: 58, right: 10, top: 10, bottom: 24 };
 
-// Return all quantities that can be plotted: { id, label, unit, read(linkage, pose) }.
+const DEGREES = 180 / Math.PI;
+
+// Return all quantities that can be plotted: { id, label, group, unit, read(linkage, pose) }: of points of interest, angles of
+// bodies, those of joints, transmission angles, forces; the frames of bodies, which are often at no place of interest, last.
 export function quantities(linkage) {
-    const found = [];
-    const outputs = [...linkage.part.outputs].sort((a, b) => rank(linkage, a) - rank(linkage, b));
-    for (const output of outputs) {
-        output.names.forEach((label, order) => {
-            const unit = output.units[order];
-            const scale = unit.startsWith("rad") ? 180 / Math.PI : 1;
-            const read = (one, pose) => [pose.q, pose.qd, pose.qdd][order][one.index.get(output.name)] * scale;
-            found.push({ id: label, label, group: output.owner, unit: unit.replace(/^rad/, "deg"), read });
-        });
-    }
+    const found = ofOutputs(linkage, (output) => rank(linkage, output) < 2);
+    found.push(...quantitiesOfJoints(linkage));
     linkage.data.loops.forEach((loop, k) => {
         const label = `transmission angle ${loop.coupler}-${loop.output}`;
         const read = (one, pose) => (transmissions(one, pose)[k].angle * 180) / Math.PI;
@@ -31,11 +27,60 @@ export function quantities(linkage) {
     linkage.part.reactions.forEach(({ name, unit }) => {
         found.push({ id: name, label: name, group: "reactions", unit, read: (_, pose) => pose.reactions().get(name) });
     });
-    return found;
+    return [...found, ...ofOutputs(linkage, (output) => rank(linkage, output) === 2)];
 }
 
+// Return 0 for a coordinate of a point of interest, 1 for the angle of a body, 2 for a coordinate of its frame.
 function rank(linkage, output) {
-    return linkage.data.interest.some((one) => one.name === output.owner) ? 0 : 1;
+    if (linkage.data.interest.some((one) => one.name === output.owner)) return 0;
+    return output.units[0] === "rad" ? 1 : 2;
+}
+
+function ofOutputs(linkage, isWanted) {
+    const outputs = linkage.part.outputs.filter(isWanted).sort((a, b) => rank(linkage, a) - rank(linkage, b));
+    return outputs.flatMap((output) => output.names.map((label, order) => {
+        const unit = output.units[order];
+        const scale = unit.startsWith("rad") ? DEGREES : 1;
+        const read = (one, pose) => [pose.q, pose.qd, pose.qdd][order][one.index.get(output.name)] * scale;
+        return { id: label, label, group: rank(linkage, output) === 2 ? `frame of ${output.owner}` : output.owner, unit: unit.replace(/^rad/, "deg"), read };
+    }));
+}
+
+// Return quantities of joints: of a pin its place, speed and acceleration, and the angle between two links that move; of a
+// slide its travel and speed.
+function quantitiesOfJoints(linkage) {
+    const { unit, joints } = linkage.data;
+    const seen = new Set();
+    return joints.flatMap(({ name, type, points, axis }) => {
+        if (points?.length !== 2) return [];
+        const bodies = points.map((point) => linkage.bodyOf[point]);
+        const isMoving = bodies.map((body) => linkage.triples[body][0] >= 0);
+        const quantity = (label, of, read) => ({ id: `joint ${name}.${label}`, label: `${name}.${label}`, group: `joint ${name}`, unit: of, read });
+        const found = [];
+        const between = (one, pose) => (one.bodyPose(bodies[1], pose)[2] - one.bodyPose(bodies[0], pose)[2]) * DEGREES;
+        if (type === "revolute" && isMoving[0] && isMoving[1]) {
+            const [point] = points;
+            const motion = (one, pose) => one.motionOf(bodies[0], one.point(point, pose), pose);
+            const at = String(linkage.point(point).map((x) => number(x / linkage.data.size, 9)));
+            if (!seen.has(at)) {
+                found.push(quantity("x", unit, (one, pose) => one.point(point, pose)[0]), quantity("y", unit, (one, pose) => one.point(point, pose)[1]));
+                found.push(quantity("speed", `${unit}/s`, (one, pose) => Math.hypot(...motion(one, pose).v)), quantity("acceleration", `${unit}/s2`, (one, pose) => Math.hypot(...motion(one, pose).a)));
+            }
+            seen.add(at);
+            found.push(quantity("angle", "deg", between));
+        }
+        if (axis !== undefined && type !== "fixed") {
+            const along = (one, pose, [x, y]) => {
+                const turn = (one.bound.get(`joints.${name}.axis`) ?? axis) + one.bodyPose(bodies[0], pose)[2];
+                return x * Math.cos(turn) + y * Math.sin(turn);
+            };
+            const apart = ([x, y], [x0, y0]) => [x - x0, y - y0];
+            const ends = (one, pose) => points.map((point) => one.point(point, pose));
+            found.push(quantity("travel", unit, (one, pose) => along(one, pose, apart(...ends(one, pose).reverse()))));
+            found.push(quantity("speed", `${unit}/s`, (one, pose) => along(one, pose, apart(...[1, 0].map((k) => one.motionOf(bodies[k], ends(one, pose)[1], pose).v)))));
+        }
+        return found;
+    });
 }
 
 // Return the first quantities to plot. A point that slides has only one coordinate that moves, a point of the ground none.
@@ -189,7 +234,7 @@ export class Plot {
                 c.fill();
             }
         }
-        if (!isPlaying) canvas.setAttribute("aria-label", `${label}: ${number(now)} ${unit}`);
+        if (!isPlaying) describe(canvas, `${label}: ${number(now)} ${unit}`);
     }
 }
 

@@ -21,6 +21,7 @@ export class Transport {
         const speeds = [...slower, ...SPEEDS];
         speeds.forEach((value) => speed.append(element("option", { value, textContent: `${value}\u00d7` })));
         speed.value = speeds.reduce((best, value) => (Math.abs(Math.log(value / wanted)) < Math.abs(Math.log(best / wanted)) ? value : best));
+        document.body.classList.toggle("single", drivers.length === 1);
         $("play").onclick = () => page.motion.play();
         const time = $("time");
         [time.min, time.max] = [run.from, run.to];
@@ -48,7 +49,7 @@ export class Transport {
                 page.address.writeSoon();
             });
             const label = element("label", { className: "wide" }, element("span", { className: "label", textContent: breakable(driver.name) }), slider);
-            $("drivers").append(element("div", { className: "row driver" }, label, field, element("span", { className: "unit", textContent: unit })));
+            $("drivers").append(element("div", { className: "row driver" }, label, field, element("span", { className: `unit${unit === "deg" ? " angle" : ""}`, textContent: unit })));
             return { slider, field, factor };
         });
     }

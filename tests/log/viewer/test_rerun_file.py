@@ -85,7 +85,7 @@ def test_curves_hold_the_numbers_of_the_run_at_its_times(run: Run, tmp_path: Pat
     angles = rows(tmp_path / "run.rrd", "/position/angle", SCALARS)
     assert [time for time, _ in angles] == [k * 10**9 for k in range(181)]
     phi = [run["crank.phi"][60], run["coupler.phi"][60], run["rocker.phi"][60]]
-    assert angles[60][1] == phi
+    np.testing.assert_allclose(angles[60][1], np.degrees(phi), rtol=1e-15)
     speeds = rows(tmp_path / "run.rrd", "/velocity/length", SCALARS)
     assert speeds[60][1] == [run[name][60] for name in ("coupler.vx", "coupler.vy", "A.vx", "A.vy")]
 
@@ -181,10 +181,10 @@ def test_a_run_without_samples_is_a_recording_too(run: Run, tmp_path: Path) -> N
 def test_differences_are_those_of_b_from_a(run: Run, tmp_path: Path) -> None:
     shifted = dataclasses.replace(run, values=run.values + 0.25)
     write_comparison(run, shifted, tmp_path / "compare.rrd")
-    for entity in ("/difference/position/angle", "/difference/position/length"):
+    for entity, apart in (("/difference/position/angle", np.degrees(0.25)), ("/difference/position/length", 0.25)):
         found = rows(tmp_path / "compare.rrd", entity, SCALARS)
         assert len(found) == len(run)
-        np.testing.assert_allclose([value for _, value in found], 0.25, rtol=1e-14)
+        np.testing.assert_allclose([value for _, value in found], apart, rtol=1e-14)
     assert verified(tmp_path / "compare.rrd")
 
 
@@ -192,7 +192,7 @@ def test_the_card_of_a_comparison_lists_what_differs_and_names_what_is_equal(run
     moved = run.values + 0.25 * (np.array(run.outputs) == "A.x")
     write_comparison(run, dataclasses.replace(run, values=moved), tmp_path / "compare.rrd")
     (text,) = documents(tmp_path / "compare.rrd", "/card")
-    assert "| A.x | 0.25 | 0 | 0 |" in text
+    assert "| A.x | 0.25 m | 0 | 0 |" in text
     assert "of the largest value: crank.phi, coupler.x, coupler.y, coupler.phi, rocker.phi, A.y." in text
     assert "coupler.x |" not in text
 

@@ -17,11 +17,11 @@ from kinfmu.cli import main
 from kinfmu.draw.scene import palette
 from kinfmu.draw.scene.scene import drawable
 from kinfmu.log import read, write_rrd
-from kinfmu.log.viewer.blueprint import Drawn, plot, single
+from kinfmu.log.viewer.blueprint import Drawn, free_corner, plot, single
 from kinfmu.log.viewer.card import parameters_apart
 from kinfmu.log.viewer.comparison import write_comparison
 from kinfmu.log.viewer.linkage import view_box
-from kinfmu.log.viewer.series import SMALLEST, accuracy, efforts, error_estimates, groups, margin, reactions
+from kinfmu.log.viewer.series import SMALLEST, Group, accuracy, efforts, error_estimates, groups, margin, reactions
 from kinfmu.log.viewer.timeline import timeline_of
 from kinfmu.run import Run
 from kinfmu.run.components import mechanism_info
@@ -33,9 +33,9 @@ from tests.run.test_forces import loaded
 def test_curves_are_grouped_by_unit(run: Run) -> None:
     found = groups(run)
     assert [group.title for group in found.values()] == [
-        "angle [rad]",
-        "angular velocity [rad/s]",
-        "angular acceleration [rad/s2]",
+        "angle [deg]",
+        "angular velocity [deg/s]",
+        "angular acceleration [deg/s2]",
         "position [m]",
         "velocity [m/s]",
         "acceleration [m/s2]",
@@ -56,7 +56,7 @@ def test_curves_have_the_colours_of_their_bodies(run: Run) -> None:
     assert found["position", "length"].colours[:2] == (blue, palette.lighter(blue))
 
 
-def test_every_one_of_many_curves_has_a_name_in_the_legend_and_a_colour_of_its_own() -> None:
+def test_every_one_of_many_curves_has_a_name_and_a_colour_of_its_own_and_no_legend_covers_them() -> None:
     run = kinfmu.solve(kinfmu.load("fourbar_chain:9"), [0.0, 1.0])
     for group in groups(run).values():
         assert len(group.names) > 14
@@ -66,7 +66,7 @@ def test_every_one_of_many_curves_has_a_name_in_the_legend_and_a_colour_of_its_o
             .properties["PlotLegend"]
             .visible.as_arrow_array()
         )
-        assert is_shown.as_py()
+        assert not is_shown.as_py()
 
 
 def test_a_single_curve_is_named_by_its_plot(run: Run) -> None:
@@ -74,6 +74,60 @@ def test_a_single_curve_is_named_by_its_plot(run: Run) -> None:
         plot("margin", [("", margin(run))], timeline_of([run]), [run]).properties["PlotLegend"].visible.as_arrow_array()
     )
     assert not is_shown.as_py()
+
+
+def test_what_is_constant_has_no_plot_and_is_listed_with_its_value(run: Run, tmp_path: Path) -> None:
+    found = groups(run)
+    assert [key for key, group in found.items() if group.is_constant] == [
+        ("velocity", "angle"),
+        ("acceleration", "angle"),
+    ]
+    assert found["position", "angle"].constants == {"coupler.phi": 0.0}
+    layout = single(timeline_of([run]), run, [], found, [], [])
+    assert [view.name for view in views(layout.root_container) if "[" in view.name] == [
+        "angle [deg]",
+        "position [m]",
+        "velocity [m/s]",
+        "acceleration [m/s2]",
+    ]
+    write_rrd(run, tmp_path / "run.rrd")
+    (text,) = documents(tmp_path / "run.rrd", "/card")
+    assert "| crank.omega | 1 deg/s |" in text
+    assert "| coupler.alpha | 0 deg/s2 |" in text
+    assert not any(group.is_constant for group in groups(fourbar(np.array([60.0]))).values())
+
+
+def test_equal_curves_are_drawn_over_wider_ones(run: Run, tmp_path: Path) -> None:
+    assert groups(run)["position", "angle"].widths() == [4.5, 1.5, 1.5]  # crank and rocker have equal angles
+    write_rrd(run, tmp_path / "run.rrd")
+    assert statics(tmp_path / "run.rrd", "/position/angle", "SeriesLines:widths") == [4.5, 1.5, 1.5]
+
+
+def test_the_tab_of_the_solver_is_in_front_if_a_sample_is_not_ok(run: Run) -> None:
+    for shown, front in ((run, "solver"), (fourbar(np.arange(10.0, 20.0)), "motion")):
+        layout = single(timeline_of([shown]), shown, [], groups(shown), [], [accuracy(shown)])
+        _, tabs = layout.root_container.contents
+        assert [tab.name for tab in tabs.contents] == ["motion", "solver"]
+        assert tabs.contents[tabs.active_tab].name == front
+        names = [view.name for view in views(tabs.contents[1])]
+        assert names == ["solver status", *(["log"] if front == "solver" else []), "log10 residual"]
+
+
+def test_a_legend_is_in_a_corner_without_curves_or_closed(run: Run) -> None:
+    def corner(*curves: Any, names: str = "ab") -> str | None:
+        values = np.column_stack([*curves, *[curves[0]] * (len(names) - len(curves))])
+        group = Group("x", "x", tuple(names), ((0, 0, 0),) * len(names), values)
+        return free_corner([group], [run], (0.0, 1.0), 300.0, 200.0)
+
+    rising = run.t / 180.0
+    assert corner(rising) == "LeftTop"
+    assert corner(1.0 - rising) == "RightTop"
+    assert corner(np.full(181, 0.9), np.where(run.t < 90.0, 0.1, 0.9)) == "RightBottom"
+    assert corner(rising, 1.0 - rising, np.where(run.t < 90.0, 0.02, 0.98), names="abc") is None
+    assert corner(0.5 + 0.5 * np.sin(run.t), 0.5 - 0.5 * np.sin(run.t)) is None
+    assert corner(rising, names="a") is None
+    assert corner(rising, names="abcdefghij") is None  # higher than the plot
+    assert corner(np.full(181, np.nan)) == "RightTop"
 
 
 def test_a_gap_is_not_a_number_even_if_the_run_holds_some(run: Run) -> None:
@@ -84,7 +138,7 @@ def test_a_gap_is_not_a_number_even_if_the_run_holds_some(run: Run) -> None:
 def test_round_off_is_drawn_as_a_line_at_zero(run: Run) -> None:
     noise = np.random.default_rng(1).normal(scale=1e-17, size=run.accelerations.shape)
     found = groups(dataclasses.replace(run, accelerations=run.accelerations + noise))
-    usual = np.pi / 180.0**2  # the largest angle over the square of the run's time
+    usual = 180.0 / 180.0**2  # the largest angle [deg] over the square of the run's time
     assert found["acceleration", "angle"].shown == pytest.approx((-usual, usual))
     assert found["acceleration", "length"].shown is None
 

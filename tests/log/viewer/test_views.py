@@ -17,12 +17,13 @@ from kinfmu.draw.scene.scene import Scene, drawable, scene
 from kinfmu.errors import LogError
 from kinfmu.log import write_mcap, write_rrd
 from kinfmu.log.viewer import headless, timeline
-from kinfmu.log.viewer.blueprint import ABREAST, EDGE, NUMBERS, WIDTH, Plot, _abreast, plot, with_two_labels
+from kinfmu.log.viewer.blueprint import ABREAST, EDGE, NUMBERS, WIDTH, plot, with_two_labels
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.comparison import write_comparison
+from kinfmu.log.viewer.dataset import DesignRun, write_dataset
 from kinfmu.log.viewer.ground import dots, places_below, shown_names
 from kinfmu.log.viewer.marks import legend_start
-from kinfmu.log.viewer.series import efforts, groups, margin
+from kinfmu.log.viewer.series import margin
 from kinfmu.log.viewer.timeline import decimated, timeline_of
 from kinfmu.mechanism import gallery
 from kinfmu.mechanism.toml_file import parse
@@ -71,11 +72,11 @@ def _forces(path: Path) -> None:
         pytest.param(
             "gap.rrd",
             _single,
-            {"linkage", "angular velocity [rad/s]", "log10 margin", "solver status", "log", "run"},
+            {"linkage", "velocity [m/s]", "log10 margin", "solver status", "log", "run"},
             marks=pytest.mark.long,
         ),
         ("one.rrd", _one_sample, {"linkage", "position [m]"}),
-        pytest.param("selected.rrd", _selected, {"linkage", "angle [rad]", "solver status"}, marks=pytest.mark.long),
+        pytest.param("selected.rrd", _selected, {"linkage", "angle [deg]", "solver status"}, marks=pytest.mark.long),
         ("loaded.rrd", _loaded, {"linkage", "crank.torque [N m]", "crank.power [W]", "energy [J]"}),
         ("compared.rrd", _compared, {"linkage", "B - A: position [m]", "position [m] of A (wide) and B"}),
         ("forces.rrd", _forces, {"crank.torque [N m] of A (wide) and B", "B - A: crank.torque [N m]", "solver status"}),
@@ -136,6 +137,19 @@ def test_the_error_of_a_view_is_reported(tmp_path: Path, viewer: headless.Viewer
     assert report.startswith("wrong: error: 2D visualizers require a pinhole")
 
 
+def test_recordings_of_designs_are_a_table_whose_layout_shows_each(tmp_path: Path, viewer: headless.Viewer) -> None:
+    runs = [kinfmu.solve(kinfmu.load("jansen_leg"), np.linspace(0.0, 1.0, 31), parameters={"j": j}) for j in (49, 51)]
+    designs = [DesignRun(f"design {k}", run, {"j [mm]": 49.0 + 2 * k}) for k, run in enumerate(runs)]
+    paths = write_dataset(designs, tmp_path, "legs")
+    viewer.show(paths)
+    assert "/dataset/" in viewer._client.get_location() or "/entry/" in viewer._client.get_location()
+    for path in paths:
+        viewer.show(path)
+        shot = viewer.glance()
+        assert shot.reports == ()
+        assert {"linkage", "angle [deg]", "acceleration [mm/s2]"} <= set(shot.views)
+
+
 @pytest.mark.long
 def test_recordings_of_two_mechanisms_do_not_share_a_layout(tmp_path: Path, viewer: headless.Viewer) -> None:
     """Rerun keeps one layout for all recordings of an application; bounds and times of another run would be wrong."""
@@ -183,21 +197,6 @@ def test_an_axis_has_two_labels_at_powers_of_ten(height: float) -> None:
         cut = 1.5 * (top - bottom) / height  # of a label nearer to the end half is missing
         labels = np.arange(np.ceil((bottom + cut) / steps[0]), np.floor((top - cut) / steps[0]) + 0.5)
         assert len(labels) >= 2, (low, high, bottom, top)
-
-
-def test_a_legend_hides_no_curve() -> None:
-    run = kinfmu.solve(loaded("slider_crank"), np.linspace(0.0, 0.1, 21))
-    plots = [Plot(group.title, [("", group)]) for group in groups(run).values()]
-    rows = [*([one, one] for one in plots), *_abreast([Plot(group.title, [("", group)]) for group in efforts(run)])]
-    for row in rows:
-        for one in row:
-            names = one.groups[0][1].names
-            view = plot(*one, timeline_of([run]), [run], WIDTH / len(row))
-            (shown,) = view.properties["TimeAxis"].view_range.as_arrow_array().to_pylist()
-            start, end = (shown[key] / 1e9 for key in ("start", "end"))
-            free = (end - 0.1) / (end - start) * (WIDTH / len(row) - NUMBERS)
-            if len(names) > 1:
-                assert free > 7.0 * max(map(len, names)) + 30.0, names  # letters, and the mark with its margins
 
 
 # ------------------------------------------------------------------------------------------------------------- timeline
@@ -253,7 +252,11 @@ def test_a_recording_states_what_it_leaves_out_and_holds_all_events(
     assert 100 <= len(angles) < 150
     (text,) = documents(tmp_path / "run.rrd", "/card")
     assert f"{len(angles)} of 2001 samples are drawn" in text
-    assert len(rows(tmp_path / "run.rrd", "/log", "TextLog:text")) == 5
+    texts = [text for _, (text,) in rows(tmp_path / "run.rrd", "/log", "TextLog:text")]  # type: ignore[misc]  # one each
+    assert texts[0] == (
+        "1 sample (crank 0 deg), bridged: the equations are singular there, so poses are interpolated across"
+    )
+    assert len(texts) == 3
     write_comparison(long_run, long_run, tmp_path / "both.rrd")
     (text,) = documents(tmp_path / "both.rrd", "/card")
     assert "A: " in text

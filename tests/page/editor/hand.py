@@ -120,6 +120,7 @@ def drawing_hand(chromium: Browser, folder: Path, text: str = "", **options: Any
         path.write_text(text, "utf-8")
     source = PlaySource(str(path), is_new=not text)
     with PlayServer(source) as server, chromium.open_at(server.url, bypass_csp=True, **options) as page:
+        page.tab.emulate_media(reduced_motion="no-preference")  # what is drawn begins to move when it is complete
         page.tab.wait_for_function("window.kinfmu.editor")
         hand = DrawingHand(page, path, with_fingers=options.get("has_touch", False))
         if not text:

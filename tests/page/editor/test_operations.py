@@ -14,7 +14,7 @@ from kinfmu.errors import KinfmuError, MechanismError
 from kinfmu.mechanism import gallery
 from kinfmu.mechanism.gallery.load import folder
 from kinfmu.mechanism.toml_text import text
-from kinfmu.page.editor import Drawing, answer, changed
+from kinfmu.page.editor import Drawing, answer, changed, view
 from kinfmu.page.editor.tables import references
 from tests.page.editor.drawn import FOURBAR, Operation, bar, drawn, empty, ground, interest, put
 
@@ -79,7 +79,8 @@ def test_every_state_has_a_sketch_with_the_keys_of_a_page(count: int) -> None:
     found = answer(drawn(*FOURBAR[:count]))
     full = answer(drawn(*FOURBAR))["sketch"]
     assert found["sketch"].keys() == full.keys()
-    assert found["badge"]["isComplete"] == found["isViewComing"] == (count == len(FOURBAR))
+    assert found["badge"]["isComplete"] == (count == len(FOURBAR))
+    assert found["isViewComing"] == (count > 2)  # a view, or changes that were tried
     lines = [shape["name"] for shape in found["sketch"]["shapes"] if shape["kind"] == "link"]
     assert lines == ["crank", "coupler", "rocker"][: max(count - 2, 0)]
 
@@ -116,6 +117,31 @@ def test_points_in_one_place_that_are_not_joined_are_pinned_by_a_finding() -> No
     assert note["text"] == "a.B and b.C are in one place and not joined"
     after = changed(drawing, note["edits"][0]["operations"])
     assert [joint.between for joint in after.mechanism.joints] == [("ground.A", "a.A"), ("a.B", "b.C")]
+
+
+def test_a_pin_that_is_dropped_next_to_its_partner_comes_first_also_among_what_was_tried() -> None:
+    drawing = drawn(*FOURBAR[:4], bar((123, 78), "ground.B", "rocker"))
+    pin = {"text": "pin coupler.D and rocker.E", "operations": [{"do": "pin", "points": ["coupler.D", "rocker.E"]}]}
+    for found in (answer(drawing), view(drawing)):
+        problem, note, *_ = found["findings"]
+        assert problem["edits"][0] == pin
+        assert (note["text"], note["edits"]) == ("coupler.D and rocker.E are 3.6 mm apart and not joined", [pin])
+    assert found["view"] is None
+    _, tried, *_ = problem["edits"]
+    assert tried["text"].startswith("join coupler.D and rocker.E and drive crank: ")
+    assert answer(changed(drawing, tried["operations"]))["badge"]["isComplete"]
+    after = changed(drawing, pin["operations"])  # type: ignore[arg-type]
+    assert after.at("coupler.D") == after.at("rocker.E") == (120, 80)
+
+
+def test_what_an_import_has_left_out_is_a_finding_as_long_as_the_file_has_it() -> None:
+    text = LINKAGE.read_text("utf-8").replace("</linkage2>", "<mystery/></linkage2>")
+    imported = changed(empty(), [{"do": "replace", "text": text, "name": LINKAGE.name}])
+    for found in (answer(imported), view(imported)):
+        notes = [one["text"] for one in found["findings"] if one["text"].startswith("import: ")]
+        assert notes
+        assert any("mystery" in note for note in notes)
+    assert not [one for one in answer(drawn(*FOURBAR))["findings"] if one["text"].startswith("import: ")]
 
 
 @pytest.mark.parametrize("kind", ["roller", "flat_face"])

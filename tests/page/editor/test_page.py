@@ -13,12 +13,13 @@ from PIL import Image
 import kinfmu
 from kinfmu.mechanism.gallery.load import folder
 from kinfmu.page.player import PlayServer, PlaySource
-from tests.page.editor.drawn import FOURBAR, drawn
+from tests.page.editor.drawn import FOURBAR, bar, drawn
 from tests.page.editor.hand import DrawingHand, drawing_hand
 from tests.page.engines import Browser, needs_browser
 from tests.page.test_page import CONTRASTS, LABELS, LARGEST
 
 pytestmark = [needs_browser, pytest.mark.long]
+LINKAGE = Path(__file__).parents[2] / "mechanism" / "imports" / "linkage" / "slider_crank.linkage2"
 CONFLICT = "Failed to load resource: the server responded with a status of 409 (Conflict)"
 
 
@@ -296,3 +297,112 @@ def test_a_pin_that_is_dropped_on_another_one_is_pinned_there(hand: DrawingHand)
     (end,) = (name for name, at in places(hand).items() if name.startswith("link_1.") and at == [100, 0])
     joints = hand.get(f"e.sketch.data.joints.filter((j) => j.points.some((k) => e.sketch.nameOf(k) === '{end}'))")
     assert [joint["type"] for joint in joints] == ["revolute"]
+
+
+def test_undo_and_redo_of_an_import_fit_the_view_and_its_notes_are_shown(chromium: Browser, tmp_path: Path) -> None:
+    with drawing_hand(chromium, tmp_path) as hand:
+        hand.click((0, 0), (0, 40), (30, 30))
+        hand.press("Escape")
+        hand.page.tab.set_input_files("#import-file", LINKAGE)
+        hand.page.tab.wait_for_function("window.kinfmu.editor.session.answer.text.startsWith('# Imported from')")
+        hand.wait()
+        notes = hand.page.tab.locator("#draw-panel .finding", has_text="import: ")
+        assert notes.count() == hand.get("e.session.answer.text").split("\n\n")[0].count("\n#   ")
+        for key in ("Control+z", "Control+y", "Control+z"):
+            hand.press(key)
+            corners = hand.get("[e.box.slice(0, 2), e.box.slice(2)].map((p) => k.view.pixel(p))")
+            width, height = hand.get("[k.view.width, k.view.height]")
+            assert all(0 <= x <= width and 0 <= y <= height for x, y in corners), key
+            assert max(abs(corners[1][0] - corners[0][0]) / width, abs(corners[1][1] - corners[0][1]) / height) > 0.5
+        assert notes.count() == 0
+        hand.click((0, 0))
+        scale = hand.get("k.view.scale")
+        hand.press("Control+z")
+        assert hand.get("k.view.scale") == scale  # of one link
+        assert hand.page.errors == []
+
+
+def test_a_half_drawn_mechanism_gets_changes_that_were_tried_and_one_click_makes_them(
+    chromium: Browser, tmp_path: Path
+) -> None:
+    half = drawn(*FOURBAR[:4], bar((123, 78), "ground.B", "rocker"))
+    with drawing_hand(chromium, tmp_path, half.text) as hand:
+        hand.page.tab.wait_for_function("window.kinfmu.editor.sketch")
+        ghosts = hand.page.tab.locator("#draw-panel .problem .ghost")
+        tried = hand.page.tab.locator(".problem .ghost", has_text="join coupler.D and rocker.E and drive crank")
+        tried.wait_for()
+        assert ghosts.first.inner_text() == "pin coupler.D and rocker.E"
+        assert "it moves over the whole run" in tried.inner_text()
+        tried.click()
+        assert hand.plays()
+        assert hand.page.tab.inner_text("#badge") == "complete"
+        hand.press("Control+z")
+        ghosts.first.click()
+        hand.wait()
+        assert places(hand)["coupler.D"] == places(hand)["rocker.E"] == [120, 80]
+        assert hand.page.errors == []
+
+
+def test_locks_are_there_after_a_reload(hand: DrawingHand) -> None:
+    hand.click((111, 45))
+    hand.page.tab.check("#draw-panel .selected .check input")
+    hand.get("k.design.lock(['bodies.crank.points.C.y'])")
+    hand.page.tab.reload()
+    hand.page.tab.wait_for_function("window.kinfmu?.editor")
+    assert hand.get("[...k.design.locked]") == ["bodies.crank.points.C.y"]
+    hand.button("#draw")
+    hand.page.tab.wait_for_function("window.kinfmu.editor.machine")
+    hand.click((111, 45))
+    assert hand.page.tab.is_checked("#draw-panel .selected .check input")
+    assert hand.page.errors == []
+
+
+def test_the_end_of_the_program_is_stated_once(chromium: Browser, tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(drawn(*FOURBAR).text, "utf-8")
+    with PlayServer(PlaySource(str(path))) as server, chromium.open_at(server.url, bypass_csp=True) as page:
+        hand = DrawingHand(page, path)
+        page.tab.wait_for_function("window.kinfmu.editor")
+        hand.button("#draw")
+        page.tab.wait_for_function("window.kinfmu.editor.machine")
+        server.__exit__(None, None, None)
+        page.tab.locator("#file-problem", has_text="kinfmu play has ended").wait_for()
+        hand.drag((120, 80), (130, 90))
+        hand.press("Control+s")
+        assert page.tab.locator("[role=alert]:visible").count() == 1
+        assert "start it again to go on" in page.tab.inner_text("#file-problem")
+
+
+def test_keys_are_listed_once(hand: DrawingHand) -> None:
+    for is_drawing in (True, False):
+        hand.page.tab.click("#help")
+        keys = hand.page.tab.locator("#keys tr:visible td:first-child").all_inner_texts()
+        assert len(keys) == len(set(keys)) > 6
+        assert sum("Space" in one for one in keys) == sum("Ctrl+Z" in one for one in keys) == 1
+        assert ("chooses a tool" in hand.page.tab.inner_text("#keys")) is is_drawing
+        hand.page.tab.click("#keys button")
+        assert hand.page.tab.is_hidden("#keys")
+        if is_drawing:
+            hand.page.tab.keyboard.press("Space")  # plays: the button that opened the list has no focus
+            hand.page.tab.wait_for_function("window.kinfmu.isPlaying && !window.kinfmu.editor.machine")
+            hand.page.tab.keyboard.press("Space")
+
+
+def test_on_a_phone_the_drawing_is_not_covered(chromium: Browser, tmp_path: Path) -> None:
+    text = drawn(*FOURBAR[:4]).text
+    options = {"has_touch": True, "viewport": {"width": 390, "height": 844}}
+    with drawing_hand(chromium, tmp_path, text, **options) as hand:
+        hand.page.tab.wait_for_function("window.kinfmu.editor.sketch")
+        hand.tool("link")
+        hand.click((0, 100))
+        box = {one: hand.page.tab.locator(one).bounding_box() for one in ("#drawing", "#draw-bar", "#typed", "#badge")}
+        bottom = box["#drawing"]["y"] + box["#drawing"]["height"]
+        assert box["#draw-bar"]["y"] >= bottom
+        assert box["#typed"]["y"] >= bottom
+        assert hand.page.tab.inner_text("#badge") == "2 more joints or drivers"
+        assert hand.page.tab.evaluate(
+            "(() => { const b = document.getElementById('badge'); return b.scrollWidth <= b.clientWidth; })()"
+        )
+        assert box["#badge"]["x"] + box["#badge"]["width"] <= 390
+        assert hand.page.tab.evaluate("document.documentElement.scrollWidth") <= 390
+        assert box["#drawing"]["height"] > 0.45 * 844

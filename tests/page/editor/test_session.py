@@ -248,3 +248,40 @@ def test_the_list_of_states_never_names_a_text_that_is_not_there(path: Path, sta
     (states,) = states_folder.rglob("states.json")
     names = json.loads(states.read_text())["texts"]
     assert {one.name for one in states.parent.glob("*.toml")} == set(names)
+
+
+def folders(states_folder: Path) -> list[Path]:
+    return [*states_folder.iterdir()] if states_folder.exists() else []
+
+
+def test_states_with_nothing_to_undo_end_with_the_program(path: Path, states_folder: Path) -> None:
+    Session(path).close()
+    assert folders(states_folder) == []
+    session = Session(path)
+    draw(session, *FOURBAR)
+    session.close()
+    assert len(folders(states_folder)) == 1  # not saved
+    again = Session(path)
+    again.save(again.number)
+    again.close()
+    assert Session(path).current()[2]["canUndo"]
+
+
+@pytest.mark.parametrize(
+    ("is_saved", "is_used", "is_kept"), [(True, False, False), (False, False, True), (True, True, True)]
+)
+def test_states_of_saved_drawings_go_after_a_month(
+    path: Path, states_folder: Path, is_saved: bool, is_used: bool, is_kept: bool
+) -> None:
+    session = Session(path)
+    draw(session, *FOURBAR)
+    if is_saved:
+        session.save(session.number)
+    (listed,) = states_folder.rglob("states.json")
+    age = 29 if is_used else 31
+    os.utime(listed, times=(time.time() - age * 86400, time.time() - age * 86400))
+    other = Session(path.with_name("other.toml"))
+    assert len(folders(states_folder)) == 1 + is_kept
+    draw(other, ground(0, 0))
+    if is_kept:
+        assert Session(path).current()[2]["canUndo"]

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import kinfmu
 from kinfmu.errors import KinfmuError
@@ -22,6 +23,17 @@ from kinfmu.page.player.server import LARGEST_BODY
 from tests.page.engines import browser, needs_browser
 
 LENGTH = "bodies.crank.points.P.x"
+WAYS = {
+    "file": ".toml",
+    "driver": ".csv",
+    "time": ".csv",
+    "svg": ".svg",
+    "fmu3": ".fmu",
+    "fmu2": ".fmu",
+    "page": ".html",
+    "gif": ".gif",
+    "dxf": ".dxf",
+}
 
 
 @pytest.fixture
@@ -68,7 +80,7 @@ def states(server: PlayServer) -> Iterator[dict[str, Any]]:
 def test_the_page_is_served_to_its_own_address_only(server: PlayServer) -> None:
     status, page = ask(server)
     assert (status, page[:15]) == (HTTPStatus.OK, "<!doctype html>")
-    assert 'Number("1")' in page
+    assert 'data-version="1"' in page
     own = f"127.0.0.1:{server.port}"
     assert ask(server, Origin=f"http://{own}")[0] == HTTPStatus.OK
     assert ask(server, Host=f"localhost:{server.port}")[0] == HTTPStatus.OK
@@ -139,7 +151,7 @@ def test_a_malformed_file_is_reported_and_the_next_good_one_is_shown(server: Pla
     assert next(reports) == {"version": 1, "problem": ""}  # the same page
     file.write_text(good.replace("Crank-rocker that", "A crank-rocker that"), "utf-8")
     assert next(reports) == {"version": 2, "problem": ""}
-    assert 'Number("2")' in ask(server)[1]
+    assert 'data-version="2"' in ask(server)[1]
 
 
 @pytest.mark.long
@@ -241,3 +253,59 @@ def test_the_page_keeps_its_values_across_a_reload_and_builds_the_fmu(
     run = kinfmu.simulate(tmp_path / "page.fmu")
     np.testing.assert_array_equal(run["rocker.phi"], kinfmu.solve(saved, run.t)["rocker.phi"])
     assert kinfmu.solve(saved, crank_angle=[1.25])["rocker.phi"][0] == pytest.approx(pose, abs=1e-12)
+
+
+@needs_browser
+@pytest.mark.long
+def test_a_design_is_saved_in_every_way_by_clicks(server: PlayServer, tmp_path: Path) -> None:
+    pytest.importorskip("ezdxf")
+    import ezdxf
+
+    with browser(tmp_path) as chromium, chromium.open_at(server.url, bypass_csp=True) as page:
+        page.tab.context.grant_permissions(["clipboard-read", "clipboard-write"])
+        field = page.tab.get_by_label("crank length mm", exact=True)
+        field.fill("22")
+        field.press("Enter")
+        page.move(1.25)
+        page.get("k.address.write()")
+        page.tab.click("#tab-files")
+        saved: dict[str, Path] = {}
+        for name, suffix in WAYS.items():
+            with page.tab.expect_download() as download:
+                page.tab.click(f"#save-{name}")
+            assert download.value.suggested_filename == f"crank_rocker{suffix}"
+            saved[name] = tmp_path / f"{name}{suffix}"
+            download.value.save_as(saved[name])
+            page.tab.wait_for_function("!document.querySelector('#files .buttons button:disabled')")
+        page.tab.click("text=Copy the address")
+        page.tab.locator("text=Copied").wait_for()
+        link = page.tab.evaluate("navigator.clipboard.readText()")
+        pin = page.get("k.linkage.point(k.linkage.data.points.findIndex(({ name }) => name === 'tracer'))")
+        assert page.errors == []
+        with chromium.open_at(link, bypass_csp=True) as shared:
+            assert shared.get(f"[k.design.values.get('{LENGTH}'), k.linkage.u[0]]") == [22, pytest.approx(1.25)]
+        with chromium.open(saved["page"].read_text("utf-8")) as alone:
+            assert alone.get(f"k.design.values.get('{LENGTH}')") == 22
+            assert alone.errors == alone.requests == []
+    mech = kinfmu.load(saved["file"])
+    assert mech.body_points["crank.P"] == (22, 0)
+    table = np.genfromtxt(saved["time"], delimiter=",", names=True, deletechars="")
+    whole = kinfmu.solve(mech, table["time_[s]"])
+    np.testing.assert_allclose(table["tracer.y_[mm]"], whole["tracer.y"], atol=1e-9)
+    assert len(np.genfromtxt(saved["driver"], delimiter=",", names=True, deletechars="")) == 361
+    for name in ("fmu2", "fmu3"):
+        run = kinfmu.simulate(saved[name])
+        np.testing.assert_allclose(run["tracer.y"], kinfmu.solve(mech, run.t)["tracer.y"], atol=1e-9)
+    assert saved["svg"].read_text("utf-8").startswith("<svg ")
+    points = [one.dxf.location for one in ezdxf.readfile(saved["dxf"]).modelspace().query("POINT")]
+    assert min(np.hypot(one.x - pin[0], one.y - pin[1]) for one in points) < 1e-6
+    with Image.open(saved["gif"]) as gif:
+        assert (gif.format, gif.n_frames > 10) == ("GIF", True)
+
+
+@pytest.mark.parametrize("query", ["", "?values=x", "?values=1&values=2", "?values=inf", "?values=nan"])
+def test_a_drawing_of_a_pose_needs_the_values_of_its_drivers(server: PlayServer, file: Path, query: str) -> None:
+    assert ask(server, f"dxf{query}", "POST", file.read_text("utf-8")) == (
+        HTTPStatus.BAD_REQUEST,
+        "values= is required: a number for each driver",
+    )
