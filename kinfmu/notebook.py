@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from kinfmu.analysis import Report
-from kinfmu.analysis.text import findings, measured_text, title
+from kinfmu.analysis.summary import measure_cells
 from kinfmu.arrays import FloatArray
 from kinfmu.design.fit import FitResult
 from kinfmu.design.fit.picture import content_of
@@ -39,6 +39,12 @@ from kinfmu.run.verdict import notable_events, sentence
 
 _LARGEST = 300  # coordinates; mobility and plan of larger mechanisms take seconds
 _KEPT = 8  # drawings
+_DIGITS = 6  # of values with units
+
+
+def title(mechanism: Mechanism) -> str:
+    """Return the name and the title of a mechanism."""
+    return f"{mechanism.name}: {mechanism.title}" if mechanism.title else mechanism.name
 
 
 @html_of.register
@@ -144,15 +150,19 @@ def _ends(values: FloatArray) -> tuple[object, object]:
 
 @html_of.register
 def report_html(report: Report) -> str:
-    """Return the findings as a table of subjects and texts."""
-    return page(title(report.mechanism), table(findings(report)))
+    """Return the verdicts and tables of a report."""
+    return page(title(report.mechanism), report.summary().html())
 
 
 @html_of.register
 def measures_html(values: MeasuredValues) -> str:
     """Return the values of measures as a table; of one without a value the reason."""
-    rows = [(value.name, value.type, value.reason or measured_text(value)) for value in values.values()]
-    return page("Measures", table(rows, ("measure", "type", "value")))
+    rows = [
+        (value.name, value.type, *((value.reason, "") if value.reason else measure_cells(value, _DIGITS)))
+        for value in values.values()
+    ]
+    drivers = dict.fromkeys(value.driver for value in values.values() if value.at)
+    return page("Measures", table(rows, ("measure", "type", "value", f"at {some(drivers)}" if drivers else "")))
 
 
 @html_of.register

@@ -1,4 +1,4 @@
-"""Cams of a mechanism: their profiles, the findings of a check at values of the driver, and the lines of its report."""
+"""Cams of a mechanism: their profiles, and the findings of a check at values of the driver."""
 
 from __future__ import annotations
 
@@ -120,6 +120,17 @@ class CamFindings:
             return ()
         cuts = self.critical.undercut
         return tuple(sorted(part for cut in cuts for part in self.turned_by.parts(cut.begin, cut.end)))
+
+    def curvature(self) -> list[tuple[str, CamExtreme]]:
+        """Return the smallest radii of the profile or, for an unknown roller, of the pitch curve, with their side."""
+        if self.critical is None:
+            return []
+        convex, curve = (
+            (self.critical.convex, "") if self.element != "unknown" else (self.critical.pitch, " pitch curve")
+        )
+        found = ((f"convex{curve}", convex), (f"concave{curve}", self.critical.concave))
+        widest = _WIDE * self.critical.nearest.value
+        return [(side, extreme) for side, extreme in found if extreme is not None and extreme.value < widest]
 
     def length(self, value: float) -> str:
         return f"{round(value, 9) + 0.0:.6g} {self.length_unit}"
@@ -322,58 +333,3 @@ def _poses(plan: SolvePlan) -> dict[str, tuple[float, float, float]]:
     rows = in_world(plan.origin, plan.anchor.q).reshape(-1, 3).tolist()
     bodies = [body.name for body in plan.mechanism.moving_bodies]
     return {GROUND_NAME: (0.0, 0.0, 0.0), **{body: (x, y, phi) for body, (x, y, phi) in zip(bodies, rows, strict=True)}}
-
-
-def cam_lines(cam: CamFindings) -> list[str]:
-    """Return the findings of a cam: the first line has its name."""
-    placed, critical = cam.cam, cam.critical
-    if placed is None or critical is None:
-        return [f"{cam.joint}: no profile, because {cam.reason}"]
-    texts = [f"{cam.joint}: {placed.cam} moves {placed.follower}, {_element(cam, placed)}"]
-    if cam.program:
-        parts = [f"{part} {degrees(begin)} to {degrees(end)}" for part, begin, end in cam.program]
-        texts.append(f"program over {cam.driver}: {', '.join(parts)}")
-    texts.append(_pressure(cam, critical))
-    if not cam.is_cut:
-        texts.append(_curvature(cam, critical))
-    if critical.width is not None:
-        low, high = critical.width
-        texts.append(
-            f"contact on the face from {cam.length(low.value)} ({cam.place(low.at)}) to {cam.length(high.value)} "
-            f"({cam.place(high.at)}): width {cam.length(high.value - low.value)}"
-        )
-    return texts
-
-
-def _element(cam: CamFindings, placed: PlacedCam) -> str:
-    if placed.normal is not None:
-        return "flat face"
-    if placed.radius is None:
-        return "roller of unknown radius: 'roller_radius' in the file gives the profile"
-    return f"roller of radius {cam.length(placed.radius)}" if placed.radius else "knife edge"
-
-
-def _pressure(cam: CamFindings, critical: Critical) -> str:
-    low, high = critical.pressure
-    worst = max(abs(low.value), abs(high.value))
-    if worst < 1e-12:
-        return "pressure angle 0 everywhere"
-    verdict = "within" if worst <= cam.limit + 1e-9 else "above"
-    return f"pressure angle {_angle(cam, low)} to {_angle(cam, high)}: {verdict} {degrees(cam.limit)}"
-
-
-def _angle(cam: CamFindings, extreme: CamExtreme) -> str:
-    return f"{degrees(extreme.value)} ({cam.place(extreme.at)})"
-
-
-def _curvature(cam: CamFindings, critical: Critical) -> str:
-    """Return the smallest radii of curvature, of the profile or, for an unknown roller, of the pitch curve."""
-    is_known = cam.element != "unknown"
-    convex, concave = (critical.convex, critical.concave) if is_known else (critical.pitch, critical.concave)
-    sides = [
-        f"{cam.length(extreme.value)} {side} ({cam.place(extreme.at)})"
-        for side, extreme in (("convex", convex), ("concave", concave))
-        if extreme is not None and extreme.value < _WIDE * critical.nearest.value
-    ]
-    curve = "profile" if is_known else "pitch curve, larger than the roller's"
-    return f"smallest radius of curvature of the {curve}: {', '.join(sides) or 'none'}"

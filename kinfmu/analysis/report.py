@@ -15,9 +15,9 @@ from kinfmu.analysis.findings import Findings
 from kinfmu.analysis.loading import loading
 from kinfmu.analysis.measuring import measurements
 from kinfmu.analysis.singular import Matrix, driver_range, pose_matrices
-from kinfmu.analysis.text import lines
+from kinfmu.analysis.summary import summary
 from kinfmu.analysis.transmission import find_dyads, find_named_loops
-from kinfmu.display import Displayed
+from kinfmu.display import Displayed, Summary
 from kinfmu.errors import AssemblyError, InconsistentError, KinfmuError, MechanismError, MobilityError, listed
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
@@ -28,14 +28,23 @@ from kinfmu.plan.equations.system import System
 
 
 class Report(Findings, Displayed):
-    """The findings of a check; as text with `str`."""
+    """The findings of a check; as text of 80 columns with `str`."""
 
     def __repr__(self) -> str:
         problem = f"; problem: {self.problem}" if self.problem else ""
         return f"<Report on {self.mechanism.name}: mobility {self.mobility}{problem}>"
 
     def __str__(self) -> str:
-        return "\n".join(lines(self))
+        return self.summary().text(80)
+
+    def summary(self, *, detail: bool = False) -> Summary:
+        """Return verdicts and tables; `text(width)` of them is what `kinfmu check` prints, `html()` the same as HTML.
+
+        Args:
+            detail: With all digits, coordinates, fixed values and the solving order.
+
+        """
+        return summary(self, detail=detail)
 
     @property
     def has_cut_cam(self) -> bool:

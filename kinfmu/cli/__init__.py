@@ -12,6 +12,7 @@ from kinfmu.cli import (  # noqa: F401  add commands
     imports,
     play,
     records,
+    report,
     simulate,
     solve,
 )

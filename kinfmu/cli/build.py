@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
@@ -66,11 +67,24 @@ if TYPE_CHECKING:
     help="Lengths of all variables in m, for hosts that convert no units; hosts that do show the file's unit. Angles, "
     "masses and forces are in SI units in any case.",
 )
-@click.option("--ssp", is_flag=True, help="Write an .ssp (SSP 1.0): the FMU, its connectors, a set of all parameters.")
+@click.option("--ssp", is_flag=True, help="Write an .ssp: the FMU, its connectors, a set of all parameters.")
+@click.option(
+    "--ssp-version",
+    type=click.Choice(["1", "2"]),
+    default="1",
+    show_default=True,
+    help="Version of SSP; 2 has enumerations, at which libcosim and Ecos end.",
+)
 @click.option(
     "--osp",
     is_flag=True,
     help="Write also <name>_OspModelDescription.xml next to the FMU: groups of variables, for libcosim.",
+)
+@click.option(
+    "--certify",
+    is_flag=True,
+    help="Put the proof of the motion, of check --certify, into the FMU, too. Default: only the record of its checks, "
+    "which verify prints.",
 )
 @outputs_option
 @click.option(
@@ -97,7 +111,9 @@ def build(
     page: bool | None,
     si: bool,
     ssp: bool,
+    ssp_version: str,
     osp: bool,
+    certify: bool,
     outputs: str | None,
     parameters: str | None,
     author: str | None,
@@ -118,7 +134,8 @@ def build(
     for option, value, plain in (("--fmi", fmi, "2"), ("--platforms", platforms, "host")):
         if flavour == "python" and value != plain:
             raise click.UsageError(f"{option} {value} needs --flavour native; the python flavour has {option} {plain}")
-    if osp and (ssp or (output is not None and suffix_of(output) == ".ssp")):
+    is_ssp = ssp or (output is not None and suffix_of(output) == ".ssp")
+    if osp and is_ssp:
         raise click.UsageError("--osp describes an FMU for the folder that it is in; an .ssp holds none")
     mech = checked_settings(gallery.load(mechanism), settings).mechanism()
     drive = drive or default_drive(mech)
@@ -141,9 +158,11 @@ def build(
             platforms=platforms,
             metadata={name: text for name, text in stated.items() if text is not None},
             si=si,
-            ssp=ssp,
+            ssp=int(ssp_version) if is_ssp else False,
             osp=osp,
             page=lambda: _page(mech, page),
+            checks=find_spec("fmpy") is not None,
+            certify=certify,
             progress=progress,
         )
     if drive == "time":
@@ -221,7 +240,8 @@ def verify(fmu: Path, results: Path | None, tolerance: float | None, columns: st
     """Check a host by the reference results in an FMU.
 
     An FMU of kinfmu holds the outputs at about 20 samples, in extra/org.kinfmu, with the step that belongs to them. An
-    FMU that torques drive has none.
+    FMU that torques drive has none. Without --results its files, description and states are checked, too, and its
+    certificate is proved again.
 
     A certificate (.json) of check --certificate, in place of an FMU, is proved again.
     """
@@ -232,6 +252,14 @@ def verify(fmu: Path, results: Path | None, tolerance: float | None, columns: st
         return
     from kinfmu.fmu import verify as verified
 
+    if results is None:
+        from kinfmu.fmu.conformance import conformance
+
+        checks = [check for check in conformance(fmu) if check.name != "results"]
+        for check in checks:
+            click.echo(f"{check.name:<12}" + check.text.replace("\n", f"\n{'':<12}"))
+        if wrong := [check for check in checks if not check.ok]:
+            raise KinfmuError(f"{fmu}: {wrong[0].name}: {wrong[0].text}")
     found = verified(fmu, results, tolerance=tolerance, columns=names_in(columns))
     click.echo(str(found))
     if not found.ok:

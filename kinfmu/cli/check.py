@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 import sys
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 import click
@@ -22,10 +26,12 @@ if TYPE_CHECKING:
     from kinfmu.mechanism import Mechanism
 
 FIGURES = (".svg", ".png", ".pdf")
+COLUMNS, MOST_COLUMNS = 80, 120  # of a report in a file, and on a wide terminal
 
 
 @main.command(epilog="Example: kinfmu check crank_rocker --figure crank_rocker.svg")
 @mechanism_argument
+@click.option("--detail", is_flag=True, help="All digits, coordinates, fixed values, solving order, determinants.")
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON, for programs.")
 @click.option("--matrices", is_flag=True, help="Also print the Jacobians at the assembled pose and at singular points.")
 @click.option(
@@ -43,6 +49,7 @@ FIGURES = (".svg", ".png", ".pdf")
 @set_option
 def check(
     mechanism: str,
+    detail: bool,
     as_json: bool,
     matrices: bool,
     assemblies: bool,
@@ -55,8 +62,9 @@ def check(
 ) -> None:
     """Check a mechanism and report its properties.
 
-    Mobility, redundant and inconsistent constraints, the solving order, ranges of the drivers, singular points, and the
-    measures of the file. With masses or loads also efforts of the drivers, reduced inertia and the largest reaction.
+    First verdicts (ok, note, poor, problem) on mobility, redundant constraints, ranges of the drivers, singular poses
+    and transmission angles; then tables of loops, transmission angles, cams, measures and, with masses or loads,
+    forces.
     """
     from kinfmu.analysis import certify as certified
     from kinfmu.analysis import check as checked
@@ -65,7 +73,7 @@ def check(
         loaded = gallery.load(mechanism)
     except MechanismError as problem:
         if not settings:
-            _print_part(mechanism, problem, as_json=as_json)
+            _print_part(mechanism, problem, detail=detail, as_json=as_json)
         raise
     mech = checked_settings(loaded, settings).mechanism()
     if over is not None:
@@ -90,11 +98,11 @@ def check(
             findings["certificate"] = certificate.as_json()
         click.echo(json.dumps(findings, indent=2))
     else:
-        click.echo(_text(report))
+        _print(report, detail=detail)
         if certificate is not None:
-            click.echo(str(certificate))
+            click.echo(f"\n{certificate}")
         if assemblies and (found := _assemblies(report)) is not None:
-            click.echo(str(found))
+            click.echo(f"\n{found}")
         if matrices and (report.problem is None or report.has_cut_cam):
             for matrix in report.matrices():
                 click.echo(f"\n{matrix}")
@@ -104,12 +112,14 @@ def check(
 
             figure(mech, picture, value)
             if not as_json:
-                click.echo(f"  figure      {picture}")
+                click.echo(f"{picture}: written")
         if report.problem is not None:
-            raise report.problem
+            raise report.problem if as_json else _shown(report.problem)
+    if sys.stdout.isatty() and not (detail or as_json):
+        click.echo(f"\nkinfmu play {quote(mechanism)} moves it; --detail shows how it is solved")
 
 
-def _print_part(path: str, problem: MechanismError, *, as_json: bool) -> None:
+def _print_part(path: str, problem: MechanismError, *, detail: bool, as_json: bool) -> None:
     """Print what can be found of an invalid mechanism file; nothing if its bodies or joints are invalid."""
     from kinfmu.analysis import check as checked
     from kinfmu.analysis.report import leaving_out
@@ -127,13 +137,28 @@ def _print_part(path: str, problem: MechanismError, *, as_json: bool) -> None:
     if lacks_driver:
         report = replace(report, mismatch=None, advice=())
     report = leaving_out(replace(report, notes=()), reason, part.left_out)
-    click.echo(json.dumps(report.as_json(), indent=2) if as_json else _text(report))
+    if as_json:
+        click.echo(json.dumps(report.as_json(), indent=2))
+    else:
+        _print(report, detail=detail)
+        raise _shown(problem)
 
 
-def _text(report: Report) -> str:
-    """Return the report; without its problem on a terminal, where the error message states it below."""
-    on_terminal = sys.stdout.isatty() and sys.stderr.isatty()
-    return str(replace(report, problem=None) if on_terminal else report)
+def _print(report: Report, *, detail: bool) -> None:
+    """Print a report in the width of the terminal; in colours on one, unless NO_COLOR is set."""
+    is_terminal = sys.stdout.isatty()
+    width = min(shutil.get_terminal_size().columns, MOST_COLUMNS) if is_terminal else COLUMNS
+    text = report.summary(detail=detail).text(width, colour=is_terminal and not os.environ.get("NO_COLOR"))
+    click.echo(text, color=is_terminal)
+
+
+def _shown(problem: KinfmuError) -> Exception:
+    """Return the problem of a printed report; only the exit status if its message would follow the report."""
+    with suppress(OSError, ValueError):
+        out, err = os.fstat(sys.stdout.fileno()), os.fstat(sys.stderr.fileno())
+        if out.st_ino and os.path.samestat(out, err):
+            return click.exceptions.Exit(1)
+    return problem
 
 
 def _assemblies(report: Report) -> Assemblies | None:

@@ -25,6 +25,7 @@ ORDER = (
     "new",
     "import",
     "check",
+    "report",
     "play",
     "solve",
     "fit",

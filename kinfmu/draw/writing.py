@@ -54,6 +54,18 @@ def write(paths: Path | tuple[Path, ...], draw: Callable[[], Figure]) -> None:
         write_bytes(path, image)
 
 
+def write_pdf(path: Path, draw: Callable[[], Sequence[Figure]]) -> None:
+    """Write the figures of `draw` as pages of a PDF; errors as in `write`."""
+    with figure_style(path):
+        from matplotlib.backends.backend_pdf import PdfPages
+
+        file = io.BytesIO()
+        with PdfPages(file, metadata={"CreationDate": None}) as pages:
+            for figure in draw():
+                pages.savefig(figure)
+    write_bytes(path, file.getvalue())
+
+
 def svg_text(subject: str, draw: Callable[[], Figure]) -> str:
     """Return the figure of `draw` as SVG; MissingPackageError about `subject` without matplotlib."""
     with figure_style(subject):

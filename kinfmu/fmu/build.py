@@ -37,9 +37,11 @@ def build(
     platforms: str = "host",
     metadata: Mapping[str, str] | None = None,
     si: bool = False,
-    ssp: bool = False,
+    ssp: bool | int = False,
     osp: bool = False,
     page: bool | Callable[[], str] = False,
+    checks: bool = False,
+    certify: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Write the FMU of a mechanism and return its path.
@@ -66,11 +68,13 @@ def build(
             also no date, so that two builds are equal.
         si: True: lengths of all variables are in m, which hosts show in the mechanism's unit (`displayUnit`). Angles,
             times, masses and forces are in SI units in every FMU. Default: lengths are in the mechanism's unit.
-        ssp: True: write an .ssp that holds the FMU, with its connectors and a set of all parameters. Default: true if
-            the path ends in .ssp.
+        ssp: True: write an .ssp that holds the FMU, with its connectors and a set of all parameters. 2: of SSP 2.0,
+            with enumerations; True or 1: of SSP 1.0. Default: 1 if the path ends in .ssp.
         osp: True: write also `<name>_OspModelDescription.xml`, next to the FMU, with groups of variables for libcosim.
         page: True: put the page of `kinfmu play` into its documentation. Or a function that is
             called after the FMU is compiled and returns the page, '' for none. Default: no page.
+        checks: True: check the FMU as `kinfmu verify` does, and put the record inside. Default: no checks.
+        certify: True: the checks, and the proof of the motion of `kinfmu check --certify`. Default: no proof.
         progress: Called with (platforms done, number of platforms) during compilation.
 
     Returns:
@@ -82,20 +86,20 @@ def build(
         MechanismError: If the mechanism is not valid.
         AssemblyError: If the mechanism cannot be assembled.
         CompilerError: If no compiler is found.
-        FmuError: If the file cannot be written.
+        FmuError: If the file cannot be written, or the FMU fails a check.
 
     """
     require_mechanism(mechanism, "build")
     drive = default_drive(mechanism) if drive is None else drive
     flavour = default_flavour(fmi, platforms) if flavour is None else flavour
-    _check(flavour, drive, fmi, platforms)
+    _check(flavour, drive, fmi, platforms, int(ssp))
     from kinfmu.fmu.documents import attributes, documents
     from kinfmu.fmu.force_variables import chosen_outputs, force_stages
     from kinfmu.plan import compile_plan
     from kinfmu.plan.forces import loaded_coordinates
 
     stated = attributes(metadata or {})
-    path = _file(path, mechanism.name, ssp=ssp)
+    path = _file(path, mechanism.name, ssp=bool(ssp))
     if osp and suffix_of(path) == ".ssp":
         raise RequestError("osp describes an FMU for the folder that it is in; an .ssp holds none")
     given, shown = mechanism, mechanism.length_unit
@@ -122,7 +126,8 @@ def build(
         from kinfmu.fmu.native import archive
 
         data = archive.archive(plan, drive, VERSION, FMI_VERSIONS[fmi], platforms, progress, forces, owned, papers)
-    return _written(path, data, page() if callable(page) else _page_of(given) if page else "", osp=osp)
+    text = page() if callable(page) else _page_of(given) if page else ""
+    return _written(path, data, text, osp=osp, ssp=int(ssp) or 1, checks=checks, certify=certify)
 
 
 def _page_of(mechanism: Mechanism) -> str:
@@ -131,18 +136,21 @@ def _page_of(mechanism: Mechanism) -> str:
     return page(mechanism)
 
 
-def _written(path: Path, data: bytes, page: str, *, osp: bool) -> Path:
-    """Write an FMU, with its page, or the .ssp that holds it, and the description for OSP."""
+def _written(path: Path, data: bytes, page: str, *, osp: bool, ssp: int, checks: bool, certify: bool) -> Path:
+    """Write an FMU, with page and checks, or the .ssp that holds it, and the description for OSP."""
     if suffix_of(path) == ".ssp":
         from kinfmu.fmu.system_files import write_ssp
 
         with temporary_folder() as folder:
-            return write_ssp(_written(folder / "model.fmu", data, page, osp=False), path)
-    write(path, data)
-    if page:
-        from kinfmu.fmu.documents import add_page
+            fmu = _written(folder / "model.fmu", data, page, osp=False, ssp=ssp, checks=checks, certify=certify)
+            return write_ssp(fmu, path, ssp)
+    from kinfmu.fmu.documents import PLACE, completed
 
-        add_page(path, page)
+    write(path, completed(data, {PLACE: page.encode()} if page else {}))
+    if checks or certify:
+        from kinfmu.fmu.conformance import record
+
+        record(path, certify=certify)
     if osp:
         from kinfmu.fmu.system_files import write_osp
 
@@ -150,7 +158,7 @@ def _written(path: Path, data: bytes, page: str, *, osp: bool) -> Path:
     return path
 
 
-def _check(flavour: str, drive: str, fmi: int, platforms: str) -> None:
+def _check(flavour: str, drive: str, fmi: int, platforms: str, ssp: int) -> None:
     """Raise a RequestError for unknown choices and for choices that exclude each other."""
     if flavour not in FLAVOURS:
         raise RequestError(f"flavour '{flavour}' is not known{valid_names(flavour, FLAVOURS, 'flavours')}")
@@ -158,6 +166,8 @@ def _check(flavour: str, drive: str, fmi: int, platforms: str) -> None:
         raise RequestError(f"drive = '{drive}' is not known{valid_names(drive, DRIVES)}")
     if fmi not in FMI_VERSIONS:
         raise RequestError(f"fmi = {fmi!r} is not known; known: {listed(map(str, FMI_VERSIONS))}")
+    if ssp not in (0, 1, 2):
+        raise RequestError(f"ssp = {ssp!r} is not known; versions of SSP: 1, 2")
     if platforms not in PLATFORMS:
         raise RequestError(f"platforms = '{platforms}' is not known{valid_names(platforms, PLATFORMS)}")
     if flavour == "python" and (fmi != 2 or platforms != "host"):

@@ -5,26 +5,27 @@
     model.png                          (FMI 2.0) the icon
     terminalsAndIcons/icon.png, .svg   (FMI 3.0), with terminalsAndIcons.xml: one terminal for each driver
     extra/org.kinfmu/                  reference results
+    extra/org.fmi-standard.fmi-ls-ref/ parameters, experiment, and the roles of all these files
 
 They are not part of the content that the token identifies, so a change of them leaves the token as it is.
 """
 
 from __future__ import annotations
 
+import io
 import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from html import escape
-from pathlib import Path
 from types import MappingProxyType
 from xml.etree.ElementTree import Element, SubElement
 
 from kinfmu.analysis.driver_path import follow
 from kinfmu.analysis.singular import DriverRange, driver_range
-from kinfmu.errors import FmuError, KinfmuError, RequestError, valid_names
-from kinfmu.fmu import reference
-from kinfmu.fmu.archive import write, zipped
+from kinfmu.errors import KinfmuError, RequestError, valid_names
+from kinfmu.fmu import reference, related
+from kinfmu.fmu.archive import zipped
 from kinfmu.fmu.description.common import document
 from kinfmu.fmu.documentation import page
 from kinfmu.fmu.interface import Interface
@@ -106,6 +107,7 @@ class Documents:
         image = "" if drawn is None else svg(drawn, escape(variables.title or variables.name, quote=True))
         text = page(self.plan, variables, picture=image, reach=self.reach, reference=found, metadata=self.metadata)
         contents = {"documentation/index.html": text.encode()} | reference.files(variables.name, found)
+        contents |= related.files(variables, found)
         if self.fmi == 3:
             contents[f"{TERMINALS}/terminalsAndIcons.xml"] = terminals(self.plan, variables)
         if drawn is None:
@@ -227,20 +229,14 @@ This FMU holds code of kinfmu, under the MIT License below. The mechanism in it 
 {_MIT}"""
 
 
-def add_page(path: Path, page: str) -> None:
-    """Put the page of a mechanism into its FMU; the same page gives the same bytes.
+def completed(data: bytes, more: Mapping[str, bytes] = MappingProxyType({})) -> bytes:
+    """Return an FMU with further files, a link to the page among them, and the manifest of all.
 
     The token of the FMU stays: it identifies what is computed.
-
-    Raises:
-        FmuError: The file cannot be read or written.
-
     """
-    try:
-        with zipfile.ZipFile(path) as given:
-            contents = {name: given.read(name) for name in given.namelist()}
-    except OSError as error:
-        raise FmuError(f"{path}: cannot be written ({error.strerror})") from None
-    before, end, after = contents[_INDEX].rpartition(b"</body>")
-    contents[_INDEX] = before + _LINK + end + after
-    write(path, zipped(contents | {PLACE: page.encode()}))
+    with zipfile.ZipFile(io.BytesIO(data)) as given:
+        contents = {name: given.read(name) for name in given.namelist()} | dict(more)
+    if PLACE in more:
+        before, end, after = contents[_INDEX].rpartition(b"</body>")
+        contents[_INDEX] = before + _LINK + end + after
+    return zipped(contents | {related.MANIFEST: related.manifest(contents)})

@@ -1,12 +1,13 @@
 """Files for tools that connect FMUs: an FMU of kinfmu as an SSP, and its groups of variables for libcosim.
 
-System Structure and Parameterization 1.0, a system of one component:
+System Structure and Parameterization 1.0 or 2.0, a system of one component:
 
     SystemStructure.ssd          the component, its connectors with units, the default experiment
     resources/<name>.fmu
     resources/<name>.ssv         all parameters, with the values that the FMU starts with
 
-Enumerations, the parameter `rates` and the output `solver.status`, are left out: libcosim and Ecos read none.
+Enumerations, the parameter `rates` and the output `solver.status`, are in 2.0 alone: libcosim and Ecos, which read 1.0,
+end at the first one.
 
 OspModelDescription.xml, of the Open Simulation Platform, names groups of variables that belong together, so that a
 system structure connects groups, by name, in place of variables. libcosim reads the file next to the FMU, by the name
@@ -23,7 +24,7 @@ from xml.etree.ElementTree import Element, SubElement
 from kinfmu.fmu import description
 from kinfmu.fmu.archive import write, zipped
 from kinfmu.fmu.description import Description
-from kinfmu.fmu.description.common import base_unit, document, text
+from kinfmu.fmu.description.common import ENUMERATIONS, base_unit, document, text
 from kinfmu.fmu.interface import Interface, Variable
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, text_in, unpacked
 from kinfmu.units import Quantity, unit_of
@@ -46,12 +47,13 @@ _ORDER = (  # in which the schema wants the groups
 )
 
 
-def write_ssp(fmu: Path, path: Path) -> Path:
+def write_ssp(fmu: Path, path: Path, version: int = 1) -> Path:
     """Write the SSP of an FMU of kinfmu and return its path; the same FMU gives the same bytes.
 
     Args:
         fmu: The FMU.
         path: The .ssp to write.
+        version: Version of SSP, 1 or 2.
 
     Raises:
         FmuError: The FMU cannot be read, or the file cannot be written.
@@ -60,9 +62,9 @@ def write_ssp(fmu: Path, path: Path) -> Path:
     about = _description_of(fmu)
     name = about.interface.name
     contents = {
-        STRUCTURE: structure(about),
+        STRUCTURE: structure(about, version),
         f"resources/{name}.fmu": fmu.read_bytes(),
-        f"resources/{name}.ssv": parameter_set(about.interface),
+        f"resources/{name}.ssv": parameter_set(about.interface, version),
     }
     write(path, zipped(contents, STRUCTURE))
     return path
@@ -73,10 +75,10 @@ def _description_of(fmu: Path) -> Description:
         return description.read(text_in(fmu, folder, DESCRIPTION, LARGEST_DESCRIPTION).encode(), str(fmu))
 
 
-def structure(about: Description) -> bytes:
+def structure(about: Description, version: int = 1) -> bytes:
     """Return SystemStructure.ssd: the FMU as the only component, with all its inputs, outputs and parameters."""
     interface = about.interface
-    root = Element("ssd:SystemStructureDescription", _SSD, version="1.0", name=interface.name)
+    root = Element("ssd:SystemStructureDescription", _SSD, version=f"{version}.0", name=interface.name)
     root.set("generationTool", about.generation_tool)
     system = SubElement(root, "ssd:System", name=interface.name, description=interface.title or interface.name)
     elements = SubElement(system, "ssd:Elements")
@@ -88,12 +90,19 @@ def structure(about: Description) -> bytes:
         source=f"resources/{interface.name}.fmu",
     )
     connectors = SubElement(component, "ssd:Connectors")
-    seen = [variable for variable in interface if _is_shown(variable)]
+    seen = [variable for variable in interface if _is_shown(variable, version)]
     for variable in seen:
         connector = SubElement(connectors, "ssd:Connector", name=variable.name, kind=variable.causality)
-        SubElement(connector, f"ssc:{variable.type}", {"unit": variable.unit} if variable.unit else {})
+        declared = {"name": variable.declared_type} if variable.declared_type else {}
+        SubElement(connector, f"ssc:{variable.type}", {"unit": variable.unit} if variable.unit else declared)
     bindings = SubElement(component, "ssd:ParameterBindings")
     SubElement(bindings, "ssd:ParameterBinding", source=f"resources/{interface.name}.ssv")
+    if version > 1:
+        definitions = SubElement(root, "ssd:Enumerations")
+        for name, items in ENUMERATIONS.items():
+            enumeration = SubElement(definitions, "ssc:Enumeration", name=name)
+            for item in items:
+                SubElement(enumeration, "ssc:Item", name=item.name.lower(), value=str(int(item)))
     units = SubElement(root, "ssd:Units")
     for name in sorted({variable.unit for variable in seen if variable.unit}):
         SubElement(SubElement(units, "ssc:Unit", name=name), "ssc:BaseUnit", base_unit(name))
@@ -103,26 +112,34 @@ def structure(about: Description) -> bytes:
     return document(root)
 
 
-def parameter_set(interface: Interface) -> bytes:
-    """Return the parameter set of an FMU: all its parameters with their start values and units."""
+def parameter_set(interface: Interface, version: int = 1) -> bytes:
+    """Return the parameter set of an FMU: all its parameters with their start values and units.
+
+    Args:
+        interface: Variables of the FMU.
+        version: Version of SSP: 2 with enumerations. The set itself is of version 1.0, which both read.
+
+    """
     root = Element("ssv:ParameterSet", _SSV, version="1.0", name=PARAMETER_SET)
     parameters = SubElement(root, "ssv:Parameters")
     for variable in interface:
-        if variable.causality == "parameter" and variable.start is not None and _is_shown(variable):
+        if variable.causality == "parameter" and variable.start is not None and _is_shown(variable, version):
             parameter = SubElement(parameters, "ssv:Parameter", name=variable.name)
             if variable.type == "Real":
                 value = SubElement(parameter, "ssv:Real", value=text(float(variable.start)))
                 if variable.unit:
                     value.set("unit", variable.unit)
+            elif variable.declared_type:
+                item = next(one for one in ENUMERATIONS[variable.declared_type] if one == variable.start)
+                SubElement(parameter, "ssv:Enumeration", value=item.name.lower())
             else:
                 start = variable.start if variable.type == "Boolean" else int(variable.start)
                 SubElement(parameter, f"ssv:{variable.type}", value=text(start))
     return document(root)
 
 
-def _is_shown(variable: Variable) -> bool:
-    """Return True for connectors. Enumerations are none: libcosim and Ecos end at the first in a file."""
-    return variable.causality in _CAUSALITIES and variable.type != "Enumeration"
+def _is_shown(variable: Variable, version: int) -> bool:
+    return variable.causality in _CAUSALITIES and (version > 1 or variable.type != "Enumeration")
 
 
 class VariableGroup(NamedTuple):

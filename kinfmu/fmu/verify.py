@@ -141,14 +141,16 @@ def verify(
     with unpacked(path) as folder:
         about = description.read(text_in(path, folder, DESCRIPTION, LARGEST_DESCRIPTION).encode(), str(path))
         name = about.interface.name
-        if not (folder / FOLDER).is_dir() and about.interface.part("states"):
+        has_results = (folder / FOLDER / f"{name}_ref.csv").exists()
+        if not has_results and about.interface.part("states"):
             raise FmuError(
                 f"{path}: efforts drive this FMU, and its results depend on them and on the steps of the host, so that "
                 f"it holds no reference results; compare with kinfmu simulate {quote(str(path))}"
             )
-        if not (folder / FOLDER).is_dir():
+        if not has_results:
             raise FmuError(f"{path}: holds no reference results ({FOLDER}/{name}_ref.csv); build it again")
-        texts = {file.name: text_in(path, folder, f"{FOLDER}/{file.name}") for file in (folder / FOLDER).iterdir()}
+        files = [file.name for file in (folder / FOLDER).iterdir() if file.name.startswith(f"{name}_")]
+        texts = {file: text_in(path, folder, f"{FOLDER}/{file}") for file in files}
     try:
         wanted = reference.read(name, texts)
     except ValueError as error:

@@ -16,7 +16,7 @@ import numpy as np
 from kinfmu.analysis import Report
 from kinfmu.analysis.loops import FourBar, Place
 from kinfmu.analysis.measuring import turns_of_cycle
-from kinfmu.analysis.text import contact_text
+from kinfmu.analysis.summary import contact_text
 from kinfmu.draw.instant import instant
 from kinfmu.draw.scene import palette
 from kinfmu.draw.scene.instant import Instant, gravity_direction

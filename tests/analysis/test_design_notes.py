@@ -11,6 +11,7 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import parse
 from tests.gallery_members import every_member
 from tests.mechanisms import FOURBAR_DRIVER, FOURBAR_PINS
+from tests.reports import unwrapped
 
 FOURBAR = (
     """
@@ -179,7 +180,7 @@ def toggles_of(mechanism: Mechanism) -> list[tuple[str, float]]:
     report = kinfmu.check(mechanism)
     assert not [note for note in report.notes if "toggle" in note]
     for toggle in report.toggles:
-        assert f"{toggle.happens} at {toggle.driver} = " in str(report)
+        assert f"toggle {toggle.happens} at {toggle.driver} = " in unwrapped(report)
     return [(toggle.happens, toggle.value) for toggle in report.toggles]
 
 

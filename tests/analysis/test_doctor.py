@@ -63,7 +63,7 @@ def test_the_lines_of_toml_can_be_pasted() -> None:
     whole = fourbar(4, 1, 3.5, 3)
     mechanism = replace(whole, joints=tuple(joint for joint in whole.joints if joint.name != "Q"))
     report = kinfmu.check(mechanism)
-    shown = str(report).partition("  advice      ")[2].splitlines()
+    shown = str(report).partition("  advice  ")[2].splitlines()
     pasted = "\n".join(line.strip() for line in shown if re.match(r"\s+(\[|type|between)", line))
     assert pasted == '[joints.Q]\ntype = "revolute"\nbetween = ["coupler.Q", "rocker.Q"]'
     assert kinfmu.check(parse(f"{text(mechanism)}\n{pasted}\n")).problem is None

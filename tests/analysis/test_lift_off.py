@@ -16,6 +16,7 @@ from kinfmu.fmu.force_variables import variable_description
 from kinfmu.mechanism.force_names import reaction_names_of
 from kinfmu.mechanism.toml_file import parse
 from tests.motion.test_breaks import TEXT, tappet
+from tests.reports import unwrapped
 
 # ------------------------------------------------------------------------------------------------------------- lift off
 # All followers move by A cos(theta) away from the cam, theta: the cam's angle. So the contact force is
@@ -100,10 +101,10 @@ def test_check_reports_where_sliding_followers_lift_off(joint: str) -> None:
     assert (found.force, found.sense, found.unit) == ("lift.force", -1 if joint == "down" else 1, "N")
     sign = "positive" if joint == "down" else "negative"
     text = (
-        f"lift: the follower lifts off: contact force lift.force {sign} from 312.941 deg to 47.0586 deg of cam; "
+        f"lift: the follower lifts off: contact force lift.force {sign} from 312.9 deg to 47.06 deg of cam; "
         "largest tension 9.18 N (cam at 0 deg)"
     )
-    assert text in str(report)
+    assert f"poor {text}" in unwrapped(report, detail=False)
 
 
 @pytest.mark.parametrize("speed", ["60 rad/s", "-60 rad/s"])
@@ -134,7 +135,7 @@ def test_lift_off_under_a_driver_that_turns_back_is_reported_in_time() -> None:
     pulls = kinfmu.solve(mechanism, t)["lift.force"] < 0.0
     is_inside = np.any([(t >= begin) & (t <= end) for begin, end in found.parts], axis=0)
     np.testing.assert_array_equal(pulls, is_inside)
-    assert " s of time; largest tension" in str(report)
+    assert " s of time; largest tension" in unwrapped(report)
 
 
 LEVER = (
@@ -166,7 +167,7 @@ def test_moment_on_a_lever(side: float, sense: int) -> None:
     assert (begin, end) == pytest.approx((1.5 * math.pi, 0.5 * math.pi), rel=1e-8)
     assert found.largest == pytest.approx(0.02 * 0.06 * SPEED**2, rel=1e-9)
     assert found.extent == "part"
-    assert "; largest moment that pulls 4.32 N m (cam at 0 deg)" in str(report)
+    assert "; largest moment that pulls 4.32 N m (cam at 0 deg)" in unwrapped(report)
 
 
 @pytest.mark.parametrize(
@@ -184,7 +185,7 @@ def test_a_load_on_the_wrong_side_pulls_throughout(speed: str, extent: str, wher
     assert report.loading is not None
     (found,) = report.loading.lift_offs
     assert (found.extent, found.as_json()["extent"]) == (extent, extent)
-    assert f"contact moment lift.moment negative {where}; largest moment that pulls 5" in str(report)
+    assert f"contact moment lift.moment negative {where}; largest moment that pulls 5" in unwrapped(report)
     if extent == "turn":
         assert found.largest == pytest.approx(500.0 + 0.02 * 0.06 * SPEED**2, rel=1e-9)
 
@@ -193,7 +194,7 @@ def test_a_pressed_follower_has_no_such_line() -> None:
     report = kinfmu.check(parse((HEAD + JOINTS["up"] + SLIDING).replace("60 rad/s", "40 rad/s")))
     assert report.loading is not None
     assert report.loading.lift_offs == ()
-    assert "lifts off" not in str(report)
+    assert "lifts off" not in unwrapped(report)
 
 
 @pytest.mark.parametrize("joint", JOINTS)
@@ -217,16 +218,13 @@ GIVEN = {
 
 def test_the_parts_of_a_lift_are_those_of_its_law() -> None:
     report = kinfmu.check(tappet("cycloidal", "40 deg"))
-    assert "program over cam: rise 40 deg to 110 deg, dwell 110 deg to 170 deg, return 170 deg to 280 deg, " in str(
-        report
-    )
-    assert "dwell 280 deg to 40 deg" in str(report)
+    parts = "rise 40 deg to 110 deg, dwell 110 deg to 170 deg, return 170 deg to 280 deg, dwell 280 deg to 40 deg"
+    assert f"program of lift over cam: {parts}" in unwrapped(report)
     (cam,) = report.cams
     assert [part["part"] for part in cam.as_json()["program"]] == ["rise", "dwell", "return", "dwell"]
     at_start = kinfmu.check(tappet("cycloidal", "0 deg"))
-    assert "rise 0 deg to 70 deg, dwell 70 deg to 130 deg, return 130 deg to 240 deg, dwell 240 deg to 360 deg" in str(
-        at_start
-    )
+    parts = "rise 0 deg to 70 deg, dwell 70 deg to 130 deg, return 130 deg to 240 deg, dwell 240 deg to 360 deg"
+    assert parts in unwrapped(at_start)
 
 
 @pytest.mark.parametrize("joint", GIVEN)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -22,12 +23,13 @@ from kinfmu import (
     RunSettings,
     Translational,
 )
-from kinfmu.analysis.driver_path import follow, value_text
+from kinfmu.analysis.driver_path import follow
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.plan import compile_plan
 from kinfmu.solver.python import Pose
 from tests.analysis.linkages import digger, five_bar_arm, pushed_crank
 from tests.mechanisms import five_bar, fourbar, slider_crank, tight_jaw, with_arm
+from tests.reports import unwrapped
 
 
 def dead_centres(ground: float, crank: float, reach: float) -> float:
@@ -47,7 +49,7 @@ def test_limits_of_four_bars_are_where_coupler_and_rocker_fall_in_line(lengths: 
     assert report.range.high == pytest.approx(exact, abs=1e-10)
     assert report.range.low == pytest.approx(least, abs=1e-10)
     assert {point.kind for point in report.singular} == {"limit"}
-    assert "coupler and rocker fall in line" in str(report)
+    assert "coupler and rocker fall in line" in unwrapped(report)
 
 
 def test_the_position_at_a_limit_is_reported() -> None:
@@ -76,7 +78,7 @@ def test_limits_of_a_slider_crank_are_where_the_rod_stands_across_the_slide(
         sine = (offset + side * rod) / crank
         expected = math.asin(sine) if abs(sine) < 1.0 else side * math.pi - math.asin((offset - side * rod) / crank)
         assert end == pytest.approx(expected, abs=1e-10)
-    assert "rod is perpendicular to the slide" in str(report)
+    assert "rod is perpendicular to the slide" in unwrapped(report)
 
 
 def test_a_slider_that_drives_goes_from_crank_and_rod_folded_to_stretched() -> None:
@@ -86,7 +88,7 @@ def test_a_slider_that_drives_goes_from_crank_and_rod_folded_to_stretched() -> N
     assert report.range.kind == "length"
     assert report.range.low == pytest.approx(math.sqrt((rod - crank) ** 2 - offset**2), abs=1e-10)
     assert report.range.high == pytest.approx(math.sqrt((rod + crank) ** 2 - offset**2), abs=1e-10)
-    assert "rod and crank fall in line" in str(report)
+    assert "rod and crank fall in line" in unwrapped(report)
 
 
 def test_each_driver_of_a_five_bar_goes_until_its_arms_are_straight() -> None:
@@ -105,9 +107,9 @@ def test_each_driver_of_a_five_bar_goes_until_its_arms_are_straight() -> None:
     half = math.acos((1.0 + away**2 - (2 * upper) ** 2) / (2 * away))
     assert elbow.low == pytest.approx(lean - half, abs=1e-10)
     assert elbow.high == pytest.approx(lean + half, abs=1e-10)
-    text = str(report)
-    assert "each with the other drivers at their start values" in text
-    assert text.count("forearm and strut fall in line") == 6  # at four limits and in two transmission angles
+    text = unwrapped(report)
+    assert "Range of each driver, the others at their start values" in text
+    assert text.count("dead centre at both ends, forearm and strut fall in line") == 2
 
 
 def test_links_of_a_loop_without_a_name_fall_in_line_too() -> None:
@@ -141,8 +143,8 @@ drivers.motor = { type = "angle", of = "crank", law = "constant_speed", start = 
         assert limit.bodies == ("link", "lever", "rod", "block")
         at = limit.coordinates
         assert math.sin(at["link.phi"] - at["lever.phi"]) == pytest.approx(0.0, abs=1e-5)
-        assert f"at {value_text(limit.value, 'mm', 'angle')} link and lever fall in line" in str(report)
     assert len(reach.limits) == 2
+    assert "; dead centre at both ends, link and lever fall in line\n" in unwrapped(report)
 
 
 def test_cylinders_go_as_far_as_their_triangles() -> None:
@@ -162,7 +164,7 @@ def test_a_cylinder_that_closes_wholly_ends_at_zero() -> None:
     assert report.ranges[0].low == pytest.approx(0.0, abs=1e-12)
     assert report.ranges[0].high == pytest.approx(4.0, abs=1e-10)
     assert [point.kind for point in report.ranges[0].points] == ["limit", "limit"]
-    assert "lift from 0 m, where the distance is 0, to 4 m, a dead centre" in str(report)
+    assert " lift distance 0 at the lower end; dead centre at the upper end 0 m 4 m\n" in unwrapped(report)
 
 
 def test_a_place_where_the_solver_stops_at_crossing_branches_is_not_called_a_dead_centre() -> None:
@@ -174,7 +176,7 @@ def test_a_place_where_the_solver_stops_at_crossing_branches_is_not_called_a_dea
     assert (reach.lowest.value, reach.lowest.kind) == (pytest.approx(-dead_centre, abs=1e-9), "dead centre")
     assert reach.highest.kind == "change point"
     assert reach.highest.value < dead_centre - 0.2
-    assert "where branches cross and the motion cannot continue" in str(report)
+    assert "; branches cross and the motion cannot continue at the upper end" in unwrapped(report)
 
 
 def test_a_crossing_near_a_dead_centre_is_bridged_and_the_dead_centre_is_the_limit() -> None:
@@ -201,7 +203,8 @@ def test_change_points_show_with_several_drivers_too() -> None:
         [point.value for point in crank.points], [math.pi, math.tau], atol=1e-11
     )  # from 1 rad on
     assert arm_alone.points == ()
-    assert "branches cross, with several drivers no run can cross it" in str(report)
+    places = "crank = 180 deg, 360 deg"
+    assert f"poor Branches cross at {places}; with several drivers no run can cross it" in unwrapped(report)
 
 
 def test_a_geared_linkage_turns_until_it_is_back() -> None:
@@ -276,7 +279,7 @@ def test_a_mechanism_repeats_where_the_motion_does_not_only_the_pose(law: str, t
     assert report.range is not None
     assert report.range.turns == turns
     if turns is None:
-        assert "crank: no limit from" in str(report)
+        assert re.search(r"one driver: crank from .* without a limit\n", unwrapped(report))
 
 
 def test_a_rack_never_comes_back_and_has_no_limit() -> None:
@@ -297,7 +300,7 @@ def test_a_rack_never_comes_back_and_has_no_limit() -> None:
     report = kinfmu.check(mechanism)
     assert report.range is not None
     assert (report.range.low, report.range.high, report.range.turns) == (None, None, None)
-    assert "drive: no limit from" in str(report)
+    assert re.search(r"one driver: drive from .* without a limit\n", unwrapped(report))
 
 
 def test_a_run_past_the_range_is_noted() -> None:
@@ -306,10 +309,10 @@ def test_a_run_past_the_range_is_noted() -> None:
     assert report.notes == (
         "[run] takes crank from 0.2 rad (11.4591559 deg) to 2.2 rad (126.050715 deg): beyond the range",
     )
-    toggle = "  toggle      crank, coupler fall in line at crank = 0.204480199 rad (11.7158524 deg)"
+    toggle = " toggle crank, coupler fall in line at crank = 11.7158524 deg"
     shorter = kinfmu.check(replace(swinging, run=RunSettings(0.0, 0.4, 0.1)))
-    assert toggle in str(report).splitlines()
-    assert toggle in str(shorter).splitlines()
+    assert toggle in unwrapped(report).splitlines()
+    assert toggle in unwrapped(shorter).splitlines()
 
 
 def test_a_run_of_several_drivers_that_stops_is_noted_with_its_time() -> None:

@@ -53,17 +53,33 @@ def on_a_terminal(arguments: tuple[str, ...], folder: Path, variables: dict[str,
     return printed
 
 
+@pytest.mark.parametrize("columns", ["60", "80", "200"])
+@pytest.mark.few(2)
+def test_a_report_is_coloured_on_a_terminal_as_wide_as_it(columns: str, tmp_path: Path) -> None:
+    arguments = (*MODULE, "check", "jansen_leg")
+    printed = on_a_terminal(arguments, tmp_path, {"COLUMNS": columns})
+    plain = on_a_terminal(arguments, tmp_path, {"COLUMNS": columns, "NO_COLOR": "1"})
+    assert b"\x1b[32m  ok" in printed
+    assert b"\x1b[31m8.648 deg" in printed
+    assert [line.rstrip() for line in COLOUR.sub(b"", printed).splitlines()] == plain.splitlines()
+    *report, _, hint = plain.decode().splitlines()
+    width = max(map(len, report))
+    assert width <= int(columns)
+    assert (width > 80) == (columns == "200")
+    assert hint.startswith("kinfmu play jansen_leg moves it")
+
+
 @pytest.mark.parametrize(
     ("arguments", "contains"),
     [
-        ((*MODULE, "check", "fourbar"), b"redundant   AB"),
+        ((*MODULE, "list"), b"fourbar"),
         ((*MODULE, "check", "fourbr"), b"did you mean"),
         ((*MODULE, "check", "--help"), b"--figure"),
         ((*MODULE, "chek"), b"Usage"),
         ((*MODULE, "solve", "double_pendulum", "-o", "run.csv", "--times", "0:3:0.5"), b"crank = 6.54"),
         (("-c", PROGRESS), b"100%"),
     ],
-    ids=["report", "error", "help", "usage", "limit", "progress"],
+    ids=["list", "error", "help", "usage", "limit", "progress"],
 )
 @pytest.mark.few(1)
 def test_commands_on_a_terminal_print_no_colours(arguments: tuple[str, ...], contains: bytes, tmp_path: Path) -> None:

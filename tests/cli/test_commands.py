@@ -209,7 +209,7 @@ def test_the_program_checks_a_mechanism_in_a_process_of_its_own(tmp_path: Path) 
     done = program("check", "double_pendulum", cwd=tmp_path)
     assert done.returncode == 0
     assert done.stderr == ""
-    assert "mobility    1, driven by crank" in done.stdout
+    assert "ok  Moves with one driver: crank from 180 deg to 360 deg; " in done.stdout
 
 
 def test_the_package_is_a_program_too(tmp_path: Path) -> None:

@@ -126,11 +126,16 @@ def test_the_target_with_an_offset_finds_a_straight_line_at_any_height(
     assert "flat" in done.output
 
 
+def over_motion(report: str) -> str:
+    """The tables of measures and forces of a report."""
+    return re.findall(r"^ +Over .*", report, re.MULTILINE | re.DOTALL)[0]
+
+
 @pytest.mark.long
 def test_forces(request: pytest.FixtureRequest, tmp_path: Path) -> None:
     followed = follow("forces.md", tmp_path)
     report = followed.outputs["kinfmu check pump.toml"]
-    page = with_outputs(page_text("forces.md"), report[report.index("  forces ") :])
+    page = with_outputs(page_text("forces.md"), over_motion(report))
     accept("forces.md", followed.commented(page), request)
     faster = followed.outputs["kinfmu check pump.toml --set piston_mass=1.2kg --set crank.speed=600rpm"]
     assert "at 62.8319 rad/s" in faster
@@ -142,7 +147,7 @@ def test_forces(request: pytest.FixtureRequest, tmp_path: Path) -> None:
 def test_measures(request: pytest.FixtureRequest, tmp_path: Path) -> None:
     followed = follow("measures.md", tmp_path)
     report, as_json, faster = followed.outputs.values()
-    page = with_outputs(with_readings(page_text("measures.md")), report[report.index("  measures ") :])
+    page = with_outputs(with_readings(page_text("measures.md")), over_motion(report))
     accept("measures.md", followed.commented(page), request)
     assert '"measures": {' in as_json
     assert "at 6.28319 rad/s" in faster

@@ -216,7 +216,7 @@ def test_check_draws_the_figure_asked_for(run_cli: Callable[..., tuple[int, str,
     path = tmp_path / "figure.svg"
     status, out, err = run_cli("check", "fourbar", "--figure", path)
     assert (status, err) == (0, "")
-    assert out.endswith(f"  figure      {path}\n")
+    assert out.endswith(f"{path}: written\n")
     assert "coupler" in texts_in(path)
 
 
@@ -250,7 +250,7 @@ def test_check_draws_a_mechanism_without_a_driver_and_still_fails(
     kinfmu.save(replace(fourbar(4.0, 1.0, 3.5, 3.0), drivers=()), path)
     status, out, err = run_cli("check", path, "--figure", picture)
     assert status == 1
-    assert f"  figure      {picture}\n" in out
+    assert f"{picture}: written\n" in out
     assert len(err.splitlines()) == 1
     assert "coupler" in texts_in(picture)
 

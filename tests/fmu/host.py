@@ -28,7 +28,8 @@ WORDS = {  # fmpy's names of types in each version
 class Host:
     """One instance of an FMU. messages: what it logged, as (status, text).
 
-    inputs_at: gives inputs by name at any time in a step of FMI 3.0, when the FMU asks for them.
+    inputs_at: gives inputs by name at any time in a step of FMI 3.0, when the FMU asks for them. events, early:
+    co-simulation of FMI 3.0 with event mode, and with steps that may end early.
     """
 
     def __init__(
@@ -38,6 +39,8 @@ class Host:
         *,
         model_exchange: bool = False,
         inputs_at: Callable[[float], Mapping[str, float]] | None = None,
+        events: bool = False,
+        early: bool = False,
     ) -> None:
         if not folder.exists():
             with zipfile.ZipFile(path) as zipped:
@@ -62,6 +65,7 @@ class Host:
             self.fmu.instantiate(
                 loggingOn=True,
                 logMessage=lambda _host, status, _category, text: self.messages.append((status, text.decode())),
+                **({} if model_exchange else {"eventModeUsed": events, "earlyReturnAllowed": early}),
                 **self._intermediate(inputs_at),
             )
 

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import zipfile
+from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
 
@@ -111,6 +112,30 @@ def test_an_ssp_is_stepped_like_its_fmu(ssp: Path, mechanism: kinfmu.Mechanism, 
         assert np.abs(system[name] * (1e3 if name == "ram.x" else 1.0) - solved[name]).max() < 1e-9 * size
     longer = simulate(ssp, stop=STEP, step=STEP, parameters={"small_press.arm": "42 mm"})
     assert longer["crank.phi"][0] != system["crank.phi"][0]
+
+
+def test_ssp_2_has_the_enumerations(ssp: Path, mechanism: kinfmu.Mechanism, tmp_path: Path) -> None:
+    """Its schemas come with pyssp-standard; without it the rest is tested."""
+    path = build(mechanism, tmp_path, flavour="native", drive="time", si=True, ssp=2)
+    root, values = etree.fromstring(_inside(path, "SystemStructure.ssd")), _inside(path, "resources/small_press.ssv")
+    assert root.get("version") == "2.0"
+    declared = {
+        one.get("name"): {item.get("name"): item.get("value") for item in one} for one in root.find("{*}Enumerations")
+    }
+    used = {one.getparent().get("name"): one.get("name") for one in root.iter("{*}Enumeration") if len(one) == 0}
+    assert used == {"solver.status": "Status", "rates": "Rates"}
+    assert set(used.values()) == set(declared)
+    assert declared["Rates"] == {"auto": "0", "estimated": "1", "wired": "2"}
+    (rates,) = (one[0] for one in etree.fromstring(values).iter("{*}Parameter") if one.get("name") == "rates")
+    assert (etree.QName(rates).localname, rates.get("value")) == ("Enumeration", "auto")
+    same = simulate(path, stop=STEP, step=STEP), simulate(ssp, stop=STEP, step=STEP)
+    assert np.array_equal(same[0]["ram.x"], same[1]["ram.x"])
+    package = find_spec("pyssp_standard")
+    if package is None or package.origin is None:
+        pytest.skip("needs the schemas in pyssp-standard")
+    schemas = Path(package.origin).parent / "resources/ssp2"
+    for data, name in ((root, "Description"), (etree.fromstring(values), "ParameterValues")):
+        etree.XMLSchema(etree.parse(str(schemas / f"SystemStructure{name}.xsd"))).assertValid(data)
 
 
 def test_an_ssp_is_built_twice_as_the_same_file_and_only_in_its_place(

@@ -49,7 +49,7 @@ enum { OK, WARNING, DISCARD, ERROR, FATAL };
 
 typedef struct {
     component c;
-    bool model_exchange, running;
+    bool model_exchange, running, has_events;
     double t;
     state states[STATES];
 } slot;
@@ -236,10 +236,11 @@ static void logger(fmi3InstanceEnvironment environment, fmi3Status status, fmi3S
 
 /* Life */
 
-static component made(host *h, bool model_exchange, const char *token)
+static component made(host *h, bool model_exchange, bool has_events, const char *token)
 {
     const bool quiet = one_in(h, 8);
 #if FMI == 2
+    (void)has_events;
     const fmi2CallbackFunctions callbacks = {logger, NULL, NULL, NULL, h};
     const fmi2CallbackFunctions silent = {NULL, NULL, NULL, NULL, NULL};
     return fmi2Instantiate(one_in(h, 9) ? NULL : "%n%s", model_exchange ? fmi2ModelExchange : fmi2CoSimulation, token,
@@ -250,8 +251,8 @@ static component made(host *h, bool model_exchange, const char *token)
     if (model_exchange) {
         return fmi3InstantiateModelExchange(one_in(h, 9) ? NULL : "%n", token, NULL, false, true, h, log);
     }
-    return fmi3InstantiateCoSimulation(one_in(h, 9) ? NULL : "%n", token, NULL, false, true, false, one_in(h, 2), NULL, 0, h, log,
-                                       NULL);
+    return fmi3InstantiateCoSimulation(one_in(h, 9) ? NULL : "%n", token, NULL, false, true, has_events, h->seed % 2, NULL, 0,
+                                       h, log, NULL);
 #endif
 }
 
@@ -300,7 +301,12 @@ static int step(slot *s, double t, double size)
 #else
     bool event = true, stop = true, early = true;
     double last;
-    return fmi3DoStep(s->c, t, size, true, &event, &stop, &early, &last);
+    const int answer = fmi3DoStep(s->c, t, size, true, &event, &stop, &early, &last);
+    if (answer < DISCARD && event && fmi3EnterEventMode(s->c) == OK) {
+        fmi3UpdateDiscreteStates(s->c, &early, &stop, NULL, NULL, &event, &last);
+        fmi3EnterStepMode(s->c);
+    }
+    return answer;
 #endif
 }
 
@@ -313,6 +319,11 @@ static void begin(host *h, slot *s)
         if (s->running && s->model_exchange) {
             answered(h, CALL(EnterContinuousTimeMode)(s->c));
         }
+#if FMI == 3
+        if (s->running && s->has_events) {
+            answered(h, fmi3EnterStepMode(s->c));
+        }
+#endif
     }
 }
 
@@ -341,11 +352,12 @@ static void end(host *h, slot *s)
 static void create(host *h, slot *s)
 {
     end(h, s);
-    if (one_in(h, 20) && made(h, one_in(h, 2), one_in(h, 2) ? NULL : "%n{other}") != NULL) {
+    if (one_in(h, 20) && made(h, one_in(h, 2), one_in(h, 2), one_in(h, 2) ? NULL : "%n{other}") != NULL) {
         fail(h, "a wrong token is taken");
     }
     s->model_exchange = one_in(h, 3);
-    s->c = made(h, s->model_exchange, KF_TOKEN);
+    s->has_events = FMI == 3 && !s->model_exchange && one_in(h, 2);
+    s->c = made(h, s->model_exchange, s->has_events, KF_TOKEN);
     if (s->c == NULL) {
         fail(h, "there is no instance");
     }
@@ -363,7 +375,7 @@ static void check_reset(host *h, slot *s)
     uint64_t random;
     int k, i;
     fresh.model_exchange = s->model_exchange;
-    fresh.c = made(h, s->model_exchange, KF_TOKEN);
+    fresh.c = made(h, s->model_exchange, s->has_events, KF_TOKEN);
     answered(h, CALL(Reset)(s->c));
     s->running = false;
     memset(inputs, 0, sizeof inputs);
@@ -373,6 +385,11 @@ static void check_reset(host *h, slot *s)
         h->random = random; /* the same tolerance for both */
         enter(h, both[k], 0.0, false);
         CALL(ExitInitializationMode)(both[k]->c);
+#if FMI == 3
+        if (s->has_events) {
+            fmi3EnterStepMode(both[k]->c);
+        }
+#endif
         for (i = 0; i < 3; ++i) {
             set_inputs(both[k], inputs);
             step(both[k], 0.1 * i, 0.1);
@@ -924,7 +941,7 @@ static void modes(host *h, slot *s)
         answered(h, fmi3EnterConfigurationMode(s->c));
         answered(h, fmi3ExitConfigurationMode(s->c));
         break;
-    case 13: refused(h, fmi3EnterStepMode(s->c), true); break;
+    case 13: refused(h, fmi3EnterStepMode(s->c), !s->has_events); break;
 #endif
     case 14: check_reset(h, s); break;
     default: create(h, s); break;

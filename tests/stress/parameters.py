@@ -1,18 +1,22 @@
 """Random settings of FMUs whose plain numbers are parameters, against files with these numbers; see `--help`.
 
-FMUs of the gallery are built with `parameters="all"`, in every flavour. Each setting is compared with Python's `solve`
-of a file in whose generated code these numbers are numbers. An FMU may refuse a setting if there is no such file, or if
-continuation does not reach its pose.
+FMUs of the gallery are built with `parameters="all"`, in every flavour, and unpacked once in each process. Each setting
+is compared with Python's `solve` of a file in whose generated code these numbers are numbers. An FMU may refuse a
+setting if there is no such file, or if continuation does not reach its pose.
 """
 
 from __future__ import annotations
 
 import argparse
 import gc
+import os
+import shutil
 import sys
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
@@ -22,6 +26,8 @@ import numpy as np
 import kinfmu
 from kinfmu import Mechanism, Run
 from kinfmu.errors import FmuError, KinfmuError
+from kinfmu.fmu.host import own
+from kinfmu.fmu.unpacked import unpacked
 from kinfmu.mechanism.gallery import names
 from kinfmu.mechanism.opened import with_open_numbers
 from kinfmu.processes import cores, processes, without_main
@@ -118,6 +124,7 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=500, help="settings of each mechanism; 500")
     parser.add_argument("--seed", type=int, default=0, help="of the settings; 0")
     parser.add_argument("names", nargs="*", help="mechanisms of the gallery; all")
+    parser.add_argument("--flavours", nargs="+", choices=FLAVOURS, default=list(FLAVOURS), help="of the FMUs; all")
     parser.add_argument("--jobs", type=int, default=cores(), help="processes; as many as cores")
     given = parser.parse_args()
     wrong = 0
@@ -125,7 +132,7 @@ def main() -> int:
         for name in given.names or names():
             begun = time.monotonic()
             with TemporaryDirectory(prefix="kinfmu_stress_") as folder:
-                fmus = built(name, Path(folder))
+                fmus = built(name, Path(folder), given.flavours)
                 with without_main():
                     parts = [slice(k, k + PART) for k in range(0, given.count, PART)]
                     waiting = [pool.submit(_part, name, fmus, given.count, given.seed, part) for part in parts]
@@ -142,10 +149,18 @@ def main() -> int:
 
 def _part(name: str, fmus: Mapping[str, Path], count: int, seed: int, part: slice) -> Settings:
     """Compare a part of the settings; garbage is collected once, after it."""
+    setattr(own, "unpacked", lambda path: nullcontext(_folder(path)))  # noqa: B010  # for mypy
     try:
         return compared(name, fmus, count, seed, part)
     finally:
         gc.collect()
+
+
+@cache
+def _folder(fmu: Path) -> Path:
+    """Unpack an FMU once in this process, next to its file, whose folder is removed at the end."""
+    with unpacked(fmu) as folder:
+        return Path(shutil.copytree(folder, fmu.with_suffix(f".{os.getpid()}")))
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ WARNING = 1  # fmi2Warning and fmi3Warning; a greater status is a failure
 DISCARD = 2  # fmi2Discard and fmi3Discard
 COUNTS = ("solver.status", "solver.iterations")
 _PYTHONFMU_FILE = "resources/slavemodule.txt"  # in every FMU of pythonfmu, of other tools too
+_STATE_CALLS = ("get", "set", "free")
 Log = Callable[[int, str], None]  # status and text of a message
 _TYPES = (  # of FMI 2.0 and 3.0, in fmpy's names of functions, by type of a variable
     {"Enumeration": "Integer"},
@@ -206,6 +207,17 @@ class LoadedSlave:
 
         failure = FMICallException(function=self._do_step.name, status=status)
         raise FmuError(f"{self.name or f'at t = {time:g} s'}: {failure}")
+
+    def saved_state(self) -> Callable[[], None]:
+        """Save the state of an FMU; return a call that restores it, once."""
+        get, put, free = (getattr(self._fmpy, f"{verb}FMU{'S' if self._is_fmi3 else 's'}tate") for verb in _STATE_CALLS)
+        state = self._call(get)
+
+        def restore() -> None:
+            self._call(put, state)
+            self._call(free, state)
+
+        return restore
 
     @property
     def _real(self) -> str:

@@ -128,7 +128,9 @@ def of_ssp(path: Path, folder: Path, opened: Any) -> SystemStructure:
     from fmpy.ssp.ssd import read_ssd
 
     try:
-        described = read_ssd(BytesIO(path.read_bytes()), validate=True)  # fmpy leaves files of an invalid SSP open
+        root = ET.parse(folder / STRUCTURE).getroot()  # noqa: S314  # the stdlib parser loads no external entities
+        is_old = root.get("version", "").startswith("1.")  # fmpy has the schemas of SSP 1.0 only
+        described = read_ssd(BytesIO(path.read_bytes()), validate=is_old)  # fmpy leaves files of an invalid SSP open
     except Exception as error:  # fmpy and lxml raise bare exceptions
         raise FmuError(f"{path}: {STRUCTURE} is not valid: {' '.join(str(error).split())[:300]}") from None
     system = described.system
@@ -165,7 +167,7 @@ def of_ssp(path: Path, folder: Path, opened: Any) -> SystemStructure:
         elif wire.endElement is not None:
             inner.append(_connection(path, components, wire))
     outer = {name: tuple(found) for name, found in ends.items() if found}
-    span = ET.parse(folder / STRUCTURE).getroot().find("{*}DefaultExperiment")  # noqa: S314  # validated above
+    span = root.find("{*}DefaultExperiment")
     name = str(described.name or system.name or path.stem)
     return _structure(
         (name, str(system.description or name)), tuple(components.values()), tuple(inner), outer, span, path

@@ -51,7 +51,7 @@ CAPABILITIES: dict[FmiVersion, dict[str, dict[str, float | bool]]] = {
         "CoSimulation": _COMMON
         | {"canGetAndSetFMUState": True, "canSerializeFMUState": True, "providesDirectionalDerivatives": True}
         | {"providesAdjointDerivatives": True, "canHandleVariableCommunicationStepSize": True}
-        | {"maxOutputDerivativeOrder": 2, "hasEventMode": False},
+        | {"maxOutputDerivativeOrder": 2, "hasEventMode": True},
     },
 }
 _OWNING = CAPABILITIES | {  # the integrator asks the host for its inputs, if the host wants that

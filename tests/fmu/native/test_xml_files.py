@@ -16,6 +16,7 @@ import kinfmu
 from kinfmu.codegen.c import compiler
 from kinfmu.errors import RequestError
 from kinfmu.fmu.interface import Drive
+from tests.fmu.test_conformance import related
 from tests.gallery_members import every_member
 
 SCHEMAS = Path(fmpy.__file__).parent / "schema/fmi3"
@@ -48,6 +49,7 @@ def described(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Built:
 def test_xml_files_follow_the_schemas_and_the_rules(name: str, drive: Drive, described: Built) -> None:
     path = described(name, drive)
     assert validate_fmu(str(path)) == []
+    assert set(related(path).values()) >= {"model", "parameter", "document"}
     with zipfile.ZipFile(path) as zipped:
         inside = set(zipped.namelist())
         roots = {file: etree.fromstring(zipped.read(file)) for file in FILES}

@@ -60,7 +60,7 @@ const char *fmi3GetVersion(void)
 }
 
 /* Resources are not read, so any path is accepted. There are no debug messages, so `loggingOn` has no effect: all messages
- * sent state why a status is not OK. Steps do not return early.
+ * sent state why a status is not OK.
  */
 static fmi3Instance instantiate(const char *token, fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
                                 const char *refusal, bool model_exchange)
@@ -102,8 +102,11 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
                                          fmi3LogMessageCallback logMessage,
                                          fmi3IntermediateUpdateCallback intermediateUpdate)
 {
-    fmi3Instance instance = instantiate(instantiationToken, instanceEnvironment, logMessage,
-                                        eventModeUsed ? "this FMU has no event mode in co-simulation" : NULL, false);
+    fmi3Instance instance = instantiate(instantiationToken, instanceEnvironment, logMessage, NULL, false);
+    if (instance && eventModeUsed) {
+        common(instance)->has_event_mode = true;
+        common(instance)->returns_early = earlyReturnAllowed;
+    }
     if (instance && intermediateUpdate && nRequiredIntermediateVariables) {
         ((instance3 *)instance)->update = intermediateUpdate;
         common(instance)->update = update;
@@ -285,7 +288,7 @@ fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference 
     return unsupported(instance, "activateModelPartition: this FMU is not for scheduled execution");
 }
 
-/* Events are jumps of laws over time and changes of status. */
+/* Events are jumps of laws over time and changes of status: event_mode.c. */
 
 fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance)
 {
@@ -333,7 +336,7 @@ fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nConti
 
 fmi3Status fmi3EnterStepMode(fmi3Instance instance)
 {
-    return unsupported(instance, "enterStepMode: this FMU has no event mode in co-simulation");
+    return instance ? (fmi3Status)kf_enter(common(instance), KF_STEPPING, KF_ENTER_STEPS) : fmi3Error;
 }
 
 OUTPUT_DERIVATIVES(fmi3GetOutputDerivatives, fmi3Int32)
@@ -342,14 +345,17 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
                       fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean *eventHandlingNeeded,
                       fmi3Boolean *terminateSimulation, fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime)
 {
+    bool has_event = false, is_early = false;
     kf_answer answer;
     if (instance == NULL) {
         return fmi3Error;
     }
-    answer = kf_step(common(instance), currentCommunicationPoint, communicationStepSize);
-    put(eventHandlingNeeded, fmi3False);
+    answer = common(instance)->has_event_mode
+                 ? kf_step_to_event(common(instance), currentCommunicationPoint, communicationStepSize, &has_event, &is_early)
+                 : kf_step(common(instance), currentCommunicationPoint, communicationStepSize);
+    put(eventHandlingNeeded, has_event);
     put(terminateSimulation, common(instance)->now.terminated);
-    put(earlyReturn, fmi3False);
+    put(earlyReturn, is_early);
     if (lastSuccessfulTime) {
         *lastSuccessfulTime = common(instance)->now.last_time;
     }

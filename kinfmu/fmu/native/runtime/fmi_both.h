@@ -130,7 +130,7 @@ FMI(Status) FMI(DeserializeFMUState)(void *c, const FMI(Byte) bytes[], size_t si
 
 FMI(Status) FMI(EnterEventMode)(void *c)
 {
-    return c ? (FMI(Status))kf_enter(common(c), KF_EVENTS, KF_ENTER_EVENTS) : FMI(Error);
+    return c ? (FMI(Status))kf_enter_events(common(c)) : FMI(Error);
 }
 
 FMI(Status) FMI(EnterContinuousTimeMode)(void *c)

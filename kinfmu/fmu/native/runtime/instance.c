@@ -34,7 +34,8 @@ void kf_start(kf_instance *instance, bool model_exchange)
 }
 
 #define RUNNING (KF_BIT(KF_EVENTS) | KF_BIT(KF_CONTINUOUS))
-#define ALIVE (KF_BIT(KF_INSTANTIATED) | KF_BIT(KF_INITIALIZATION) | KF_BIT(KF_STEPPING) | RUNNING)
+#define IN_STEPS (KF_BIT(KF_STEPPING) | KF_BIT(KF_EVENTS_OF_STEPS))
+#define ALIVE (KF_BIT(KF_INSTANTIATED) | KF_BIT(KF_INITIALIZATION) | IN_STEPS | RUNNING)
 
 /* The modes in which each call is possible, a bit each, and the answer in all others. */
 static const struct {
@@ -45,13 +46,15 @@ static const struct {
     [KF_EXIT_INITIALIZATION] = {KF_BIT(KF_INITIALIZATION),
                                 "exitInitializationMode: the instance is not in initialization mode"},
     [KF_SET_VARIABLES] = {ALIVE, "nothing can be set after terminate"},
-    [KF_DO_STEP] = {KF_BIT(KF_STEPPING), "doStep before the end of initialization, or after terminate"},
+    [KF_DO_STEP] = {KF_BIT(KF_STEPPING), "doStep before the end of initialization, in event mode, or after terminate"},
+    [KF_ENTER_EVENTS_OF_STEPS] = {KF_BIT(KF_STEPPING), "enterEventMode: not possible now"},
+    [KF_ENTER_STEPS] = {KF_BIT(KF_EVENTS_OF_STEPS), "enterStepMode: the instance is not in event mode of co-simulation"},
     [KF_ENTER_EVENTS] = {RUNNING, "enterEventMode: not possible now"},
     [KF_ENTER_CONTINUOUS] = {RUNNING, "enterContinuousTimeMode: not possible now"},
     [KF_SET_TIME] = {ALIVE, "setTime: not possible after terminate"},
     [KF_SET_STATES] = {KF_BIT(KF_CONTINUOUS), "setContinuousStates: the instance is not in continuous-time mode"},
     [KF_COMPLETE_STEP] = {RUNNING, "completedIntegratorStep: the instance is not in continuous-time mode"},
-    [KF_TERMINATE] = {KF_BIT(KF_STEPPING) | RUNNING, "terminate: not possible now"},
+    [KF_TERMINATE] = {IN_STEPS | RUNNING, "terminate: not possible now"},
 };
 
 kf_answer kf_possible(const kf_instance *instance, kf_call call)
@@ -111,7 +114,7 @@ kf_answer kf_exit_initialization(kf_instance *instance)
         return KF_ERROR;
     }
     s->mode = s->model_exchange ? KF_EVENTS : KF_STEPPING;
-    return KF_DONE;
+    return instance->has_event_mode ? kf_enter_events(instance) : KF_DONE;
 }
 
 /* Between events the discrete variables keep the values that they had at the last one. */
@@ -182,36 +185,4 @@ kf_answer kf_complete_integrator_step(kf_instance *instance, bool *wants_event)
         kf_commit(s, s->time, 0.0);
     }
     return answer;
-}
-
-/* Return a time at which the law is beyond its jump in spite of rounding. */
-static double just_after(double jump, double period, double times)
-{
-    const double at = jump + times * period;
-    return at + KF_JUST_AFTER * (fabs(jump) + fabs(at) + period);
-}
-
-/* Return the next time at which a driver's value, speed or acceleration jumps. */
-bool kf_next_event(const kf_instance *instance, double *time)
-{
-    const kf_state *const s = &instance->now;
-    const double *const constants = kf_constants_of_jumps(s);
-    double jumps[KF_ROOM(KF_JUMPS)], periods[KF_ROOM(KF_JUMPS)], next = INFINITY;
-    int k;
-    if (constants == NULL) {
-        return false;
-    }
-    kf_jumps(&s->solver.model, constants, jumps, periods);
-    for (k = 0; k < KF_JUMPS; ++k) {
-        const double past = periods[k] > 0.0 ? floor((s->time - jumps[k]) / periods[k]) : 0.0;
-        double event = just_after(jumps[k], periods[k], past);
-        if (!(event > s->time) && periods[k] > 0.0) {
-            event = just_after(jumps[k], periods[k], past + 1.0);
-        }
-        if (event > s->time) {
-            next = fmin(next, event);
-        }
-    }
-    *time = next;
-    return next < INFINITY;
 }

@@ -20,6 +20,7 @@ typedef enum {
     KF_INSTANTIATED,
     KF_INITIALIZATION,
     KF_STEPPING,
+    KF_EVENTS_OF_STEPS, /* event mode of co-simulation, if the host uses it */
     KF_EVENTS,
     KF_CONTINUOUS,
     KF_TERMINATED
@@ -31,6 +32,8 @@ typedef enum {
     KF_EXIT_INITIALIZATION,
     KF_SET_VARIABLES,
     KF_DO_STEP,
+    KF_ENTER_EVENTS_OF_STEPS,
+    KF_ENTER_STEPS,
     KF_ENTER_EVENTS,
     KF_ENTER_CONTINUOUS,
     KF_SET_TIME,
@@ -116,6 +119,7 @@ typedef struct {
     kf_send send;     /* passes messages to the host, with `host` as its argument */
     const void *host;
     bool silent;
+    bool has_event_mode, returns_early; /* the host uses event mode in co-simulation; steps may end before they should */
     unsigned muted; /* one bit for each category */
     kf_list list;
     kf_pose track[2]; /* of the integrator */
@@ -142,6 +146,8 @@ kf_answer kf_step(kf_instance *instance, double time, double step);
 kf_answer kf_set_time(kf_instance *instance, double time);
 kf_answer kf_complete_integrator_step(kf_instance *instance, bool *wants_event);
 bool kf_next_event(const kf_instance *instance, double *time);
+kf_answer kf_enter_events(kf_instance *instance);
+kf_answer kf_step_to_event(kf_instance *instance, double time, double step, bool *has_event, bool *is_early);
 kf_answer kf_enter(kf_instance *instance, kf_mode mode, kf_call call);
 kf_answer kf_possible(const kf_instance *instance, kf_call call); /* or Error, with a message */
 

@@ -50,6 +50,9 @@ kf_answer kf_restore_state(kf_instance *instance, const void *state)
                            instance->now.model_exchange ? "model exchange" : "co-simulation");
     }
     memcpy(&instance->now, state, KF_STATE_SIZE);
+    if (instance->now.mode == KF_EVENTS_OF_STEPS && !instance->has_event_mode) {
+        instance->now.mode = KF_STEPPING;
+    }
     return KF_DONE;
 }
 

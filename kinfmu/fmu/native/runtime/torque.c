@@ -138,14 +138,14 @@ static bool fail(kf_course *course, const kf_end *at)
     return false;
 }
 
-/* Step to the end of a span without jumps; false if the motion ends before. */
+/* Step to the end of a span without jumps, or past a break if steps end there; false if the motion ends before. */
 static bool advance(kf_course *course, kf_end *at, double last)
 {
     while (at->t < last) {
         const double least = KF_TORQUE_LEAST * fmax(fabs(at->t), fabs(last));
         const double asked = fmin(fmin(course->size, course->longest), size_for(at, KF_TORQUE_STEEP));
         double h = asked, error, grown;
-        bool refused = false, is_last;
+        bool refused = false, is_last, is_past_break = false;
         kf_end to;
         if (++course->steps > KF_TORQUE_MOST) {
             return fail(course, at);
@@ -174,6 +174,7 @@ static bool advance(kf_course *course, kf_end *at, double last)
             if (!complete(course, &to)) {
                 return fail(course, at);
             }
+            is_past_break = true;
             break;
         default:
             break;
@@ -186,6 +187,9 @@ static bool advance(kf_course *course, kf_end *at, double last)
             break;
         default:
             *at = to;
+            if (is_past_break && course->instance->returns_early) {
+                return true;
+            }
         }
     }
     return true;
@@ -205,8 +209,8 @@ static void explain(kf_state *s, const kf_course *course)
     }
 }
 
-/* Integrate the states from the present time to `end`. If the motion ends before, at `reached`, states and pose stay, the status
- * is that of the poses past its end, and the message states why.
+/* Integrate the states from the present time to `end`, or past a break, if steps end there. If the motion ends before, at
+ * `reached`, states and pose stay, the status is that of the poses past its end, and the message states why.
  */
 bool kf_integrate(kf_instance *instance, double end, double *reached)
 {
@@ -265,6 +269,7 @@ bool kf_integrate(kf_instance *instance, double end, double *reached)
             kf_forget_motion(s);
             return false;
         }
+        end = at.t < last ? at.t : end;
     }
     s->time = end;
     if (s->moving) { /* inputs stay at the values that they reached, and their derivatives hold for one step */
