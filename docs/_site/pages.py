@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 FOLDERS = ("gallery", "reference")  # of docs/; git ignores them
@@ -34,3 +35,13 @@ def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
     """Return a Markdown table."""
     lines = [head, tuple("---" for _ in head), *rows]
     return "\n".join("| " + " | ".join(cell.replace("|", r"\|") for cell in line) + " |" for line in lines)
+
+
+def folded(title: str, content: str) -> str:
+    """Return Markdown that a reader opens and closes; it must not contain headings."""
+    return f"<details>\n<summary>{coded(title)}</summary>\n\n{content}\n\n</details>\n"
+
+
+def coded(text: str) -> str:
+    """Return text with HTML for its backticks."""
+    return re.sub(r"`([^`]*)`", r"<code>\1</code>", text)

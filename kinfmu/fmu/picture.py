@@ -44,14 +44,19 @@ class Picture:
     height: float
 
 
-def picture(run: Run) -> Picture | None:
-    """Return the picture of the mechanism at the first sample of a run; None if there is nothing to draw."""
+def picture(run: Run, width: float = WIDTH, highest: float = _HIGHEST, part: float = 0.0) -> Picture | None:
+    """Return the picture of the mechanism in a run; None if there is nothing to draw.
+
+    width, highest: of the picture [px]; bars, pins and supports have the same size in all. part: of the solved samples,
+    after which the pose is drawn; 0: the first.
+    """
     found, _ = drawable(run)
     if found is None or not found.shapes or not run.good.any():
         return None
+    row = int(np.flatnonzero(run.good)[int(part * (run.good.sum() - 1))])
     extent = np.maximum(found.high - found.low, 1e-3 * found.size)
-    scale = min((WIDTH - 2 * _EDGE) / extent[0], (_HIGHEST - 2 * _EDGE) / extent[1])
-    width, height = WIDTH, max(float(extent[1] * scale + 2 * _EDGE), _LOWEST)
+    scale = min((width - 2 * _EDGE) / extent[0], (highest - 2 * _EDGE) / extent[1])
+    height = max(float(extent[1] * scale + 2 * _EDGE), min(_LOWEST, highest))
     middle = 0.5 * (found.low + found.high)
 
     def placed(points: FloatArray) -> FloatArray:
@@ -60,7 +65,7 @@ def picture(run: Run) -> Picture | None:
     sizes = Sizes(_POINT / scale, found.sizes.fine)
     lines = [
         PictureLine(placed(points), colours, scale * sizes.width(stroke), stroke.dash, is_closed)
-        for stroke, points, colours, is_closed in _lines(found, int(np.argmax(run.good)), sizes)
+        for stroke, points, colours, is_closed in _lines(found, row, sizes)
         if np.isfinite(points).all()
     ]
     return Picture(tuple(lines), width, height)

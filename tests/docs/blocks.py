@@ -1,4 +1,7 @@
-"""The blocks of a page in their order: commands to type, Python, files, and what is shown between them."""
+"""The blocks of a page in their order: commands to type, Python, files, and what is shown between them.
+
+`python -m tests.docs.blocks` prints the words of each page.
+"""
 
 from __future__ import annotations
 
@@ -69,6 +72,11 @@ def commands(block: Block) -> list[str]:
     return [shlex.join(shlex.split(line, comments=True)) for line in block.text.splitlines() if line.strip()]
 
 
+def words(page: str) -> int:
+    """Return the number of words of a page, in its text, tables and blocks; signs alone are none."""
+    return sum(any(map(str.isalnum, word)) for word in page.split())
+
+
 # ------------------------------------------------------------------------------------------------------------- executed
 
 
@@ -87,3 +95,12 @@ def executed(path: Path) -> str:
         return block[0] if block[2] is None else f"```python\n{block[1]}```\n\n```text\n{printed.getvalue()}```\n"
 
     return BLOCK.sub(run, path.read_text(encoding="utf-8"))
+
+
+if __name__ == "__main__":
+    counts = {path.name: words(path.read_text(encoding="utf-8")) for path in sorted(DOCS.glob("*.md"))}
+    print(
+        "\n".join(f"{count:6} {name}" for name, count in counts.items()),
+        f"{sum(counts.values()):6} words in docs",
+        sep="\n",
+    )

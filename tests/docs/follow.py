@@ -71,9 +71,17 @@ BEFORE = {  # commands for the files that a page takes as given
     "host-pyfmi.md": ["kinfmu solve fourbar -o pyfmi.csv"],
     "host-simulink.md": ["kinfmu build fourbar --si", "kinfmu solve fourbar -o simulink.csv"],
     "hosts.md": ["kinfmu build fourbar", "kinfmu solve fourbar -o host.csv"],
+    "plots.md": [
+        "kinfmu simulate fourbar",
+        "kinfmu simulate jansen_leg --mcap logs/leg.mcap",
+        "kinfmu simulate jansen_leg --set j=48.5 --mcap logs/shorter.mcap",
+    ],
     "playing.md": ["kinfmu new crank_rocker mine.toml", "kinfmu simulate mine.toml"],
 }
-FROM_PAGES = {"commands.md": ["fitting.md", "studies.md"]}  # pages whose files a page takes as given
+FROM_PAGES = {
+    "commands.md": ["fitting.md", "studies.md"],
+    "torque.md": ["forces.md"],
+}  # pages whose files a page takes as given
 SHOWN = re.compile(r"(print\(.*\))  # (.*)")
 INPUTS = {  # files that pages take as given
     "crank.csv": "time,crank_angle\n0,0\n0.5,0.5\n1,1\n",

@@ -1,4 +1,4 @@
-"""The key tables of docs/mechanism-files.md and docs/measures.md, from the declared keys of the classes."""
+"""The key tables of docs/mechanism-files.md and docs/measures-reference.md, from the declared keys of the classes."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def filled(page: str) -> str:
 
 
 def with_readings(page: str) -> str:
-    """Return the page of measures with its generated part replaced."""
+    """Return the page of types of measures with its generated part replaced."""
     text = _types(READINGS)
     words = {"as u": "as the quantity", "as x": "as the driver", "list of `[x, u]`": "list of `[x, y]`"}
     for general, here in words.items():

@@ -14,13 +14,19 @@ from fmpy.ssp.ssd import read_ssd
 
 from kinfmu.cli import main
 from kinfmu.log import read
-from tests.docs.blocks import DOCS, PAGES, ROOT, Block, blocks, commands, is_typed
+from tests.docs.blocks import DOCS, PAGES, ROOT, Block, blocks, commands, is_typed, words
 from tests.docs.follow import NOT_RUN, SHOWN, accept, files, follow, page_text, typed
 from tests.docs.key_tables import with_readings
 from tests.draw.picture import differences, picture
 
 SCRIPT = (ROOT / "scripts" / "pictures").read_text(encoding="utf-8")
+MOST_WORDS = 35_000  # in docs
 MOST = 600_000  # [bytes] of a picture; pages load it
+
+
+def test_pages_stay_short() -> None:
+    assert words(page_text("README.md")) <= 600
+    assert sum(words(page.read_text(encoding="utf-8")) for page in DOCS.glob("*.md")) <= MOST_WORDS
 
 
 def with_outputs(page: str, *outputs: str) -> str:
@@ -144,13 +150,23 @@ def test_forces(request: pytest.FixtureRequest, tmp_path: Path) -> None:
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("name", ["forces-reference.md", "torque.md"])
+def test_forces_that_are_looked_up(name: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    accept(name, follow(name, tmp_path).commented(page_text(name)), request)
+
+
+@pytest.mark.long
 def test_measures(request: pytest.FixtureRequest, tmp_path: Path) -> None:
     followed = follow("measures.md", tmp_path)
     report, as_json, faster = followed.outputs.values()
-    page = with_outputs(with_readings(page_text("measures.md")), over_motion(report))
+    page = with_outputs(page_text("measures.md"), over_motion(report))
     accept("measures.md", followed.commented(page), request)
     assert '"measures": {' in as_json
     assert "at 6.28319 rad/s" in faster
+
+
+def test_the_types_of_measures_are_what_the_classes_declare(request: pytest.FixtureRequest) -> None:
+    accept("measures-reference.md", with_readings(page_text("measures-reference.md")), request)
 
 
 @pytest.mark.long
@@ -162,16 +178,16 @@ def test_playing_has_a_live_mechanism_with_the_length_of_the_page(tmp_path: Path
 
 
 @pytest.mark.long
-def test_reviewing_has_a_table_with_units(tmp_path: Path) -> None:
+def test_plots_have_a_table_with_units(tmp_path: Path) -> None:
     pytest.importorskip("pandas")
-    names = follow("reviewing-a-run.md", tmp_path).names
+    names = follow("plots.md", tmp_path).names
     assert names["table"].attrs["units"]["coupler.vx"] == "m/s"
 
 
 @pytest.mark.parametrize(
     ("page", "folder"),
-    [("docs/reviewing-a-run.md", "docs"), ("docs/gallery.md", "docs"), ("README.md", "")],
-    ids=["page", "gallery", "readme"],
+    [("docs/reviewing-a-run.md", "docs"), ("docs/plots.md", "docs"), ("README.md", "")],
+    ids=["review", "plots", "readme"],
 )
 def test_pictures_are_there_of_a_size_to_load_and_made_by_the_script(page: str, folder: str) -> None:
     found = re.findall(r"!\[[^\]]+\]\(([\w./-]+)\)", (ROOT / page).read_text(encoding="utf-8"))
@@ -228,7 +244,6 @@ CHECKED_ELSEWHERE = {  # other blocks than commands, Python and what these print
     ("host-osp.md", "<VariableGroupConnection>"): "tests/docs/test_host_pages.py",
     ("mechanism-files.md", "time, crank_angle [deg]"): "tests/docs/test_mechanism_files.py",
     ("mechanism-files.md", "kinfmu: press.toml: [joints.P]"): "tests/docs/test_mechanism_files.py",
-    ("tutorial.md", "tip"): "a sketch",
 }
 FORMULA = re.compile(r"[^\n\"{]*( = | -> )[^\n\"{]*\n")  # neither a command nor TOML
 BY_NAME = {name: blocks(page.read_text(encoding="utf-8")) for name, page in PAGES.items()}
@@ -257,7 +272,7 @@ def problems(name: str, found: list[Block]) -> list[str]:
     for before, block in zip([Block("", ""), *found], found, strict=False):
         listed = any(name == page and block.head.startswith(begin) for page, begin in CHECKED_ELSEWHERE)
         if block.kind == "indented":
-            is_shown = FORMULA.match(block.text) or name.startswith("fmus/")  # there are sketches of the mechanism
+            is_shown = FORMULA.match(block.text)
             executed = is_shown and not any(map(is_typed, block.text.splitlines()))
         elif block.kind == "text":
             executed = before.kind in ("commands", "python", "text")  # what they print

@@ -16,6 +16,11 @@ import pytest
 import kinfmu
 from kinfmu.cli import main
 from kinfmu.mechanism import gallery
+from kinfmu.mechanism.drivers import DRIVERS
+from kinfmu.mechanism.joints import JOINTS
+from kinfmu.mechanism.laws import LAWS
+from kinfmu.mechanism.loads import LOADS
+from kinfmu.mechanism.quantities import POSE_QUANTITIES
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -64,7 +69,8 @@ def test_the_page_of_the_command_line_holds_every_option(site: Any, tmp_path: Pa
 def test_a_page_of_the_gallery_has_figure_report_file_and_reference(site: Any) -> None:
     page = site("_site.gallery")._page("fourbar")
     mechanism = kinfmu.load("fourbar")
-    assert page.startswith(f"# {mechanism.title}\n")
+    assert page.startswith(f"# {mechanism.title}\n\n```{{raw}} html\n<iframe ")
+    assert page.count("<details") == 4
     assert str(kinfmu.check(mechanism)) in page
     for name in ("figure.svg", "mechanism.toml", "reference.csv"):
         assert f"../../fmus/fourbar/{name}>`" in page
@@ -74,9 +80,39 @@ def test_a_page_of_the_gallery_has_figure_report_file_and_reference(site: Any) -
 
 def test_links_to_folders_of_the_gallery_lead_to_its_pages(site: Any) -> None:
     source = ["[`engine`](../fmus/engine/README.md) and [page](fmu.md)"]
+    site("_site.gallery").linked(None, "cams", source)
+    assert source == ["[`engine`](gallery/engine.md) and [page](fmu.md)"]
+
+
+def test_every_mechanism_of_the_gallery_has_a_card(site: Any) -> None:
+    source = [(DOCS / "gallery.md").read_text(encoding="utf-8")]
     site("_site.gallery").linked(None, "gallery", source)
-    assert source[0].startswith("[`engine`](gallery/engine.md) and [page](fmu.md)")
     assert re.findall(r"^gallery/(\w+)$", source[0], re.MULTILINE) == gallery.names()
+    assert sorted(re.findall(r'<a class="card" href="gallery/(\w+)\.html">', source[0])) == gallery.names()
+    assert "| what it shows |" not in source[0]
+    assert site("_site.live").drawn(kinfmu.load("fourbar")).startswith("<svg ")
+
+
+def test_every_type_has_an_example_that_solves_and_is_drawn(site: Any) -> None:
+    examples = site("_site.examples")
+    groups = {"joints": JOINTS, "drivers": DRIVERS, "loads": LOADS, "measures": POSE_QUANTITIES, "laws": LAWS}
+    source = [(DOCS / "mechanism-files.md").read_text(encoding="utf-8")]
+    examples.added(None, "mechanism-files", source)
+    for group, classes in groups.items():
+        assert list(examples.examples()[group]) == [cls.type for cls in classes]
+        for cls in classes:
+            mechanism = examples.mechanism(group, cls.type)
+            assert kinfmu.check(mechanism).problem is None, cls.type
+            assert kinfmu.solve(mechanism).good.all(), cls.type
+            assert f'"{cls.type}"' in examples.shown(group, cls.type)
+            assert examples.shown(group, cls.type) in source[0]
+    assert source[0].count('<img class="example ') == sum(map(len, groups.values())) - len(POSE_QUANTITIES)
+
+
+def test_formulas_of_docstrings_are_set(site: Any) -> None:
+    latex = site("_site.formulas").latex
+    assert latex("Phi = n.d    (1 row, scale 1)") == r"\Phi =n \cdot d \quad \text{(1 row, scale 1)}"
+    assert latex("e = -damping ds/dt    along    s = |d|").endswith(r"\dot s  \quad \text{along} \quad s=|d|")
 
 
 @pytest.mark.long

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,15 +9,14 @@ import pytest
 
 import kinfmu
 from kinfmu.page.player import PlayServer, PlaySource
+from tests.page.axe import needs_axe, violations
 from tests.page.editor.drawn import FOURBAR, drawn
 from tests.page.editor.hand import drawing_hand
 from tests.page.engines import PHONE, Browser, Opened, needs_browser, text_of
 
-_PLACES = [*os.environ.get("NODE_PATH", "").split(os.pathsep), str(Path(sys.prefix, "node_modules"))]
-AXE = next((path for place in _PLACES if place and (path := Path(place, "axe-core", "axe.min.js")).is_file()), None)
 pytestmark = [
     needs_browser,
-    pytest.mark.skipif(AXE is None, reason="axe-core is not installed; scripts/browser installs it"),
+    needs_axe,
     pytest.mark.long,
 ]
 
@@ -27,17 +24,6 @@ pytestmark = [
 @pytest.fixture(autouse=True)
 def states_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("KINFMU_STATES", str(tmp_path / "states"))
-
-
-def violations(page: Opened) -> list[str]:
-    """Return what axe finds in a page: rule and element."""
-    assert AXE is not None
-    page.tab.wait_for_timeout(200)  # colours of buttons fade
-    if not page.tab.evaluate("'axe' in window"):
-        page.tab.evaluate(AXE.read_text("utf-8"))
-    found = page.tab.evaluate("axe.run()")
-    assert len(found["passes"]) > 10
-    return [f"{one['id']}: {node['html'][:200]}" for one in found["violations"] for node in one["nodes"]]
 
 
 def themes(page: Opened) -> Iterator[str]:
@@ -57,14 +43,14 @@ def test_pages_of_mechanisms_have_no_violations(chromium: Browser, name: str) ->
             for tab in ("values", "show", "files"):
                 page.tab.click(f"#tab-{tab}")
                 page.settle()
-                assert violations(page) == [], (theme, tab)
+                assert violations(page.tab) == [], (theme, tab)
         page.tab.keyboard.press("?")
-        assert violations(page) == []
+        assert violations(page.tab) == []
         page.tab.keyboard.press("Escape")
         page.resize(PHONE)
-        assert violations(page) == []
+        assert violations(page.tab) == []
         page.tab.click("#sheet")
-        assert violations(page) == []
+        assert violations(page.tab) == []
 
 
 def test_a_length_that_does_not_close_has_no_violations(chromium: Browser) -> None:
@@ -72,7 +58,7 @@ def test_a_length_that_does_not_close_has_no_violations(chromium: Browser) -> No
         page.get("(k.setValues({ m: 45 }), k.commit())")
         page.tab.wait_for_selector("#banner button")
         for _ in themes(page):
-            assert violations(page) == []
+            assert violations(page.tab) == []
 
 
 def test_the_editor_has_no_violations(chromium: Browser, tmp_path: Path) -> None:
@@ -84,14 +70,14 @@ def test_the_editor_has_no_violations(chromium: Browser, tmp_path: Path) -> None
         hand.click((0, 20))
         for theme in themes(hand.page):
             hand.tool("link")
-            assert violations(hand.page) == [], theme
+            assert violations(hand.page.tab) == [], theme
             hand.tool("cam")
-            assert violations(hand.page) == [], theme
+            assert violations(hand.page.tab) == [], theme
         hand.page.tab.click("#help")
-        assert violations(hand.page) == []
+        assert violations(hand.page.tab) == []
         hand.page.tab.keyboard.press("Escape")
         hand.page.resize(PHONE)
-        assert violations(hand.page) == []
+        assert violations(hand.page.tab) == []
 
 
 def test_the_gallery_has_no_violations_and_leads_to_a_mechanism_and_back(chromium: Browser, tmp_path: Path) -> None:
@@ -100,11 +86,11 @@ def test_the_gallery_has_no_violations_and_leads_to_a_mechanism_and_back(chromiu
     with PlayServer(PlaySource(str(path))) as server, chromium.open_at(server.url, bypass_csp=True) as page:
         page.tab.click("[aria-label=Gallery]")
         page.tab.wait_for_selector("text=Back to the mechanism")
-        assert violations(page) == []
+        assert violations(page.tab) == []
         page.tab.click("text=jansen_leg >> nth=0")
         page.tab.wait_for_function("window.kinfmu")
         assert page.tab.inner_text("#name").replace("\u200b", "") == "jansen_leg"
-        assert violations(page) == []
+        assert violations(page.tab) == []
         page.tab.click("[aria-label=Gallery]")
         page.tab.click("text=Back to the mechanism")
         page.tab.wait_for_function("window.kinfmu")

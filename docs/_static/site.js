@@ -1,0 +1,20 @@
+// A button on each block of code that copies it.
+for (const code of document.querySelectorAll("article pre")) {
+    const button = document.createElement("button");
+    button.textContent = "Copy";
+    button.addEventListener("click", async () => {
+        await navigator.clipboard.writeText(code.textContent.trimEnd());
+        button.textContent = "Copied";
+        setTimeout(() => (button.textContent = "Copy"), 1500);
+    });
+    code.parentElement.classList.add("copied");
+    code.after(button);
+}
+
+// Names for readers aloud that the theme leaves out, and keys for what scrolls.
+for (const button of document.querySelectorAll(".search-button-field")) button.ariaLabel = button.textContent.trim().replace(/\s+/g, " ");
+for (const summary of document.querySelectorAll("summary"))
+    if (!summary.textContent.trim()) summary.ariaLabel = `Pages of ${summary.parentElement.parentElement.querySelector("a").textContent.trim()}`;
+for (const head of document.querySelectorAll("th")) if (!head.textContent.trim()) head.role = "presentation";
+for (const wide of document.querySelectorAll(".formula, .pst-scrollable-table-container"))
+    if (wide.scrollWidth > wide.clientWidth) wide.tabIndex = 0;
