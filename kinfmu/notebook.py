@@ -39,6 +39,7 @@ from kinfmu.run.verdict import notable_events, sentence
 
 _LARGEST = 300  # coordinates; mobility and plan of larger mechanisms take seconds
 _KEPT = 8  # drawings
+_DARK = ":is([data-jp-theme-light=false], .vscode-dark, [data-theme=dark])"  # pages of dark notebooks: Jupyter, VS Code
 _DIGITS = 6  # of values with units
 
 
@@ -282,4 +283,5 @@ def picture(draw: Callable[[], str], alternative: str) -> str:
         image = b64encode(draw().encode()).decode()
     except KinfmuError as reason:
         return f"<p>{escaped(reason)}</p>"
-    return f'<p><img alt="{escaped(alternative)}" style="max-width: 100%" src="data:image/svg+xml;base64,{image}"></p>'
+    shown = f'<img class="kinfmu" alt="{escaped(alternative)}" style="max-width: 100%" src="data:image/svg+xml;base64,'
+    return f'<style>{_DARK} img.kinfmu {{ color-scheme: dark }}</style><p>{shown}{image}"></p>'

@@ -33,7 +33,6 @@ div { overflow-x: auto; }
 div:last-child p { display: inline-block; margin: 0; }
 @media screen and (prefers-color-scheme: dark) {
   body { color: #d1d7e0; background: #151b23; }
-  img { filter: invert(1) hue-rotate(180deg); mix-blend-mode: screen; }
   .ok { color: #3fb950 !important; }
   .note, .advice { color: #4493f8 !important; }
   .poor, .problem { color: #f85149 !important; }

@@ -41,10 +41,7 @@ def places_of_symbols(plan: SolvePlan, *, are_loads_open: bool = True) -> dict[s
     z: unknowns of all blocks, with zd and zdd in time; slopes: dz/du, for one driver after another; efforts: of
     external loads, then constants of the laws of loads.
 
-    Args:
-        plan: The plan.
-        are_loads_open: Constants of the laws of loads can be set; else they are numbers.
-
+    are_loads_open: Constants of the laws of loads can be set; else they are numbers.
     """
     places = {"time": "time"}
     count = len(plan.unknowns)
@@ -139,12 +136,8 @@ def emit_jumps(plan: SolvePlan) -> str:
 def emit_c_forces(plan: SolvePlan, steps: ForceSteps, stage: str = "forces", *, are_loads_open: bool = True) -> str:
     """Return the text of a stage; linear systems of three and more unknowns are left to `kf_solutions`.
 
-    Args:
-        plan: The plan.
-        steps: Of the stage.
-        stage: Its name.
-        are_loads_open: Constants of the laws of loads can be set: they follow the efforts of external loads.
-
+    steps: Of the stage. are_loads_open: Constants of the laws of loads can be set: they follow the efforts of external
+    loads.
     """
     places, symbols = places_of_symbols(plan, are_loads_open=are_loads_open), given_symbols(steps)
     curves = {data: f"&{name.lower()}" for data, name in stage_curves(steps).items()}

@@ -33,26 +33,13 @@ def determinant(jacobian: Rows) -> str:
     return f"{_product(a, d)} - {_product(b, c)}"
 
 
-def solution(jacobian: Rows, r: Sequence[str], det: str) -> list[str]:
-    """Return J^-1 r of one or two unknowns."""
+def solution(jacobian: Rows, r: Sequence[str], by_det: str = "/ det", *, is_opposite: bool = False) -> list[str]:
+    """Return J^-1 r, or its opposite, of one or two unknowns; by_det: '/ det', or '* per_det', computed before r."""
     if len(r) == 1:
-        return [f"{r[0]} / {det}"]
+        return [f"{'-' if is_opposite else ''}{r[0]} {by_det}"]
     (a, b), (c, d) = jacobian
-    return [
-        f"({_product(d, r[0])} - {_product(b, r[1])}) / {det}",
-        f"({_product(a, r[1])} - {_product(c, r[0])}) / {det}",
-    ]
-
-
-def opposite_solution(jacobian: Rows, r: Sequence[str], by_det: str) -> list[str]:
-    """Return -J^-1 r of one or two unknowns; by_det: '/ det', or '* per_det', which is computed before r is known."""
-    if len(r) == 1:
-        return [f"-{r[0]} {by_det}"]
-    (a, b), (c, d) = jacobian
-    return [
-        f"({_product(b, r[1])} - {_product(d, r[0])}) {by_det}",
-        f"({_product(c, r[0])} - {_product(a, r[1])}) {by_det}",
-    ]
+    pairs = (_product(d, r[0]), _product(b, r[1])), (_product(a, r[1]), _product(c, r[0]))
+    return [f"({' - '.join(reversed(pair) if is_opposite else pair)}) {by_det}" for pair in pairs]
 
 
 def square(r: Sequence[str], scales: Sequence[float]) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 
 from kinfmu.plan import Block
-from kinfmu.plan.equations.graph import FUNCTIONS, Node
+from kinfmu.plan.equations.graph import FUNCTIONS, Node, reachable
 from kinfmu.solver.python.curve import CurveData
 
 _LEVEL = {"+": 1, "-": 1, "neg": 2, "*": 3, "/": 3}  # how strongly operators bind: a weaker operand gets parentheses
@@ -81,7 +81,7 @@ class Writer:
 
     def statements(self, targets: Sequence[Node]) -> list[str]:
         """Return assignments after which `expression` can return every target."""
-        new = [node for node in self._reachable(targets) if node.args and node not in self.known]
+        new = [node for node in reachable(targets, self.known) if node.args and node not in self.known]
         uses = Counter(arg for node in new for arg in node.args)
         uses.update(targets)
         inline = {node for node in new if uses[node] == 1 and node not in self.keep and node.op not in FUNCTIONS}
@@ -129,7 +129,7 @@ class Writer:
         """Return the largest parts of the targets without the symbols `moving`, which a loop need not repeat."""
         moves: set[Node] = set(moving)
         parts: dict[Node, None] = {}
-        for node in self._reachable(targets):
+        for node in reachable(targets, self.known):
             if any(arg in moves for arg in node.args):
                 moves.add(node)
                 parts.update((arg, None) for arg in node.args if arg.args and arg not in moves)
@@ -138,19 +138,6 @@ class Writer:
     def expression(self, node: Node) -> str:
         """Return a target as an expression, after its statements."""
         return self._reference(node, self._inline)[0]
-
-    def _reachable(self, targets: Sequence[Node]) -> list[Node]:
-        """Return the nodes that the targets are made of; known nodes are not expanded."""
-        found: dict[int, Node] = {}
-        stack = list(targets)
-        while stack:
-            node = stack.pop()
-            if node.id in found:
-                continue
-            found[node.id] = node
-            if node not in self.known:
-                stack.extend(node.args)
-        return [found[number] for number in sorted(found)]
 
     def _reference(self, node: Node, text: Mapping[Node, tuple[str, int]]) -> tuple[str, int]:
         """Return a node as a number, name or expression, and its level in _LEVEL; text: those of inline nodes."""

@@ -15,13 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.drawing import draw, extent, placed, shortest
+from kinfmu.draw.drawing import draw, extent, placed
 from kinfmu.draw.marks import gravity_in_margin, paths, pins
 from kinfmu.draw.scene import palette
-from kinfmu.draw.scene.instant import Instant
+from kinfmu.draw.scene.dark import on_dark
+from kinfmu.draw.scene.instant import Instant, directions
 from kinfmu.draw.scene.placing import poses_of, remedy, world
 from kinfmu.draw.scene.shapes import shapes
-from kinfmu.draw.sheet import GREY, PAPER, Sheet, ink
+from kinfmu.draw.scene.strokes import Sizes, fineness, strokes_of
+from kinfmu.draw.sheet import GREY, Sheet, ink
 from kinfmu.draw.writing import check_suffix, figure_style, write_bytes
 from kinfmu.errors import FigureError, MechanismError, MissingPackageError, listed
 from kinfmu.files import suffix_of, temporary_folder
@@ -32,6 +34,7 @@ from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from PIL.Image import Image
 
 
@@ -48,14 +51,14 @@ _TRAIL = 0.12  # of the pictures, length of a trail
 _FARTHEST = 0.5 * math.pi  # [rad], largest rotation of a body from picture to picture
 _LARGEST = 1e100  # largest position to draw: squares of larger ones are infinite
 _WIDTHS = (1.3, 1.9, 2.6, 3.3)  # [pt] of a trail, along it
-_LOST: palette.Colour = (185, 28, 28)
 
 
 class _Size(NamedTuple):
-    """Width of the pictures [pixels], None for the usual one, and the file, for messages."""
+    """Width of the pictures [pixels], None for the usual one; the file, for messages; True for a dark paper."""
 
     width: int | None
     path: Path
+    is_dark: bool
 
     def dots_per_inch(self, inches: FloatArray) -> float:
         """Return the resolution of pictures whose width and height are `inches`."""
@@ -77,7 +80,7 @@ class _Film(NamedTuple):
     repeats: bool
 
 
-def animate(run: Run, path: str | Path, *, width: int | None = None) -> None:
+def animate(run: Run, path: str | Path, *, width: int | None = None, dark: bool = False) -> None:
     """Draw the moving linkage of `run` into a .gif or .mp4 file: bodies, joints, cams, wheels, paths, trails.
 
     The animation takes the run's own time, but at least SHORTEST and at most LONGEST; LONGEST if the run has no time. A
@@ -89,6 +92,7 @@ def animate(run: Run, path: str | Path, *, width: int | None = None) -> None:
         path: The .gif or .mp4 file.
         width: Of the pictures [pixels], 100 or more; no side may be longer than 1920. A video has an even width and
             height, rounded up. Default: 80 pixels per inch, about 600.
+        dark: True for light lines on a dark paper, for dark pages. Default: a white paper.
 
     Raises:
         FigureError: The width is out of range; the run has no mechanism, not all its coordinates, fewer than two
@@ -106,9 +110,17 @@ def animate(run: Run, path: str | Path, *, width: int | None = None) -> None:
     mechanism, poses = placed_run(run, path)
     film = _film(run, poses, path)
     with figure_style(path):
-        images = list(_images(run, mechanism, poses, film, _Size(width, path)))
-    own = [*PAPER, *_LOST, *(palette.LOAD if mechanism.loads else ())]
+        images = list(_images(run, mechanism, poses, film, _Size(width, path, dark)))
+    own = [on_dark(colour) if dark else colour for colour in _colours(mechanism, poses)]
     write_bytes(path, mp4(images, film.seconds, path) if is_video else _gif(images, film, own))
+
+
+def _colours(mechanism: Mechanism, poses: dict[str, FloatArray]) -> list[palette.Colour]:
+    """Return colours that a picture of few colours keeps as they are: of paper, loads, and most bodies."""
+    shown = Instant(mechanism, {body: pose[:1] for body, pose in poses.items()}, {})
+    painted = sorted(strokes_of(shapes(shown), Sizes(1.0, 1.0)), key=lambda one: not one.shape.is_effort)
+    found = [palette.WHITE, palette.DRIVER, *(colour for one in painted for colour in one.colours() if colour)]
+    return list(dict.fromkeys(found))[: COLOURS // 2]
 
 
 def placed_run(run: Run, path: Path) -> tuple[Mechanism, dict[str, FloatArray]]:
@@ -174,25 +186,26 @@ def _comes_back(pose: FloatArray) -> bool:
 def _images(run: Run, mechanism: Mechanism, poses: dict[str, FloatArray], film: _Film, size: _Size) -> Iterator[Image]:
     """Yield the pictures in order, all of one size."""
     some = slice(None, None, max(-(-len(run) // _SAMPLES), 1))
-    directions = {driver.name: 1.0 for driver in mechanism.drivers}
-    start = int(film.rows[0])
-    whole = Instant(mechanism, {body: np.vstack([pose[start], pose[some]]) for body, pose in poses.items()}, directions)
+    start, ways = int(film.rows[0]), directions(run, mechanism)
+    whole = Instant(mechanism, {body: np.vstack([pose[start], pose[some]]) for body, pose in poses.items()}, ways)
     found, tracks = shapes(whole), paths(whole)  # for all pictures; the frames of the shapes move
     scenes = []
     for row in film.rows.tolist():
-        shown = Instant(mechanism, {body: pose[row : row + 1] for body, pose in poses.items()}, directions)
+        shown = Instant(mechanism, {body: pose[row : row + 1] for body, pose in poses.items()}, ways)
         scenes.append((placed(shown, found), pins(shown)))
     extents = [part for drawn, places in scenes for part in (extent(drawn), *(mark.extent() for mark in places))]
     reach = np.vstack([*extents, *(track.extent() for track in tracks)])
-    thinnest = shortest(scenes[0][0], float(np.ptp(reach, axis=0).max()))
+    fine = fineness(scenes[0][0], float(np.ptp(reach, axis=0).max()))
     back = max(round(_TRAIL * len(film.rows)), 1)
     for k, (row, (drawn, places)) in enumerate(zip(film.rows, scenes, strict=True)):
-        sheet = Sheet(reach, thinnest, None, mechanism.title or mechanism.name)
+        sheet = Sheet(reach, fine, None, mechanism.title or mechanism.name)
         begun = k - back if k >= back else (k - back + len(film.rows) if film.repeats else 0)
         draw(sheet, drawn, tracks, places)
         _trails(sheet, run, mechanism, poses, (int(film.rows[begun]), int(row)))
         gravity_in_margin(sheet, mechanism)
         _clock(sheet, run, int(row))
+        if size.is_dark:
+            _darken(sheet.figure)
         yield _picture(sheet, size.dots_per_inch(sheet.figure.get_size_inches()))
 
 
@@ -216,10 +229,22 @@ def _clock(sheet: Sheet, run: Run, row: int) -> None:
     name = "" if axis.is_time else f"{axis.name}{' =' if axis.unit else ''} "
     text, colour = f"{name}{axis.values[row]:.{digits}f} {axis.unit}".rstrip(), GREY
     if not run.good[row]:
-        text, colour = f"no pose at {text}: the last one that closed", _LOST
+        text, colour = f"no pose at {text}: the last one that closed", palette.DRIVER
     sheet.axes.text(
         1.0, 0.0, text, fontsize=9.0, ha="right", va="bottom", transform=sheet.axes.transAxes, color=ink(colour)
     )
+
+
+def _darken(figure: Figure) -> None:
+    """Give everything in a figure its colours on dark paper."""
+    from matplotlib.colors import to_rgba
+    from matplotlib.patches import Patch
+
+    for artist in figure.findobj(lambda one: hasattr(one, "get_color") or isinstance(one, Patch)):
+        for key in ("facecolor", "edgecolor") if isinstance(artist, Patch) else ("color",):
+            *rgb, alpha = to_rgba(getattr(artist, f"get_{key}")())
+            red, green, blue = (round(255.0 * value) for value in rgb)
+            getattr(artist, f"set_{key}")((*ink(on_dark((red, green, blue), is_area=key == "facecolor")), alpha))
 
 
 def _picture(sheet: Sheet, dots_per_inch: float) -> Image:
@@ -232,10 +257,10 @@ def _picture(sheet: Sheet, dots_per_inch: float) -> Image:
     return Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy())  # type: ignore[no-untyped-call]
 
 
-def _gif(images: Sequence[Image], film: _Film, own: Sequence[int]) -> bytes:
+def _gif(images: Sequence[Image], film: _Film, own: Sequence[palette.Colour]) -> bytes:
     """Return the pictures as a GIF with their COLOURS most important colours, without dithering.
 
-    own: red, green and blue of colours that are kept as they are; quantizing would mix them with others.
+    own: colours that are kept as they are; quantizing would mix them with others.
     """
     from PIL import Image
 
@@ -244,16 +269,16 @@ def _gif(images: Sequence[Image], film: _Film, own: Sequence[int]) -> bytes:
     together = Image.new("RGB", (width, height * len(some)))
     for k, image in enumerate(some):
         together.paste(image, (0, k * height))
-    mixed = together.quantize(COLOURS - len(own) // 3, method=Image.Quantize.MEDIANCUT).getpalette() or []
-    colours = np.array([*own, *mixed[: 3 * COLOURS - len(own)]], int).reshape(-1, 3)
+    mixed = together.quantize(COLOURS - len(own), method=Image.Quantize.MEDIANCUT).getpalette() or []
+    colours = np.vstack([own, np.reshape(mixed, (-1, 3))])[:COLOURS]
     nearest = _nearest(colours)
     flat = []
     for image in images:
         coarse = np.asarray(image, int) >> 3
         flat.append(Image.fromarray(nearest[coarse[:, :, 0], coarse[:, :, 1], coarse[:, :, 2]]))
         flat[-1].putpalette(colours.ravel().tolist())
-    each = round(100.0 * film.seconds / (len(images) - (not film.repeats))) * 10  # [ms]
-    times = [each] * len(images)
+    each = round(100.0 * film.seconds / (len(flat) - (not film.repeats))) * 10  # [ms]
+    times = [each] * len(flat)
     if not film.repeats:
         times[-1] += round(1000.0 * REST)
     file = io.BytesIO()

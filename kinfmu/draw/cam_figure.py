@@ -10,8 +10,8 @@ import numpy as np
 from kinfmu.arrays import FloatArray
 from kinfmu.draw.chart import SMALL, degree_ticks, dress
 from kinfmu.draw.dxf_file import written_drawing
-from kinfmu.draw.marks import COLOUR
 from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.palette import DRIVER
 from kinfmu.draw.sheet import GREY, INK, arc, ink, titled_figure
 from kinfmu.draw.writing import SUFFIXES, check_suffix, write
 from kinfmu.files import suffix_of
@@ -136,7 +136,7 @@ def _legend(axes: Axes, side: str) -> None:
 
 def _turning(axes: Axes, profile: CamProfile) -> None:
     """Draw arrows about the axle: the sense in which the cam's angle grows, and that in which its driver turns it."""
-    _arrow(axes, profile, _ARROW, COLOUR, "angle of the cam")
+    _arrow(axes, profile, _ARROW, DRIVER, "angle of the cam")
     if profile.driver is not None and len(profile.driver) > 1:
         falls = np.median(np.sign(np.diff(profile.driver) * np.diff(profile.angle))) < 0.0  # it jumps after its period
         label = f"rotation with {profile.driver_name}"

@@ -10,7 +10,7 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray
 from kinfmu.draw.marks import value_text
-from kinfmu.draw.scene.instant import Instant, OpenGap
+from kinfmu.draw.scene.instant import Instant, OpenGap, directions
 from kinfmu.draw.scene.placing import poses_of, world
 from kinfmu.draw.scene.shape import points_of, rim
 from kinfmu.errors import FigureError, KinfmuError, listed
@@ -66,14 +66,14 @@ def _with_run(mechanism: Mechanism, plan: SolvePlan, at: float | None) -> Instan
     run = solve(plan, times[:: -(-len(times) // MOST_SAMPLES)])
     poses, _ = poses_of(run, mechanism)
     poses[GROUND_NAME] = np.zeros((len(run), 3))
-    directions = _directions(mechanism, run)
+    ways = directions(run, mechanism)
     if at is not None:
         drawn = _poses_at(mechanism, plan, at)
     elif run.good[0] and _is_clear(mechanism, first := {name: pose[:1] for name, pose in poses.items()}):
         drawn = first
     else:
         drawn = _clearest_poses(mechanism, plan, run, poses)
-    return Instant(mechanism, {name: np.vstack([drawn[name], pose]) for name, pose in poses.items()}, directions)
+    return Instant(mechanism, {name: np.vstack([drawn[name], pose]) for name, pose in poses.items()}, ways)
 
 
 def pose_note(shown: Instant) -> str:
@@ -111,16 +111,6 @@ def _clearest_poses(
     return {name: choice[name][row][None] for name in poses}
 
 
-def _directions(mechanism: Mechanism, run: Run) -> dict[str, float]:
-    """Return +1.0 or -1.0 by driver, the direction of its first motion."""
-    directions = {}
-    for k, driver in enumerate(mechanism.drivers):
-        speeds = run.inputs[:, 3 * k + 1]
-        moving = speeds[speeds != 0.0]
-        directions[driver.name] = float(np.sign(moving[0])) if len(moving) else 1.0
-    return directions
-
-
 def _is_near(u: FloatArray, values: FloatArray) -> bool:
     """Return True if driver values u (d,) are near one of a run's (n, d), or if a driver does not move in the run."""
     ranges = np.ptp(values, axis=0)
@@ -145,8 +135,8 @@ def _without_run(mechanism: Mechanism, problem: KinfmuError, *, with_gap: bool) 
             q, gap = close(Part(system, range(system.joint_row_count)), start.q, start.u)
             if gap > CLOSED:
                 raise problem
-    directions = {driver.name: 1.0 for driver in mechanism.drivers}
-    return Instant(mechanism, _by_body(mechanism, q, origin), directions, open_gap)
+    ways = {driver.name: 1.0 for driver in mechanism.drivers}
+    return Instant(mechanism, _by_body(mechanism, q, origin), ways, open_gap)
 
 
 def _by_body(mechanism: Mechanism, q: FloatArray, origin: Point) -> dict[str, FloatArray]:

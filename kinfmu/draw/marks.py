@@ -1,4 +1,4 @@
-"""Marks that only figures and animations have: pins and points with names, drivers, an open gap, gravity."""
+"""Marks that only figures and animations have: pins and points with names, an open gap, gravity; values of drivers."""
 
 from __future__ import annotations
 
@@ -11,26 +11,20 @@ import numpy as np
 from kinfmu.arrays import FloatArray
 from kinfmu.draw.names import Mark, Name
 from kinfmu.draw.scene import palette
-from kinfmu.draw.scene.details import box
 from kinfmu.draw.scene.instant import Instant, gravity_direction
 from kinfmu.draw.scene.joints import slides
 from kinfmu.draw.scene.loads import BETWEEN
-from kinfmu.draw.sheet import BAR, GREY, INK, PAPER, Sheet, arc
+from kinfmu.draw.scene.strokes import STROKES
+from kinfmu.draw.sheet import GREY, INK, Sheet
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
-from kinfmu.mechanism.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
+from kinfmu.mechanism.drivers import DistanceDriver, Driver
 from kinfmu.mechanism.joints import CamRoller, Distance, Fixed, PointOnLine, Revolute, Translational
-from kinfmu.mechanism.quantities.placement import body_of, point_of, unit_vector
+from kinfmu.mechanism.quantities.placement import body_of, point_of
 from kinfmu.plan.equations.system import size_of
 
 _SAME = 1e-6  # of the size; points that are nearer are one place
 _ORDER = ("loose", "slide", "weld", "pin")  # kinds of places; if one place has several, the last one is drawn
-COLOUR: palette.Colour = (185, 28, 28)
-_RADII, _TURN = (19.0, 32.0), math.radians(95.0)  # [pt] and [rad], of a curved arrow; the larger one around torques
-_PUSH, _DISTANCE = 30.0, 13.0  # [pt]; length of a straight arrow, and its distance from its point
-_HEAD = np.array([7.0, 2.8])  # [pt], length and half width of the head
-_STROKE = 1.4  # [pt]
-_TRIES = 12  # places for an arrow that are compared
 _RED = palette.STATUS[3]
 _BOX, _LENGTH = 44.0, 26.0  # [pt]; side of the free square, length of the arrow
 _SMALL, _LETTER = 22.0, 8.0  # [pt]; length of the arrow in the margin of an animation, distance of its letter
@@ -63,19 +57,12 @@ class Pin(Mark):
     colour: palette.Colour | None
 
     def draw(self, sheet: Sheet) -> list[Name]:
-        size = BAR * sheet.fine * sheet.point
-        if self.kind == "pin":
-            sheet.circle(self.at, 0.34 * size, 1.1, INK, fill=PAPER, matters=2.0)
-        elif self.kind == "weld":
-            square = box(self.at, np.array([1.0, 0.0]), 0.32 * size, 0.32 * size)
-            sheet.line(square, 0.5, INK, closed=True, fill=INK, matters=2.0)
-        elif self.kind == "loose":
-            sheet.circle(self.at, 0.14 * size, 0.5, INK, fill=INK, matters=1.0)
+        if self.kind in STROKES:
+            sheet.dot(self.kind, self.at)
         if self.colour is not None:
-            colour = palette.darker(self.colour)
-            sheet.circle(self.at, (0.17 if self.kind == "pin" else 0.24) * size, 0.5, colour, fill=colour, matters=2.0)
+            sheet.dot("point", self.at, self.colour)
         colour = INK if self.colour is None else palette.darker(self.colour)
-        clearance = 0.5 * BAR * sheet.fine + 1.0
+        clearance = 0.5 * sheet.bar + 1.0
         return [Name(self.text, self.at[None], clearance, colour, rank=0)] if self.text else []
 
 
@@ -90,7 +77,7 @@ class PathMark(Mark):
         return self.at[np.isfinite(self.at).all(axis=1)]
 
     def draw(self, sheet: Sheet) -> list[Name]:
-        sheet.track(self.at, 0.9, self.colour)
+        sheet.track(self.at, STROKES["path"][0].width, self.colour)
         return []
 
 
@@ -162,108 +149,12 @@ def _pin(place: _Place) -> Pin:
     return Pin(place.at, kind, ", ".join(texts), next(iter(place.interest.values()), None))
 
 
-@dataclass(frozen=True, eq=False)
-class Turn(Mark):
-    """A curved arrow about a pin; sense: 1.0 counter-clockwise, -1.0 clockwise; heading: of the driven body [rad]."""
-
-    text: str
-    at: FloatArray
-    sense: float
-    heading: float
-
-    def draw(self, sheet: Sheet) -> list[Name]:
-        radii = [radius * sheet.ornament for radius in _RADII]
-        starts = [self.heading + self.sense * (math.radians(25.0) + k * math.tau / _TRIES) for k in range(_TRIES)]
-        arcs = [arc(self.at, radius, start, start + self.sense * _TURN) for radius in radii for start in starts]
-        route = _freest(sheet, arcs)  # the first one compared begins just ahead of the body
-        return _driving_arrow(sheet, route, self.text, route[[len(route) // 2, -1, 0]])
-
-
-@dataclass(frozen=True, eq=False)
-class Push(Mark):
-    """A straight arrow next to a point that is driven along a unit vector."""
-
-    text: str
-    at: FloatArray
-    along: FloatArray
-
-    def draw(self, sheet: Sheet) -> list[Name]:
-        size = sheet.ornament
-        across = np.array([-self.along[1], self.along[0]])
-        half = 0.5 * _PUSH * size * self.along
-        shaft = np.array([part * half for part in (-1.0, -0.5, 0.0, 0.5, 1.0)]) + self.at
-        offsets = [way * side * across for way in (1.0, 1.6) for side in (1.0, -1.0)]
-        route = _freest(sheet, [shaft + _DISTANCE * size * offset for offset in offsets])
-        return _driving_arrow(sheet, route, self.text, np.array([route.mean(axis=0), *route[::-1]]))
-
-
-@dataclass(frozen=True, eq=False)
-class Length(Mark):
-    """The name and value of a cylinder between its ends (2, 2)."""
-
-    text: str
-    at: FloatArray
-
-    def draw(self, sheet: Sheet) -> list[Name]:  # noqa: ARG002  it is only a name
-        anchors = np.array([self.at[0] + part * (self.at[1] - self.at[0]) for part in (0.4, 0.55, 0.25, 0.75)])
-        return [Name(self.text, anchors, 8.0, COLOUR, rank=1)]
-
-
-def motion(shown: Instant) -> list[Mark]:
-    """Return one mark for each driver."""
-    return [_mark(shown, driver) for driver in shown.drivers]
-
-
-def _mark(shown: Instant, driver: Driver) -> Mark:
-    value, direction = shown.value(driver.name), shown.directions[driver.name]
-    text = f"{driver.name} = {value_text(shown, driver, value)}"
-    if isinstance(driver, DistanceDriver):
-        return Length(text, np.array([shown.point(end) for end in driver.between]))
-    if isinstance(driver, SlideDriver):
-        a, b = driver.between
-        e = np.array(unit_vector(driver.axis))
-        ends = shown.placed(body_of(a), np.array([[0.0, 0.0], e]))
-        return Push(text, shown.point(b), direction * (ends[1] - ends[0]))
-    if isinstance(driver, CoordinateDriver):
-        along = np.array([1.0, 0.0] if driver.axis == "x" else [0.0, 1.0])
-        return Push(text, shown.point(driver.of), direction * along)
-    *held, body = driver.bodies()
-    pin = shown.pivot(body, held[0] if held else GROUND_NAME)
-    centre = shown.point(pin) if pin else np.asarray(shown.poses[body][0, :2])
-    return Turn(text, centre, direction, _heading(shown, body, centre))
-
-
 def value_text(shown: Instant, driver: Driver, value: float) -> str:
     """Return a driver's value with its unit, to a tenth of a degree or to four digits of the mechanism's size."""
     if driver.quantity.kind == "angle":
         return f"{round(math.degrees(value), 1) + 0.0:.6g}\N{DEGREE SIGN}"
     finest = 4 - math.ceil(math.log10(size_of(shown.mechanism)))
     return f"{round(value, finest) + 0.0:.6g} {shown.mechanism.length_unit}"
-
-
-def _heading(shown: Instant, body: str, centre: FloatArray) -> float:
-    """Return the angle [rad] of the line from a pin to the point of the body furthest from it."""
-    points = next(member.points for member in shown.mechanism.bodies if member.name == body)
-    vectors = [shown.point(f"{body}.{name}") - centre for name in points]
-    furthest = max(vectors, key=lambda vector: float(np.hypot(*vector)), default=np.zeros(2))
-    return math.atan2(furthest[1], furthest[0]) if furthest.any() else shown.angle(body)
-
-
-def _freest(sheet: Sheet, routes: list[FloatArray]) -> FloatArray:
-    """Return the route that covers least; of nearly equal ones the first."""
-    covered = sheet.covered
-    costs = []
-    for k, route in enumerate(routes):
-        dots = sheet.to_paper(route)
-        near = np.hypot(*(covered[None, :, :2] - dots[:, None, :]).transpose(2, 0, 1)) < 5.0  # [pt]
-        costs.append(round(float((near * covered[:, 2]).sum()), 6) + 0.6 * k)
-    return routes[int(np.argmin(costs))]
-
-
-def _driving_arrow(sheet: Sheet, route: FloatArray, text: str, anchors: FloatArray) -> list[Name]:
-    """Draw the arrow of a driver, and return its name with the places for it."""
-    _arrow(sheet, route, _STROKE, _HEAD * sheet.ornament, COLOUR, 1.5)
-    return [Name(text, anchors, 4.0, COLOUR, rank=1)]
 
 
 def _arrow(
@@ -290,7 +181,7 @@ class GapMark(Mark):
 
     def draw(self, sheet: Sheet) -> list[Name]:
         sheet.line(self.at, 2.2, _RED, matters=2.0)
-        return [Name(self.text, self.at.mean(axis=0)[None], 0.5 * BAR * sheet.fine + 1.0, _RED, rank=0)]
+        return [Name(self.text, self.at.mean(axis=0)[None], 0.5 * sheet.bar + 1.0, _RED, rank=0)]
 
 
 def gaps(shown: Instant) -> Iterator[GapMark]:

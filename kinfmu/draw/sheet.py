@@ -12,18 +12,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.scene.palette import Colour, on_white
+from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.palette import Colour, tint
+from kinfmu.draw.scene.strokes import BAR, STROKES, Painted, Sizes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _MOVE, _LINE, _CLOSE = 1, 2, 79  # codes of a path of matplotlib
-INK: Colour = (40, 40, 40)
+INK: Colour = palette.INK
 GREY: Colour = (110, 110, 110)
-PAPER: Colour = (255, 255, 255)
 INCH = 72.0  # [pt]
-BAR = 9.0  # [pt]; largest width of a link
 FONT = 9.0  # [pt]
 LINE = 11.0  # [pt], from line to line of a name in several lines
 _WIDEST, _HIGHEST = 470.0, 380.0  # [pt], of the drawing
@@ -33,7 +33,6 @@ _MARGIN = 34.0  # [pt]; for supports and names
 _MARGIN_PART = 0.15  # of the shorter side of given axes, at most
 _LEFT, _RIGHT, _BOTTOM, _TOP = 46.0, 12.0, 40.0, 28.0  # [pt] around the axes
 _EDGE = 12.0  # [pt], margin left and below without axes
-_FINEST = 0.45  # smallest factor of the sizes of details, for short links
 _SPACING = 3.0  # [pt] between the dots that record what is covered
 TITLE_FONT = 11.0  # [pt]
 TITLE_LINE = 15.0  # [pt], from line to line
@@ -44,20 +43,19 @@ _THINNEST = 2.0  # [pt], width of the narrowest letters, i and l
 
 
 class Sheet:
-    """A sheet for a mechanism within `extent` (k, 2), whose shortest link is `shortest` [length].
+    """A sheet for a mechanism within `extent` (k, 2), whose links have the factor `fine` of the usual width.
 
     unit: of the axes, None for a sheet without axes and names, as in animations; given: Axes of another figure to draw
-    into, which keep their size; point: length of a printer's point (1/72 inch) in the world; fine: factor of the sizes
-    of details.
+    into, which keep their size; point: length of a printer's point (1/72 inch) in the world.
     """
 
     def __init__(
-        self, extent: FloatArray, shortest: float, unit: str | None, title: str, given: Axes | None = None
+        self, extent: FloatArray, fine: float, unit: str | None, title: str, given: Axes | None = None
     ) -> None:
         low, high = extent.min(axis=0), extent.max(axis=0)
         paper, scale = _paper_for(high - low) if given is None else _paper_of(given, high - low)
         self.point = float(1.0 / scale)
-        self.fine: float = float(np.clip(shortest * scale / 40.0, _FINEST, 1.0))
+        self.sizes = Sizes(self.point, fine)
         self.low: FloatArray = (low + high) / 2.0 - paper / 2.0 / scale
         self.high: FloatArray = (low + high) / 2.0 + paper / 2.0 / scale
         self._has_names, self._is_given = unit is not None, given is not None
@@ -78,9 +76,9 @@ class Sheet:
         return np.asarray((np.asarray(points, dtype=float) - self.low) / self.point)
 
     @property
-    def ornament(self) -> float:
-        """Length of a printer's point for supports and blocks [length], which shrink less than links."""
-        return float(self.point * (0.35 + 0.65 * self.fine))
+    def bar(self) -> float:
+        """Width of a link [pt]."""
+        return BAR * self.sizes.fine
 
     @property
     def beyond(self) -> FloatArray:
@@ -113,10 +111,19 @@ class Sheet:
         if matters:
             self.cover(route, matters, width)
 
-    def strokes(self, ends: ArrayLike, width: float, colour: Colour) -> None:
-        """Draw hatching: straight lines of one style with ends (k, 2, 2), which names may cover."""
-        points = np.asarray(ends, dtype=float).reshape(-1, 2)
-        self._add(points, [_MOVE, _LINE] * (len(points) // 2), width, colour)
+    def paint(self, one: Painted) -> None:
+        """Paint a stroke of a mechanism that is placed in the world."""
+        colour, fill = one.colours()
+        style = (0, one.stroke.dash) if one.stroke.dash else "solid"
+        look: dict[str, Any] = {"closed": one.is_closed, "fill": fill, "style": style}
+        self.line(one.points, self.sizes.width(one.stroke) / self.point, colour, matters=1.0 * one.is_first, **look)
+
+    def dot(self, key: str, at: FloatArray, colour: Colour = INK) -> None:
+        """Paint a pin or point (2,) as its row in the table of strokes has it."""
+        (stroke,) = STROKES[key]
+        fill = tint(stroke.fill, colour)
+        line = tint(stroke.line, colour)
+        self.circle(at, self.sizes.radius(stroke), stroke.width, line, fill=fill, matters=2.0)
 
     def circle(
         self,
@@ -127,14 +134,13 @@ class Sheet:
         *,
         matters: float = 1.0,
         fill: Colour | None = None,
-        style: Any = "solid",
     ) -> None:
         """Draw a circle of `radius` [length] with a line of `width` [pt]."""
         from matplotlib.path import Path as Outline
 
         unit = Outline.unit_circle()
         centre = np.asarray(centre, dtype=float)
-        self._add(centre + radius * np.asarray(unit.vertices), unit.codes, width, colour, fill, linestyle=style)
+        self._add(centre + radius * np.asarray(unit.vertices), unit.codes, width, colour, fill)
         if matters:
             self.cover(arc(centre, radius, 0.0, 2.0 * np.pi), matters, width)
 
@@ -152,10 +158,9 @@ class Sheet:
         )
 
     def track(self, points: FloatArray, width: float, colour: Colour) -> None:
-        """Draw a thin line through points (n, 2) with gaps where they are NaN."""
-        self.axes.plot(
-            *points.T, linewidth=width, color=ink(on_white(colour)), zorder=self._next(), solid_capstyle="round"
-        )
+        """Draw the path of a point of a colour through points (n, 2), with gaps where they are NaN."""
+        line = ink(tint(STROKES["path"][0].line, colour))
+        self.axes.plot(*points.T, linewidth=width, color=line, zorder=self._next(), solid_capstyle="round")
         known = points[np.isfinite(points).all(axis=1)]
         if len(known) > 1:
             self.cover(known, 0.35, width)

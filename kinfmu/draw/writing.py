@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from kinfmu.draw.scene.dark import with_dark_colours
 from kinfmu.errors import FigureError, MissingPackageError, listed
 from kinfmu.files import errors_of_writing, suffix_of, write_whole
 
@@ -105,8 +106,9 @@ def _image(figure: Figure, suffix: str) -> bytes:
     """Return a figure as the bytes of a file."""
     file = io.BytesIO()
     if suffix == ".svg":
-        figure.savefig(file, format="svg", metadata={"Date": None})
-    elif suffix == ".pdf":
+        figure.savefig(file, format="svg", metadata={"Date": None}, transparent=True)
+        return with_dark_colours(file.getvalue().decode()).encode()
+    if suffix == ".pdf":
         figure.savefig(file, format="pdf", metadata={"CreationDate": None})
     else:
         figure.savefig(file, format="png", dpi=DOTS_PER_INCH)

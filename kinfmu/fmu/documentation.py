@@ -19,9 +19,10 @@ from kinfmu.solver.python.pose import Status
 from kinfmu.units import Quantity, unit_of
 
 _PAGE = """<!DOCTYPE html>
-<html lang="en">
+<html lang="en" class="kinfmu">
 <head><meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}</title>
-<style>body {{ font-family: sans-serif; max-width: 60em; margin: 2em auto; padding: 0 1em }}
+<style>:root {{ color-scheme: light dark }}
+body {{ font-family: sans-serif; max-width: 60em; margin: 2em auto; padding: 0 1em }}
 table {{ display: block; overflow-x: auto }} td, th {{ padding: 0.1em 1em 0.1em 0; text-align: left;
 vertical-align: top }} svg {{ display: block; max-width: 40em; margin: 1em auto }}</style></head>
 <body>

@@ -64,7 +64,7 @@ def _jumps_of_loads(plan: SolvePlan) -> tuple[tuple[Node, Node], ...]:
     found = []
     for load in mechanics.members.loads:
         if isinstance(load, Following) and load.over is None and not isinstance(load.law, External):
-            jumps = load.law.jumps(**{key: constant.value for key, constant in load.law.constants().items()})
+            jumps = load.law.own_breaks()
             found += [(mechanics.graph.lift(at), mechanics.graph.lift(jumps.period)) for at in jumps.at]
     return tuple(found)
 

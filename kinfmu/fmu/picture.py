@@ -5,44 +5,34 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.scene import details, palette
+from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.dark import with_dark_colours
 from kinfmu.draw.scene.placing import world
 from kinfmu.draw.scene.scene import Scene, drawable
-from kinfmu.draw.scene.shape import Shape, guides_of_cams
+from kinfmu.draw.scene.strokes import STROKES, Sizes, Stroke, strokes_of
 from kinfmu.run import Run
 
 WIDTH, ICON = 640, 100  # [px]
 _EDGE = 30.0  # [px] around everything
-_DETAIL = 1.1  # [px] of a unit of details
-_STROKES = {
-    "link": 5.0,
-    "rib": 3.0,
-    "bar": 4.0,
-    "rod": 3.0,
-    "face": 5.0,
-    "barrel": 9.0,
-    "shaft": 4.0,
-    "pitch": 0.8,
-}  # [px]
-_PIN = 3.5  # [px], radius
-_ROUND = np.linspace(0.0, 2.0 * np.pi, 25)
+_POINT = 1.2  # [px] of a printer's point
+_ROUND = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
 _LOWEST, _HIGHEST = 160, 480  # [px] of the height
 
 
 @dataclass(frozen=True, eq=False)
 class PictureLine:
-    """A line of the picture: points (k, 2) in px, y down; colour, width [px]; filled: an area in a lighter colour."""
+    """A line of the picture: points (k, 2) in px, y down; colours: of line and area, None without one; width [px]."""
 
     points: FloatArray
-    colour: palette.Colour
+    colours: tuple[palette.Colour, palette.Colour | None]
     width: float
-    is_filled: bool = False
-    is_dashed: bool = False
+    dash: tuple[float, ...]
+    is_closed: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,29 +62,30 @@ def picture(run: Run, width: float = WIDTH, highest: float = _HIGHEST, part: flo
     def placed(points: FloatArray) -> FloatArray:
         return np.asarray((points - middle) * [scale, -scale] + [0.5 * width, 0.5 * height])
 
+    sizes = Sizes(_POINT / scale, found.sizes.fine)
     lines = [
-        PictureLine(placed(points), line.colour, line.width, line.is_filled, line.is_dashed)
-        for line in _lines(found, row, _DETAIL / scale)
-        if np.isfinite(points := line.points).all()
+        PictureLine(placed(points), colours, scale * sizes.width(stroke), stroke.dash, is_closed)
+        for stroke, points, colours, is_closed in _lines(found, row, sizes)
+        if np.isfinite(points).all()
     ]
     return Picture(tuple(lines), width, height)
 
 
 def svg(drawn: Picture, title: str) -> str:
-    """Return a picture as SVG; title: text with entities for special characters."""
+    """Return a picture as SVG, light or dark as the page is; title: text with entities for special characters."""
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {drawn.width:.0f} {drawn.height:.0f}" role="img" '
         f'aria-label="{title}" stroke-linecap="round" stroke-linejoin="round" fill="none">'
     ]
     for line in drawn.lines:
         path = " ".join(f"{x + 0.0:.1f},{y + 0.0:.1f}" for x, y in line.points.tolist())
-        fill = f' fill="{_hex(palette.lighter(line.colour))}" fill-opacity="0.6"' if line.is_filled else ""
-        dash = ' stroke-dasharray="4 5"' if line.is_dashed else ""
-        tag = "polygon" if line.is_filled else "polyline"
-        parts.append(
-            f'<{tag} points="{path}" stroke="{_hex(line.colour)}" stroke-width="{line.width:.1f}"{fill}{dash}/>'
-        )
-    return "\n".join([*parts, "</svg>", ""])
+        colour, area = line.colours
+        fill = f' fill="{palette.hexadecimal(area)}"' if area else ""
+        dash = f' stroke-dasharray="{" ".join(map(str, line.dash))}"' if line.dash else ""
+        tag = "polygon" if line.is_closed else "polyline"
+        look = f'stroke="{palette.hexadecimal(colour)}" stroke-width="{line.width:.1f}"'
+        parts.append(f'<{tag} points="{path}" {look}{fill}{dash}/>')
+    return with_dark_colours("\n".join([*parts, "</svg>", ""]))
 
 
 def png(drawn: Picture, size: int = ICON) -> bytes:
@@ -105,8 +96,6 @@ def png(drawn: Picture, size: int = ICON) -> bytes:
     colours = np.zeros((size, size, 3))
     cover = np.zeros((size, size, 1))
     for line in drawn.lines:
-        if line.is_dashed:
-            continue
         points = line.points * scale + shift
         step = max(len(points) // 24, 1)
         points = np.vstack([points[:-1:step], points[-1:]])
@@ -115,73 +104,39 @@ def png(drawn: Picture, size: int = ICON) -> bytes:
             [points.min(axis=0) - half - 1.0, points.max(axis=0) + half + 2.0], 0.0, size
         ).astype(int)
         part = np.s_[top:bottom, left:right]
-        distance = _distance(x[part], y[part], np.vstack([points, points[:1]]) if line.is_filled else points)
-        if line.is_filled:
-            inside = _inside(x[part], y[part], points) * 0.6
-            _paint(colours[part], cover[part], palette.lighter(line.colour), inside)
-        _paint(colours[part], cover[part], line.colour, np.clip(half + 0.5 - distance, 0.0, 1.0))
+        distance = _distance(x[part], y[part], np.vstack([points, points[:1]]) if line.is_closed else points)
+        colour, area = line.colours
+        if area:
+            _paint(colours[part], cover[part], area, _inside(x[part], y[part], points))
+        _paint(colours[part], cover[part], colour, np.clip(half + 0.5 - distance, 0.0, 1.0))
     image = np.concatenate([colours, 255.0 * cover], axis=2)
     return _encoded(np.rint(image).astype(np.uint8))
 
 
-def _lines(found: Scene, row: int, size: float) -> Iterator[PictureLine]:
-    """Yield the lines in the world, in order; size: of a unit of details."""
-    for path in found.paths.values():
-        good = path[np.isfinite(path).all(axis=1)]
-        if len(good) > 1 and np.ptp(good, axis=0).max() > 1e-3 * found.size:
-            yield PictureLine(good, palette.GROUND, 1.2, is_dashed=True)
-    order = ("support", "rail", "bed", "slot", "belt")
+_Line = tuple[Stroke, FloatArray, tuple[palette.Colour, palette.Colour | None], bool]
+
+
+def _lines(found: Scene, row: int, sizes: Sizes) -> Iterator[_Line]:
+    """Yield strokes in the world in their order, with points, colours, and True for closed ones."""
     frames = {name: pose[row] for name, pose in found.frames.items()}
-    guides = guides_of_cams(found.shapes)
-    shapes = sorted(
-        found.shapes,
-        key=lambda shape: shape.kind not in order and not (shape.kind == "block" and shape.name in guides),
-    )
-    for shape in shapes:
-        if shape.kind != "pitch" and shape.frame in frames:
-            drawn = shape.placed(frames)
-            for face in shapes:
-                if face.kind == "face" and face.frame == shape.frame and shape.kind in ("link", "rib", "rod", "face"):
-                    half = 0.5 * _STROKES["link"] * size / _DETAIL
-                    drawn = replace(drawn, points=details.on_face(drawn.points, face.placed(frames), half))
-            yield from _of_shape(drawn, size)
-    for frame, pins in found.pins.items():
-        if frame in frames:
-            for _, point in pins:
-                centre = world(frames[frame][None], (point[0], point[1]))[0]
-                circle = centre + _PIN * size / _DETAIL * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
-                yield PictureLine(circle, (60, 60, 60), 1.2, is_filled=True)
-
-
-def _of_shape(shape: Shape, size: float) -> Iterator[PictureLine]:
-    """Yield the lines of a shape that is placed in the world."""
-    if shape.kind == "support":
-        triangle, foot = details.support(shape, size)
-        yield PictureLine(triangle, palette.GROUND, 1.5, is_filled=True)
-        yield from _ground(foot, shape, size)
-    elif shape.kind in ("rail", "bed"):
-        yield from _ground(details.rail(shape, size), shape, size)
-    elif shape.kind in ("block", "die"):
-        corners = details.box(shape.points[0], shape.towards, details.BLOCK * size, details.BLOCK_WIDTH * size)
-        yield PictureLine(corners, shape.colour, 1.5, is_filled=True)
-    elif shape.strips:
-        for strip, points in details.symbol(shape, size):
-            yield PictureLine(points, shape.colour, 1.5, is_filled=strip.is_area)
-    elif shape.kind == "contact":
-        return
-    else:
-        is_area = shape.kind in ("cam", "wheel") or (shape.kind == "link" and shape.is_closed)
-        yield PictureLine(shape.line, shape.colour, _STROKES.get(shape.kind, 1.5), is_filled=is_area)
-
-
-def _ground(line: FloatArray, shape: Shape, size: float) -> Iterator[PictureLine]:
-    yield PictureLine(line, palette.GROUND, 1.5)
-    for stroke in details.hatching(line, shape.towards, size):
-        yield PictureLine(stroke, palette.GROUND, 1.0)
-
-
-def _hex(colour: palette.Colour) -> str:
-    return "#" + "".join(f"{value:02x}" for value in colour)
+    shapes = [shape.placed(frames) for shape in found.shapes if {shape.frame, shape.other or shape.frame} <= {*frames}]
+    painted = strokes_of(shapes, sizes)
+    (path,) = STROKES["path"]
+    over = next((k for k, one in enumerate(painted) if one.stroke.order > path.order), len(painted))
+    yield from ((one.stroke, one.points, one.colours(), one.is_closed) for one in painted[:over])
+    for name, points in found.paths.items():
+        good = points[np.isfinite(points).all(axis=1)]
+        if len(good) > 1 and np.ptp(good, axis=0).max() > 1e-3 * found.size:
+            yield path, good, (palette.tint(path.line, found.colour(name)), None), False
+    yield from ((one.stroke, one.points, one.colours(), one.is_closed) for one in painted[over:])
+    for key, dots in (("pin", found.pins), ("point", found.points)):
+        (dot,) = STROKES[key]
+        circle = sizes.radius(dot) * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
+        for frame in frames:
+            for name, (x, y) in dots.get(frame, ()):
+                colour = found.colour(name) if key == "point" else palette.INK
+                both = palette.tint(dot.line, colour), palette.tint(dot.fill, colour)
+                yield dot, world(frames[frame][None], (float(x), float(y)))[0] + circle, both, True
 
 
 def _distance(x: FloatArray, y: FloatArray, points: FloatArray) -> FloatArray:

@@ -27,7 +27,7 @@ from kinfmu.mechanism.loads import Load
 from kinfmu.mechanism.measures import Reading
 from kinfmu.mechanism.members import MechanismParts, Members, NumberPath, texts_of
 from kinfmu.mechanism.metres import in_metres
-from kinfmu.mechanism.parameters import Parameter, parameter_values, resolve
+from kinfmu.mechanism.parameters import Parameter, parameter_values, parameters_behind, resolve
 from kinfmu.mechanism.quantities.arithmetic import Value
 from kinfmu.mechanism.quantities.placement import body_of
 from kinfmu.mechanism.settings import LawConstant, Settable, law_constants, with_law_constants
@@ -131,14 +131,7 @@ class Mechanism(MechanismParts, Live):
     @property
     def unused_parameters(self) -> tuple[str, ...]:
         """Parameters to which no number of the mechanism refers, directly or through other parameters."""
-        open_ones = [name for expression in self.expressions.values() for name in expression.names]
-        used: set[str] = set()
-        while open_ones:
-            name = open_ones.pop()
-            if name not in used:
-                used.add(name)
-                expression = self.parameters[name].expression
-                open_ones += expression.names if expression else ()
+        used = parameters_behind(self.parameters, *self.expressions.values())
         return tuple(name for name in self.parameters if name not in used)
 
     @property

@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 
 from kinfmu.errors import RequestError
 from kinfmu.mechanism import Mechanism, Parameter
-from kinfmu.mechanism.expression import Computed, Expression
+from kinfmu.mechanism.expression import Computed
 from kinfmu.mechanism.joints.joint import Joint
 from kinfmu.mechanism.members import NumberPath, path_text
+from kinfmu.mechanism.parameters import parameters_behind
 from kinfmu.units import Quantity
 
 AXES = ("x", "y")  # of a point
@@ -182,7 +183,7 @@ def dependent_points(mechanism: Mechanism) -> dict[str, list[str]]:
     for place, expression in mechanism.expressions.items():
         if place[0] != "bodies" or place[2] != "points":
             continue
-        for name in parameters_behind(mechanism, expression):
+        for name in parameters_behind(mechanism.parameters, expression):
             point = f"{place[1]}.{place[3]}"
             if point not in found.setdefault(name, []):
                 found[name].append(point)
@@ -193,24 +194,12 @@ def parameters_of(mechanism: Mechanism, joint: Joint, key: str = "") -> list[str
     """Return the parameters on which numbers of a joint depend, or only the number of a key."""
     path = ("joints", joint.name, key) if key else ("joints", joint.name)
     found = [one for place, one in mechanism.expressions.items() if place[: len(path)] == path]
-    return sorted({name for expression in found for name in parameters_behind(mechanism, expression)})
+    return sorted(parameters_behind(mechanism.parameters, *found))
 
 
 def number_data(mechanism: Mechanism, path: NumberPath, value: float) -> dict[str, Any]:
     """Return a number of the file, the parameters on which it depends, and that one which is its whole expression."""
     expression = mechanism.expressions.get(path)
-    names = sorted(parameters_behind(mechanism, expression)) if expression else []
+    names = sorted(parameters_behind(mechanism.parameters, expression)) if expression else []
     alone = expression.alone if expression and names == [expression.alone] else None
     return {"value": value, "names": names, "alone": alone}
-
-
-def parameters_behind(mechanism: Mechanism, expression: Expression) -> set[str]:
-    """Return the parameters on which an expression depends."""
-    names, seen = list(expression.names), set()
-    while names:
-        name = names.pop()
-        if name not in seen:
-            seen.add(name)
-            other = mechanism.parameters[name].expression
-            names += other.names if other else ()
-    return seen

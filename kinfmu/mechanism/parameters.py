@@ -164,6 +164,18 @@ def parameter_values(parameters: Mapping[str, Parameter], values: Mapping[str, V
     return results
 
 
+def parameters_behind(parameters: Mapping[str, Parameter], *expressions: Expression) -> set[str]:
+    """Return the parameters on which expressions depend, directly or through other parameters."""
+    names, seen = [name for expression in expressions for name in expression.names], set[str]()
+    while names:
+        name = names.pop()
+        if name not in seen:
+            seen.add(name)
+            other = parameters[name].expression
+            names += other.names if other else ()
+    return seen
+
+
 def in_order(names: Iterable[str], expressions: Mapping[str, Expression]) -> list[str]:
     """Return the names sorted so that each comes after those in its expression."""
     names = dict.fromkeys(names)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.arrays import FloatArray, IntArray
+from kinfmu.codegen.lanes.stage import address_of
 from kinfmu.motion.history import Extreme, cut_places, larger, weights_at
 from kinfmu.motion.quantities import QuantityNames, QuantityRead, path_of
 from kinfmu.motion.quintic import compiled
@@ -84,9 +85,7 @@ class Channels:
     def find(self, names: QuantityNames, points: Any, of: Any, order: int) -> tuple[tuple[int, ...], int]:
         """Return the columns of a quantity or a point, and the order of its derivative with that of its name.
 
-        Raises:
-            SamplesNeededError: Its derivatives are not those of columns.
-
+        Raise a SamplesNeededError if its derivatives are not those of columns.
         """
         quantities: tuple[QuantityRead, ...] = (of,)
         if isinstance(of, str) and order and of in points:
@@ -287,8 +286,7 @@ class ExtremesReader:
     def _address(self, array: NDArray[Any]) -> int:
         array = np.ascontiguousarray(array)
         self._kept.append(array)
-        place: int = array.__array_interface__["data"][0]
-        return place
+        return address_of(array)
 
     def extremes(self) -> Extremes:
         """Return what was found."""

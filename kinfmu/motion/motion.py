@@ -96,10 +96,8 @@ class Motion:
     def of_run(cls, run: Run) -> Motion:
         """Return the motion of a run; forces and margins are computed when they are read.
 
-        Raises:
-            RequestError: The run has too few samples or no mechanism, or its samples are not in the order of time or of
-                one driver that has a constant speed.
-
+        Raise a RequestError if the run has too few samples or no mechanism, or its samples are not in the order of time
+        or of one driver that has a constant speed.
         """
         mechanism = run.mechanism
         if mechanism is None:

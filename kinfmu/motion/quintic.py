@@ -10,12 +10,12 @@ import ctypes
 from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.arrays import FloatArray, IntArray
+from kinfmu.codegen.lanes.stage import address_of
 
 Rows = tuple[FloatArray, FloatArray, FloatArray]  # (m, n) values, rates and accelerations of a quantity
 
@@ -57,7 +57,7 @@ def ranges(table: FloatArray) -> tuple[FloatArray, FloatArray]:
         return np.where(is_known, low, np.nan), np.where(is_known, high, np.nan)
     rows = _by_samples(table.reshape(-1, table.shape[-1]))
     low, high = np.empty(len(rows)), np.empty(len(rows))
-    _compiled[0].kf_ranges(*rows.shape, _start(rows), rows.strides[0] // 8, _start(low), _start(high))
+    _compiled[0].kf_ranges(*rows.shape, address_of(rows), rows.strides[0] // 8, address_of(low), address_of(high))
     return low.reshape(table.shape[:-1]), high.reshape(table.shape[:-1])
 
 
@@ -69,14 +69,10 @@ def maxima(x: FloatArray, rows: Rows, signs: Sequence[float]) -> list[tuple[Floa
 
         f_0, f_0 + h v_0 / 5, f_0 + 2 h v_0 / 5 + h^2 a_0 / 20   and the same from the other end
 
-    Args:
-        x: (n,) arguments.
-        rows: (m, n) values, rates and accelerations.
-        signs: 1 for the largest value of the quantity, -1 for that of its negative.
+    Both are (m,), for each sign.
 
-    Returns:
-        Largest values and their places, (m,) each, for each sign.
-
+    x: (n,) arguments. rows: (m, n) values, rates and accelerations. signs: 1 for the largest value of the quantity, -1
+    for that of its negative.
     """
     if _compiled:
         return _compiled_maxima(x, rows, signs)
@@ -237,9 +233,9 @@ def _compiled_maxima(x: FloatArray, rows: Rows, signs: Sequence[float]) -> list[
     h, sides, (m, n) = np.diff(x), np.array(signs), tables[0].shape
     x = np.ascontiguousarray(x)
     value, at = np.empty((len(sides), m)), np.empty((len(sides), m))
-    places = [part for table in tables for part in (_start(table), table.strides[0] // 8)]
-    given = (_start(x), _start(h), len(sides), _start(sides))
-    _compiled[0].kf_maxima(m, n, *given, *places, _start(value), _start(at))
+    places = [part for table in tables for part in (address_of(table), table.strides[0] // 8)]
+    given = (address_of(x), address_of(h), len(sides), address_of(sides))
+    _compiled[0].kf_maxima(m, n, *given, *places, address_of(value), address_of(at))
     return list(zip(value, at, strict=True))
 
 
@@ -248,16 +244,11 @@ def _compiled_higher(rows: Rows, weights: tuple[FloatArray, FloatArray], *, is_c
     m, n = tables[0].shape
     given = [np.ascontiguousarray(one) for one in weights]
     third, fourth = np.empty((m, n)), np.empty((m, n))
-    places = [part for table in tables for part in (_start(table), table.strides[0] // 8)]
-    _compiled[0].kf_higher(m, n, is_closed, *map(_start, given), *places, _start(third), _start(fourth))
+    places = [part for table in tables for part in (address_of(table), table.strides[0] // 8)]
+    _compiled[0].kf_higher(m, n, is_closed, *map(address_of, given), *places, address_of(third), address_of(fourth))
     return rows[2], third, fourth
 
 
 def _by_samples(row: FloatArray) -> FloatArray:
     """Return an array whose samples follow each other in memory."""
     return row if row.strides[1] == 8 and row.strides[0] % 8 == 0 else np.ascontiguousarray(row)
-
-
-def _start(array: NDArray[Any]) -> int:
-    place: int = array.__array_interface__["data"][0]
-    return place

@@ -15,7 +15,7 @@ from kinfmu.codegen.python import load_model
 from kinfmu.errors import RequestError
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.measures import Reading
-from kinfmu.mechanism.parameters import in_order, parameter_values
+from kinfmu.mechanism.parameters import parameter_values, parameters_behind
 from kinfmu.mechanism.quantities.arithmetic import Value, atan2_like, cos, sin, sqrt
 from kinfmu.motion.breaks import has_breaks
 from kinfmu.motion.extremes import Channels, Extremes, SamplesNeededError
@@ -274,10 +274,5 @@ def points_of_designs(mechanism: Mechanism, given: Mapping[str, FloatArray]) -> 
 
 def dependent_numbers(mechanism: Mechanism, given: Collection[str]) -> list[tuple[str | int, ...]]:
     """Return the paths of the numbers that change with parameters, directly or through other parameters."""
-    parameters = mechanism.parameters
-    expressions = {name: p.expression for name, p in parameters.items() if p.expression and name not in given}
-    changing = set(given)
-    for name in in_order(parameters, expressions):
-        if name in expressions and changing.intersection(expressions[name].names):
-            changing.add(name)
-    return [place for place, expression in mechanism.expressions.items() if changing.intersection(expression.names)]
+    behind = {place: parameters_behind(mechanism.parameters, one) for place, one in mechanism.expressions.items()}
+    return [place for place, names in behind.items() if names.intersection(given)]

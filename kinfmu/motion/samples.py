@@ -187,14 +187,11 @@ def goes_round(
 
     They are compared with their largest values, of angles and of other quantities.
 
-    Args:
-        histories: One or more quantities, each with True if it is an angle, which may be whole turns further.
-        is_known: (...) True for the designs whose samples all have numbers: of those a few samples usually show that
-            the motion is large enough, and the others are not looked at. Default: every sample is looked at.
+    (...) True for the designs that go round; False where a sample has no numbers, or nothing moves.
 
-    Returns:
-        (...) True for the designs that go round; False where a sample has no numbers, or nothing moves.
-
+    histories: One or more quantities, each with True if it is an angle, which may be whole turns further. is_known:
+    (...) True for the designs whose samples all have numbers: of those a few samples usually show that the motion is
+    large enough, and the others are not looked at. Default: every sample is looked at.
     """
     if is_known is not None:
         is_closed = is_known & _ends_agree(histories, _ranges_of_few)

@@ -78,7 +78,7 @@ def drawn(shown: Instant, report: Report | None = None) -> dict[str, Any]:
     found = []
     every = shapes(shown)
     for shape in every:
-        if shape.strips:
+        if shape.is_load:
             continue
         slide = next(along[shape.frame]) if shape.kind == "rod" else lines.get(shape.name)
         found.append(_shape(shown, shape, numbers) | _line(shape, slide, numbers))
@@ -101,7 +101,7 @@ def drawn(shown: Instant, report: Report | None = None) -> dict[str, Any]:
             {"name": name, "point": numbers[point], "colour": list(palette.body(len(bodies) - 1 + k))}
             for k, (name, point) in enumerate(mechanism.points.items())
         ],
-        "loads": [_load(mechanism, shape, numbers) for shape in every if shape.strips],
+        "loads": [_load(mechanism, shape, numbers) for shape in every if shape.is_load],
         "gravity": _gravity(mechanism),
         "cams": [cam_data(mechanism, joint, numbers) for joint in shown.joints if joint.name in cams],
         "shapes": [shape for shape in found if shape["kind"] not in _NOT_DRAWN],
@@ -294,6 +294,7 @@ def _load(mechanism: Mechanism, shape: Shape, numbers: Mapping[str, int]) -> dic
     found: dict[str, Any] = {
         "name": load.name,
         "type": load.type,
+        "colour": list(shape.colour),
         "text": load_text(load),
         "frame": shape.frame,
         "axes": shape.other,
@@ -302,13 +303,7 @@ def _load(mechanism: Mechanism, shape: Shape, numbers: Mapping[str, int]) -> dic
             for body, point in ends
             if any(body_of(name) == body and tuple(point) == places[name] for name in numbers)
         ],
-        "strips": [
-            {"points": _rounded(strip.points)}
-            | ({"area": True} if strip.is_area else {})
-            | ({"solid": True} if strip.is_solid else {})
-            for strip in shape.strips
-        ],
-    }
+    } | _strips(shape)
     numbers_of = {key: getattr(load, key) for key in ("x", "y") if isinstance(load, ForceAt)}
     if isinstance(load, ForceAlong):
         numbers_of["angle"] = load.angle
@@ -320,6 +315,13 @@ def _load(mechanism: Mechanism, shape: Shape, numbers: Mapping[str, int]) -> dic
     return found | {
         key: number_data(mechanism, ("loads", load.name, key), float(value)) for key, value in numbers_of.items()
     }
+
+
+def _strips(shape: Shape) -> dict[str, Any]:
+    """Return the lines of a symbol with their rows of the table of strokes."""
+    if not shape.strips:
+        return {}
+    return {"strips": [{"points": _rounded(strip.points), "stroke": strip.stroke} for strip in shape.strips]}
 
 
 def _gravity(mechanism: Mechanism) -> list[float] | None:
@@ -364,7 +366,9 @@ def _shape(shown: Instant, shape: Shape, numbers: Mapping[str, int]) -> dict[str
         found["closed"] = True
     if shape.direction is not None:
         found["direction"] = _rounded(shape.direction)
-    return found
+    if shape.other:
+        found["axes"] = shape.other
+    return found | _strips(shape)
 
 
 def _nearest(shown: Instant, shape: Shape, numbers: Mapping[str, int]) -> int | None:

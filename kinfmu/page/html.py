@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from kinfmu.analysis import Report, check
+from kinfmu.draw.scene.strokes import look
 from kinfmu.mechanism import Mechanism, gallery
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.mechanism.opened import opened
@@ -146,7 +147,7 @@ def page_of(data: Mapping[str, Any], script: str = "") -> str:
         script: JavaScript after that of the page. Default: none.
 
     """
-    text = json.dumps({**data, "solver": solver()}, separators=(",", ":"), allow_nan=False)
+    text = json.dumps({**data, "solver": solver(), "look": look()}, separators=(",", ":"), allow_nan=False)
     code = "\n".join([*(_script(name) for name in _SCRIPTS), f"{{\n{script}\n}}"])  # names of its own
     return _filled(
         (_WEB / "index.html").read_text("utf-8"),

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from kinfmu.plan.block import Block
+from kinfmu.plan.block import Block, determinant_formula
 from kinfmu.plan.compile import compile_plan, plan_from
-from kinfmu.plan.determinant import determinant_formula
 from kinfmu.plan.origin import localized
 from kinfmu.plan.plan import DriverInfo, SolvePlan
 

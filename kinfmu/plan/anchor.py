@@ -20,19 +20,11 @@ from kinfmu.plan.origin import far_rows
 def find_anchor(system: System, assembly: AssembledStart, kept: Sequence[int]) -> Assembled:
     """Return the closed start pose, or a pose near it if it is singular.
 
-    Args:
-        system: The equations of the mechanism.
-        assembly: Its start values and assembled pose.
-        kept: Its independent joint rows, by index into System.rows.
+    Raise an AssemblyError if the mechanism does not close; the message has the loop and its gap, an AmbiguousStartError
+    if the start pose is singular and several branches leave it, a MobilityError if the mechanism is singular near the
+    start pose too.
 
-    Returns:
-        The anchor, from which every run is followed.
-
-    Raises:
-        AssemblyError: The mechanism does not close; the message has the loop and its gap.
-        AmbiguousStartError: The start pose is singular and several branches leave it.
-        MobilityError: The mechanism is singular near the start pose too.
-
+    assembly: Its start values and assembled pose. kept: Its independent joint rows, by index into System.rows.
     """
     start, found = assembly
     if found is None:

@@ -236,7 +236,7 @@ def _jumps(mechanism: Mechanism, tracer: Tracer) -> tuple[tuple[Node, Node], ...
     """Return the times at which a law jumps, each with its period."""
     found = []
     for driver, constants in _law_constants(mechanism, tracer):
-        jumps = driver.law.jumps(**constants)
+        jumps = driver.law.breaks(2, **constants)
         found += [(tracer.graph.lift(at), tracer.graph.lift(jumps.period)) for at in jumps.at]
     return tuple(found)
 

@@ -40,9 +40,7 @@ def effort_names(plan: SolvePlan) -> list[str]:
 def effort_inputs(plan: SolvePlan) -> list[str]:
     """Return the names of the inputs for all efforts: of the drivers, then of loads.
 
-    Raises:
-        RequestError: An effort of a driver has the name of a load's input.
-
+    Raise a RequestError if an effort of a driver has the name of a load's input.
     """
     names = [*effort_names(plan), *load_inputs(plan)]
     doubled = [name for name in names if names.count(name) > 1]

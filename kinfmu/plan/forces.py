@@ -72,12 +72,9 @@ def loaded_coordinates(mechanism: Mechanism) -> list[str]:
 def force_steps(plan: SolvePlan, wanted: Sequence[str], *, coefficients: Coefficients = "solved") -> ForceSteps:
     """Return the steps to forces.
 
-    Args:
-        plan: The plan, as `Mechanics` takes it.
-        wanted: Names of forces, of those of `force_names`.
-        coefficients: Where the velocity coefficients come from. At singular points they are known better than the
-            blocks give them; a single driver that moves needs no steps that solve for them.
-
+    wanted: Names of forces, of those of `force_names`. coefficients: Where the velocity coefficients come from. At
+    singular points they are known better than the blocks give them; a single driver that moves needs no steps that
+    solve for them.
     """
     mechanics = Mechanics(plan, coefficients=coefficients)
     names, found = force_names(plan.mechanism), _forces(plan, mechanics)

@@ -54,14 +54,10 @@ def find_open_loop(system: System, start: StartValues, kept: Sequence[int]) -> O
     Blocks are closed one by one in the solving order, as the plan solves them: a loop that depends on an open one is
     not blamed for it.
 
-    Args:
-        system: The equations of a mechanism that does not close.
-        start: Its start values.
-        kept: The independent joint rows, by index into System.rows; the drivers' rows are added.
+    Where rows and coordinates have no order, or each block closes alone, it is that of all rows.
 
-    Returns:
-        The loop. Where rows and coordinates have no order, or each block closes alone, that of all rows.
-
+    system: The equations of a mechanism that does not close. start: Its start values. kept: The independent joint rows,
+    by index into System.rows; the drivers' rows are added.
     """
     everything = tuple(range(len(system.rows))), tuple(range(len(system.coordinates)))
     order = in_order(system, [*kept, *range(system.joint_row_count, len(system.rows))])

@@ -16,7 +16,8 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from kinfmu.mechanism.body import GROUND_NAME
-from kinfmu.mechanism.force_names import reaction_names_of, shaking_names
+from kinfmu.mechanism.force_names import reaction_names_of as reaction_names_of
+from kinfmu.mechanism.force_names import shaking_names
 from kinfmu.mechanism.joints import CamOscillating, CamTranslating, Joint, Revolute, Translational
 from kinfmu.mechanism.joints.cam import Cam
 from kinfmu.mechanism.quantities.placement import Placement, body_of
@@ -31,15 +32,6 @@ from kinfmu.plan.steps import Assignment
 from kinfmu.plan.structure import RowTracer
 from kinfmu.units import CoordinateName
 
-__all__ = [
-    "follower_of",
-    "known_contacts",
-    "reaction_names_of",
-    "reaction_steps",
-    "shaking_steps",
-    "supports",
-]
-
 Pair = tuple[Node, Node]
 
 
@@ -49,10 +41,7 @@ def reaction_steps(plan: SolvePlan, wanted: Container[str] | None = None) -> For
     Where redundant rows share a load, the steps give one of the possible distributions. What the unknown contact of a
     cam loads lacks its force.
 
-    Args:
-        plan: The plan, as `Mechanics` takes it.
-        wanted: Names of those of joints that are wanted, without those on the ground. Default: all.
-
+    wanted: Names of those of joints that are wanted, without those on the ground. Default: all.
     """
     mechanics = Mechanics(plan)
     multipliers = _Multipliers(plan, mechanics).of_row
@@ -188,10 +177,7 @@ def known_contacts(joints: Sequence[Joint]) -> Iterator[tuple[int, Supports]]:
 def carried(mechanics: Mechanics, efforts: Mapping[int, Sequence[Node]]) -> dict[tuple[int, int], Node]:
     """Return what contacts add to the reactions of supports, by the numbers of joint and row [N, N m].
 
-    Args:
-        mechanics: Masses and loads of a plan.
-        efforts: By the number of a joint, what its rows transmit [N, N m]; of cams that nothing loads 0.
-
+    efforts: By the number of a joint, what its rows transmit [N, N m]; of cams that nothing loads 0.
     """
     added: dict[tuple[int, int], Node] = {}
 
@@ -312,10 +298,7 @@ def _turned(a: Pair) -> Pair:
 def shaking_steps(plan: SolvePlan, wanted: Container[str] | None = None) -> ForceSteps:
     """Return the steps to shaking force and moment alone; they solve nothing.
 
-    Args:
-        plan: The plan, as `Mechanics` takes it.
-        wanted: Names of those that are wanted. Default: all.
-
+    wanted: Names of those that are wanted. Default: all.
     """
     mechanics = Mechanics(plan, coefficients="given")
     nodes = shaking_nodes(plan, mechanics)  # of loads too, whose slopes are along symbols of known coordinates

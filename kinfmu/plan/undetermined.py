@@ -110,12 +110,7 @@ def _pushes(system: System, cam: Cam, pose: FloatArray) -> FloatArray:
 
 
 def distance_steps(plan: SolvePlan) -> ForceSteps:
-    """Return the steps to the distances [m] between the ends of loads that need a direction; 0: they have none.
-
-    Args:
-        plan: The plan, as `Mechanics` takes it.
-
-    """
+    """Return the steps to the distances [m] between the ends of loads that need a direction; 0: they have none."""
     mechanics = Mechanics(plan, coefficients="given")
     loads = [load for load in mechanics.members.loads if load.needs_direction]
     nodes = [node for load in loads for node in mechanics.measured(load)]

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cached_property
 from typing import Any, NamedTuple
 
 from kinfmu.codegen.python import load_model
 from kinfmu.errors import RequestError
 from kinfmu.mechanism import Mechanism
-from kinfmu.mechanism.expression import Expression
-from kinfmu.mechanism.parameters import in_order, parameter_values
+from kinfmu.mechanism.parameters import parameter_values
 from kinfmu.mechanism.valid import LARGEST_NUMBER, is_number, quoted
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.equations.graph import evaluate
@@ -57,10 +55,8 @@ class Arguments:
     def setting(self, given: Settings) -> Setting:
         """Return parameters and law constants as numbers.
 
-        Raises:
-            RequestError: A name is unknown or a value is invalid.
-            MechanismError: The mechanism cannot have these values.
-
+        Raise a RequestError if a name is unknown or a value is invalid, a MechanismError if the mechanism cannot have
+        these values.
         """
         if not given:
             return Setting(given, (), *self._split(self._constants_written), starts_elsewhere=False)
@@ -97,24 +93,12 @@ class Arguments:
     def number(self, name: str, value: float | str) -> float:
         """Return the value of a parameter or law constant as a number.
 
-        Raises:
-            RequestError: The name is unknown.
-            MechanismError: The value is invalid.
-
+        Raise a RequestError if the name is unknown, a MechanismError if the value is invalid.
         """
         setting = self.setting({name: value})
         if name in self._places:
             return setting.values[self._places[name]]
         return (*setting.constants, *setting.load_constants)[self._constant_places[name]]
-
-    @cached_property
-    def _derived(self) -> tuple[tuple[str, Expression], ...]:
-        """Parameters that follow from others by expressions, each after those in its expression."""
-        parameters = self.mechanism.parameters
-        expressions = {
-            name: p.expression for name, p in parameters.items() if p.expression and name not in self._places
-        }
-        return tuple((name, expressions[name]) for name in in_order(parameters, expressions) if name in expressions)
 
     def _read(self, given: Settings) -> dict[str, float]:
         """Return the numbers of settings of which some are text, or refuse them."""
@@ -159,9 +143,9 @@ class Arguments:
 
     def info(self, setting: Setting, engine: str) -> dict[str, str]:
         mechanism = self.mechanism
-        values: dict[str, Any] = dict(zip(self._places, setting.values or self.written, strict=True))
-        for name, expression in self._derived if setting.values else ():
-            values[name] = expression.value(values)
+        values: dict[str, Any] = {}
+        if setting.values:
+            values = parameter_values(mechanism.parameters, dict(zip(self._places, setting.values, strict=True)))
         return {
             "name": mechanism.name,
             "title": mechanism.title,

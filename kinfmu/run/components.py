@@ -11,10 +11,7 @@ _OTHER = f"{MAIN} "  # and then its name: the mechanism file of another componen
 def mechanism_info(main: str, others: Sequence[tuple[str, str]]) -> dict[str, str]:
     """Return what the info of a run states of the mechanisms in a system; nothing if there is only one.
 
-    Args:
-        main: The component whose mechanism the run holds.
-        others: Other components with the texts of their mechanism files.
-
+    main: The component whose mechanism the run holds. others: Other components with the texts of their mechanism files.
     """
     return {MAIN: main} | {f"{_OTHER}{name}": text for name, text in others} if others else {}
 

@@ -38,10 +38,7 @@ def continued(mechanism: Mechanism, settings: Settings) -> Continued:
     the start of the laws, as an FMU does. A mechanism that does not assemble as it is written, or that cannot be
     followed, keeps its start poses.
 
-    Raises:
-        RequestError: A name is unknown.
-        MechanismError: A value is invalid.
-
+    Raise a RequestError if a name is unknown, a MechanismError if a value is invalid.
     """
     changed = mechanism.with_parameters(settings)
     if not any(name in mechanism.parameters for name in settings) and law_starts(changed) == law_starts(mechanism):

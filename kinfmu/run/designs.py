@@ -144,10 +144,8 @@ class Batch:
     def driving(self, t: ArrayLike | None, inputs: Mapping[str, ArrayLike]) -> Driving:
         """Return what moves the designs: times, or inputs.
 
-        Raises:
-            RequestError: Times or inputs are invalid, or constants of the drivers' laws are given, without effect where
-                inputs are.
-
+        Raise a RequestError if times or inputs are invalid, or constants of the drivers' laws are given, without effect
+        where inputs are.
         """
         driven = self._driven(inputs)
         times = times_of(self.plan.mechanism.run, t) if driven is None else np.arange(driven[0].shape[-2], dtype=float)

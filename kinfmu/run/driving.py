@@ -170,9 +170,7 @@ def with_constants(drivers: Sequence[DriverInfo], driven: Driven, inputs: Mappin
 def applied_efforts(known: Sequence[str], given: Mapping[str, ArrayLike], count: int) -> dict[str, FloatArray]:
     """Return the efforts of external loads at all samples, (n,) by the names of their inputs; 0 where none is given.
 
-    Raises:
-        RequestError: An effort is not a number, or neither one number nor one for each sample.
-
+    Raise a RequestError if an effort is not a number, or neither one number nor one for each sample.
     """
     efforts = {}
     for name in known:

@@ -26,8 +26,7 @@ from kinfmu.codegen.python.stage import CompiledStage, load_stage
 from kinfmu.display import Displayed
 from kinfmu.errors import RequestError, listed, suggestion, valid_names
 from kinfmu.plan import SolvePlan, compile_plan, localized
-from kinfmu.plan.sensitivity import scale_of, sensitivity_steps
-from kinfmu.plan.steps import law_symbol
+from kinfmu.plan.steps import law_symbol, scale_of, sensitivity_steps
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.run import Run
 from kinfmu.run.arguments import Settings

@@ -160,7 +160,8 @@ class Tabular(ABC):
             MissingPackageError: polars is not installed.
 
         """
-        return table_package("polars").DataFrame({column.name: column.values for column in self.columns()})
+        tables = {name: values.tolist() if values.dtype == object else values for name, _, values in self.columns()}
+        return table_package("polars").DataFrame(tables)
 
 
 def arrow_table(columns: Iterable[Column]) -> Any:

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 
 import kinfmu
 from kinfmu.cli import main
-from kinfmu.draw import figure
+from kinfmu.draw import animate, figure
 from kinfmu.page import page
 from tests.mechanism.loads.every_load import every_load
 from tests.page.editor.hand import drawing_hand
@@ -98,6 +98,11 @@ def draw_gap() -> None:
             raise SystemExit(result.output)
 
 
+def draw_dark() -> None:
+    """Draw the leg of the README for dark pages."""
+    animate(kinfmu.solve(kinfmu.load("jansen_leg")), DOCS / "jansen_leg-dark.gif", dark=True)
+
+
 def draw_loads() -> None:
     """Draw a mechanism with a load of every kind."""
     figure(every_load(), DOCS / "loads.svg")
@@ -140,6 +145,7 @@ def draw_editor() -> None:
 if __name__ == "__main__":
     draw_files()
     draw_gap()
+    draw_dark()
     draw_loads()
     draw_pages()
     draw_editor()

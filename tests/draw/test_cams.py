@@ -16,10 +16,10 @@ from kinfmu.analysis import cam_profile
 from kinfmu.draw.cam_figure import _figure
 from kinfmu.draw.instant import instant
 from kinfmu.draw.scene import palette
-from kinfmu.draw.scene.details import on_face
 from kinfmu.draw.scene.joints import CamShape, cam_shapes
 from kinfmu.draw.scene.scene import scene
 from kinfmu.draw.scene.shape import Shape, guides_of_cams
+from kinfmu.draw.scene.strokes import on_face
 from kinfmu.draw.sheet import ink
 from kinfmu.fmu.picture import picture
 from kinfmu.log.urdf import robot_description
@@ -254,8 +254,8 @@ def test_the_block_of_a_follower_hides_neither_cam_nor_roller_in_fmus_and_record
     run = kinfmu.solve(tappet, [0.0])
     drawn = picture(run)
     assert drawn is not None
-    (block,) = (k for k, line in enumerate(drawn.lines) if line.is_filled and line.colour == palette.body(1))
-    (profile,) = (k for k, line in enumerate(drawn.lines) if line.is_filled and line.colour == palette.body(0))
+    areas = [line.colours[1] for line in drawn.lines]
+    block, profile = (areas.index(palette.lighter(palette.body(k))) for k in (1, 0))
     assert block < profile
     text = robot_description("tappet", scene(run, tappet), 1.0)
     visuals = re.search(r'<link name="follower">(.*?)</link>', text)

@@ -21,7 +21,6 @@ from kinfmu.draw import figure
 from kinfmu.draw.drawing import placed, sheet_of
 from kinfmu.draw.instant import instant, pose_note
 from kinfmu.draw.scene.shapes import shapes
-from kinfmu.draw.sheet import BAR
 from kinfmu.errors import AssemblyError, FigureError, MissingPackageError, RequestError
 from kinfmu.mechanism import gallery, toml_file, toml_text
 from tests.gallery_members import every_member
@@ -63,7 +62,7 @@ def test_names_are_above_all_lines_and_off_the_links_bars_and_cylinders(name: st
     canvas = FigureCanvasAgg(sheet.figure)
     canvas.draw()  # type: ignore[no-untyped-call]  # matplotlib has no types here
     point = sheet.figure.dpi / 72.0
-    half = (0.5 * BAR * sheet.fine - 1.5) * point  # of a bar, whose edge a name may touch
+    half = (0.5 * sheet.bar - 1.5) * point  # of a bar, whose edge a name may touch
     names = [text for text in sheet.axes.texts if text.get_transform() != sheet.axes.transAxes]
     assert min(text.get_zorder() for text in names) > max(patch.get_zorder() for patch in sheet.axes.patches)
     for shape in placed(shown, shapes(shown)):

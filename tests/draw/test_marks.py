@@ -29,13 +29,14 @@ from kinfmu.arrays import FloatArray
 from kinfmu.draw import animate, animation, figure
 from kinfmu.draw.drawing import placed, sheet_of
 from kinfmu.draw.instant import instant
-from kinfmu.draw.marks import Length, Pin, Push, Turn, motion, pins
+from kinfmu.draw.marks import Pin, pins
 from kinfmu.draw.names import LEADER
 from kinfmu.draw.scene import palette
 from kinfmu.draw.scene.instant import Instant
 from kinfmu.draw.scene.joints import slides
 from kinfmu.draw.scene.shape import Shape
 from kinfmu.draw.scene.shapes import shapes
+from kinfmu.draw.scene.strokes import symbol
 from kinfmu.draw.sheet import Sheet, ink
 from tests.draw.picture import picture
 from tests.gallery_members import every_member
@@ -202,23 +203,25 @@ def test_drivers_are_cylinders_and_arrows_with_the_value_of_the_start() -> None:
         length_unit="mm",
     )
     shown = instant(arm)
-    (cylinder,) = motion(shown)
-    assert isinstance(cylinder, Length)
     length = 1.7  # where the law starts, not where the start pose is: 1.685
-    assert cylinder.text == "cylinder = 1.7 mm"
+    assert "cylinder = 1.7 mm" in texts(sheet_of(shown))
+    assert drawn(shown, "driver") == []
     (barrel,), (shaft,) = drawn(shown, "barrel"), drawn(shown, "shaft")
-    np.testing.assert_allclose(cylinder.at, [barrel.points[0], shaft.points[1]], atol=1e-12)
+    ends = [shown.point("ground.C"), shown.point("arm.Q")]
+    np.testing.assert_allclose([barrel.points[0], shaft.points[1]], ends, atol=1e-12)
     assert 0.3 * length <= np.hypot(*(barrel.points[1] - barrel.points[0])) <= 0.62 * length + 1e-12
 
-    (turn,) = motion(instant(fourbar(4.0, 1.0, 3.5, 3.0)))
-    assert isinstance(turn, Turn)
-    assert (turn.text, turn.sense, tuple(turn.at)) == ("crank = 57.3°", 1.0, (0.0, 0.0))
-    assert turn.heading == pytest.approx(1.0)
+    shown = instant(fourbar(4.0, 1.0, 3.5, 3.0))
+    assert "crank = 57.3°" in texts(sheet_of(shown))
+    (turn,) = drawn(shown, "driver")
+    np.testing.assert_allclose(turn.points, [[0.0, 0.0]], atol=1e-12)
+    np.testing.assert_allclose(turn.towards, [math.cos(1.0), math.sin(1.0)], atol=1e-12)  # ahead of the crank
+    (arc, _) = (points for _, points in symbol(turn, 0.01))
+    assert (np.diff(np.unwrap(np.arctan2(*arc.T[::-1]))) > 0.0).all()  # the way it turns
 
     ram = SlideDriver("ram", ("ground.slot", "block.S"), law=ConstantSpeed(3.5, -0.1))
-    (push,) = motion(instant(crank_and_slider(drivers=(ram,))))
-    assert isinstance(push, Push)
-    assert tuple(push.along) == (-1.0, 0.0)
+    (push,) = drawn(instant(crank_and_slider(drivers=(ram,))), "driver")
+    np.testing.assert_allclose(push.towards, (-1.0, 0.0), atol=1e-12)
 
 
 def test_a_place_is_named_once_by_its_joint_and_its_points_of_interest() -> None:

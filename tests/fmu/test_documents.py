@@ -50,7 +50,9 @@ def test_the_page_has_picture_law_range_wiring_and_check(built: Built) -> None:
     pixels = _pixels(icon)
     assert pixels.shape == (100, 100, 4)
     assert 0.02 < (pixels[:, :, 3] > 128).mean() < 0.5
-    assert {tuple(one) for one in pixels.reshape(-1, 4)[:, :3].tolist()} >= {(230, 159, 0)}  # the crank's colour
+    assert {tuple(one) for one in pixels.reshape(-1, 4)[:, :3].tolist()} >= {
+        palette.lighter(palette.body(0))
+    }  # the crank
 
 
 def _pixels(data: bytes) -> np.ndarray:
@@ -154,9 +156,9 @@ def test_the_picture_of_an_fmu_shows_loads() -> None:
     run = kinfmu.solve(every_load(), [0.0, 0.1])
     drawn = picture(run)
     assert drawn is not None
-    violet = [line for line in drawn.lines if line.colour == palette.LOAD]
-    strips = [shape.strips for shape in scene(run, every_load()).shapes]
+    violet = [line for line in drawn.lines if line.colours[0] == palette.LOAD]
+    strips = [shape.strips for shape in scene(run, every_load()).shapes if shape.is_load]
     assert len(violet) == sum(map(len, strips)) > 20
     bare = picture(kinfmu.solve(fourbar(), [0.0, 0.1]))
     assert bare is not None
-    assert not [line for line in bare.lines if line.colour == palette.LOAD]
+    assert not [line for line in bare.lines if line.colours[0] == palette.LOAD]

@@ -32,7 +32,7 @@ from kinfmu.mechanism.measures import (
 from kinfmu.mechanism.quantities import AngleBetween, DistanceBetween
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.motion import History, Motion
-from kinfmu.motion.jerk import motion_of
+from kinfmu.motion.motion_curve import motion_of
 from kinfmu.motion.samples import sampled_history
 from kinfmu.run.channels import select
 from tests.analysis.test_lift_off import sliding

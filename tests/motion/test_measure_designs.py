@@ -182,7 +182,7 @@ def test_measures_of_extremes_are_read_without_tables(
     def never(*_: object) -> None:
         raise AssertionError("all samples are kept")
 
-    monkeypatch.setattr("kinfmu.motion.batch_reading.BatchReading._samples_of", never)
+    monkeypatch.setattr("kinfmu.motion.designs.BatchReading._samples_of", never)
     model = kinfmu.compile(crank_rocker(), engine="native")
     values = drawn(5)
     values["crank_link"] = np.array([15.0, np.nan, 38.0, 15.2, 14.9])  # one is invalid, one does not turn round
@@ -233,7 +233,7 @@ def test_laws_over_time(constants: dict[str, object]) -> None:
 
 
 def test_every_design_may_have_driver_values_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("kinfmu.motion.batch_reading.SAMPLES_AT_ONCE", len(TURN))  # a part for each
+    monkeypatch.setattr("kinfmu.motion.designs.SAMPLES_AT_ONCE", len(TURN))  # a part for each
     model = kinfmu.compile(crank_rocker())
     angles = TURN + np.array([[0.0], [0.5], [1.0]])
     measures = [one for one in READ if one.name in ("minimum", "peak_speed", "dwell", "velocity_ratio")]
@@ -259,7 +259,7 @@ def test_workers_and_the_size_of_parts_change_nothing(monkeypatch: pytest.Monkey
     values = drawn(50)
     alone = kinfmu.measure_designs(model, values, READ[:-1], crank_angle=TURN)  # type: ignore[arg-type]
     for size, workers in ((121 * 7, 1), (121, 3)):
-        monkeypatch.setattr("kinfmu.motion.batch_reading.SAMPLES_AT_ONCE", size)
+        monkeypatch.setattr("kinfmu.motion.designs.SAMPLES_AT_ONCE", size)
         other = kinfmu.measure_designs(model, values, READ[:-1], crank_angle=TURN, workers=workers)  # type: ignore[arg-type]
         for name in alone.values:
             np.testing.assert_array_equal(other[name], alone[name], name)

@@ -15,8 +15,7 @@ from kinfmu.arrays import FloatArray
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.drivers import Driver
 from kinfmu.mechanism.laws import Law
-from kinfmu.motion.jerk import motion_of
-from kinfmu.motion.motion_curve import MotionCurve, motion_curve
+from kinfmu.motion.motion_curve import MotionCurve, motion_curve, motion_of
 from tests.mechanisms import slider_crank
 
 LEVER = """

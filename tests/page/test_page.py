@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 from pathlib import Path
@@ -291,8 +292,21 @@ def test_value_changes_curve_and_can_be_undone_and_read_from_the_address(chromiu
         assert page.errors == []
     leg = kinfmu.load("jansen_leg").with_parameters({"m": 14.0})
     run = kinfmu.solve(leg, crank_angle=np.linspace(0.0, 2.0 * np.pi, 721))
-    apart = np.hypot(*(np.array(changed).T - np.array([run["foot.x"], run["foot.y"]])))
-    assert apart.max() < 1e-9
+    x, y, is_of_run = np.array(changed).T
+    assert np.hypot(x - run["foot.x"], y - run["foot.y"]).max() < 1e-9
+    assert is_of_run.all()  # a whole turn
+
+
+def test_the_part_of_a_curve_over_the_run_is_known(chromium: Browser) -> None:
+    quarter = dataclasses.replace(kinfmu.load("crank_rocker"), run=kinfmu.RunSettings(0.0, 0.25))
+    with chromium.open(kinfmu.page.page(quarter)) as page:
+        start, stop = page.get("[0, 0.25].map((t) => k.linkage.driven(t).u[0])")
+        values = np.linspace(*page.get("k.linkage.ranges[0]"), len(page.get("k.curves[0]")))
+        is_of_run = np.array(page.get("k.curves[0]"))[:, 2].astype(bool)
+        ahead = (values - start + 1e-5) % (2.0 * np.pi)
+        np.testing.assert_array_equal(is_of_run, ahead <= stop - start + 2e-5)
+        assert 0.1 < is_of_run.mean() < 0.9
+        assert page.errors == []
 
 
 @pytest.mark.long

@@ -21,7 +21,7 @@ from kinfmu.errors import RequestError
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text
 from kinfmu.plan import compile_plan
-from kinfmu.plan.sensitivity import sensitivity_steps
+from kinfmu.plan.steps import sensitivity_steps
 from kinfmu.run.sensitivities import Sensitivities
 from tests import oracle
 from tests.fmu.test_parameters import LENGTHS, linkage

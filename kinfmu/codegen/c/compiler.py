@@ -66,18 +66,13 @@ def shared_library(
 
     A terminal shows a line while the compiler runs.
 
-    Args:
-        files: Texts by file name.
-        flags: Flags of the compiler, after FLAGS.
-        target: A platform as zig names it, such as x86_64-windows-gnu, for which zig compiles; default: this platform.
-        rare: Names of C files that run rarely: the compiler optimizes them as in FLAGS, which is faster.
+    It returns the path in the cache.
 
-    Returns:
-        The path of the library in the cache.
+    Raise a CompilerError if there is no compiler, it fails, or the cache cannot be used.
 
-    Raises:
-        CompilerError: There is no compiler, it fails, or the cache cannot be used.
-
+    flags: Flags of the compiler, after FLAGS. target: A platform as zig names it, such as x86_64-windows-gnu, for which
+    zig compiles; default: this platform. rare: Names of C files that run rarely: the compiler optimizes them as in
+    FLAGS, which is faster.
     """
     build = _Build(files, flags, target, rare)
     found = library_cache.find(build.key, build.suffix)
@@ -90,9 +85,7 @@ def shared_library(
 def shared_library_bytes(files: Mapping[str, str], flags: Sequence[str] = (), target: str | None = None) -> bytes:
     """Return the content of a library as `shared_library` compiles it, also if the cache cannot be used.
 
-    Raises:
-        CompilerError: There is no compiler, or it fails.
-
+    Raise a CompilerError if there is no compiler, or it fails.
     """
     return _Build(files, flags, target).found_or_compiled()
 
@@ -178,9 +171,7 @@ def compile_files(
 ) -> None:
     """Run a compiler on C files; see `shared_library`.
 
-    Raises:
-        CompilerError: It fails; the message has its first error.
-
+    Raise a CompilerError if it fails; the message has its first error.
     """
     with temporary_folder() as scratch:
         for name, text in files.items():
@@ -278,9 +269,7 @@ def _run(commands: Sequence[Sequence[str]], folder: Path) -> None:
 def command() -> tuple[str, ...]:
     """Return the compiler: what CC names, else cc, gcc, clang, or zig's from the extra `native`.
 
-    Raises:
-        CompilerError: None is found.
-
+    Raise a CompilerError if none is found.
     """
     wanted = os.environ.get("CC")
     for name in [wanted] if wanted else ["cc", "gcc", "clang"]:
@@ -296,9 +285,7 @@ def command() -> tuple[str, ...]:
 def zig(target: str) -> tuple[str, ...]:
     """Return zig's compiler for a platform.
 
-    Raises:
-        CompilerError: Zig is not installed.
-
+    Raise a CompilerError if zig is not installed.
     """
     if find_spec("ziglang") is None:
         raise CompilerError("compiling for other platforms needs ziglang; pip install 'kinfmu[native]'")

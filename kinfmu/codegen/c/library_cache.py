@@ -39,9 +39,7 @@ for _flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"):  # those tha
 def find(key: str, suffix: str) -> Path | None:
     """Return the stored library of a key, checked, or None.
 
-    Raises:
-        CompilerError: The folder is not private.
-
+    Raise a CompilerError if the folder is not private.
     """
     with _private_folder() as folder:
         for path in _listed(folder, f"{key}-", suffix):
@@ -57,9 +55,7 @@ def find(key: str, suffix: str) -> Path | None:
 def store(key: str, suffix: str, data: bytes) -> Path:
     """Write a library and return its path.
 
-    Raises:
-        CompilerError: The folder is not private or cannot be written.
-
+    Raise a CompilerError if the folder is not private or cannot be written.
     """
     with _private_folder() as folder:
         _remove_stale(folder)

@@ -21,7 +21,6 @@ from kinfmu.codegen.newton import (
     determinant,
     is_small,
     jacobian_text,
-    opposite_solution,
     outright,
     outright_rates,
     right_side,
@@ -200,7 +199,7 @@ class Units:
         """Return z -= J^-1 r."""
         m, k = len(jacobian), len(z)
         if m == k <= 2:
-            return [f"{name} -= {step}" for name, step in zip(z, solution(jacobian, r, "det"), strict=True)]
+            return [f"{name} -= {step}" for name, step in zip(z, solution(jacobian, r), strict=True)]
         return self._solve(m, k, r, [f"{name} -= step[{i}]" for i, name in enumerate(z)])
 
     def _solve(self, m: int, k: int, right: Sequence[str], then: Sequence[str]) -> list[str]:
@@ -248,7 +247,7 @@ class Units:
         if is_small(block):
             jacobian = jacobian_text(writer, block) if entries else []
             kept, by_det = ("det = <kept>", "/ det") if order == 1 else ("per_det = 1.0 / <kept>", "* per_det")
-            values = opposite_solution(jacobian, b, by_det)
+            values = solution(jacobian, b, by_det, is_opposite=True)
             solved += [kept, *(f"{one} = {value}" for one, value in zip(z, values, strict=True))]
         else:
             opposite = [f"-{one}" for one in b]

@@ -173,9 +173,7 @@ def load_native_stage(stage: CompiledStage) -> Callable[[Sequence[Given], FloatA
     It fills the rows of `empty_results` that are not 0, from arrays (n,) or single numbers. The last argument: whether
     all are finite is wanted, and returned.
 
-    Raises:
-        CompilerError: There is no compiler, or it fails.
-
+    Raise a CompilerError if there is no compiler, or it fails.
     """
     head = Path(__file__).with_name("stage.h").read_text("utf-8")
     files = {"evaluate.c": stage_source(stage), "stage.h": head} | compiler.sources(HEADERS)
@@ -246,15 +244,3 @@ def empty_results(rows: int, n: int, of: Callable[[int], FloatArray] = np.empty)
     whole = of(rows * pitch + LINE)
     first = -address_of(whole) // ITEM % LINE
     return whole[first : first + rows * pitch].reshape(rows, pitch)[:, :n]
-
-
-__all__ = [
-    "Given",
-    "Strided",
-    "address_of",
-    "empty_results",
-    "is_printable",
-    "load_native_stage",
-    "stage_source",
-    "strided_columns",
-]

@@ -10,7 +10,6 @@ from kinfmu.codegen.newton import (
     determinant,
     is_small,
     jacobian_text,
-    opposite_solution,
     outright,
     right_side,
     settled,
@@ -73,7 +72,7 @@ def _correction(label: str, jacobian: Sequence[Sequence[str]], r: Sequence[str],
     """Return z -= J^-1 r."""
     m, n = len(jacobian), len(z)
     if m == n <= 2:
-        return [f"{name} -= {step}" for name, step in zip(z, solution(jacobian, r, f"det{label}"), strict=True)]
+        return [f"{name} -= {step}" for name, step in zip(z, solution(jacobian, r, f"/ det{label}"), strict=True)]
     solve = "lu_solve" if m == n else "qr_solve"
     steps = [f"d{i}" for i in range(n)]
     lines = [f"{tupled(steps)} = {solve}(factors{label}, [{', '.join(r)}])"]
@@ -87,9 +86,10 @@ def solution_lines(
     m, n = len(jacobian), len(z)
     if m == n <= 2:
         if order == 1:  # a quotient, rounded once: bodies that turn equally have equal speeds to the bit
-            solved, before = opposite_solution(jacobian, b, f"/ det{label}"), []
+            solved, before = solution(jacobian, b, f"/ det{label}", is_opposite=True), []
         else:
-            solved, before = opposite_solution(jacobian, b, "* per_det"), [f"per_det = 1.0 / det{label}"]
+            solved = solution(jacobian, b, "* per_det", is_opposite=True)
+            before = [f"per_det = 1.0 / det{label}"]
         return [*before, *(f"{name} = {value}" for name, value in zip(z, solved, strict=True))]
     solve = "lu_solve" if m == n else "qr_solve"
     return [f"{tupled(z)} = {solve}(factors{label}, [{', '.join(f'-{name}' for name in b)}])"]

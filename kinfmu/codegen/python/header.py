@@ -10,7 +10,7 @@ from kinfmu.codegen.newton import ROUND_OFF
 from kinfmu.codegen.python.block_code import defined, extreme, indented, tupled, unpacking
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.plan import Block, SolvePlan
-from kinfmu.plan.equations.graph import Node
+from kinfmu.plan.equations.graph import Node, reachable
 from kinfmu.plan.path_laws import argument_symbol
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.solver.python.curve import CurveData
@@ -169,16 +169,8 @@ def drive(plan: SolvePlan, curves: Mapping[CurveData, str]) -> list[str]:
 
 def _may_raise(plan: SolvePlan) -> bool:
     """Return True if an operation of the laws has no value for some numbers, such as the sine of infinity."""
-    found: set[int] = set()
-    stack = [node for law in plan.laws for node in (law.position, law.rate, law.acceleration)]
-    while stack:
-        node = stack.pop()
-        if node.id not in found:
-            found.add(node.id)
-            stack.extend(node.args)
-            if node.op in _RAISING:
-                return True
-    return False
+    laws = (node for law in plan.laws for node in (law.position, law.rate, law.acceleration))
+    return any(node.op in _RAISING for node in reachable(laws))
 
 
 _HOLDS = {

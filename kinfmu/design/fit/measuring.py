@@ -117,28 +117,11 @@ class Measuring:
         self, parameters: Mapping[str, FloatArray], aims: Sequence[Aim], reasons: dict[int, str] | None = None
     ) -> FloatArray:
         """Return the values (aims, m) of designs; NaN where there is none, for the reasons that are added by design."""
-        margins = [aim for aim in aims if isinstance(aim.reading, LowestMargin)]  # of the samples: nothing to refine
-        others = [aim for aim in aims if aim not in margins]
-        found: dict[str, FloatArray] = {}
-        if others:
-            readings = [_renamed(aim.reading, aim.name) for aim in others]
-            table = measure_designs(self.model, parameters, readings, anew=False, **self.inputs)
-            found |= table.values
-            if reasons is not None:
-                reasons |= table.reasons
-        if margins:
-            rows = zip(*(values.tolist() for values in parameters.values()), strict=True)
-            lowest = np.array([self._lowest_margin(dict(zip(parameters, row, strict=True))) for row in rows])
-            found |= {aim.name: lowest for aim in margins}
-        return np.array([found[aim.name] for aim in aims])
-
-    def _lowest_margin(self, parameters: Mapping[str, float]) -> float:
-        """Return the lowest margin of a design's samples; NaN if one of them is not reached."""
-        try:
-            run = self.model.solve(parameters=parameters, anew=False, **self.inputs)
-        except KinfmuError:
-            return math.nan
-        return float(run.margin.min()) if run.good.all() else math.nan
+        readings = [_renamed(aim.reading, aim.name) for aim in aims]
+        table = measure_designs(self.model, parameters, readings, anew=False, **self.inputs)
+        if reasons is not None:
+            reasons |= table.reasons
+        return np.array([table.values[aim.name] for aim in aims])
 
 
 def measuring_of(

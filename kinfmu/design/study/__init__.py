@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from kinfmu.design.study.definition import Study
+from kinfmu.design.study.definition import Study, read_study
 from kinfmu.design.study.result import StudyResult
 from kinfmu.design.study.run import run_study, study
-from kinfmu.design.study.study_file import read_study
 
 __all__ = ["Study", "StudyResult", "read_study", "run_study", "study"]

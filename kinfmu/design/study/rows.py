@@ -20,7 +20,7 @@ from kinfmu.errors import StudyError, suggestion
 from kinfmu.mechanism import Mechanism, toml_file
 from kinfmu.mechanism.number import DisplayUnit, display_unit
 from kinfmu.mechanism.valid import quoted
-from kinfmu.run.tables import Column, table_package
+from kinfmu.run.tables import Column, Tabular, table_package
 from kinfmu.units import quantity_in
 
 
@@ -76,7 +76,7 @@ class Moments:
         return Statistics(self._count, self._mean, deviation, self._low, self._high, self._missing)
 
 
-class StudyRows:
+class StudyRows(Tabular):
     """A row for each design of a study, and what they were made from; attributes as in `StudyResult`."""
 
     def __init__(self, table: Table, name: str = "the results") -> None:
@@ -175,18 +175,18 @@ class StudyRows:
         """Return (m,) True for designs whose measures all have values."""
         return np.asarray(np.logical_and.reduce([np.isfinite(self[name]) for name in self.measures]))
 
-    def columns(self) -> Iterator[tuple[str, FloatArray]]:
-        """Yield all columns but that of reasons, with their names."""
-        for name in self.units:
-            if name != REASON:
-                yield name, self[name]
+    def columns(self) -> Iterator[Column]:
+        """Yield all columns; in that of reasons are texts, or None."""
+        for name, unit in self.units.items():
+            yield Column(name, unit, self[name])
 
     def shown_columns(self) -> list[Column]:
         """Return all columns but that of reasons, in the units in which summary and pictures show them."""
         found = []
-        for name, values in self.columns():
-            unit, factor = self.display_unit(name)
-            found.append(Column(name, unit, values if factor == 1.0 else values / factor))
+        for name, _, values in self.columns():
+            if name != REASON:
+                unit, factor = self.display_unit(name)
+                found.append(Column(name, unit, values if factor == 1.0 else values / factor))
         return found
 
     def to_arrow(self) -> Any:
@@ -198,26 +198,6 @@ class StudyRows:
         """
         table_package("pyarrow")
         return self._table.to_arrow()
-
-    def to_pandas(self) -> Any:
-        """Return the rows as a pandas.DataFrame, with the units by column in `attrs["units"]`.
-
-        Raises:
-            MissingPackageError: pandas is not installed.
-
-        """
-        frame = table_package("pandas").DataFrame({name: self._table.column(name) for name in self.units})
-        frame.attrs["units"] = dict(self.units)
-        return frame
-
-    def to_polars(self) -> Any:
-        """Return the rows as a polars.DataFrame.
-
-        Raises:
-            MissingPackageError: polars is not installed.
-
-        """
-        return table_package("polars").DataFrame({name: self._table.column(name).tolist() for name in self.units})
 
 
 def study_in(path: Path) -> Mapping[str, str]:

@@ -104,17 +104,11 @@ Variation = Grid | UniformRange | Tolerance
 def read_variation(where: str, name: str, table: Mapping[str, Any], mechanism: Mechanism) -> Variation:
     """Return how a parameter varies, from a table of a study file or of a call.
 
-    Args:
-        where: The table in messages, such as '[parameters.crank]'.
-        name: The parameter or law constant.
-        table: Its keys: `values`; or `from`, `to` and `count`; or `from` and `to`; or `tolerance`, `distribution`,
-            `deviations` and `nominal`. Numbers are bare or have units, as in mechanism files.
-        mechanism: The mechanism.
+    Raise a MechanismError if a key or a value is invalid, a RequestError if the mechanism has no such parameter.
 
-    Raises:
-        MechanismError: A key or a value is invalid.
-        RequestError: The mechanism has no such parameter.
-
+    where: The table in messages, such as '[parameters.crank]'. name: The parameter or law constant. table: Its keys:
+    `values`; or `from`, `to` and `count`; or `from` and `to`; or `tolerance`, `distribution`, `deviations` and
+    `nominal`. Numbers are bare or have units, as in mechanism files.
     """
     settable = mechanism.settable
     if not isinstance(name, str):

@@ -18,6 +18,7 @@ from kinfmu.mechanism.drivers import Driver
 from kinfmu.mechanism.joints import Revolute
 from kinfmu.mechanism.joints.joint import Joint
 from kinfmu.mechanism.quantities.placement import BodyFrame, Placement, body_of
+from kinfmu.run import Run
 
 
 class OpenGap(NamedTuple):
@@ -109,6 +110,17 @@ class Instant:
         poses = {name: BodyFrame.of(*pose[0].tolist()) for name, pose in self.poses.items()}
         (found,) = (one for one in self.mechanism.drivers if one.name == driver)
         return float(found.measured().value(Placement(poses, self.body_points)))
+
+
+def directions(run: Run, mechanism: Mechanism) -> dict[str, float]:
+    """Return +1.0 or -1.0 by driver, the direction of its first motion in a run."""
+    found = {}
+    for driver in mechanism.drivers:
+        _, speed, _ = driver.inputs()
+        is_known = speed in run.input_names and speed not in run.absent
+        moving = run[speed][run[speed] != 0.0] if is_known else np.zeros(0)
+        found[driver.name] = float(np.sign(moving[0])) if len(moving) and np.isfinite(moving[0]) else 1.0
+    return found
 
 
 def gravity_direction(mechanism: Mechanism) -> FloatArray | None:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinfmu.arrays import FloatArray
+from kinfmu.draw.scene import strokes
 from kinfmu.draw.scene.instant import Instant
 from kinfmu.draw.scene.placing import seen_from
 from kinfmu.draw.scene.shape import Shape, points_of
@@ -135,13 +136,16 @@ def racks_of(shown: Instant) -> set[str]:
     return {body_of(joint.between[1]) for joint in joints if isinstance(joint, RackAndPinion)}
 
 
-def wheels(shown: Instant) -> Iterator[Shape]:
-    """Yield gears, pulleys, belts and racks, in the world as drawn, whose axles are pinned on their carrier."""
+def wheels(shown: Instant, size: float) -> Iterator[Shape]:
+    """Yield gears, pulleys, belts and racks, in the world as drawn, whose axles are pinned on their carrier.
+
+    size: about that of details [length].
+    """
     for joint in shown.joints:
         if isinstance(joint, Gear):
             yield from _pair(shown, joint)
         elif isinstance(joint, RackAndPinion):
-            yield from _rack(shown, joint)
+            yield from _rack(shown, joint, size)
 
 
 def _pair(shown: Instant, joint: Gear) -> Iterator[Shape]:
@@ -175,7 +179,7 @@ def _belt(a: FloatArray, b: FloatArray, radii: tuple[float, float]) -> FloatArra
     return np.stack([a + radii[0] * off, b + radii[1] * off], axis=1)
 
 
-def _rack(shown: Instant, joint: RackAndPinion) -> Iterator[Shape]:
+def _rack(shown: Instant, joint: RackAndPinion, size: float) -> Iterator[Shape]:
     """Yield the rack over its path in the run, and the pinion."""
     holder, rack = map(body_of, joint.between)
     centre = shown.axle(joint.pinion, holder)
@@ -192,7 +196,8 @@ def _rack(shown: Instant, joint: RackAndPinion) -> Iterator[Shape]:
     end = _BEYOND * radius
     first, last = -np.nanmax(way) - end, -np.nanmin(way) + end  # part that passes the pinion, relative to the rack now
     ends = np.array([contact + first * along, contact + last * along])
-    yield Shape("rack", joint.name, rack, ends, shown.colour(rack), direction=across)
+    teeth = strokes.rack(last - first, size)
+    yield Shape("rack", joint.name, rack, ends, shown.colour(rack), direction=across, strips=teeth)
     yield from _wheel(shown, joint.name, joint.pinion, centre, radius)
     yield Shape("contact", joint.name, rack, contact[None])
 

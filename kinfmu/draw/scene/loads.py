@@ -1,4 +1,4 @@
-"""Shapes of loads: springs, dampers and gas springs between their points, forces and torques where they act."""
+"""Shapes of loads and drivers: springs between their points, forces, torques and motions where they act."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from kinfmu.draw.scene import palette
 from kinfmu.draw.scene.instant import Instant
 from kinfmu.draw.scene.shape import Shape, Strip
 from kinfmu.mechanism.body import GROUND_NAME
-from kinfmu.mechanism.drivers import DistanceDriver
+from kinfmu.mechanism.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
 from kinfmu.mechanism.joints import Distance
 from kinfmu.mechanism.laws import ConstantValue, External
 from kinfmu.mechanism.loads import (
@@ -42,6 +42,8 @@ IN_CUP, IN_TUBE = (0.27, 0.92), (0.13, 0.95)  # of the barrel's length, between 
 _ARROW, _HEAD, _HALF_HEAD = 26.0, 7.0, 3.0  # length of an arrow; its head
 _CLEAR = 5.0  # from a point to the tip of an arrow that pushes it
 _TURN = (14.0, math.radians(40.0), math.radians(310.0))  # radius of a torque's arrow, and its ends
+_DRIVEN = (19.0, math.radians(25.0), math.radians(115.0))  # those of a driver, ahead of its body
+_PUSH, _ASIDE = 15.0, 13.0  # half length of the arrow of a straight motion, and its distance from its point
 _SPIRAL = (3.5, 12.0, 2.25)  # radii of a torsion spring, and its turns
 _DASHPOT = (14.0, 21.0)  # radii of a torsion damper's cup
 _CUP_ANGLES, _ROD_ANGLES, _STEM = (100.0, 215.0), (150.0, 20.0), 0.5  # [deg], and of the stem behind the cup [rad]
@@ -57,10 +59,11 @@ _TURNS, _FEWEST_MOST = 18.0, (4, 14)  # of a spring as long as the mechanism; li
 
 
 def load_shapes(shown: Instant, box: FloatArray) -> Iterator[Shape]:
-    """Yield the symbols of loads on bodies whose poses are known; box: corners (2, 2) of the mechanism as drawn.
+    """Yield the symbols of loads and drivers of bodies whose poses are known; box: corners (2, 2) as drawn.
 
     A force points where its largest effort over the run does, and pushes its point if that is towards the middle. A
-    constant force of 0 has no direction and no symbol. Symbols about one pin have different radii.
+    constant force of 0 has no direction and no symbol, and neither has a driven cylinder. Symbols about one pin have
+    different radii.
     """
     taken = Counter(
         frozenset(member.between)
@@ -80,8 +83,25 @@ def load_shapes(shown: Instant, box: FloatArray) -> Iterator[Shape]:
             yield _between(shown, load, off, float(np.ptp(box, axis=0).max()))
         elif isinstance(load, ForceAt | ForceAlong):
             yield from _force(shown, load, box.mean(axis=0))
-        elif load.name in rings:
-            yield rings[load.name]
+        elif load in rings:
+            yield rings[load]
+    for driver in shown.drivers:
+        if isinstance(driver, SlideDriver | CoordinateDriver):
+            yield _pushed(shown, driver)
+        elif driver in rings:
+            yield rings[driver]
+
+
+def _pushed(shown: Instant, driver: SlideDriver | CoordinateDriver) -> Shape:
+    """Return the arrow of a driver next to its point."""
+    if isinstance(driver, SlideDriver):
+        axes, point, angle = body_of(driver.between[0]), driver.between[1], float(driver.axis)
+    else:
+        axes, point, angle = GROUND_NAME, driver.of, 0.0 if driver.axis == "x" else 0.5 * math.pi
+    towards = shown.directions.get(driver.name, 1.0) * np.array(unit_vector(angle))
+    strips = _arrow(_FIRST, -_PUSH, _PUSH, _ASIDE)
+    frame, at = body_of(point), shown.at(point)[None]
+    return Shape("driver", driver.name, frame, at, palette.DRIVER, direction=towards, strips=strips, other=axes)
 
 
 def load_text(load: Load) -> str:
@@ -155,12 +175,12 @@ def _force(shown: Instant, load: ForceAt | ForceAlong, middle: FloatArray) -> It
     yield _shape(load, body_of(load.at), shown.at(load.at)[None], strips, direction=towards, other=load.axes)
 
 
-def _rings(shown: Instant, size: float) -> dict[str, Shape]:
-    """Return the symbols about pins, by load: of torques, torsion springs and torsion dampers on known bodies.
+def _rings(shown: Instant, size: float) -> dict[Load | Driver, Shape]:
+    """Return the symbols about pins: of torques, torsion springs and dampers, and turning drivers.
 
     Those about one pin have different radii, springs the smallest ones. size: of the mechanism as drawn [length].
     """
-    rings: list[tuple[Load, tuple[str, str], _Ring]] = []
+    rings: list[tuple[Load | Driver, tuple[str, str], _Ring]] = []
     for load in shown.mechanism.loads:
         if not shown.poses.keys() >= {*load.bodies()}:
             continue
@@ -168,15 +188,20 @@ def _rings(shown: Instant, size: float) -> dict[str, Shape]:
             rings.append((load, load.between[::-1], spiral if isinstance(load, TorsionSpring) else dashpot))
         elif isinstance(load, TorqueOn):
             rings.append((load, (load.on, load.against), partial(turn, _sense(shown, load))))
-    shapes: dict[str, Shape] = {}
-    for load, bodies, ring in sorted(rings, key=lambda entry: radii(entry[2](0.0))):
-        shapes[load.name] = _about(shown, load, bodies, ring, shapes.values(), size)
+    for driver in shown.drivers:
+        if driver.quantity.kind == "angle":
+            *held, body = driver.bodies()
+            ring = partial(turn, shown.directions.get(driver.name, 1.0), ring=_DRIVEN)
+            rings.append((driver, (body, held[0] if held else GROUND_NAME), ring))
+    shapes: dict[Load | Driver, Shape] = {}
+    for member, bodies, own in sorted(rings, key=lambda entry: radii(entry[2](0.0))):
+        shapes[member] = _about(shown, member, bodies, own, shapes.values(), size)
     return shapes
 
 
 def _about(
     shown: Instant,
-    load: Load,
+    load: Load | Driver,
     bodies: tuple[str, str],
     ring: _Ring,
     others: Iterable[Shape],
@@ -194,7 +219,18 @@ def _about(
         other for other in others if np.hypot(*(shown.placed(other.frame, other.points)[0] - place)) <= _SAME * size
     ]
     strips = ring(beyond([other.strips for other in same], ring(0.0)))
+    if isinstance(load, Driver):
+        angle = _heading(shown, body, at)
+        towards = np.array([math.cos(angle), math.sin(angle)])
+        return Shape("driver", load.name, body, at[None], palette.DRIVER, direction=towards, strips=strips)
     return _shape(load, body, at[None], strips, direction=np.array([1.0, 0.0]))
+
+
+def _heading(shown: Instant, body: str, at: FloatArray) -> float:
+    """Return the angle [rad], in its frame, of the line from a point of a body to the one furthest from it."""
+    points = [shown.at(name) - at for name in shown.body_points if body_of(name) == body]
+    furthest = max(points, key=lambda vector: float(np.hypot(*vector)), default=np.zeros(2))
+    return math.atan2(furthest[1], furthest[0])
 
 
 def _shape(
@@ -254,9 +290,9 @@ def gas_spring(rod: float, tube: float, off: float = 0.0) -> tuple[Strip, ...]:
     """Return a cylinder from the first point, with a rod [length] from the second one."""
     start, end = _TO_TUBE * tube, [(0.0, 0.0)] if off else []
     return (
-        _at_end(_LAST, _box(-rod, 0.0, off, _ROD), is_area=True),
+        _at_end(_LAST, _box(-rod, 0.0, off, _ROD), "case"),
         _at_end(_FIRST, [*end, (0.0, off), (start, off)]),
-        _at_end(_FIRST, _box(start, tube, off, _TUBE), is_area=True),
+        _at_end(_FIRST, _box(start, tube, off, _TUBE), "case"),
         _at_end(_LAST, [(-rod, off - _TUBE), (-rod, off + _TUBE)]),
         *([_at_end(_LAST, [(0.0, off), *end])] if off else []),
     )
@@ -282,16 +318,16 @@ def arrows_apart(sense: float) -> tuple[Strip, ...]:
     return (line, *_arrow(_FIRST, 0.0, -sense * _ARROW), *_arrow(_LAST, 0.0, sense * _ARROW))
 
 
-def turn(sense: float, out: float = 0.0) -> tuple[Strip, ...]:
-    """Return the circular arrow of a torque; sense: 1.0 counter-clockwise, -1.0 clockwise; out: added to its radius."""
-    radius, first, last = _TURN[0] + out, *_TURN[1:]
+def turn(sense: float, out: float = 0.0, ring: tuple[float, float, float] = _TURN) -> tuple[Strip, ...]:
+    """Return a circular arrow; sense: -1.0 if it is clockwise, else 1.0; out: added to its radius; ring: as _TURN."""
+    radius, first, last = ring[0] + out, *ring[1:]
     tip = last + _HEAD / radius
     arc = _polar(radius, _angles(first, last))
     base, point = arc[-1], _polar(radius, np.array([tip]))[0]
     way = (point - base) / np.hypot(*(point - base))  # the head lies along the chord
     across = _HALF_HEAD * np.array([-way[1], way[0]])
     mirror = np.array([1.0, sense])
-    return _flat(arc * mirror), _flat(np.array([point, base + across, base - across]) * mirror, is_head=True)
+    return _flat(arc * mirror), _flat(np.array([point, base + across, base - across]) * mirror, "head")
 
 
 def spiral(out: float = 0.0) -> tuple[Strip, ...]:
@@ -332,13 +368,13 @@ def radii(strips: tuple[Strip, ...]) -> tuple[float, float]:
     return float(distances.min()), float(distances.max())
 
 
-def _arrow(part: float, tail: float, tip: float) -> tuple[Strip, ...]:
-    """Return a straight arrow along the direction, from `tail` to `tip` in details."""
+def _arrow(part: float, tail: float, tip: float, off: float = 0.0) -> tuple[Strip, ...]:
+    """Return a straight arrow along the direction, from `tail` to `tip` in details, at a distance from its line."""
     base = tip - math.copysign(_HEAD, tip - tail)
-    head = [(tip, 0.0), (base, _HALF_HEAD), (base, -_HALF_HEAD)]
+    head = [(tip, off), (base, off + _HALF_HEAD), (base, off - _HALF_HEAD)]
     return (
-        _line((part, 0.0, along, 0.0) for along in (tail, base)),
-        _line(((part, 0.0, along, across) for along, across in head), is_area=True, is_solid=True),
+        _line((part, 0.0, along, off) for along in (tail, base)),
+        _line(((part, 0.0, along, across) for along, across in head), "head"),
     )
 
 
@@ -346,9 +382,9 @@ def _box(first: float, last: float, off: float, half: float) -> list[tuple[float
     return [(first, off - half), (last, off - half), (last, off + half), (first, off + half)]
 
 
-def _at_end(part: float, points: Iterable[tuple[float, float]], *, is_area: bool = False) -> Strip:
+def _at_end(part: float, points: Iterable[tuple[float, float]], stroke: str = "symbol") -> Strip:
     """Return a strip that keeps its length, fixed at one of two points; points: (length, across)."""
-    return _line(((part, length, 0.0, across) for length, across in points), is_area=is_area)
+    return _line(((part, length, 0.0, across) for length, across in points), stroke)
 
 
 def _polar(radius: float | FloatArray, angles: FloatArray) -> FloatArray:
@@ -356,16 +392,14 @@ def _polar(radius: float | FloatArray, angles: FloatArray) -> FloatArray:
     return np.column_stack([radius * np.cos(angles), radius * np.sin(angles)])
 
 
-def _flat(points: FloatArray, *, is_head: bool = False) -> Strip:
+def _flat(points: FloatArray, stroke: str = "symbol") -> Strip:
     """Return a strip at one point; points: (k, 2) in details."""
-    return Strip(np.column_stack([0.0 * points, points]), is_head, is_head)
+    return Strip(np.column_stack([0.0 * points, points]), stroke)
 
 
 def _angles(first: float, last: float) -> FloatArray:
     return np.linspace(first, last, max(round(abs(last - first) / _STEP), 2) + 1)
 
 
-def _line(
-    points: Iterable[tuple[float, float, float, float]], *, is_area: bool = False, is_solid: bool = False
-) -> Strip:
-    return Strip(np.array(list(points), dtype=float), is_area, is_solid)
+def _line(points: Iterable[tuple[float, float, float, float]], stroke: str = "symbol") -> Strip:
+    return Strip(np.array(list(points), dtype=float), stroke)

@@ -17,10 +17,11 @@ GROUND: Colour = (150, 150, 150)
 BAR: Colour = (190, 190, 190)
 PIN: Colour = (235, 235, 235)
 LOAD: Colour = (126, 34, 206)
-LOAD_ON_DARK: Colour = (168, 85, 247)  # in recordings
+DRIVER: Colour = (185, 28, 28)
+INK: Colour = (40, 40, 40)
+WHITE: Colour = (255, 255, 255)
+DARK: Colour = (18, 23, 29)  # paper of dark pages
 RUNS: tuple[Colour, Colour] = ((213, 94, 0), (86, 180, 233))  # two runs compared
-BACKDROP: Colour = (13, 16, 17)  # background of a recording's linkage
-OUT_OF_REACH: Colour = (110, 110, 110)
 STATUS: tuple[Colour, ...] = (
     (0, 140, 100),
     (230, 159, 0),
@@ -32,6 +33,20 @@ STATUS: tuple[Colour, ...] = (
 
 
 LEAST_CONTRAST = 3.0  # of lines to their background, WCAG 2.2, 1.4.11
+# What the colour of a thing is mixed with for its strokes, and how much of it, on white paper and on dark paper.
+ROLES: dict[str, tuple[tuple[Colour, float], tuple[Colour, float]]] = {
+    "own": (((0, 0, 0), 0.0), (WHITE, 0.45)),
+    "edge": (((0, 0, 0), 0.45), (WHITE, 0.25)),
+    "fill": ((WHITE, 0.5), (DARK, 0.55)),
+    "pale": ((WHITE, 0.82), (DARK, 0.78)),
+    "paper": ((WHITE, 1.0), (DARK, 1.0)),
+    "ink": ((INK, 1.0), ((232, 237, 243), 1.0)),
+}
+
+
+def tint(role: str, colour: Colour, *, is_dark: bool = False) -> Colour:
+    """Return the colour of a stroke: of a role of ROLES, for a thing of a colour, on white or on dark paper."""
+    return _mixed(colour, *ROLES[role][is_dark])
 
 
 def body(index: int) -> Colour:
@@ -52,14 +67,12 @@ def _mixed(colour: Colour, other: Colour, part: float) -> Colour:
 
 def lighter(colour: Colour) -> Colour:
     """Return the colour halfway to white, such as for y next to x."""
-    red, green, blue = ((value + 255) // 2 for value in colour)
-    return red, green, blue
+    return tint("fill", colour)
 
 
 def darker(colour: Colour) -> Colour:
     """Return the colour for edges and names on white paper."""
-    red, green, blue = ((11 * value) // 20 for value in colour)
-    return red, green, blue
+    return tint("edge", colour)
 
 
 def on_white(colour: Colour) -> Colour:
@@ -80,3 +93,14 @@ def _luminance(colour: Colour) -> float:
     parts = [value / 255.0 for value in colour]
     red, green, blue = (x / 12.92 if x <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4 for x in parts)
     return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+def grey(colour: Colour) -> Colour:
+    """Return the grey that is as light as a colour."""
+    value = sum(colour) // 3
+    return value, value, value
+
+
+def hexadecimal(colour: Colour) -> str:
+    """Return a colour as '#1c2430'."""
+    return "#" + "".join(f"{value:02x}" for value in colour)

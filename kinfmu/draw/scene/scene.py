@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.scene.instant import Instant, gravity_direction
+from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.instant import Instant, directions, gravity_direction
 from kinfmu.draw.scene.placing import poses_of, remedy, world
 from kinfmu.draw.scene.shape import Shape, frames, pins_of
 from kinfmu.draw.scene.shapes import shapes
+from kinfmu.draw.scene.strokes import UNITS, Sizes, fineness
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.mechanism import Mechanism
@@ -20,7 +22,6 @@ from kinfmu.mechanism.quantities.placement import body_of
 from kinfmu.run import Run
 
 MOST_SAMPLES = 2000  # of a run, from which bounds and shapes are computed
-_LONG_ENOUGH, _FINEST = 0.15, 0.1  # of the size: shortest link that needs no thinner lines; factor of the thinnest
 _WITHOUT_POSE = ("link", "rib", "bar", "support")  # shapes that do not depend on a pose
 
 
@@ -46,6 +47,10 @@ class Scene:
     high: FloatArray
     gravity: FloatArray | None
 
+    def colour(self, point: str) -> palette.Colour:
+        """Return the colour of a point of interest."""
+        return palette.body(len(self.bodies) + list(self.paths).index(point))
+
     @property
     def supports(self) -> dict[str, FloatArray]:
         """Pins of the ground, name -> (2,)."""
@@ -56,13 +61,10 @@ class Scene:
         """Larger side of the bounding box; 1 if everything is one point."""
         return float(max(self.high - self.low)) or 1.0
 
-    @property
-    def stroke(self) -> float:
-        """Reference length of line widths: the size, or less if links are short compared with it."""
-        links = [shape.line for shape in self.shapes if shape.kind in ("link", "rib", "bar")]
-        lengths = [length for line in links for length in np.hypot(*np.diff(line, axis=0).T).tolist()]
-        shortest = min((length for length in lengths if length > 1e-3 * self.size), default=self.size)
-        return self.size * math.sqrt(min(max(shortest / (_LONG_ENOUGH * self.size), _FINEST**2), 1.0))
+    @cached_property
+    def sizes(self) -> Sizes:
+        """Sizes of strokes in a picture of the whole scene."""
+        return Sizes(self.size / UNITS, fineness(self.shapes, self.size))
 
 
 def drawable(run: Run) -> tuple[Scene | None, str]:
@@ -86,7 +88,7 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
     good = np.flatnonzero(run.good)
     rows = np.concatenate([good[:1], good[_some(len(good))]])
     placed = {name: pose[rows] if len(rows) else np.zeros((1, 3)) for name, pose in known.items()}
-    shown = Instant(mechanism, placed, {driver.name: 1.0 for driver in mechanism.drivers})
+    shown = Instant(mechanism, placed, directions(run, mechanism))
     found = tuple(shape for shape in shapes(shown) if len(rows) or shape.kind in _WITHOUT_POSE)
     pins: dict[str, list[tuple[str, FloatArray]]] = {}
     for joint in mechanism.joints:
@@ -95,7 +97,7 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
     for shape in found:
         if shape.kind in ("barrel", "shaft"):
             pins[shape.frame] = [(shape.name, np.zeros(2))]
-        elif shape.strips and len(shape.points) > 1:
+        elif shape.is_effort and len(shape.points) > 1:
             for frame, point in zip((shape.frame, shape.other), shape.points, strict=True):
                 pins.setdefault(frame, []).append((shape.name, point))
     points: dict[str, list[tuple[str, FloatArray]]] = {}
@@ -121,7 +123,7 @@ def _bounds(found: Sequence[Shape], poses: Mapping[str, FloatArray]) -> tuple[Fl
     for shape in found:
         if shape.kind == "pitch":  # only figures draw it
             continue
-        if shape.strips:  # a load; its points on bodies are those of links
+        if shape.is_effort:  # its points on bodies are those of links
             ends = zip((shape.frame, shape.other), shape.points, strict=False)
             corners += [point[None] for frame, point in ends if frame == GROUND_NAME]
             continue

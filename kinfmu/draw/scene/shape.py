@@ -1,6 +1,6 @@
-"""What is drawn of a mechanism, once for figures, recordings and robot descriptions: shapes in moving frames.
+"""What is drawn of a mechanism, once for all pictures and robot descriptions: shapes in moving frames.
 
-A renderer places the frames and paints each kind in its own way. Frames are bodies, 'ground', or those
+A picture places the frames, and paints the strokes of each kind (see `strokes`). Frames are bodies, 'ground', or those
 of `frames`: bars, cylinders, and the blocks of pins.
 
     link             a body's points: a closed plate or an open bar; rib: from a plate's corner to a point inside
@@ -16,6 +16,7 @@ of `frames`: bars, cylinders, and the blocks of pins.
     bar              a joint Distance; barrel, shaft: of a driven distance, at its first and at its second point
     spring, damper, gas_spring, force_between, force, force_along, torque, torsion_spring, torsion_damper
                      the symbol of a load of this type: one point, or two; direction: of a force, of a body's x axis
+    driver           the arrow of a driver: one point; direction: from its pin along the body, or of its motion
 """
 
 from __future__ import annotations
@@ -34,25 +35,25 @@ from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.mechanism.drivers import DistanceDriver, Driver
 from kinfmu.mechanism.joints import CamRoller, Coordinate, Distance, Fixed, PointOnLine, Revolute
 from kinfmu.mechanism.joints.joint import Joint
+from kinfmu.mechanism.loads import LOADS
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.mechanism.quantities.placement import body_of
 
 FLAT = 1e-6  # of the points' extent; points nearer to a line than that count as a line
 _ROUND = np.linspace(0.0, 2.0 * np.pi, 73)  # [rad], corners of a circle
+_LOADS = frozenset(load.type for load in LOADS)
 
 
 class Strip(NamedTuple):
-    """A line of the symbol of a load: points (k, 4), each (part, length, along, across).
+    """A line of a symbol: points (k, 4), each (part, length, along, across), and its row in the table of strokes.
 
-    A point lies at `part` of the distance of the symbol's two ends, plus a length of the mechanism, plus details along
-    and across, whose size follows from the picture (see `details`). A symbol at one point has parts and lengths of 0,
-    and its direction is its own. is_area: True for a closed line that covers what is below it; is_solid: True for one
-    filled with its own colour.
+    A point lies at `part` of the distance of the shape's two ends, plus a length of the mechanism, plus details along
+    and across, whose size follows from the picture. A symbol at one point has parts and lengths of 0. Rows with an area
+    are closed lines.
     """
 
     points: FloatArray
-    is_area: bool = False
-    is_solid: bool = False
+    stroke: str = "symbol"
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +62,8 @@ class Shape:
 
     kind: see above; name: of the joint, body or driver it shows; frame: that moves it; points: (k, 2) in the frame;
     colour: of the body, or grey; is_closed: True for a line that returns to its first point; radius: of a circle about
-    the only point; direction: unit vector (2,), as stated with the kinds. Of loads: strips: the lines of the symbol;
-    other: the frame of the second of two points, else that of the direction.
+    the only point; direction: unit vector (2,), as stated with the kinds; strips: the lines of a symbol. Of loads and
+    drivers: other: the frame of the second of two points, else that of the direction.
     """
 
     kind: str
@@ -75,6 +76,21 @@ class Shape:
     direction: FloatArray | None = None
     strips: tuple[Strip, ...] = ()
     other: str = ""
+
+    @property
+    def is_load(self) -> bool:
+        """True for the symbol of a load."""
+        return self.kind in _LOADS
+
+    @property
+    def is_effort(self) -> bool:
+        """True for the symbol of a load or driver."""
+        return self.is_load or self.kind == "driver"
+
+    @property
+    def is_bar(self) -> bool:
+        """True for a line of a body besides its link."""
+        return self.kind in ("rod", "face")
 
     @property
     def line(self) -> FloatArray:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.scene import palette
+from kinfmu.draw.scene import palette, strokes
 from kinfmu.draw.scene.instant import Instant
 from kinfmu.draw.scene.joints import Slide, cam_shapes, place, racks_of, rods, slides, wheels
 from kinfmu.draw.scene.loads import BETWEEN, lengths_between, load_shapes
+from kinfmu.draw.scene.placing import world
 from kinfmu.draw.scene.shape import Shape, bar_frame, cylinder_frames, die_frame, points_of, ribs, rim
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.drivers import DistanceDriver, Driver
@@ -24,15 +26,18 @@ _CROWDED = 0.8  # cosine of the angle to a link; above it a support would hide t
 _SIDES = ((0.0, -1.0), (-1.0, 0.0), (1.0, 0.0), (0.0, 1.0))  # of a support; below is preferred
 _BARREL, _OF_SHORTEST = 0.62, 0.9  # length of the barrel: of the usual length, and at most of the shortest one
 _SMALLEST = 0.3  # of the usual length, smallest barrel if the shortest length is very small
-_GUIDED = 0.1  # of the barrel, in which the rod stays at the longest pose
+_GUIDED, _FREE = 0.1, 0.12  # of the barrel: with the rod in the longest pose; without the piston
+_POSES = 24  # of a run, that decide the size of details
 _STEEP = 0.9  # sine of a rail's angle, above which the ground is on the side away from the mechanism
 
 
 def shapes(shown: Instant) -> list[Shape]:
     """Return everything to draw of the bodies whose poses are known, but for pins, arrows and paths."""
     sliding = slides(shown)
-    in_world = [*_cams(shown), *wheels(shown), *_slides(shown, sliding), *_supports(shown)]
-    acting = load_shapes(shown, _box(shown))
+    box = _box(shown)
+    size = _detail(shown)
+    in_world = [*_cams(shown), *wheels(shown, size), *_slides(shown, sliding, box, size), *_supports(shown)]
+    acting = load_shapes(shown, box)
     return [*_links(shown, sliding), *_between(shown), *(_in_frame(shown, shape) for shape in in_world), *acting]
 
 
@@ -67,21 +72,23 @@ def _between(shown: Instant) -> Iterator[Shape]:
             yield Shape("bar", joint.name, bar_frame(joint.name), ends, palette.BAR)
     for driver in shown.drivers:
         if isinstance(driver, DistanceDriver):
-            tube, rod = _cylinder(shown, driver)
-            barrel, end = cylinder_frames(driver.name)
-            yield Shape("shaft", driver.name, end, np.array([[-rod, 0.0], [0.0, 0.0]]), palette.BAR)
-            yield Shape("barrel", driver.name, barrel, np.array([[0.0, 0.0], [tube, 0.0]]))
+            yield from _cylinder(shown, driver)
 
 
-def _cylinder(shown: Instant, driver: DistanceDriver) -> tuple[float, float]:
-    """Return the lengths of the barrel and of the rod of a driven distance over the run.
+def _cylinder(shown: Instant, driver: DistanceDriver) -> Iterator[Shape]:
+    """Yield the rod and the barrel of a driven distance, with lengths that follow from those over the run.
 
-    The rod's length follows from the longest pose, so it may project behind the barrel in shorter ones.
+    If the piston cannot stay in the barrel over the run, it is not drawn, and the rod may project behind the barrel.
     """
     lengths = lengths_between(shown, driver.between)
     usual, shortest, longest = (float(of(lengths)) for of in (np.nanmedian, np.nanmin, np.nanmax))
-    barrel = max(min(_OF_SHORTEST * shortest, _BARREL * usual), _SMALLEST * usual)
-    return barrel, max(longest - (1.0 - _GUIDED) * barrel, 0.0)
+    stroke = (longest - shortest) / (1.0 - _GUIDED - _FREE)
+    tube = max(min(_OF_SHORTEST * shortest, max(_BARREL * usual, stroke)), _SMALLEST * usual)
+    rod = max(longest - (1.0 - _GUIDED) * tube, 0.0)
+    parts = strokes.shaft(has_piston=tube >= (1.0 - 1e-9) * stroke)
+    barrel, end = cylinder_frames(driver.name)
+    yield Shape("shaft", driver.name, end, np.array([[-rod, 0.0], [0.0, 0.0]]), palette.BAR, strips=parts)
+    yield Shape("barrel", driver.name, barrel, np.array([[0.0, 0.0], [tube, 0.0]]), strips=strokes.barrel())
 
 
 def _cams(shown: Instant) -> Iterator[Shape]:
@@ -99,22 +106,25 @@ def _cams(shown: Instant) -> Iterator[Shape]:
             yield Shape("contact", cam.joint, cam.follower, cam.contact[None])
 
 
-def _slides(shown: Instant, sliding: Sequence[Slide]) -> Iterator[Shape]:
+def _slides(shown: Instant, sliding: Sequence[Slide], around: FloatArray, size: float) -> Iterator[Shape]:
     """Yield the moving parts of slides, and rails under blocks or under a fixed block through which a rod slides."""
-    racks, middle = racks_of(shown), _box(shown).mean(axis=0)
+    racks, middle = racks_of(shown), around.mean(axis=0)
     for slide in sliding:
         at, along = place(shown, slide)
         is_rack, is_on_ground = slide.slider in racks, slide.holder == GROUND_NAME
         if is_on_ground or (slide.slider == GROUND_NAME and not slide.turns):
             ends = slide.ends if is_on_ground else np.array([at, at])
             side = _outwards(along, at, middle)
-            yield Shape("bed" if is_rack and is_on_ground else "rail", slide.name, GROUND_NAME, ends, direction=side)
+            kind = "bed" if is_rack and is_on_ground else "rail"
+            lines = strokes.rail(kind, float(np.hypot(*(ends[1] - ends[0]))), size)
+            yield Shape(kind, slide.name, GROUND_NAME, ends, direction=side, strips=lines)
         if is_rack:
             continue  # the rack itself slides
+        look: dict[str, Any] = {"direction": along, "strips": strokes.block()}
         if not slide.turns:
-            yield Shape("block", slide.name, slide.slider, at[None], shown.colour(slide.slider), direction=along)
+            yield Shape("block", slide.name, slide.slider, at[None], shown.colour(slide.slider), **look)
         elif is_on_ground:
-            yield Shape("die", slide.name, die_frame(slide.name), at[None], palette.BAR, direction=along)
+            yield Shape("die", slide.name, die_frame(slide.name), at[None], palette.BAR, **look)
         else:
             ends = shown.placed(slide.holder, slide.ends)
             yield Shape("slot", slide.name, slide.holder, ends, shown.colour(slide.holder))
@@ -140,8 +150,8 @@ def _supports(shown: Instant) -> Iterator[Shape]:
     for point, found in joints.items():
         names.setdefault(shown.body_points[point], []).extend(found or [point_of(point)])
     for at, found in names.items():
-        side = _free_side(leaving.get(at, []))
-        yield Shape("support", ", ".join(dict.fromkeys(found)), GROUND_NAME, np.array([at]), direction=side)
+        side, text = _free_side(leaving.get(at, [])), ", ".join(dict.fromkeys(found))
+        yield Shape("support", text, GROUND_NAME, np.array([at]), direction=side, strips=strokes.support())
 
 
 def _held(member: Joint | Driver | Load) -> list[tuple[str, str]]:
@@ -167,6 +177,17 @@ def _points(shown: Instant, body: str) -> FloatArray:
     """Return the points (k, 2) of a body in the world as drawn; none if its pose is unknown."""
     names = [name for name in shown.body_points if body_of(name) == body and body in shown.poses]
     return np.array([shown.point(name) for name in names]).reshape(-1, 2)
+
+
+def _detail(shown: Instant) -> float:
+    """Return the usual size of details in pictures of the whole run [length]."""
+    count = max(map(len, shown.poses.values()), default=1)
+    some = slice(None, None, max(count // _POSES, 1))
+    points = [(name, at) for name, at in shown.body_points.items() if body_of(name) in shown.poses]
+    tracks = np.array([world(shown.poses[body_of(name)][some], at) for name, at in points]).reshape(-1, 2)
+    if not len(tracks):
+        return 1.0
+    return float((np.nanmax(tracks, axis=0) - np.nanmin(tracks, axis=0)).max()) / strokes.UNITS or 1.0
 
 
 def _box(shown: Instant) -> FloatArray:

@@ -1,4 +1,4 @@
-"""The ground of a recording: supports, rails, fixed blocks, pins; and the choice of names that are always shown."""
+"""Names of a recording's linkage that are always shown: of supports, and of bodies that others leave free; gravity."""
 
 from __future__ import annotations
 
@@ -7,27 +7,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.scene import details, palette
+from kinfmu.draw.scene import palette
 from kinfmu.draw.scene.placing import world
 from kinfmu.draw.scene.scene import Scene
-from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.draw.scene.strokes import SUPPORT
 
 if TYPE_CHECKING:
     import rerun as rr
 
 MARGIN = 0.12  # around the linkage, as a part of its size
-_SUPPORT = 0.05  # height of a support, as a part of the size
 _WIDTH, _HEIGHT = 600.0, 380.0  # [points] of the view on a usual screen, within its frame
 _LETTER, _EDGE, _LINE = 6.5, 8.0, 17.0  # [points]; of a name: width of a letter, margin, height
 _SAMPLES = 40  # poses that are compared
 _OFTEN = 0.35  # of them; of two names that cover each other in more poses only one is shown
 _GRAVITY = 0.07  # of the size: length of the arrow of gravity
 MOST_NAMES = 12  # more names would hide the linkage; they show when pointed at
-
-
-def detail(scene: Scene) -> float:
-    """Return the size of details of a recording [length]."""
-    return _SUPPORT * scene.stroke / details.SUPPORT
 
 
 def dots(scene: Scene) -> float:
@@ -38,7 +32,7 @@ def dots(scene: Scene) -> float:
 
 def places_below(scene: Scene) -> FloatArray:
     """Return the places of the names of supports, (k, 2): below each, or lower where another name would cover it."""
-    depth = 1.7 * _SUPPORT * scene.stroke
+    depth = 1.7 * SUPPORT * scene.sizes.detail
     line, placed = _LINE / dots(scene), dict[str, FloatArray]()
     for name, at in scene.supports.items():
         here = at - np.array([0.0, depth])
@@ -75,41 +69,10 @@ def _covers(scene: Scene, a: FloatArray, b: FloatArray, first: str, second: str)
     return np.asarray((apart[:, 0] < width) & (apart[:, 1] < _LINE), float)
 
 
-def log_ground(rec: rr.RecordingStream, root: str, scene: Scene, pin: float) -> None:
-    """Log everything that is fixed under the entity `root`.
-
-    pin: radius of the pins [length].
-    """
+def log_ground(rec: rr.RecordingStream, root: str, scene: Scene) -> None:
+    """Log the names of supports, and the direction of gravity, under the entity `root`."""
     import rerun as rr
 
-    size = detail(scene)
-    shapes = [
-        shape for shape in scene.shapes if shape.frame == GROUND_NAME and shape.kind != "contact" and not shape.strips
-    ]
-    strips: list[FloatArray] = []
-    for shape in shapes:
-        if shape.kind == "support":
-            triangle, line = details.support(shape, size)
-            strips += [np.vstack([triangle, triangle[:1]]), line, *details.hatching(line, shape.towards, size)]
-        elif shape.kind in ("rail", "bed"):
-            line = details.rail(shape, size)
-            strips += [line, *details.hatching(line, shape.towards, size)]
-        elif shape.kind != "block":
-            strips.append(shape.line)
-    if strips:
-        lines = rr.LineStrips2D(strips, colors=[palette.GROUND], radii=rr.Radius.ui_points(0.9), draw_order=0.0)
-        rec.log(f"{root}/ground", lines, static=True)
-    blocks = [shape for shape in shapes if shape.kind == "block"]
-    if blocks:
-        bushes = rr.LineStrips2D(
-            [details.core(shape, size) for shape in blocks],
-            colors=[palette.GROUND],
-            radii=[details.BLOCK_WIDTH * size],
-            labels=[shape.name for shape in blocks],
-            show_labels=False,
-            draw_order=1.0,
-        )
-        rec.log(f"{root}/ground/blocks", bushes, static=True)
     names = list(scene.supports)
     if names:
         labels = rr.Points2D(
@@ -122,10 +85,6 @@ def log_ground(rec: rr.RecordingStream, root: str, scene: Scene, pin: float) -> 
         rec.log(f"{root}/ground/names", labels, static=True)
     if scene.gravity is not None:
         _log_gravity(rec, f"{root}/ground/gravity", scene, scene.gravity)
-    if GROUND_NAME in scene.pins:
-        names, at = map(list, zip(*scene.pins[GROUND_NAME], strict=True))
-        pins = rr.Points2D(at, labels=names, colors=[palette.PIN], radii=[pin], show_labels=False, draw_order=30.0)
-        rec.log(f"{root}/ground/pins", pins, static=True)
 
 
 def _log_gravity(rec: rr.RecordingStream, entity: str, scene: Scene, along: FloatArray) -> None:

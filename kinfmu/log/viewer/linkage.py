@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.scene import details, palette
+from kinfmu.draw.scene import palette
 from kinfmu.draw.scene.forces import Arrows
 from kinfmu.draw.scene.scene import Scene
-from kinfmu.draw.scene.shape import Shape, guides_of_cams
-from kinfmu.log.viewer.ground import MARGIN, MOST_NAMES, detail, log_ground, shown_names
+from kinfmu.draw.scene.strokes import STROKES, Painted, strokes_of
+from kinfmu.log.viewer.ground import MARGIN, MOST_NAMES, log_ground, shown_names
 from kinfmu.log.viewer.timeline import Timeline, send
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import Run
@@ -26,37 +25,12 @@ if TYPE_CHECKING:
 TRAIL = 0.5  # length of the trail behind a point, as a part of the linkage's size
 LONGEST_TRAIL = 0.2  # of the run's time
 _TRAIL_PIECES = 1500  # of a path over the whole run
-_PIN, _POINT = 0.012, 0.015  # radii, as parts of the size
+_MOST_LINES = 200  # that fill an area
+_OWN = ("link", "bar", "barrel", "shaft")  # shapes whose entity is that of their frame
+_NAMED = ("link", "bar", "block")
 _TIP = 0.03  # around the tips of arrows, as a part of the size
 _SUPPORT_NAMES = 0.04  # additional margin below, for the names of supports
 APPLICATION = "kinfmu"
-
-
-class _Paint(NamedTuple):
-    """How lines of one kind are drawn: radius, as a part of the size; order: higher ones cover lower ones."""
-
-    radius: float
-    order: float
-
-
-_PAINT = {
-    "cam": _Paint(0.006, 19.5),  # under the link through its pins
-    "wheel": _Paint(0.006, 19.5),
-    "spoke": _Paint(0.004, 19.5),
-    "rack": _Paint(0.004, 19.5),
-    "rod": _Paint(0.012, 19.5),
-    "face": _Paint(0.012, 19.5),
-    "bar": _Paint(0.006, 10.0),
-    "link": _Paint(0.012, 20.0),
-    "rib": _Paint(0.012, 20.0),
-    "belt": _Paint(0.004, 20.0),
-    "slot": _Paint(0.006, 20.5),
-    "block": _Paint(0.022, 20.6),
-    "die": _Paint(0.022, 20.6),
-    "roller": _Paint(0.004, 23.0),
-    "shaft": _Paint(0.006, 26.0),
-    "barrel": _Paint(0.0176, 27.0),
-}
 
 
 def view_box(scene: Scene, forces: Arrows | None = None) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -87,8 +61,8 @@ def trail_time(run: Run, scene: Scene, point: str) -> float:
 class Linkage:
     """The linkage of a placed run, logged under the entity `root`: all in `colour`, or each body in its own.
 
-    width: factor of the lines' widths; layer: higher layers cover lower ones. Where the run has no numbers, the last
-    pose that closed stays, in grey, with a notice; before the first pose nothing is drawn.
+    width: factor of the lines' widths; layer: higher layers cover lower ones, by lines without areas. Where the run has
+    no numbers, the last pose that closed stays, in grey, with a notice; before the first pose nothing is drawn.
     """
 
     rec: rr.RecordingStream
@@ -102,8 +76,9 @@ class Linkage:
 
     def __post_init__(self) -> None:
         """Set what follows from the scene: sizes, and the names that are always shown."""
-        self.size, self.detail = self.width * self.scene.stroke, detail(self.scene)
-        self.frames = Frames(self.rec, self.timeline, self.run, self.size, self.layer)
+        self.sizes = self.scene.sizes._replace(point=self.width * self.scene.sizes.point)
+        self.frames = Frames(self.rec, self.timeline, self.run, self.layer)
+        self.ground = Frames(self.rec, self.timeline, self.run, self.layer, is_fixed=True)
         bare = [shape.frame for shape in self.scene.shapes if shape.kind == "link" and len(shape.points) < 2]
         self._unlinked = {body: body for body in bare}  # bodies whose name is that of their first other shape
         is_named = self.colour is None and len(self.scene.bodies) <= MOST_NAMES
@@ -115,16 +90,12 @@ class Linkage:
 
         # Rerun's plane has y down; flipping the plane once keeps the logged numbers as they are.
         self.rec.log(self.root, rr.Transform3D(mat3x3=[[1, 0, 0], [0, -1, 0], [0, 0, 1]]), static=True)
-        log_ground(self.rec, self.root, self.scene, _PIN * self.size)
-        entities = {frame: self._entity(frame) for frame in self.scene.frames if frame != GROUND_NAME}
-        seen: Counter[str] = Counter()  # entities of bodies with several shapes of one kind and joint
+        log_ground(self.rec, self.root, self.scene)
+        entities = {frame: self._entity(frame) for frame in self.scene.frames}
         for frame, path in entities.items():
-            self.frames.move(path, self.scene.frames[frame])
-        for shape in self.scene.shapes:
-            if shape.frame in entities and shape.kind in _PAINT:
-                entity = f"{entities[shape.frame]}/{shape.kind}/{shape.name}"
-                self._shape(shape, f"{entity}/{seen[entity]}" if seen[entity] else entity)
-                seen[entity] += 1
+            if frame != GROUND_NAME:
+                self.frames.move(path, self.scene.frames[frame])
+        self._shapes()
         for frame, path in entities.items():
             self._points(path, frame)
         for name, points in self.scene.paths.items():
@@ -138,54 +109,64 @@ class Linkage:
             self._path(f"{self.root}/paths/{name}", points, self._colour_of(name))
 
     def _colour_of(self, point: str) -> palette.Colour:
-        """Return the colour of a point of interest."""
-        return self.colour or palette.body(len(self.scene.bodies) + list(self.scene.paths).index(point))
+        """Return the colour of a point of interest, of which those of its dot and path are made."""
+        return self.colour or self.scene.colour(point)
 
     def _entity(self, frame: str) -> str:
         """Return the entity of a frame, such as 'bodies/crank' or 'cylinders/boom/rod'."""
         kind, dot, name = frame.partition(".")
+        if frame == GROUND_NAME:
+            return f"{self.root}/ground"
         if not dot:
             return f"{self.root}/bodies/{frame}"
         return f"{self.root}/{kind}s/{name.replace('.', '/')}"
 
-    def _shape(self, shape: Shape, entity: str) -> None:
-        """Log one shape; that of a body's link, a bar or a cylinder is the frame's own entity."""
-        paint, line, own = _PAINT[shape.kind], shape.line, self.colour or shape.colour
-        if shape.kind == "link" and len(line) < 2:
-            return
-        if shape.kind in ("link", "bar", "barrel", "shaft"):
-            entity = self._entity(shape.frame)
-            label = shape.name if shape.kind in ("link", "bar") else None
-        else:
-            label = self._unlinked.pop(shape.frame, None)
-        if shape.kind in ("block", "die"):
-            line = details.core(shape, self.detail)
-        elif shape.kind == "rack":
-            pinion = next(wheel for wheel in self.scene.shapes if (wheel.kind, wheel.name) == ("wheel", shape.name))
-            line = details.teeth(shape, details.teeth_size(pinion.radius))
-            line = np.vstack([line, line[:1]])
-        elif shape.kind == "slot":
-            own = palette.BACKDROP
-        elif shape.kind == "shaft":
-            own = self.colour or palette.lighter(shape.colour)
-        for face in self.scene.shapes:
-            if shape.kind in ("link", "rib", "rod", "face") and (face.kind, face.frame) == ("face", shape.frame):
-                line = details.on_face(line, face, paint.radius * self.size)
-        order = paint.order + self.scene.bodies.get(shape.frame, 0) / 100.0
-        if shape.kind == "block" and shape.name in guides_of_cams(self.scene.shapes):
-            order = _PAINT["cam"].order - 1.0
-        self.frames.line(entity, line, paint.radius, own, order, label, label in self.names)
+    def _shapes(self) -> None:
+        """Log the shapes but for loads and drivers; the link and the bars of a body are one entity."""
+        strokes: dict[str, list[Painted]] = {}
+        shapes = [shape for shape in self.scene.shapes if shape.frame in self.scene.frames and shape.kind != "pitch"]
+        for one in strokes_of([shape for shape in shapes if not shape.is_effort], self.sizes):
+            strokes.setdefault(self._place(one), []).append(one)
+        for entity, painted in strokes.items():
+            first = painted[0]
+            label = first.shape.name if first.shape.kind in _NAMED else self._unlinked.pop(first.shape.frame, None)
+            lines = [line for one in painted for line in self._lines(one)]
+            order = first.stroke.order + self.scene.bodies.get(first.shape.frame, 0) / 100.0
+            frames = self.ground if first.shape.frame == GROUND_NAME else self.frames
+            frames.lines(entity, lines, order, label, shown=label in self.names)
+
+    def _place(self, one: Painted) -> str:
+        """Return the entity of a stroke; that of a link, a bar or a cylinder is the frame's own."""
+        shape, own = one.shape, self._entity(one.shape.frame)
+        if shape.frame == GROUND_NAME:
+            return f"{own}/blocks" if shape.kind == "block" else own
+        return own if shape.is_bar or shape.kind in _OWN else f"{own}/{shape.kind}/{shape.name}"
+
+    def _lines(self, one: Painted) -> Iterator[RecordedLine]:
+        """Yield the lines of a stroke: those that fill its area, then its own."""
+        tinted = one._replace(shape=replace(one.shape, colour=self.colour)) if self.colour else one
+        line, area = tinted.colours(is_dark=True)
+        radius = 0.5 * self.sizes.width(one.stroke)
+        if area and not self.layer:
+            yield from filled(one.points, area, radius)
+        yield RecordedLine(np.vstack([one.points, one.points[: int(one.is_closed)]]), radius, line)
 
     def _points(self, path: str, frame: str) -> None:
         """Log pins with the names of their joints, which show when pointed at, and points of interest."""
-        pins = self.scene.pins.get(frame, ())
+        pins, frames = self.scene.pins.get(frame, ()), self.ground if frame == GROUND_NAME else self.frames
+        (pin,), (point,) = STROKES["pin"], STROKES["point"]
         if pins:
             names, at = zip(*pins, strict=True)
-            self.frames.points(f"{path}/pins", np.array(at), _PIN, palette.PIN, 30.0, list(names), shown=False)
-        order = list(self.scene.paths)
+            radius, half = self.sizes.radius(pin), 0.5 * self.sizes.width(pin)
+            for name, size, role in (("pins", radius + half, pin.line), ("pins/inside", radius - half, pin.fill)):
+                colour = palette.tint(role, palette.INK, is_dark=True)
+                texts = list(names) if name == "pins" else []
+                order = pin.order + (name != "pins") / 2.0
+                frames.points(f"{path}/{name}", np.array(at), size, colour, order, texts, shown=False)
         for name, place in self.scene.points.get(frame, ()):
-            tint = self.colour or palette.body(len(self.scene.bodies) + order.index(name))
-            self.frames.points(f"{path}/points/{name}", place[None], _POINT, tint, 40.0, [name], self.colour is None)
+            colour = palette.tint(point.fill, self._colour_of(name), is_dark=True)
+            radius, shown = self.sizes.radius(point), self.colour is None
+            frames.points(f"{path}/points/{name}", place[None], radius, colour, point.order, [name], shown)
 
     def _path(self, path: str, points: FloatArray, colour: palette.Colour) -> None:
         """Log the path of a point over the run, one line for each part between gaps."""
@@ -193,7 +174,10 @@ class Linkage:
 
         pieces = [piece.astype(np.float32) for piece in pieces_between_gaps(points)]
         if pieces:
-            line = rr.LineStrips2D(pieces, colors=[colour], radii=self._thin(1.0), draw_order=self.layer + 5.0)
+            (path_,) = STROKES["path"]
+            tinted = palette.tint(path_.line, colour, is_dark=True)
+            radii = self._thin(0.5 * path_.width)
+            line = rr.LineStrips2D(pieces, colors=[tinted], radii=radii, draw_order=self.layer + path_.order)
             self.rec.log(path, line, static=True)
 
     def _trail(self, path: str, points: FloatArray, colour: palette.Colour) -> None:
@@ -206,7 +190,7 @@ class Linkage:
         known = np.array([bool(np.isfinite(piece).all()) for piece in pieces], bool)
         if not known.any():
             return
-        look = rr.LineStrips2D.from_fields(radii=self._thin(2.4), colors=[colour], draw_order=self.layer + 6.0)
+        look = rr.LineStrips2D.from_fields(radii=self._thin(2.4), colors=[colour], draw_order=self.layer + 26.0)
         self.rec.log(path, look, static=True)
         strips = np.stack([piece for piece, is_known in zip(pieces, known, strict=True) if is_known])
         self._strips(path, self.run.t[ends[known]], strips)
@@ -260,16 +244,47 @@ def pieces_between_gaps(points: FloatArray) -> list[FloatArray]:
     return [piece for piece in pieces if len(piece) > 1]
 
 
+class RecordedLine(NamedTuple):
+    """A line of a recording: points (k, 2) in its frame; radius [length], or a negative one [points of the screen]."""
+
+    points: FloatArray
+    radius: float
+    colour: palette.Colour
+
+
+def filled(points: FloatArray, colour: palette.Colour, radius: float) -> list[RecordedLine]:
+    """Return lines along the longest side of an area (k, 2), which fill it: the viewer fills no areas.
+
+    radius: of the line around the area, up to which the lines may reach beyond it.
+    """
+    sides = np.roll(points, -1, axis=0) - points
+    along = sides[int(np.argmax(np.hypot(*sides.T)))]
+    turn = np.array([along, [-along[1], along[0]]]) / max(float(np.hypot(*along)), 1e-300)
+    a = points @ turn.T  # the side is along x
+    b = np.roll(a, -1, axis=0)
+    low, high = float(a[:, 1].min()), float(a[:, 1].max())
+    count = int(np.clip(np.ceil((high - low) / (1.8 * radius)), 1, _MOST_LINES))
+    found = []
+    for y in low + (high - low) * (np.arange(count) + 0.5) / count:
+        crossed = (a[:, 1] > y) != (b[:, 1] > y)
+        (x_a, y_a), (x_b, y_b) = a[crossed].T, b[crossed].T
+        xs = np.sort(x_a + (y - y_a) / (y_b - y_a) * (x_b - x_a)).reshape(-1, 2)
+        found += [RecordedLine(np.column_stack([ends, [y, y]]) @ turn, radius, colour) for ends in xs]
+    return found
+
+
 class Frames:
     """The frames of one run, placed on a timeline.
 
-    size: of which radii are parts [length]; layer: added to the order of drawing.
+    layer: added to the order of drawing; is_fixed: what is in them is there at all samples, as the ground is.
     """
 
-    def __init__(self, rec: rr.RecordingStream, timeline: Timeline, run: Run, size: float, layer: float) -> None:
-        self._rec, self._timeline, self._run, self._size, self._layer = rec, timeline, run, size, layer
+    def __init__(
+        self, rec: rr.RecordingStream, timeline: Timeline, run: Run, layer: float, *, is_fixed: bool = False
+    ) -> None:
+        self._rec, self._timeline, self._run, self._layer = rec, timeline, run, layer
         self._good = np.flatnonzero(run.good)
-        self._always = 0 < len(self._good) == len(run.good)  # every sample holds numbers
+        self._always = is_fixed or 0 < len(self._good) == len(run.good)  # every sample holds numbers
 
     def move(self, path: str, pose: FloatArray, stretch: FloatArray | None = None) -> None:
         """Send poses (n, 3) of the frame of an entity, x, y [length], phi [rad], at the samples that hold numbers.
@@ -296,48 +311,32 @@ class Frames:
             ),
         )
 
-    def line(
-        self,
-        path: str,
-        points: FloatArray,
-        radius: float,
-        colour: palette.Colour,
-        order: float,
-        label: str | None = None,
-        shown: bool = False,
-    ) -> None:
-        """Log a line (k, 2) that is fixed in its frame, from the first pose on; grey where the run has no numbers.
-
-        radius: relative to the size; label: its name, if it has one; shown: True if the name is always shown.
-        """
-        self.lines(path, [points], radius * self._size, colour, order, label, shown)
-
     def lines(
-        self,
-        path: str,
-        points: Sequence[FloatArray],
-        radius: Any,
-        colour: palette.Colour,
-        order: float,
-        label: str | None = None,
-        shown: bool = False,
+        self, path: str, lines: Sequence[RecordedLine], order: float, label: str | None, *, shown: bool = False
     ) -> None:
-        """Log lines, each (k, 2), of one colour and name, as `line` does; radius: of the plane or of the screen."""
+        """Log lines that are fixed in their frame, from the first pose on; grey where the run has no numbers.
+
+        Later lines cover earlier ones. label: their name, if they have one; shown: True if it is always shown.
+        """
         import rerun as rr
 
-        look = self._look(radius, order, [label] if label else [], shown)
-        strips = [line.astype(np.float32) for line in points]
+        look = self._look([line.radius for line in lines], order, [label] if label else [], shown)
+        strips, colours = [line.points.astype(np.float32) for line in lines], [line.colour for line in lines]
         if self._always:
-            self._rec.log(path, rr.LineStrips2D(strips, colors=[colour], **look), static=True)
+            self._rec.log(path, rr.LineStrips2D(strips, colors=colours, **look), static=True)
         elif len(self._good):
             self._rec.log(path, rr.LineStrips2D.from_fields(**look), static=True)
             self._with_first_pose(path, rr.LineStrips2D.columns(strips=strips).partition([len(strips)]))
             switches = self.switches()
-            colours = np.array(
-                [colour if good else palette.OUT_OF_REACH for good in self._run.good[switches]], np.uint8
-            )
-            at = self._run.t[switches]
-            send(self._rec, path, self._timeline, at, lambda rows: rr.LineStrips2D.columns(colors=colours[rows]))
+            both = [[palette.grey(colour) for colour in colours], colours]
+            table = np.array(both, np.uint8)[self._run.good[switches].astype(int)]  # (switches, lines, 3)
+
+            def columns(rows: slice) -> Any:
+                chosen = table[rows]
+                partition = [len(lines)] * len(chosen)
+                return rr.LineStrips2D.columns(colors=chosen.reshape(-1, 3)).partition(partition)
+
+            send(self._rec, path, self._timeline, self._run.t[switches], columns)
 
     def points(
         self,
@@ -352,7 +351,7 @@ class Frames:
         """Log points (k, 2) with their names, fixed in their frame, from the first pose on."""
         import rerun as rr
 
-        look = {"colors": [colour], **self._look(radius * self._size, order, names, shown)}
+        look = {"colors": [colour], **self._look([radius], order, names, shown)}
         at = points.astype(np.float32)
         if self._always:
             self._rec.log(path, rr.Points2D(at, **look), static=True)
@@ -367,10 +366,10 @@ class Frames:
     def _with_first_pose(self, path: str, columns: Any) -> None:
         send(self._rec, path, self._timeline, self._run.t[self._good[:1]], lambda _: columns)
 
-    def _look(self, radius: Any, order: float, names: list[str], shown: bool) -> dict[str, Any]:
+    def _look(self, radii: Sequence[float], order: float, names: list[str], shown: bool) -> dict[str, Any]:
         """Return the style that lines and points have in common."""
         return {
-            "radii": [radius],
+            "radii": radii,
             "labels": names or None,
             "show_labels": shown if names else None,
             "draw_order": self._layer + order,

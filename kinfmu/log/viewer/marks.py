@@ -12,64 +12,61 @@ from kinfmu.draw.scene import palette
 from kinfmu.draw.scene.forces import Arrows
 from kinfmu.draw.scene.scene import Scene
 from kinfmu.draw.scene.shape import Shape
+from kinfmu.draw.scene.strokes import STROKES
 from kinfmu.log.viewer.ground import MARGIN
-from kinfmu.log.viewer.linkage import Linkage
+from kinfmu.log.viewer.linkage import Linkage, RecordedLine, filled
 from kinfmu.log.viewer.timeline import send
 
 if TYPE_CHECKING:
     import rerun as rr
 
 FORCES = ("force", "force_along", "force_between")  # kinds that the arrows of a run show to scale
-_LOAD_ORDER = 28.0  # above cylinders, below pins
-_LOAD_RADIUS = 0.9  # of lines [points of the screen]
-_JOINT = (185, 28, 28)
-_ARROW_ORDER = 50.0  # above the linkage
+_LOAD_RADIUS = 0.75  # of lines, as a part of their width [points of the screen]
+_LOAD, _JOINT = palette.tint("own", palette.LOAD, is_dark=True), (185, 28, 28)
+_ARROW_ORDER = 95.0  # above the linkage
 _PLACES, _LOWEST_PART = 9, 0.2  # places of the legend; part of the size above the lowest point, in which names matter
 _ARROW_RADIUS = 0.004  # as a part of the scene's size, however thin its links are
 
 
 class _Part(NamedTuple):
-    """Lines of a symbol that move together: pose (n, 3), stretch along it (n,), lines (k, 2) in this frame."""
+    """Lines of a symbol that move together: pose (n, 3), stretch along it (n,), lines in this frame."""
 
     name: str
     pose: FloatArray
     stretch: FloatArray
-    lines: list[FloatArray]
+    lines: list[RecordedLine]
 
 
 def log_loads(linkage: Linkage, with_arrow: Collection[str] = ()) -> None:
-    """Log the symbols of loads; those of forces only if they are not among the names of loads `with_arrow`."""
-    import rerun as rr
-
-    for load in linkage.scene.shapes:
-        if not load.strips or (load.kind in FORCES and load.name in with_arrow):
+    """Log the symbols of loads and drivers; those of forces only if they are not among the loads `with_arrow`."""
+    for shape in linkage.scene.shapes:
+        if not shape.is_effort or (shape.kind in FORCES and shape.name in with_arrow):
             continue
-        for part in _parts(load, linkage):
-            entity = f"{linkage.root}/loads/{load.name}/{part.name}"
+        for part in _parts(shape, linkage):
+            kind = "drivers" if shape.kind == "driver" else "loads"
+            entity = f"{linkage.root}/{kind}/{shape.name}/{part.name}"
             linkage.frames.move(entity, part.pose, part.stretch)
-            linkage.frames.lines(
-                entity,
-                part.lines,
-                rr.Radius.ui_points(_LOAD_RADIUS),
-                linkage.colour or palette.LOAD_ON_DARK,
-                _LOAD_ORDER,
-                load.name,
-            )
+            linkage.frames.lines(entity, part.lines, STROKES["symbol"][0].order, shape.name)
 
 
-def _parts(load: Shape, linkage: Linkage) -> Iterator[_Part]:
+def _parts(shape: Shape, linkage: Linkage) -> Iterator[_Part]:
     """Yield the parts at the first point, at the second one, and what is stretched between them."""
-    first, angle, distance = load.ends(linkage.scene.frames)
+    first, angle, distance = shape.ends(linkage.scene.frames)
     second = first + distance[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
-    keeps = np.ones(len(angle))
+    keeps, size = np.ones(len(angle)), linkage.sizes.detail
     poses = {"first": (first, 0.0, keeps), "last": (second, 1.0, keeps), "between": (first, np.nan, distance)}
-    found: dict[str, list[FloatArray]] = {}
-    for strip in load.strips:
+    found: dict[str, list[RecordedLine]] = {}
+    for strip in shape.strips:
         part, length, along, across = strip.points.T
         (name,) = [key for key, (_, end, _) in poses.items() if (part == end).all()] or ["between"]
-        ahead = part if name == "between" else length + linkage.detail * along
-        line = np.column_stack([ahead, linkage.detail * across])
-        found.setdefault(name, []).append(np.vstack([line, line[:1]]) if strip.is_area else line)
+        ahead = part if name == "between" else length + size * along
+        points, (stroke,) = np.column_stack([ahead, size * across]), STROKES[strip.stroke]
+        colour = palette.tint(stroke.line, linkage.colour or shape.colour, is_dark=True)
+        if stroke.fill and name != "between":
+            area = palette.tint(stroke.fill, linkage.colour or shape.colour, is_dark=True)
+            found.setdefault(name, []).extend(filled(points, area, 0.5 * size))
+        line = np.vstack([points, points[:1]]) if stroke.fill else points
+        found.setdefault(name, []).append(RecordedLine(line, -_LOAD_RADIUS * stroke.width, colour))
     for name, lines in found.items():
         at, _, stretch = poses[name]
         yield _Part(name, np.column_stack([at, angle]), stretch, lines)
@@ -99,12 +96,12 @@ def log_arrows(linkage: Linkage, found: Arrows | None) -> frozenset[str]:
     if found is None:
         return frozenset()
     look: dict[str, Any] = {
-        "radii": [_ARROW_RADIUS * max(linkage.size, scene.size)],
+        "radii": [_ARROW_RADIUS * scene.size],
         "draw_order": linkage.layer + _ARROW_ORDER,
     }
     for name, along in found.along.items():
         kind, _, label = name.partition(".")
-        entity, colour = f"{path}/{kind}/{label}", palette.LOAD_ON_DARK if kind == "loads" else _JOINT
+        entity, colour = f"{path}/{kind}/{label}", _LOAD if kind == "loads" else _JOINT
         known = np.asarray(np.isfinite(along + found.at[name]).all(axis=1))
         linkage.rec.log(
             entity, rr.Arrows2D.from_fields(**look, colors=[colour], labels=[label], show_labels=False), static=True

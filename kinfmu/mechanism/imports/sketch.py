@@ -211,9 +211,7 @@ class Sketch:
     def file_text(self) -> str:
         """Return the mechanism file, with the notes at its head.
 
-        Raises:
-            MechanismError: The drawing is no mechanism.
-
+        Raise a MechanismError if the drawing is no mechanism.
         """
         mobility, drivers = self.mobility(), len(self._tables["drivers"])
         if self._renamed:

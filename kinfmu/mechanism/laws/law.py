@@ -92,12 +92,8 @@ class Law(ABC):
     def target(self, x: Value, **constants: Value) -> Value:
         """Return f(x), in plain arithmetic, with the constants given by name."""
 
-    def jumps(self, **constants: Value) -> Jumps:
-        """Return the arguments at which f, f' or f'' jumps, in plain arithmetic, with the constants given by name."""
-        return self.breaks(2, **constants)
-
     def breaks(self, order: int, /, **constants: Value) -> Jumps:  # noqa: ARG002  smooth laws have none
-        """Return the arguments at which f or a derivative of it up to an order jumps, as `jumps` does."""
+        """Return the arguments at which f or a derivative up to an order jumps, in any arithmetic."""
         return Jumps()
 
     def fewest_steps(self, x: Value, **constants: Value) -> Value:  # noqa: ARG002  it is smooth, as poses are

@@ -72,7 +72,6 @@ class Spring(BetweenPoints):
     """
 
     type: ClassVar[str] = "spring"
-    is_conservative: ClassVar[bool] = True
     required: ClassVar[Mapping[str, str]] = {"stiffness": "0 or more", "free_length": "0 or more"}
 
     name: str
@@ -153,7 +152,6 @@ class GasSpring(BetweenPoints):
     """
 
     type: ClassVar[str] = "gas_spring"
-    is_conservative: ClassVar[bool] = True
     required: ClassVar[Mapping[str, str]] = dict.fromkeys(("extended_length", "stroke", "extended_force"), "positive")
 
     name: str
@@ -242,7 +240,6 @@ class TorsionSpring(BetweenBodies):
     """
 
     type: ClassVar[str] = "torsion_spring"
-    is_conservative: ClassVar[bool] = True
     required: ClassVar[Mapping[str, str]] = {"stiffness": "0 or more"}
 
     name: str

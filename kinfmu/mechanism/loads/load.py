@@ -29,7 +29,6 @@ class Load(ABC):
     """
 
     type: ClassVar[str]  # its name in mechanism files
-    is_conservative: ClassVar[bool] = False  # True if its power is minus the change of `energy`
     required: ClassVar[Mapping[str, str]] = {}  # 'positive' or '0 or more', by the keys of numbers
     columns: ClassVar[tuple[str, ...]] = ()  # of its effort and of its quantity in results, as nouns and quantities
     name: str

@@ -1,7 +1,7 @@
 // The drawing of a linkage: shapes, pins, names, curves, arrows, marks.
 
-import { edgeOf, fillOf, GREY, inkOf, paleOf, widthOf } from "./pen.js";
-import { distance, distanceToSegment, isSlim, outline, placed } from "./geometry.js";
+import { GREY, inkOf, LOOK, tint, widthOf } from "./pen.js";
+import { distance, distanceToSegment, outline, placed, symbol } from "./geometry.js";
 import { gravity, loads } from "./loads.js";
 import { marks } from "./marks.js";
 import { Names } from "./names.js";
@@ -22,17 +22,17 @@ export function draw(pen, linkage, view, theme, show, extra, spots) {
     return { handles: painter.handles, hasHidden: painter.names.hidden.length > 0, symbols: painter.symbols };
 }
 
-// Return a factor for the widths of lines, less than 1 if links are short compared with the linkage.
+// Return the factor of the width of links, less than 1 if some are short compared with the linkage.
 export function fineness(linkage) {
     const lengths = [];
     linkage.data.shapes.forEach((shape) => {
-        const points = shape.between || (shape.kind === "link" ? shape.at : []);
-        points.slice(1).forEach((point, k) => lengths.push(Math.hypot(...linkage.point(point).map((value, i) => value - linkage.point(points[k])[i]))));
+        const points = shape.kind === "link" ? shape.at : shape.kind === "bar" ? shape.between : [];
+        points.slice(1).forEach((point, k) => lengths.push(distance(linkage.point(point), linkage.point(points[k]))));
     });
     const [x0, y0, x1, y1] = linkage.box();
     const size = Math.max(x1 - x0, y1 - y0);
     const shortest = Math.min(...lengths.filter((length) => length > 1e-3 * size), size);
-    return Math.sqrt(Math.min(Math.max(shortest / (0.12 * size), 0.01), 1));
+    return Math.sqrt(Math.min(Math.max(shortest / (LOOK.longEnough * size), LOOK.finest ** 2), 1));
 }
 
 // Find the spots of names that are free at most poses of the motion.
@@ -42,6 +42,7 @@ export function foresee(linkage, view, theme, show, spots) {
     spots.foresee(frames);
 }
 
+const [UNIT, LEAST_UNIT] = [4 / 3, 0.95]; // [px] of a point of the table of strokes, less in small views
 const NO_PEN = { line() {}, circle() {}, text() {} };
 const NOTHING_MORE = { curves: [], arrows: [], legend: [], held: null, isGhost: false };
 
@@ -49,15 +50,12 @@ const NOTHING_MORE = { curves: [], arrows: [], legend: [], held: null, isGhost: 
 function painted(pen, linkage, view, theme, show, extra, spots) {
     const painter = new Painter(pen, linkage, view, theme, extra.isGhost, spots);
     painter.grid(show.grid);
-    painter.curves(extra.curves, show);
-    painter.wheels();
-    painter.ground();
-    painter.links(true);
-    painter.bars();
-    painter.links(false);
-    painter.racks();
-    painter.slides();
-    painter.cylinders();
+    const strokes = painter.strokes(show);
+    const [path] = LOOK.strokes.path;
+    for (const one of strokes) if (one.stroke.order < path.order) painter.paint(one);
+    if (show.curves) painter.curves(extra.curves);
+    for (const one of strokes) if (one.stroke.order > path.order) painter.paint(one);
+    painter.namesOfShapes();
     if (show.loads) loads(painter);
     painter.pins(extra.held);
     if (show.loads) gravity(painter);
@@ -73,20 +71,24 @@ class Painter {
         this.names = new Names(pen, view, theme, spots);
         [this.handles, this.symbols] = [[], []];
         this.fine = linkage.fineness;
-        this.width = Math.max(4, Math.min(15, 13 * this.fine));
-        this.size = Math.max(0.55, Math.min(1.15, 1.15 * this.fine));
-    }
-
-    edge(colour) {
-        return this.isGhost ? edgeOf(GREY, this.theme) : edgeOf(colour, this.theme);
+        this.unit = Math.min(Math.max(Math.min(view.width, view.height) / LOOK.units, LEAST_UNIT), UNIT); // [px] of a point
+        this.width = this.unit * LOOK.bar * this.fine; // of a link
+        this.size = this.unit * (LOOK.always + (1 - LOOK.always) * this.fine); // of a unit of details
     }
 
     ink(colour) {
         return inkOf(this.isGhost ? GREY : colour, this.theme);
     }
 
-    fill(colour) {
-        return this.isGhost ? fillOf(GREY, this.theme) : fillOf(colour, this.theme);
+    // Return how a stroke of a thing of a colour is painted.
+    look({ line, fill, width = 0, of_link: ofLink = 0, dash }, colour) {
+        const own = this.isGhost ? GREY : colour;
+        return {
+            width: Math.max(this.unit * width + ofLink * this.width, this.unit * LOOK.thinnest),
+            colour: tint(line, own, this.theme),
+            fill: fill ? tint(fill, own, this.theme) : null,
+            dash: dash ? dash.map((length) => this.unit * length) : null,
+        };
     }
 
     dot = (p) => this.view.pixel(p);
@@ -116,7 +118,7 @@ class Painter {
 
     // Return a direction of a shape in pixels, y down.
     direction(shape) {
-        const body = this.linkage.body(shape.frame);
+        const body = this.linkage.body(shape.axes ?? shape.frame);
         const phi = body < 0 ? 0 : this.linkage.bodyPose(body)[2];
         const [x, y] = placed([0, 0, phi], ...shape.direction);
         return [x, -y];
@@ -149,152 +151,116 @@ class Painter {
         this.names.boxes.add([x, y - 6, x + widthOf(text, 10), y + 6]);
     }
 
-    curves(curves, show) {
-        if (!show.curves) return;
+    // Draw paths of points: thin over the range, strong over the run.
+    curves(curves) {
+        const paint = (key, colour, points) => this.pen.line(points.map((p) => this.dot(p)), this.look(LOOK.strokes[key][0], colour));
         for (const { line, colour, isTrace } of curves) {
-            const points = line.map((p) => this.dot(p));
-            this.pen.line(points, { width: isTrace ? 2.5 : 1.6, colour: this.edge(colour), alpha: isTrace ? 0.9 : 0.75 });
+            const runs = isTrace ? [line] : runsOf(line);
+            if (runs[0]?.length !== line.length) paint("range", colour, line);
+            for (const run of runs) paint("path", colour, run);
         }
     }
 
     // ---- shapes
 
-    // Larger wheels first; cams over the blocks of their followers, and the edge of the roller over both: it is often in the
-    // middle of a block that is larger.
-    wheels() {
-        for (const shape of this.all("wheel").sort((a, b) => b.radius - a.radius)) this.circle(shape, { dash: [7, 3] });
-        for (const shape of this.all("pitch")) this.pen.line(this.at(shape).map((p) => this.dot(p)), { width: 1.1, colour: this.edge(shape.colour), closed: true, dash: [9, 3, 2, 3] });
-        for (const shape of this.all("roller")) this.circle(shape);
-        const guides = this.all("block").filter((shape) => this.isOfFollower(shape));
-        for (const shape of guides) this.block(shape);
-        for (const shape of this.all("cam")) {
-            const points = this.at(shape).map((p) => this.dot(p));
-            this.pen.line(points, { ...this.area(shape), closed: true });
-            this.names.coverAll(points, 1.5, true);
-        }
-        if (guides.length) for (const shape of this.all("roller")) this.circle(shape, { fill: null });
-        for (const shape of this.all("spoke", "belt")) {
-            this.pen.line(this.at(shape).map((p) => this.dot(p)), { width: 1.4, colour: this.edge(shape.colour) });
-        }
-    }
-
-    area(shape) {
-        return { width: 1.5, colour: this.edge(shape.colour), fill: this.isGhost ? null : paleOf(shape.colour, this.theme) };
-    }
-
-    circle(shape, style = {}) {
-        const [centre] = this.at(shape).map((p) => this.dot(p));
-        const radius = shape.radius * this.view.scale;
-        this.pen.circle(...centre, radius, { ...this.area(shape), ...style });
-        this.names.coverCircle(centre, radius);
-    }
-
-    isOfFollower(shape) {
-        return this.linkage.data.cams.some((cam) => cam.follower === shape.frame);
-    }
-
-    // Racks are drawn over the links: a rack is often a link too.
-    racks() {
-        for (const rack of this.all("rack")) this.rack(rack);
-    }
-
-    rack(shape) {
-        const [a, b] = this.at(shape).map((p) => this.dot(p));
-        const [nx, ny] = this.direction(shape);
-        const length = distance(a, b);
-        const count = Math.max(Math.round(length / 11), 2);
-        const along = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
-        const corners = [];
-        for (let k = 0; k < count; k++) {
-            for (const [part, depth] of [[0, 1], [0.25, 1], [0.4, -1], [0.6, -1], [0.75, 1]]) {
-                const s = ((k + part) / count) * length;
-                corners.push([a[0] + s * along[0] + 4 * depth * nx, a[1] + s * along[1] + 4 * depth * ny]);
+    // Return the strokes of shapes in the order in which they are painted, as strokes_of does in Python.
+    strokes(show) {
+        const { linkage } = this;
+        const plates = new Set(linkage.shapes.filter((shape) => this.isPlate(shape)).map((shape) => shape.frame));
+        const followers = new Set(linkage.data.cams.map((cam) => cam.follower));
+        const ranks = new Map();
+        const found = [];
+        for (const shape of linkage.shapes) {
+            if (!ranks.has(shape.frame)) ranks.set(shape.frame, ranks.size);
+            if (shape.kind === "driver" && !show.limits) continue;
+            for (const route of this.routes(shape, keyOf(shape, plates, followers))) {
+                LOOK.strokes[route.key].forEach((stroke, layer) => found.push({ shape, route, stroke, place: [stroke.order, -(shape.radius || 0), ranks.get(shape.frame), layer] }));
             }
         }
-        corners.push([b[0] + 4 * nx, b[1] + 4 * ny], [b[0] + 11 * nx, b[1] + 11 * ny], [a[0] + 11 * nx, a[1] + 11 * ny]);
-        this.pen.line(corners, { width: 1.2, colour: this.edge(shape.colour), fill: this.fill(shape.colour), closed: true });
-        this.names.coverAll(corners.slice(-4), 8, true);
+        const compared = (a, b) => a[0] - b[0] || a[1] - b[1] || a[2] - b[2] || a[3] - b[3];
+        return found.sort((a, b) => compared(a.place, b.place));
     }
 
-    ground() {
-        const s = this.size;
-        const colour = this.edge(GREY);
-        for (const shape of this.all("support")) {
-            const [p] = this.at(shape).map((one) => this.dot(one));
-            const [dx, dy] = [shape.direction[0], -shape.direction[1]];
-            const foot = [p[0] + 17 * s * dx, p[1] + 17 * s * dy];
-            const along = [-dy * s, dx * s];
-            const corner = (k) => [foot[0] + k * along[0], foot[1] + k * along[1]];
-            this.pen.line([p, corner(-10), corner(10)], { width: 1.3, colour, fill: fillOf(GREY, this.theme), closed: true });
-            this.hatched(corner(-15), corner(15), [dx, dy], colour);
-            this.names.cover(p, foot, 12 * s);
-        }
-        for (const shape of this.all("rail", "bed")) {
-            const [a, b] = this.at(shape).map((one) => this.dot(one));
-            const [dx, dy] = [shape.direction[0], -shape.direction[1]];
-            let along = [-dy, dx];
-            if (along[0] * (b[0] - a[0]) + along[1] * (b[1] - a[1]) < 0) along = [dy, -dx];
-            const lift = (shape.kind === "rail" ? 9 : 13) * s;
-            const end = (p, sign) => [p[0] + lift * dx + sign * 25 * s * along[0], p[1] + lift * dy + sign * 25 * s * along[1]];
-            this.hatched(end(a, -1), end(b, 1), [dx, dy], colour);
-        }
+    paint({ shape, route, stroke, place }) {
+        const { points, centre, radius, closed } = route;
+        const look = this.look(stroke, shape.colour);
+        if (radius) this.pen.circle(...centre, radius, look);
+        else this.pen.line(points, { ...look, closed });
+        if (place[3]) return; // of one line the first stroke is the widest
+        if (radius) this.names.coverCircle(centre, radius);
+        else this.names.coverAll(points, look.width, closed);
     }
 
-    hatched(a, b, [dx, dy], colour) {
-        const length = distance(a, b);
-        const along = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
-        const count = Math.min(Math.max(Math.floor(length / 6), 3), 400);
-        for (let k = 0; k < count; k++) {
-            const s = (length * (k + 0.8)) / count;
-            const top = [a[0] + s * along[0], a[1] + s * along[1]];
-            const depth = 6 * this.size;
-            this.pen.line([top, [top[0] + depth * (dx - 0.8 * along[0]), top[1] + depth * (dy - 0.8 * along[1])]], { width: 0.9, colour });
-        }
-        this.pen.line([a, b], { width: 1.6, colour });
-        this.names.cover(a, b, 4);
+    isPlate(shape) {
+        return shape.kind === "link" && this.outlines[this.linkage.body(shape.frame)].closed;
     }
 
-    // Draw links: plates first, then those whose points are on a line, with their rods.
-    links(areClosed) {
-        const rods = grouped(this.all("rod"), (rod) => rod.frame);
-        for (const link of this.all("link")) {
-            const body = this.linkage.body(link.frame);
-            const found = this.outlines[body];
-            if (found.closed !== areClosed) continue;
-            const pose = this.linkage.bodyPose(body);
-            const place = (p) => this.dot(placed(pose, p[0], p[1]));
-            const routes = found.corners.length > 1 ? [{ points: found.corners.map(place), closed: found.closed }] : [];
-            for (const rod of rods.get(link.frame) || []) routes.push({ points: this.at(rod).map((p) => this.dot(p)), closed: false });
-            const [edge, fill] = [this.edge(link.colour), this.fill(link.colour)];
-            const width = this.width * (found.closed ? 0.8 : 1);
-            for (const face of this.all("face")) if (face.frame === link.frame) this.face(face, routes, width);
-            if (found.closed) this.pen.line(routes[0].points, { width: 0, fill: paleOf(this.isGhost ? GREY : link.colour, this.theme), closed: true, alpha: 0.85 });
-            for (const { points, closed } of routes) this.pen.line(points, { width: width + 1.4, colour: edge, closed });
-            for (const { points, closed } of routes) this.pen.line(points, { width: width - 1.4, colour: fill, closed });
-            if (found.closed && isSlim(routes[0].points, width)) this.pen.line(routes[0].points, { width: 0, fill, closed: true });
-            for (const { points, closed } of routes) this.names.coverAll(points, width, closed);
-            for (const rib of found.ribs) {
-                this.pen.line(rib.map(place), { width: width * 0.5, colour: fill });
-                this.names.coverAll(rib.map(place), width * 0.5);
-            }
-            const middles = middlesOf(routes);
-            const gap = (p) => Math.min(...routes.flatMap(({ points, closed }) => sidesOf(points, closed).map((side) => distanceToSegment(p, ...side) - width / 2)));
-            const inside = found.closed ? centreOf(routes[0].points) : null;
-            const first = place(found.corners[0] || [0, 0]);
-            if (middles.length) this.name(link.name, middles, this.ink(link.colour), width / 2 + 8, 2, { inside, gap });
-            else this.name(link.name, [first], this.ink(link.colour), 24, 3, { gap: (p) => distance(p, first) - width });
+    // Return the lines of a shape in pixels: { key, points, closed } or, of a circle, { key, centre, radius }.
+    routes(shape, key) {
+        if (shape.strips) {
+            const base = this.base(shape);
+            return shape.strips.map(({ points, stroke }) => {
+                const own = stroke === shape.kind ? key : stroke;
+                return { key: own, points: symbol(base, points, this.view.scale, this.size), closed: Boolean(LOOK.strokes[own][0].fill) };
+            });
         }
+        if (!key) return [];
+        const [points, closed] = this.line(shape);
+        if (shape.radius) return [{ key, centre: points[0], radius: shape.radius * this.view.scale }];
+        const isBody = shape.kind === "link" || BARS.includes(shape.kind);
+        for (const face of isBody ? this.all("face") : []) if (face.frame === shape.frame) this.offFace(face, points);
+        return points.length > 1 ? [{ key, points, closed }] : [];
     }
 
-    // Add the line of a flat face to the routes of its body, all of a width on the side away from the cam, so that their
-    // edge is the line.
-    face(shape, routes, width) {
-        const [a, b] = this.at(shape).map((p) => this.dot(p));
-        const away = this.direction(shape);
-        const isOn = (p) => Math.abs((p[0] - a[0]) * away[0] + (p[1] - a[1]) * away[1]) < 0.1; // [px]
-        routes.push({ points: [a, b], closed: false });
-        this.name(shape.name, middlesOf([{ points: [a, b], closed: false }]), this.theme.ink, width + 8, 3);
-        for (const route of routes) route.points = route.points.map((p) => (isOn(p) ? [0, 1].map((k) => p[k] + 0.5 * width * away[k]) : p));
+    // Return the points of a shape in pixels, and whether they are a closed line.
+    line(shape) {
+        if (shape.between) return [shape.between.map((point) => this.dot(this.linkage.point(point))), false];
+        if (shape.kind !== "link") return [this.at(shape).map((p) => this.dot(p)), Boolean(shape.closed)];
+        const body = this.linkage.body(shape.frame);
+        const { corners, closed } = this.outlines[body];
+        const pose = this.linkage.bodyPose(body);
+        return [corners.map((p) => this.dot(placed(pose, ...p))), closed];
+    }
+
+    // Return where the strips of a shape begin, the unit vector along them, and the distance of their ends [px], y down.
+    base(shape) {
+        const [start, end] = this.line(shape).flatMap((points) => points || []);
+        const unit = (a, b) => [(b[0] - a[0]) / (distance(a, b) || 1), (b[1] - a[1]) / (distance(a, b) || 1)];
+        if (shape.between) {
+            const along = unit(start, end);
+            const [from, to] = shape.points.map(([x]) => x * this.view.scale);
+            const origin = shape.kind === "barrel" ? start : end;
+            return { at: [0, 1].map((k) => origin[k] + from * along[k]), along, length: to - from };
+        }
+        if (!shape.direction) return { at: start, along: unit(start, end), length: distance(start, end) };
+        const [x, y] = this.direction(shape);
+        if (!end) return { at: start, along: [x, y], length: 0 };
+        const length = (end[0] - start[0]) * y - (end[1] - start[1]) * x; // the direction is on the right of the line
+        return { at: length < 0 ? end : start, along: [y, -x], length: Math.abs(length) };
+    }
+
+    // Move points of a body on the line of its flat face away from the cam, so that the edge of the body is the line.
+    offFace(face, points) {
+        const [a] = this.at(face).map((p) => this.dot(p));
+        const away = this.direction(face);
+        points.forEach((p, i) => {
+            if (Math.abs((p[0] - a[0]) * away[0] + (p[1] - a[1]) * away[1]) < 0.1) points[i] = [0, 1].map((k) => p[k] + 0.5 * this.width * away[k]); // [px]
+        });
+    }
+
+    // Want the names of bodies, bars, cylinders and faces.
+    namesOfShapes() {
+        const bars = grouped(this.all(...BARS), (bar) => bar.frame);
+        for (const shape of this.all("link", "bar", "barrel", "face")) {
+            const [points, closed] = this.line(shape);
+            const own = shape.kind === "link" ? (bars.get(shape.frame) || []).map((bar) => ({ points: this.line(bar)[0], closed: false })) : [];
+            const routes = points.length > 1 ? [{ points, closed }, ...own] : own;
+            const gap = (p) => Math.min(...routes.flatMap((one) => sidesOf(one.points, one.closed).map((side) => distanceToSegment(p, ...side) - this.width / 2)));
+            const [off, rank] = shape.kind === "link" ? [this.width / 2 + 8, 2] : [this.width / 3 + 8, 3];
+            const ink = this.ink(shape.kind === "link" ? shape.colour : GREY);
+            if (routes.length) this.name(shape.name, middlesOf(routes), ink, off, rank, { inside: closed ? centreOf(points) : null, fill: tint("fill", this.isGhost ? GREY : shape.colour, this.theme), gap });
+            else this.name(shape.name, points, ink, 24, 3, { gap: (p) => distance(p, points[0]) - this.width });
+        }
     }
 
     // Return for each point the first one that is always at the same place: of its body, or joined by a pin.
@@ -327,99 +293,68 @@ class Painter {
         return linkage.outlineList;
     }
 
-    bars() {
-        for (const bar of this.all("bar")) {
-            const points = bar.between.map((point) => this.dot(this.linkage.point(point)));
-            const width = 0.5 * this.width;
-            this.pen.line(points, { width: width + 1.2, colour: this.edge(GREY) });
-            this.pen.line(points, { width: Math.max(width - 1, 1), colour: fillOf(GREY, this.theme) });
-            this.names.cover(...points, width);
-            this.name(bar.name, middlesOf([{ points, closed: false }]), this.ink(GREY), width / 2 + 8, 3, { gap: (p) => distanceToSegment(p, ...points) });
-        }
-    }
-
-    slides() {
-        for (const shape of this.all("slot", "block", "die")) {
-            if (shape.kind === "slot") {
-                const [a, b] = this.at(shape).map((p) => this.dot(p));
-                const [edge, fill] = [this.edge(shape.colour), this.fill(shape.colour)];
-                this.pen.line([a, b], { width: 1.55 * this.width + 1.4, colour: edge });
-                this.pen.line([a, b], { width: 1.55 * this.width - 1.4, colour: fill });
-                this.pen.line([a, b], { width: 0.75 * this.width + 1.2, colour: edge });
-                this.pen.line([a, b], { width: 0.75 * this.width - 1.2, colour: this.theme.paper });
-                this.names.cover(a, b, 1.55 * this.width);
-            } else if (shape.kind === "die" || !this.isOfFollower(shape)) this.block(shape);
-        }
-    }
-
-    block(shape) {
-        const s = 1.2 * this.size;
-        const [centre] = this.at(shape).map((p) => this.dot(p));
-        const [x, y] = shape.kind === "die" ? [shape.direction[0], -shape.direction[1]] : this.direction(shape);
-        const corner = (i, j) => [centre[0] + s * (13 * i * x - 8 * j * y), centre[1] + s * (13 * i * y + 8 * j * x)];
-        const style = { width: 1.5, colour: this.edge(shape.colour), fill: this.fill(shape.colour), closed: true };
-        this.pen.line([corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)], style);
-        this.names.cover(corner(-0.4, 0), corner(0.4, 0), 16 * s);
-    }
-
-    cylinders() {
-        const shafts = new Map(this.all("shaft").map((shape) => [shape.name, shape]));
-        for (const barrel of this.all("barrel")) {
-            const [a, b] = barrel.between.map((point) => this.dot(this.linkage.point(point)));
-            const length = distance(a, b);
-            const along = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
-            const tube = Math.min(barrel.points[1][0] * this.view.scale, 0.97 * length);
-            const piston = Math.max(length + shafts.get(barrel.name).points[0][0] * this.view.scale, 5);
-            const at = (d) => [a[0] + d * along[0], a[1] + d * along[1]];
-            const w = this.width;
-            this.pen.line([a, b], { width: 0.42 * w + 1.4, colour: this.edge(GREY), cap: "butt" });
-            this.pen.line([a, b], { width: 0.42 * w - 0.8, colour: this.theme.paper, cap: "butt" });
-            this.pen.line([at(4), at(tube)], { width: 1.15 * w + 1.4, colour: this.edge(GREY), cap: "butt" });
-            this.pen.line([at(5), at(tube - 1)], { width: 1.15 * w - 1, colour: fillOf(GREY, this.theme), cap: "butt" });
-            const disc = Math.min(Math.max(piston, 7), tube - 3);
-            this.pen.line([at(disc - 1.6), at(disc + 1.6)], { width: 1.15 * w - 1, colour: this.edge(GREY), cap: "butt" });
-            this.names.cover(a, b, 1.15 * w);
-            this.name(barrel.name, [0.35, 0.6].map((part, id) => ({ at: at(part * length), id, along })), this.ink(GREY), 0.6 * w + 8, 3, { gap: (p) => distanceToSegment(p, a, b) });
-        }
-    }
-
+    // Draw pins and points, one at each place with the names of all that is there.
     pins(held) {
-        const { linkage, pen, theme } = this;
-        const radius = Math.max(2.4, 0.33 * this.width);
-        const [done, withName, named] = [new Set(), new Set(), new Set()]; // places of pins, those with names, names with places
-        const isOfInterest = new Set(linkage.data.interest.map(({ point }) => point));
-        const pin = (point, text, rank = 1) => {
-            const p = this.dot(linkage.point(point));
+        const { joints, drivers, loads: efforts, interest, points } = this.linkage.data;
+        const places = new Map(); // by number of the first point that is there
+        const at = (point) => {
             const place = this.pinOf[point];
-            if (!done.has(place)) {
-                done.add(place);
-                pen.circle(...p, radius, { width: 1.6, colour: theme.ink, fill: theme.pin });
-                this.names.boxes.add([p[0] - radius, p[1] - radius, p[0] + radius, p[1] + radius]);
-            }
-            if (text) {
-                this.name(text, [p], theme.ink, radius + 8, rank, { gap: (one) => distance(one, p) - radius });
-                withName.add(place);
-            }
-            named.add(`${text} ${place}`);
+            if (!places.has(place)) places.set(place, { point, names: [], ends: [], key: "", colour: null });
+            return places.get(place);
         };
-        const end = (point) => { // of a bar, cylinder or spring, whose own name is at its middle
-            const { name } = linkage.data.points[point];
-            pin(point, withName.has(this.pinOf[point]) || isOfInterest.has(point) ? "" : name, 4);
-        };
-        const joints = linkage.data.joints.filter((joint) => joint.points && !["translational", "cam_flat_face"].includes(joint.type));
-        const [bars, others] = [true, false].map((isBar) => joints.filter((joint) => (joint.type === "distance") === isBar));
-        for (const { points, name } of others) points.forEach((point, k) => pin(point, k === points.length - 1 ? name : ""));
-        for (const { points } of bars) points.forEach(end);
-        for (const driver of linkage.data.drivers) if (driver.type === "distance") driver.points.forEach(end);
-        for (const { points } of linkage.data.loads) if (points.length > 1) points.forEach(end);
-        for (const { name, point, colour } of linkage.data.interest) {
-            const p = this.dot(linkage.point(point));
-            pen.circle(...p, radius + 0.6, { width: 1.6, colour: theme.ink, fill: this.edge(colour) });
-            if (!done.has(this.pinOf[point])) this.names.boxes.add([p[0] - radius, p[1] - radius, p[0] + radius, p[1] + radius]);
-            if (!named.has(`${name} ${this.pinOf[point]}`)) this.name(name, [p], theme.ink, radius + 8, 0, { gap: (one) => distance(one, p) - radius });
+        for (const { type, name, points: both } of joints) {
+            if (!both || ["translational", "cam_flat_face"].includes(type)) continue;
+            both.forEach((point, k) => {
+                const pin = at(point);
+                pin.key = type === "fixed" && pin.key !== "pin" ? "weld" : "pin";
+                if (type === "distance") pin.ends.push(points[point].name);
+                else if (k === both.length - 1) pin.names.push(name);
+            });
         }
-        if (held) pen.circle(...this.dot(held), radius + 6, { width: 2.5, colour: theme.accent });
+        for (const { points: ends } of [...drivers.filter(({ type }) => type === "distance"), ...efforts.filter((one) => one.points.length > 1)]) {
+            for (const point of ends) Object.assign(at(point), { key: "pin" }).ends.push(points[point].name);
+        }
+        for (const { name, point, colour } of interest) {
+            const pin = at(point);
+            Object.assign(pin, { colour }).names.push(name);
+        }
+        for (const { point, names, ends, key, colour } of places.values()) {
+            const p = this.dot(this.linkage.point(point));
+            if (key) this.dotAt(key, p, GREY);
+            if (colour) this.dotAt("point", p, colour);
+            const radius = LOOK.strokes[key || "point"][0].radius * this.width;
+            this.names.boxes.add([p[0] - radius, p[1] - radius, p[0] + radius, p[1] + radius]);
+            const text = [...new Set(names.length ? names : ends)].join(", ");
+            const rank = colour ? 0 : names.length ? 1 : 4; // an end of a bar or cylinder, whose own name is at its middle
+            this.name(text, [p], this.theme.ink, radius + 8, rank, { gap: (one) => distance(one, p) - radius });
+        }
+        if (held) this.pen.circle(...this.dot(held), 0.33 * this.width + 6, { width: 2.5, colour: this.theme.accent });
     }
+
+    dotAt(key, p, colour) {
+        const [stroke] = LOOK.strokes[key];
+        this.pen.circle(...p, stroke.radius * this.width, this.look(stroke, colour));
+    }
+}
+
+const BARS = ["rod", "face"]; // lines of a body besides its link
+
+// Return the row of the table of strokes for a shape that is a line; "" for what is not painted.
+function keyOf({ kind, frame }, plates, followers) {
+    if (kind === "link") return plates.has(frame) ? "plate" : "link";
+    if (BARS.includes(kind)) return plates.has(frame) ? "arm" : "link";
+    if (kind === "block" && followers.has(frame)) return "guide";
+    return kind in LOOK.strokes ? kind : "";
+}
+
+// Return the parts of a path that are of the run.
+function runsOf(line) {
+    const runs = [[]];
+    for (const point of line) {
+        if (point[2]) runs[runs.length - 1].push(point);
+        else if (runs[runs.length - 1].length) runs.push([]);
+    }
+    return runs;
 }
 
 function sidesOf(points, closed) {

@@ -3,7 +3,7 @@
 import { draw } from "./drawing.js";
 import { $ } from "./elements.js";
 import { distance, placed } from "./geometry.js";
-import { CanvasPen, edgeOf, fillOf, GREY } from "./pen.js";
+import { CanvasPen, GREY, tint } from "./pen.js";
 import { Spots } from "./names.js";
 import { GROUND, measured, ONE_PIN } from "./editor_places.js";
 import { Sketch } from "./editor_sketch.js";
@@ -71,8 +71,8 @@ export class EditorPainter {
             const [x, y] = view.pixel(at);
             const isSupported = supports.some((p) => distance(p, at) < ONE_PIN * sketch.size);
             if (!isSupported && points.some((k) => data.points[k].body === GROUND)) {
-                const colour = edgeOf(GREY, theme);
-                pen.line([[x, y], [x - 10, y + 17], [x + 10, y + 17]], { width: 1.3, colour, fill: fillOf(GREY, theme), closed: true });
+                const colour = tint("edge", GREY, theme);
+                pen.line([[x, y], [x - 10, y + 17], [x + 10, y + 17]], { width: 1.3, colour, fill: tint("fill", GREY, theme), closed: true });
                 pen.line([[x - 15, y + 17], [x + 15, y + 17]], { width: 1.6, colour });
             }
             pen.circle(x, y, size, { width: 1.6, colour: theme.ink, fill: theme.paper });

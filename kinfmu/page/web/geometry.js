@@ -67,6 +67,16 @@ export function outline(points) {
     return { corners, closed: true, ribs };
 }
 
+// Return the pixels, y down, of points of a strip: each a part of the length of its base, plus a length of the mechanism, plus
+// details of a size along and across.
+export function symbol({ at, along: [x, y], length }, points, scale, size, flips = [1, 1]) {
+    return points.map(([part, own, detail, across]) => {
+        const ahead = Math.min(Math.max(part * length + own * scale, 0), length) + size * detail * flips[0];
+        const side = size * across * flips[1];
+        return [at[0] + ahead * x + side * y, at[1] + ahead * y - side * x];
+    });
+}
+
 // Return whether a plate is so narrow that bars of a width along its edges meet.
 export function isSlim(points, width) {
     const sides = points.map((p, k) => [p, points[(k + 1) % points.length]]);

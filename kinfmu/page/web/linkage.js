@@ -407,7 +407,17 @@ export class Linkage {
         return low + (((value - low) % period) + period) % period;
     }
 
-    // Return polylines of the points with these numbers, over the driver's range or the run.
+    // Return whether the run comes through a value of the only driver; true with several, whose curves are over the run.
+    #isOfRun([value]) {
+        if (this.data.drivers.length > 1) return true;
+        const [low, high] = [Math.min, Math.max].map((of) => of(...this.law.map(({ u }) => u[0])));
+        const near = 1e-6 * (this.ranges[0][1] - this.ranges[0][0]);
+        const period = this.data.drivers[0].kind === "angle" && !this.limits.length ? this.ranges[0][1] - this.ranges[0][0] : 0;
+        const first = period ? value + period * Math.ceil((low - near - value) / period) : value;
+        return first >= low - near && first <= high + near;
+    }
+
+    // Return polylines of the points with these numbers, over the driver's range or the run: [x, y, whether it is of the run].
     curves(points, count = CURVE) {
         const bodies = [...new Set(points.map((point) => this.bodyOf[point]))].filter((body) => this.triples[body][0] >= 0);
         const columns = bodies.flatMap((body) => this.triples[body]);
@@ -416,6 +426,7 @@ export class Linkage {
         const moving = columns.map((column) => (column < this.count ? column : 0));
         const { values, status } = this.#swept(samples, moving);
         const width = columns.length;
+        const areOfRun = samples.map((u) => this.#isOfRun(u));
         columns.forEach((column, place) => {
             if (column < this.count) return;
             for (let k = 0; k < samples.length; k++) values[k * width + place] = this.pose.q[column];
@@ -430,7 +441,7 @@ export class Linkage {
                 const at = k * width + place;
                 const c = Math.cos(values[at + 2]);
                 const s = Math.sin(values[at + 2]);
-                line.push([values[at] + c * x - s * y, values[at + 1] + s * x + c * y]);
+                line.push([values[at] + c * x - s * y, values[at + 1] + s * x + c * y, areOfRun[k]]);
             }
             return line;
         });

@@ -1,29 +1,25 @@
 // Symbols of loads, as the scene has them: springs, dampers, forces and torques; the direction of gravity.
 
 import { valueOf } from "./cams.js";
-import { css, edgeOf, GREY } from "./pen.js";
-import { distance } from "./geometry.js";
+import { LOOK, tint } from "./pen.js";
+import { distance, symbol } from "./geometry.js";
 import { number } from "./numbers.js";
 import { BUTTONS } from "./view.js";
 
-const OF_LOADS = { light: [126, 34, 206], dark: [216, 150, 255] };
 const PULL = 34; // [px] of the arrow of gravity
 
 export function loads(painter) {
     const { theme, pen, size } = painter;
-    const ink = painter.isGhost ? edgeOf(GREY, theme) : css(OF_LOADS[theme.isDark ? "dark" : "light"]);
     for (const load of painter.linkage.data.loads) {
         const found = baseOf(painter, load);
         if (!found) continue;
-        const { at, along: [x, y], length, text, flips } = found;
+        const { along: [x, y], length, text, flips } = found;
+        const ink = painter.isGhost ? theme.quiet : tint("own", load.colour, theme);
         const all = [];
-        for (const { points, area, solid } of load.strips) {
-            const line = points.map(([part, own, detail, across]) => {
-                const ahead = Math.min(Math.max(part * length + own * painter.view.scale, 0), length) + 1.3 * size * detail * flips[0];
-                const side = 1.3 * size * across * flips[1];
-                return [at[0] + ahead * x + side * y, at[1] + ahead * y - side * x];
-            });
-            pen.line(line, { width: solid ? 0.5 : 1.8, colour: ink, closed: Boolean(area), fill: area ? (solid ? ink : theme.paper) : null });
+        for (const { points, stroke } of load.strips) {
+            const line = symbol(found, points, painter.view.scale, size, flips);
+            const [row] = LOOK.strokes[stroke];
+            pen.line(line, { ...painter.look(row, load.colour), closed: Boolean(row.fill) });
             painter.names.coverAll(line, 3);
             line.slice(1).forEach((b, k) => painter.symbols.push({ table: "loads", name: load.name, ends: [line[k], b] }));
             all.push(...line);

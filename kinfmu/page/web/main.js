@@ -2,7 +2,7 @@
 
 import { Address, Design } from "./design.js";
 import { arrows } from "./marks.js";
-import { CanvasPen, THEMES } from "./pen.js";
+import { CanvasPen, LOOK, THEMES } from "./pen.js";
 import { draw, fineness, foresee } from "./drawing.js";
 import { $, breakable, describe, element, shownUnit } from "./elements.js";
 import { unpacked } from "./engine.js";
@@ -406,6 +406,7 @@ async function start() {
     try {
         const data = JSON.parse(new TextDecoder().decode(await unpacked($("data").textContent)));
         const solver = await unpacked(data.solver);
+        Object.assign(LOOK, data.look);
         window.kinfmu = new Page(data.modules && (await linkageOf(data, solver)), solver);
         window.kinfmu.isEditable = data.isEditable;
         if (data.modules && !location.hash && window.matchMedia("(prefers-reduced-motion: no-preference)").matches) window.kinfmu.motion.showOnce();

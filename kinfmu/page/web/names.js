@@ -64,16 +64,16 @@ export class Names {
         [this.wanted, this.hidden, this.counts] = [[], [], new Map()];
     }
 
-    // Want a name next to one of its places, the best first, at a distance `off`, or on the place `inside`; gap: how far a
-    // pixel is from what it names. Names of a lower rank are more important. A place is a pixel, or { at, id, along } with
+    // Want a name next to one of its places, the best first, at a distance `off`, or on the place `inside` of an area
+    // with the colour `fill`; gap: how far a pixel is from what it names. Names of a lower rank are more important. A place is a pixel, or { at, id, along } with
     // the direction of the line that it is on. Name and rank tell which name it is in the next frame, or a key in place of
     // the name.
-    add({ text, places, colour, off, rank, key = text, inside = null, gap = null }) {
+    add({ text, places, colour, off, rank, key = text, inside = null, fill = "", gap = null }) {
         const own = `${rank} ${key}`;
         const count = (this.counts.get(own) ?? 0) + 1; // of names with the same text
         this.counts.set(own, count);
         const all = places.map((place, id) => (Array.isArray(place) ? { at: place, id } : place));
-        this.wanted.push({ text, places: all, colour, off, rank, inside, gap, key: `${own} ${count}`, width: widthOf(text) + 4 });
+        this.wanted.push({ text, places: all, colour, off, rank, inside, fill, gap, key: `${own} ${count}`, width: widthOf(text) + 4 });
     }
 
     // Keep names off a line of a width.
@@ -114,8 +114,9 @@ export class Names {
             found.push({ ...place, name });
         });
         for (const { leader } of found) if (leader) this.pen.line(leader, { width: 0.8, colour: this.theme.quiet });
-        for (const { box, name } of found) {
-            this.pen.text((box[0] + box[2]) / 2, (box[1] + box[3]) / 2, name.text, { colour: name.colour, size: 12, align: "center", halo: this.theme.paper });
+        for (const { box, name, spot } of found) {
+            const halo = (spot.isInside && name.fill) || this.theme.paper;
+            this.pen.text((box[0] + box[2]) / 2, (box[1] + box[3]) / 2, name.text, { colour: name.colour, size: 12, align: "center", halo });
         }
     }
 

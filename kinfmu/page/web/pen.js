@@ -1,8 +1,8 @@
 // Pens: the same drawing on a canvas or as SVG text, and the colours of both themes. All places are in pixels, y down.
 
 export const THEMES = {
-    light: { paper: "#ffffff", ink: "#1c2430", quiet: "#5b6675", grid: "#e9edf2", accent: "#0b5cad", bad: "#b3261e", pin: "#ffffff", isDark: false },
-    dark: { paper: "#12171d", ink: "#e8edf3", quiet: "#9aa7b6", grid: "#1f2730", accent: "#6cb6ff", bad: "#ff9b93", pin: "#12171d", isDark: true },
+    light: { paper: "#ffffff", ink: "#1c2430", quiet: "#5b6675", grid: "#e9edf2", accent: "#0b5cad", bad: "#b3261e", isDark: false },
+    dark: { paper: "#12171d", ink: "#e8edf3", quiet: "#9aa7b6", grid: "#1f2730", accent: "#6cb6ff", bad: "#ff9b93", isDark: true },
 };
 
 const LEAST_CONTRAST = 4.5; // of text, as WCAG AA has it
@@ -15,15 +15,20 @@ export function css([r, g, b], alpha = 1) {
     return alpha < 1 ? `rgba(${r},${g},${b},${alpha})` : `rgb(${r},${g},${b})`;
 }
 
-export function edgeOf(colour, theme) {
-    return css(theme.isDark ? mix(colour, [255, 255, 255], 0.25) : mix(colour, [0, 0, 0], 0.45));
+// The table of strokes and the roles of their colours, as kinfmu/draw/scene/strokes.py has them.
+export const LOOK = {};
+
+// Return the colour of a stroke: of a role of the table, for a thing of a colour.
+export function tint(role, colour, theme) {
+    return css(mix(colour, ...LOOK.roles[role][theme.isDark ? 1 : 0]));
 }
 
 // Return the colour of a name: that of edges, with at least the contrast that readers need on paper.
 export function inkOf(colour, theme) {
-    const [towards, paper] = theme.isDark ? [255, [18, 23, 29]] : [0, [255, 255, 255]];
-    for (let part = theme.isDark ? 0.25 : 0.45; ; part += 0.05) {
-        const mixed = mix(colour, [towards, towards, towards], Math.min(part, 1));
+    const [paper] = LOOK.roles.paper[theme.isDark ? 1 : 0];
+    const [towards, least] = LOOK.roles.edge[theme.isDark ? 1 : 0];
+    for (let part = least; ; part += 0.05) {
+        const mixed = mix(colour, towards, Math.min(part, 1));
         if (part >= 1 || contrast(mixed, paper) >= LEAST_CONTRAST) return css(mixed);
     }
 }
@@ -36,14 +41,6 @@ function contrast(a, b) {
     };
     const [x, y] = [light(a), light(b)];
     return Math.max(x, y) / Math.min(x, y);
-}
-
-export function fillOf(colour, theme) {
-    return css(theme.isDark ? mix(colour, [18, 23, 29], 0.55) : mix(colour, [255, 255, 255], 0.5));
-}
-
-export function paleOf(colour, theme) {
-    return css(theme.isDark ? mix(colour, [18, 23, 29], 0.78) : mix(colour, [255, 255, 255], 0.82));
 }
 
 export const GREY = [150, 150, 150];

@@ -75,16 +75,10 @@ def find_assembly(system: System) -> AssembledStart:
     there the pose is followed to the start of the laws. If the pose does not close, or a limit lies between, the
     mechanism is assembled at the start of the laws.
 
-    Args:
-        system: The equations of the mechanism.
+    The pose is the closed one nearest to the start values. If it is singular or nearly so, it is the most regular one
+    of it and of poses near it.
 
-    Returns:
-        The start values and the closed pose nearest to them. If that pose is singular or nearly so, the most regular
-        one of it and of poses near it.
-
-    Raises:
-        AssemblyError: The mechanism has more than MOST_DENSE coordinates and does not assemble block by block.
-
+    Raise an AssemblyError if the mechanism has more than MOST_DENSE coordinates and does not assemble block by block.
     """
     given, law = start_from_poses(system), law_targets(system)
     found = _assembled(system, given)

@@ -25,11 +25,8 @@ def ordered_blocks(meets: Sequence[Sequence[int]], column_count: int, of_drivers
     Ties go to the earlier row, so that equal input gives equal order. Written in Python, since scipy takes longer to
     import than the largest mechanism to order.
 
-    Args:
-        meets: The columns that each row meets.
-        column_count: Number of columns.
-        of_drivers: Number of rows at the end that are never to spare where a row before them could be.
-
+    meets: The columns that each row meets. of_drivers: Number of rows at the end that are never to spare where a row
+    before them could be.
     """
     row_of = _matched(meets, [*range(len(meets) - of_drivers, len(meets)), *range(len(meets) - of_drivers)])
     column_of = {row: column for column, row in row_of.items()}

@@ -36,14 +36,9 @@ def close(part: System | Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray
     Levenberg-Marquardt far away, the shortest Gauss-Newton step near a solution, so that redundant rows and singular
     points do no harm; near a dead centre, where that step goes too far, Levenberg-Marquardt again.
 
-    Args:
-        part: A system or a part of it.
-        q: Rough pose, (columns of the part,).
-        u: Driver values, (d,).
+    The residual is that beyond what the rounding of an offset leaves; above CLOSED the pose does not close.
 
-    Returns:
-        The pose and its residual beyond what the rounding of an offset leaves; above CLOSED the pose does not close.
-
+    q: Rough pose, (columns of the part,). u: Driver values, (d,).
     """
     part = Part(part) if isinstance(part, System) else part
     best, residual, jacobian = _straight(part, q, u)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
 from typing import Any
@@ -234,15 +234,16 @@ class ExactGraph(Graph):
         return self._intern(op, args, value)
 
 
-def reachable(targets: Iterable[Node]) -> list[Node]:
-    """Return the targets and all nodes they are made of, arguments first."""
+def reachable(targets: Iterable[Node], known: Container[Node] = ()) -> list[Node]:
+    """Return the targets and all nodes they are made of, arguments first; nothing that known ones are made of."""
     found: dict[int, Node] = {}
     stack = list(targets)
     while stack:
         node = stack.pop()
         if node.id not in found:
             found[node.id] = node
-            stack.extend(node.args)
+            if node not in known:
+                stack.extend(node.args)
     return [found[number] for number in sorted(found)]
 
 

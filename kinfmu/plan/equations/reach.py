@@ -32,13 +32,9 @@ def cannot_close(part: Part, u: FloatArray) -> bool:
     Known poses are those of the ground, of bodies that are not among the coordinates of the part, and of bodies pinned
     to these with an angle that is held or driven. Of a body whose angle alone is among them the origin is known.
 
-    Args:
-        part: The rows and their coordinates.
-        u: Driver values, (d,).
+    False proves nothing.
 
-    Returns:
-        True: no pose closes the rows. False proves nothing.
-
+    u: Driver values, (d,).
     """
     system = part.system
     whole, chosen = part.whole(np.zeros(len(part.columns))), set(part.rows)

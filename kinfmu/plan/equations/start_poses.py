@@ -99,10 +99,7 @@ def open_joints(system: System, q: FloatArray) -> list[OpenJoint]:
 
     Where all points are in coordinates of the world, more than the digits of a drawing counts.
 
-    Args:
-        system: The equations of the mechanism.
-        q: (n,) the start poses, as in StartValues.
-
+    q: (n,) the start poses, as in StartValues.
     """
     mechanism = system.mechanism
     complete = {body.name for body in mechanism.moving_bodies if all(value is not None for value in body.start)}

@@ -219,7 +219,7 @@ def test_rows_are_the_same_in_every_format_and_without_pyarrow(tmp_path: Path, m
         assert (other.failures, other.first_failure) == (found.failures, found.first_failure)
         assert other.statistics == found.statistics
         assert other.to_arrow().schema.equals(found.to_arrow().schema, check_metadata=True)
-        for name, column in found.columns():
+        for name, _, column in found.columns():
             assert other[name].dtype == column.dtype
             np.testing.assert_array_equal(other[name], column)
     monkeypatch.setitem(sys.modules, "pyarrow", None)

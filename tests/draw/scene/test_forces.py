@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import kinfmu
 from kinfmu.arrays import FloatArray
-from kinfmu.draw.scene import details
 from kinfmu.draw.scene import loads as symbols
+from kinfmu.draw.scene import strokes
 from kinfmu.draw.scene.forces import LONGEST, arrows
 from kinfmu.draw.scene.instant import Instant
 from kinfmu.draw.scene.loads import load_text
@@ -175,9 +175,9 @@ def scene_of(mechanism: kinfmu.Mechanism) -> Scene:
 
 def lines(found: Scene, name: str, row: int = 0) -> list[FloatArray]:
     """The lines of the symbol of a load at a sample, in the world [mm]."""
-    (shape,) = (one for one in found.shapes if one.strips and one.name == name)
+    (shape,) = (one for one in found.shapes if one.is_load and one.name == name)
     placed = shape.placed({frame: pose[row] for frame, pose in found.frames.items()})
-    return [points for _, points in details.symbol(placed, SIZE)]
+    return [points for _, points in strokes.symbol(placed, SIZE)]
 
 
 def point(found: Scene, name: str, row: int = 0) -> FloatArray:
@@ -192,7 +192,7 @@ def found() -> Scene:
 
 
 def test_every_kind_of_load_has_a_symbol(found: Scene) -> None:
-    drawn = {shape.kind: shape.name for shape in found.shapes if shape.strips}
+    drawn = {shape.kind: shape.name for shape in found.shapes if shape.is_load}
     assert drawn == {load.type: load.name for load in every_load().loads}
     assert set(drawn) == {cls.type for cls in CLASSES}
 
@@ -201,9 +201,11 @@ def test_every_kind_of_load_has_a_symbol(found: Scene) -> None:
 @pytest.mark.few(4)
 def test_a_mechanism_without_loads_has_no_symbols(name: str) -> None:
     mechanism = kinfmu.load(name)
-    shown = [shape.name for shape in scene_of(replace(mechanism, loads=())).shapes if shape.strips]
+    shown = [shape.name for shape in scene_of(replace(mechanism, loads=())).shapes if shape.is_load]
     assert shown == []
-    assert [shape.name for shape in scene_of(mechanism).shapes if shape.strips] == [one.name for one in mechanism.loads]
+    assert [shape.name for shape in scene_of(mechanism).shapes if shape.is_load] == [
+        one.name for one in mechanism.loads
+    ]
 
 
 @pytest.mark.parametrize("row", [0, 30, 77])
@@ -280,7 +282,7 @@ def test_a_load_near_a_cylinder_is_next_to_it() -> None:
     mechanism = kinfmu.load("excavator")
     assist = Spring("assist", ("ground.boom_foot", "boom.boom_eye"), 1.0, 1.0)
     shown = scene_of(replace(mechanism, loads=(assist,)))
-    (shape,) = (one for one in shown.shapes if one.strips)
+    (shape,) = (one for one in shown.shapes if one.is_load)
     assert np.abs(shape.strips[0].points[2:-2, 3]).min() >= symbols.PITCH - 6.0
 
 
@@ -292,7 +294,7 @@ def test_a_constant_force_points_where_it_acts_and_one_of_zero_is_not_drawn(foun
     assert tip[1] > point(found, "coupler.M")[1]  # it pushes from above: the mechanism is below
     mechanism = every_load()
     free = replace(mechanism, loads=(ForceAt("weight", "coupler.M"),))
-    assert [shape for shape in scene_of(free).shapes if shape.strips] == []
+    assert [shape for shape in scene_of(free).shapes if shape.is_load] == []
 
 
 def test_a_force_turns_with_the_body_of_its_axes(found: Scene) -> None:
@@ -375,7 +377,7 @@ def test_loads_of_bodies_that_a_run_does_not_hold_are_left_out() -> None:
     mechanism = every_load()
     run = kinfmu.solve(mechanism).without(["rocker.phi"])
     assert "rocker" not in poses_of(run, mechanism)[0]
-    drawn = [shape.name for shape in scene(run, mechanism).shapes if shape.strips]
+    drawn = [shape.name for shape in scene(run, mechanism).shapes if shape.is_load]
     assert drawn == ["coil", "oil", "weight", "clock"]
 
 
@@ -388,7 +390,7 @@ def test_texts_state_the_constant_force_and_what_gives_other_ones() -> None:
 def test_parts_of_a_cylinder_stay_between_its_ends() -> None:
     ends = np.array([[0.0, 0.0], [1.0, 0.0]])
     strut = Shape("gas_spring", "strut", "ground", ends, strips=symbols.gas_spring(3.0, 2.0), other="ground")
-    everything = np.vstack([points for _, points in details.symbol(strut, 0.01)])
+    everything = np.vstack([points for _, points in strokes.symbol(strut, 0.01)])
     assert (everything[:, 0] >= 0.0).all()
     assert (everything[:, 0] <= 1.0).all()
 
@@ -399,12 +401,12 @@ def test_parts_of_a_cylinder_stay_between_its_ends() -> None:
 def test_any_load_has_a_symbol_of_finite_lines(cls: type[Load], data: st.DataObject) -> None:
     mechanism = data.draw(mechanisms(cls))
     poses = {body.name: np.zeros((2, 3)) for body in mechanism.bodies}
-    drawn = [shape for shape in shapes(Instant(mechanism, poses, {})) if shape.strips]
+    drawn = [shape for shape in shapes(Instant(mechanism, poses, {})) if shape.is_load]
     (load,) = mechanism.loads
     assert [shape.name for shape in drawn] == [load.name] * (not isinstance(load, ForceAt) or bool(load.x or load.y))
     for shape in drawn:
         placed = shape.placed({frame: pose[0] for frame, pose in poses.items()})
-        assert all(np.isfinite(points).all() for _, points in details.symbol(placed, SIZE))
+        assert all(np.isfinite(points).all() for _, points in strokes.symbol(placed, SIZE))
 
 
 def test_a_run_without_numbers_has_symbols_too() -> None:
@@ -414,5 +416,5 @@ def test_a_run_without_numbers_has_symbols_too() -> None:
     )
     poses = {body: np.full((3, 3), np.nan) for body in ("ground", "crank", "coupler", "rocker")}
     poses["ground"] = np.zeros((3, 3))
-    drawn = [shape.name for shape in shapes(Instant(mechanism, poses, {"crank": 1.0})) if shape.strips]
+    drawn = [shape.name for shape in shapes(Instant(mechanism, poses, {"crank": 1.0})) if shape.is_load]
     assert drawn == ["gas"]

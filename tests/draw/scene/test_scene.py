@@ -11,7 +11,7 @@ import pytest
 
 import kinfmu
 from kinfmu.draw.overlay import MOST_CURVES, curve_colour
-from kinfmu.draw.scene import details, palette
+from kinfmu.draw.scene import palette, strokes
 from kinfmu.draw.scene.placing import recomputed, world
 from kinfmu.draw.scene.scene import Scene, drawable
 from kinfmu.draw.scene.shape import Shape, ribs, rim
@@ -195,7 +195,7 @@ def test_cylinders_span_their_points_and_hold_their_rods() -> None:
 def test_slides_have_rails_blocks_and_slots_but_no_pin_on_their_line() -> None:
     found, _ = drawn("inverted_slider_crank")
     kinds = {shape.kind for shape in found.shapes}
-    assert kinds == {"link", "rod", "block", "rail", "support"}
+    assert kinds == {"link", "rod", "block", "rail", "support", "driver"}
     assert "way" not in found.supports
     assert {shape.kind for shape in drawn("scotch_yoke")[0].shapes} >= {"rod", "slot", "block", "rail"}
 
@@ -209,55 +209,97 @@ def test_the_block_of_a_pin_on_a_line_of_the_ground_moves_with_the_pin_and_does_
     assert len(pose) == len(run)
 
 
-# -------------------------------------------------------------------------------------------------------------- details
+# ------------------------------------------------------------------------------------------------------------- strokes
 
 
 DOWN = np.array([0.0, -1.0])
 
 
 def shape(kind: str, *points: tuple[float, float], direction: np.ndarray = DOWN) -> Shape:
-    return Shape(kind, "name", "ground", np.array(points), direction=direction)
+    strips = {
+        "support": strokes.support,
+        "block": strokes.block,
+        "rack": lambda: strokes.rack(10.0, 0.1),
+    }.get(kind, lambda: strokes.rail(kind, 6.0, 0.1))()
+    return Shape(kind, "name", "ground", np.array(points), direction=direction, strips=strips)
+
+
+def lines(one: Shape, size: float = 0.1) -> dict[str, np.ndarray]:
+    """The lines of a symbol by their row in the table of strokes."""
+    return {strip.stroke: points for strip, points in strokes.symbol(one, size)}
 
 
 @pytest.mark.parametrize("size", [0.01, 0.5])
 def test_hatching_is_below_the_whole_line(size: float) -> None:
-    line = details.rail(shape("rail", (4.0, 1.0), (-2.0, 1.0)), size)  # drawn to the right or to the left
-    strokes = details.hatching(line, DOWN, size)
-    tops, ends = strokes[:, 0], strokes[:, 1]
-    np.testing.assert_allclose(tops[:, 1], line[0, 1])
+    found = lines(shape("rail", (4.0, 1.0), (-2.0, 1.0)), size)  # drawn to the right or to the left
+    tops, ends, again = found["hatch"].reshape(-1, 3, 2).swapaxes(0, 1)
+    np.testing.assert_array_equal(tops, again)
+    np.testing.assert_allclose(tops[:, 1], found["ground"][0, 1])
     assert (ends[:, 1] < tops[:, 1]).all()
-    gaps = np.diff(np.sort([*line[:, 0], *tops[:, 0]]))
+    gaps = np.diff(np.sort([*found["ground"][:, 0], *tops[:, 0]]))
     assert gaps.max() < 2.0 * np.median(gaps)
 
 
 def test_a_rail_is_as_far_from_its_line_as_its_block_is_wide() -> None:
-    line = details.rail(shape("rail", (0.0, 1.0), (5.0, 1.0)), 0.1)
-    np.testing.assert_allclose(line[:, 1], 1.0 - 0.1 * details.BLOCK_WIDTH)
-    assert np.ptp(line[:, 0]) > 5.0 + 2.0 * 0.1 * details.BLOCK
-    assert details.rail(shape("bed", (0.0, 1.0), (5.0, 1.0)), 0.1)[0, 1] < line[0, 1]
+    line = lines(shape("rail", (0.0, 1.0), (5.0, 1.0)))["ground"]
+    np.testing.assert_allclose(line[:, 1], 1.0 - 0.1 * strokes.BLOCK_WIDTH)
+    assert np.ptp(line[:, 0]) > 5.0 + 2.0 * 0.1 * strokes.BLOCK
+    assert lines(shape("bed", (0.0, 1.0), (5.0, 1.0)))["ground"][0, 1] < line[0, 1]
 
 
 @pytest.mark.parametrize("towards", [(0.0, -1.0), (1.0, 0.0), (-0.6, 0.8)])
 def test_a_support_ends_at_its_line_with_the_pin_at_its_tip(towards: tuple[float, float]) -> None:
     direction = np.array(towards)
-    triangle, line = details.support(shape("support", (2.0, 3.0), direction=direction), 0.1)
+    found = lines(shape("support", (2.0, 3.0), direction=direction))
+    triangle, line = found["support"], found["ground"]
     np.testing.assert_array_equal(triangle[0], [2.0, 3.0])
     for point in (*triangle[1:], *line):
-        assert (point - triangle[0]) @ direction == pytest.approx(0.1 * details.SUPPORT)
+        assert (point - triangle[0]) @ direction == pytest.approx(0.1 * strokes.SUPPORT)
     np.testing.assert_allclose(line.mean(axis=0), triangle[1:].mean(axis=0))
 
 
-def test_teeth_are_on_both_sides_of_the_pitch_line_and_smaller_than_their_pinion() -> None:
-    rack, radius = shape("rack", (0.0, 0.0), (10.0, 0.0)), 2.0
-    corners = details.teeth(rack, details.teeth_size(radius))
-    assert 0.0 < corners[:, 1].max() < 0.5 * radius
-    assert corners[:, 1].min() < -corners[:, 1].max()  # the back is on the side of the direction
-    assert (corners[0, 0], corners[-2, 0]) == (0.0, 10.0)
+def test_teeth_are_on_both_sides_of_the_pitch_line_and_the_back_on_that_of_the_direction() -> None:
+    corners = lines(shape("rack", (0.0, 0.0), (10.0, 0.0)))["rack"]
+    assert 0.0 < corners[:, 1].max() < -corners[:, 1].min()
+    assert np.ptp(corners[:, 0]) == pytest.approx(10.0)
 
 
 def test_a_shape_without_direction_is_reported() -> None:
     with pytest.raises(TypeError, match="a shape of kind 'link' has no direction"):
-        details.support(Shape("link", "crank", "crank", np.zeros((2, 2))), 1.0)
+        _ = Shape("link", "crank", "crank", np.zeros((2, 2))).towards
+
+
+def test_the_piston_of_a_cylinder_stays_in_its_barrel() -> None:
+    found, excavated = drawn("excavator")
+    for barrel in (one for one in found.shapes if one.kind == "barrel"):
+        (shaft,) = (one for one in found.shapes if one.kind == "shaft" and one.name == barrel.name)
+        assert [strip.stroke for strip in shaft.strips] == ["shaft", "piston"]
+        first, last = (found.frames[frame][:, :2] for frame in (barrel.frame, shaft.frame))
+        place = np.hypot(*(last - first).T) + shaft.points[0, 0]
+        assert place.min() > 0.1 * barrel.points[1, 0]
+        assert place.max() < 0.95 * barrel.points[1, 0]
+    assert len(excavated)
+
+
+def test_strokes_of_a_body_are_painted_together_its_edges_first() -> None:
+    found, _ = drawn("scotch_yoke")
+    painted = strokes.strokes_of(found.shapes, found.sizes)
+    orders = [one.stroke.order for one in painted]
+    assert orders == sorted(orders)
+    yoke = [(one.key, one.stroke.line) for one in painted if one.shape.is_bar or one.shape.kind == "link"]
+    assert {key for key, _ in yoke} <= {"plate", "arm", "link"}
+    for body in found.bodies:
+        roles = [one.stroke.line for one in painted if one.shape.frame == body and one.key in ("plate", "arm", "link")]
+        assert roles == sorted(roles)  # 'edge', then 'fill'
+    assert painted[0].colours()[0] == palette.tint(painted[0].stroke.line, painted[0].shape.colour)
+
+
+def test_every_row_of_the_table_has_roles_of_the_palette_and_widths_that_are_seen() -> None:
+    for rows in strokes.STROKES.values():
+        for row in rows:
+            assert {row.line, row.fill or row.line} <= palette.ROLES.keys()
+            assert row.width + strokes.BAR * row.of_link > 0.0
+    assert strokes.look()["strokes"].keys() == strokes.STROKES.keys()
 
 
 def test_a_placed_shape_turns_with_its_frame() -> None:

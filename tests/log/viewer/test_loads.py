@@ -126,7 +126,8 @@ def test_a_comparison_draws_the_loads_of_both_runs_in_their_colours(run: Run, tm
     assert {("a", load.name) for load in every_load().loads} | {("b", "coil")} == symbols
     (a,) = statics(tmp_path / "both.rrd", "/a/linkage/loads/coil/between", "LineStrips2D:colors")
     (b,) = statics(tmp_path / "both.rrd", "/b/linkage/loads/coil/between", "LineStrips2D:colors")
-    assert [a, b] == [red << 24 | green << 16 | blue << 8 | 255 for red, green, blue in palette.RUNS]
+    shown = [palette.tint("own", colour, is_dark=True) for colour in palette.RUNS]
+    assert [a, b] == [red << 24 | green << 16 | blue << 8 | 255 for red, green, blue in shown]
 
 
 def test_a_recording_without_loads_has_no_symbols(tmp_path: Path) -> None:

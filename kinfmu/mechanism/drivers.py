@@ -1,4 +1,7 @@
-"""Drivers: constraint rows whose target moves, one class for each quantity that can be driven."""
+"""Drivers: constraint rows whose target follows a law, one class for each quantity that can be driven.
+
+To add one, write its class and add it to `DRIVERS`.
+"""
 
 from __future__ import annotations
 
@@ -159,3 +162,12 @@ class DistanceDriver(Driver):
 
     def measured(self) -> DistanceBetween:
         return DistanceBetween(self.between)
+
+
+DRIVERS: tuple[type[Driver], ...] = (
+    AngleDriver,
+    RelativeAngleDriver,
+    CoordinateDriver,
+    SlideDriver,
+    DistanceDriver,
+)
