@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -12,6 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import kinfmu
+from kinfmu.mechanism import toml_text
 from tests.cli.conftest import Command
 
 
@@ -48,6 +51,29 @@ def test_checks_of_the_gallery_are_golden_files(
     arguments: tuple[str, ...], command: Command, golden: Callable[[str, str], None]
 ) -> None:
     golden(f"{arguments[0]}_check.txt", command("check", *arguments).stdout)
+
+
+def test_over_chooses_the_motion_that_is_measured(command: Command) -> None:
+    """A crank that swings by 30 deg to each side: the rocker's swing over the run, and over a whole turn."""
+    text = toml_text.text(kinfmu.load("crank_rocker"))
+    law = re.search(r'law = "constant_speed"\n(\w+ = .*\n)+', text)
+    assert law is not None
+    swinging = 'law = "harmonic"\nstart = "90 deg"\namplitude = "30 deg"\nfrequency = "1 Hz"\n'
+    measure = '\n[measures.swing]\ntype = "range"\nof = "rocker.phi"\n'
+    Path("swing.toml").write_text(text.replace(law[0], swinging) + measure, encoding="utf-8")
+    found = {}
+    for over in ("run", "turn"):
+        measures = json.loads(command("check", "swing.toml", "--over", over, "--json").stdout)["measures"]
+        found[over] = measures["values"][0]["value"]
+    turn = kinfmu.solve(kinfmu.load("crank_rocker"), crank_angle=np.linspace(0.0, 2.0 * math.pi, 3601))["rocker.phi"]
+    run = kinfmu.solve(kinfmu.load("crank_rocker"), crank_angle=np.radians(np.linspace(60.0, 120.0, 3601)))[
+        "rocker.phi"
+    ]
+    assert found["turn"] == pytest.approx(np.ptp(turn), rel=1e-6)
+    assert found["run"] == pytest.approx(np.ptp(run), rel=1e-6)
+    result = command("check", "swing.toml", "--over", "cycle")
+    assert result.exit_code == 2
+    assert "'cycle' is not one of 'run', 'turn'" in result.stderr
 
 
 def test_the_matrices_at_sixty_degrees_are_those_of_the_report(command: Command) -> None:

@@ -411,8 +411,12 @@ def test_the_files_of_a_fit_are_never_replaced_by_its_result(tmp_path: Path) -> 
         assert f"would replace {what}; choose another name" in done.output
         assert (tmp_path / name).read_bytes() == before
     (tmp_path / "linkage.toml").unlink()
-    done = CliRunner().invoke(main, ["fit", str(path), "-o", str(tmp_path / "fit.toml").replace("fit", "other")])
+    (tmp_path / "other.toml").write_text("kept", encoding="utf-8")
+    done = CliRunner().invoke(main, ["fit", str(path), "-o", str(tmp_path / "other.toml")])
     assert done.exit_code == 1
+    assert "linkage.toml" in done.output
+    assert len(done.output.splitlines()) == 1
+    assert (tmp_path / "other.toml").read_text(encoding="utf-8") == "kept"
     with pytest.raises(kinfmu.KinfmuError, match="fit needs a FitProblem or the path of a fit file, not int"):
         kinfmu.fit(5)  # type: ignore[arg-type]
 
