@@ -13,6 +13,7 @@ import pytest
 
 import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, PointOnLine, Revolute, Run, SlideDriver, Translational
+from kinfmu.mechanism.toml_file import parse
 from tests import oracle
 from tests.oracle import Residual, largest_error, mp
 
@@ -197,6 +198,40 @@ def test_guides_close_to_a_world_axis(guided: Callable[[float], Guided], engine:
     for axis in AXES if engine == "python" else FEW:
         one = guided(axis)
         assert_exact(one, kinfmu.solve(one.mechanism, np.linspace(0.0, 1.0, 7), engine=engine))
+
+
+TILTED = """name = "tilted"
+[parameters]
+tilt = "10 deg"
+[bodies.ground]
+points = { O = [0.35, -0.21] }
+[bodies.bar]
+points = { p = [0, 0], q = [0.7, 0] }
+start = { x = 0.55, y = -0.17, phi = "10 deg" }
+[joints]
+a = { type = "point_on_line", between = ["ground.O", "bar.p"], axis = "tilt" }
+b = { type = "point_on_line", between = ["ground.O", "bar.q"], axis = "tilt" }
+[drivers.push]
+type = "slide"
+between = ["ground.O", "bar.p"]
+axis = "tilt"
+law = "constant_speed"
+start = 0.2
+speed = 0.5
+"""
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.few(1)
+def test_the_axis_of_a_guide_may_be_a_parameter(engine: Literal["python", "native"]) -> None:
+    tilt = np.concatenate([axis + sign * np.array(OFF) for axis in np.arange(-1, 3) * math.pi / 2 for sign in (1, -1)])
+    u = np.array([0.2, 0.5, -0.3])
+    designs = kinfmu.compile(parse(TILTED), engine=engine).solve_designs({"tilt": tilt}, push_position=u)
+    assert (designs.status == 0).all()
+    found = dict(zip(designs.outputs, np.moveaxis(designs.values, 2, 0), strict=True))
+    np.testing.assert_allclose(found["bar.x"], PLACE.real + np.cos(tilt)[:, None] * u, atol=AGREEMENT)
+    np.testing.assert_allclose(found["bar.y"], PLACE.imag + np.sin(tilt)[:, None] * u, atol=AGREEMENT)
+    np.testing.assert_allclose(np.sin(found["bar.phi"] - tilt[:, None]), 0.0, atol=AGREEMENT)
 
 
 @pytest.mark.parametrize(("flavour", "fmi"), [("python", 2), ("native", 2), ("native", 3)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -123,6 +124,18 @@ def test_a_resting_body_is_followed_through_its_change_points_in_thousands_of_sa
     run = kinfmu.solve(table(pins), engine=engine, crank_angle=u)
     assert run.good.all()
     assert np.abs(run["plate.phi"]).max() < 1e-13
+
+
+@pytest.mark.parametrize(("flavour", "fmi"), [("python", 2), ("native", 2), ("native", 3)])
+@pytest.mark.parametrize("name", ["table", "parallelogram", "slide"])
+@pytest.mark.few(1)
+def test_fmus_follow_what_rests(
+    name: str, flavour: Literal["python", "native"], fmi: Literal[2, 3], tmp_path: Path
+) -> None:
+    built = kinfmu.build(MECHANISMS[name][0](), tmp_path / "rests.fmu", flavour=flavour, fmi=fmi)
+    run = kinfmu.simulate(built, stop=12.6, step=0.0371)
+    assert set(run.status.tolist()) <= {0, 1, 2}
+    assert np.abs(run["block.x" if name == "slide" else "plate.phi"]).max() < 1e-13
 
 
 @pytest.mark.parametrize("pins", [PINS, PINS[:1]])
