@@ -34,6 +34,7 @@ _MARGIN_PART = 0.15  # of the shorter side of given axes, at most
 _LEFT, _RIGHT, _BOTTOM, _TOP = 46.0, 12.0, 40.0, 28.0  # [pt] around the axes
 _EDGE = 12.0  # [pt], margin left and below without axes
 _SPACING = 3.0  # [pt] between the dots that record what is covered
+_MATTERS = 0.8  # weight of a line for names; pins have more
 TITLE_FONT = 11.0  # [pt]
 TITLE_LINE = 15.0  # [pt], from line to line
 TITLE_EDGE = 8.0  # [pt] around the title of a figure
@@ -116,7 +117,9 @@ class Sheet:
         colour, fill = one.colours()
         style = (0, one.stroke.dash) if one.stroke.dash else "solid"
         look: dict[str, Any] = {"closed": one.is_closed, "fill": fill, "style": style}
-        self.line(one.points, self.sizes.width(one.stroke) / self.point, colour, matters=1.0 * one.is_first, **look)
+        self.line(
+            one.points, self.sizes.width(one.stroke) / self.point, colour, matters=_MATTERS * one.is_first, **look
+        )
 
     def dot(self, key: str, at: FloatArray, colour: Colour = INK) -> None:
         """Paint a pin or point (2,) as its row in the table of strokes has it."""

@@ -14,7 +14,9 @@ from tests.page.engines import browser, needs_browser
 @needs_browser
 @needs_axe
 @pytest.mark.long
-@pytest.mark.skipif(not (SITE / "index.html").is_file(), reason="the site is not built; scripts/docs builds it")
+@pytest.mark.skipif(
+    not all((SITE / f"{page}.html").is_file() for page in PAGES), reason="the site is not built; scripts/docs builds it"
+)
 def test_pages_of_the_site_are_accessible(tmp_path: Path) -> None:
     with browser(tmp_path) as chromium:
         found = [f"{name}: {line}" for name, tab in opened(chromium, PAGES) for line in violations(tab)]

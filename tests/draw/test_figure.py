@@ -21,6 +21,7 @@ from kinfmu.draw import figure
 from kinfmu.draw.drawing import placed, sheet_of
 from kinfmu.draw.instant import instant, pose_note
 from kinfmu.draw.scene.shapes import shapes
+from kinfmu.draw.scene.strokes import strokes_of
 from kinfmu.errors import AssemblyError, FigureError, MissingPackageError, RequestError
 from kinfmu.mechanism import gallery, toml_file, toml_text
 from tests.gallery_members import every_member
@@ -65,15 +66,16 @@ def test_names_are_above_all_lines_and_off_the_links_bars_and_cylinders(name: st
     half = (0.5 * sheet.bar - 1.5) * point  # of a bar, whose edge a name may touch
     names = [text for text in sheet.axes.texts if text.get_transform() != sheet.axes.transAxes]
     assert min(text.get_zorder() for text in names) > max(patch.get_zorder() for patch in sheet.axes.patches)
-    for shape in placed(shown, shapes(shown)):
-        if shape.kind not in ("link", "bar", "rod", "barrel"):
-            continue
-        for a, b in pairwise(sheet.axes.transData.transform(shape.line)):
+    drawn = strokes_of(placed(shown, shapes(shown)), sheet.sizes)
+    lines = [(one.shape.name, one.points) for one in drawn if one.key in ("link", "arm", "plate") and one.is_first]
+    lines += [(shape.name, shape.line) for shape in placed(shown, shapes(shown)) if shape.kind == "barrel"]
+    for drawn_name, line in lines:
+        for a, b in pairwise(sheet.axes.transData.transform(line)):
             dots = a + np.linspace(0.0, 1.0, 300)[:, None] * (b - a)
             for text in names:
                 box = text.get_window_extent().get_points()
                 apart = np.maximum(np.maximum(box[0] - dots, dots - box[1]), 0.0)
-                assert np.hypot(*apart.T).min() > half, f"{text.get_text()} is on {shape.name}"
+                assert np.hypot(*apart.T).min() > half, f"{text.get_text()} is on {drawn_name}"
 
 
 @pytest.mark.parametrize("suffix", [".svg", ".png"])

@@ -167,6 +167,9 @@ def test_the_documentation_of_an_fmu_has_the_page(command: Command, tmp_path: Pa
     assert DATA.search(page)
     assert b'<a href="play.html">' in contents["one"].pop("documentation/index.html")
     assert b"play.html" not in contents["none"].pop("documentation/index.html")
+    for listing in ("extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml", "extra/org.kinfmu/conformance.json"):
+        assert b"documentation/play.html" in contents["one"].pop(listing)
+        assert b"documentation/play.html" not in contents["none"].pop(listing)
     assert contents["one"] == contents["none"]
 
 

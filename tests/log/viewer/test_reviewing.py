@@ -16,6 +16,7 @@ from matplotlib.image import imread
 import kinfmu
 from kinfmu.cli import main
 from kinfmu.draw.scene import palette
+from kinfmu.draw.scene.strokes import STROKES
 from kinfmu.errors import LogError, RequestError
 from kinfmu.log import LiveView, read, review, write_mcap, write_rrd
 from kinfmu.log.viewer import headless, live, reviewing
@@ -141,8 +142,9 @@ def test_a_picture_shows_the_linkage_in_its_colours_and_the_viewer_is_gone(
         size = picture.size
         pixels = np.asarray(picture.convert("RGB"), dtype=int).reshape(-1, 3)
     assert size == (1600, 900)
+    inside = STROKES["link"][-1].line
     for colour in palette.BODIES[:3]:
-        assert (np.abs(pixels - colour).max(axis=1) <= 2).sum() > 500
+        assert (np.abs(pixels - palette.tint(inside, colour, is_dark=True)).max(axis=1) <= 2).sum() > 500
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.mcap", "shot.png"]
 
 
