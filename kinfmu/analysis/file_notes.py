@@ -284,9 +284,11 @@ def _lengths(place: NumberPath, value: float, lengths: dict[NumberPath, float], 
     low, high = min(others), max(others)
     for factor, word in ((_SLIP, "a thousandth of"), (1.0 / _SLIP, "a thousand times")):
         is_apart = size * least < low if factor > 1.0 else size > high * least
-        meant = [one for one in ("m", "mm") if math.isclose(METRES[one], METRES[unit] * factor)]
+        meant = [f"{value:.12g} {one}" for one in ("m", "mm") if math.isclose(METRES[one], METRES[unit] * factor)]
+        if place[:2] == ("bodies", GROUND_NAME):  # of links, their lengths are noted
+            meant.append(f"{value * factor:.12g} {unit}")
         if is_apart and low / _NEAR <= size * factor <= high * _NEAR and meant:
             yield (
                 f"{path_text(place)}: {value:.12g} is {value:.12g} {unit}, about {word} the other lengths ({low:.6g} "
-                f"to {high:.6g} {unit}); write '{value:.12g} {meant[0]}' if intended"
+                f"to {high:.6g} {unit}); write '{meant[0]}' if intended"
             )

@@ -410,3 +410,11 @@ def test_a_length_of_a_thousandth_of_all_others_is_noted(length: str, noted: boo
         others = "the other lengths (100 to 400 mm); write '0.35 m' if intended"
         assert notes == [f"[bodies.coupler] points.Q: 0.35 is 0.35 mm, about a thousandth of {others}"]
         assert notes[0] in check(mechanism).notes
+
+
+def test_a_ground_pivot_a_thousand_times_too_far_is_noted_in_any_unit() -> None:
+    for unit, meant in (("mm", "400 mm"), ("m", "400000 mm")):
+        mechanism = parse(BARS.format(unit=unit, g=400000, a=100, b=350, c=300))
+        (note,) = unit_notes(mechanism)
+        others = f"about a thousand times the other lengths (100 to 350 {unit}); write '{meant}' if intended"
+        assert note == f"[bodies.ground] points.C: 400000 is 400000 {unit}, {others}"
