@@ -19,7 +19,7 @@ from tests.docs.follow import NOT_RUN, SHOWN, accept, files, follow, page_text, 
 from tests.docs.key_tables import with_readings
 from tests.draw.picture import differences, picture
 
-SCRIPT = (ROOT / "scripts" / "pictures").read_text(encoding="utf-8")
+SCRIPT = "".join((ROOT / path).read_text(encoding="utf-8") for path in ("scripts/pictures", "tests/docs/pictures.py"))
 MOST_WORDS = 35_000  # in docs
 MOST = 600_000  # [bytes] of a picture; pages load it
 
@@ -190,7 +190,7 @@ def test_plots_have_a_table_with_units(tmp_path: Path) -> None:
     ids=["review", "plots", "readme"],
 )
 def test_pictures_are_there_of_a_size_to_load_and_made_by_the_script(page: str, folder: str) -> None:
-    found = re.findall(r"!\[[^\]]+\]\(([\w./-]+)\)", (ROOT / page).read_text(encoding="utf-8"))
+    found = re.findall(r"(?:!\[[^\]]+\]\(|src(?:set)?=\")([\w./-]+)[)\"]", (ROOT / page).read_text(encoding="utf-8"))
     assert found
     for name in found:
         path = (ROOT / folder / name).resolve()
