@@ -37,6 +37,7 @@ _USUAL = {  # a bare number is in N/m or N s/m
     ("damping", "mm"): "N s/mm",
 }
 _EARTH = (9.7, 10.1)  # [m/s2]; what is written for the gravity of the earth
+LEAVES_RANGE = "[run] takes", "[run] at t ="  # how notes begin on a run that leaves what the mechanism can reach
 _SLIP = 1000.0  # between m and mm
 _APART = 100.0  # a length that is farther from all others is probably one in another unit
 _FREE_APART = 20.0  # the same for free lengths, which are like the distances that springs span
@@ -177,11 +178,11 @@ def run_notes(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Iterator[str]:
             ends = (values[0], values[-1])
             extent = ends if {min(values), max(values)} == set(ends) else (min(values), max(values))
             asked = " to ".join(value_text(u, mechanism.length_unit, driver.quantity.kind) for u in extent)
-            yield f"[run] takes {driver.name} from {asked}: beyond the range"
+            yield f"{LEAVES_RANGE[0]} {driver.name} from {asked}: beyond the range"
     elif len(mechanism.drivers) > 1 and len(mechanism.coordinate_names) <= _LARGE:
         times = np.linspace(mechanism.run.start, mechanism.run.stop, LOOKS)
         for event in solve(plan, times).events[:1]:
-            yield f"[run] at t = {event.t:.6g} s: {event.text}"
+            yield f"{LEAVES_RANGE[1]} {event.t:.6g} s: {event.text}"
 
 
 def beyond_range(mechanism: Mechanism) -> list[str]:

@@ -8,6 +8,7 @@ from functools import partial
 
 from kinfmu.analysis.cams import CamFindings
 from kinfmu.analysis.driver_path import degrees
+from kinfmu.analysis.file_notes import LEAVES_RANGE
 from kinfmu.analysis.findings import Findings
 from kinfmu.analysis.loading import ForceRange, LeftTable, LiftOff, UnknownContact
 from kinfmu.analysis.loops import FourBar
@@ -259,7 +260,9 @@ class _Summary:
         """Yield notes that no other verdict states, and surplus drivers that the problem does not name."""
         report = self._report
         stated = {cam.note() for cam in report.cams}
-        yield from (Verdict("note", note) for note in report.notes if note not in stated)
+        for note in report.notes:
+            if note not in stated:
+                yield Verdict("poor" if note.startswith(LEAVES_RANGE) else "note", note)
         for surplus in report.mismatch.surplus if report.mismatch else ():
             if f"[drivers.{surplus.name}]" not in str(report.problem):
                 by = f"{listed(surplus.implied_by)} and the joints" if surplus.implied_by else "the joints alone"

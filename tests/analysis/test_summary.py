@@ -53,6 +53,8 @@ def test_every_level_has_its_verdicts() -> None:
     assert levels(kinfmu.load("jansen_leg"))["poor"] == [
         "Transmission angle 8.648 deg between lower_rod and lower_rocker (40 deg from 0 and 180 deg is usual)"
     ]
+    rocking = levels(fourbar(4.0, 3.0, 3.5, 2.0))
+    assert [text.partition(" takes crank from ")[0] for text in rocking["poor"]] == ["[run]"]
     broken = levels(replace(fourbar(4, 1, 3.5, 3), drivers=()))
     assert [text.partition(":")[0] for text in broken["problem"]] == ["[drivers] mobility is 1 but there is no driver"]
     assert broken["advice"][0].startswith("drive crank: nothing drives the mechanism; leads to: mobility 1, ")
