@@ -46,6 +46,7 @@ html_js_files = [("site.js", {"defer": "defer"})]
 html_favicon = "_static/favicon.svg"
 html_show_sourcelink = False
 html_copy_source = False
+html_context = {"default_mode": "auto"}  # light or dark
 html_theme_options = {
     "navbar_align": "left",
     "header_links_before_dropdown": 6,
