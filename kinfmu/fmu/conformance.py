@@ -75,6 +75,7 @@ def record(path: Path, *, certify: bool = False) -> list[Check]:
     more = {}
     with unpacked(path) as folder:
         about = description.read(text_in(path, folder, DESCRIPTION, LARGEST_DESCRIPTION).encode(), str(path))
+        files = _digests(folder)  # before it runs: Python may leave its own files in the folder
         checks = _run(path, folder, about)
         if failed := [f"{check.name}: {check.text}" for check in checks if not check.ok]:
             raise FmuError(f"{path}: {failed[0]}")
@@ -86,7 +87,7 @@ def record(path: Path, *, certify: bool = False) -> list[Check]:
                 certificate.write(place / "it.json")
                 more[CERTIFICATE] = (place / "it.json").read_bytes()
             checks.append(Check("motion", ok=True, text=dedent(str(certificate)).strip()))
-        files = _digests(folder) | {name: sha256(data).hexdigest() for name, data in more.items()}
+        files |= {name: sha256(data).hexdigest() for name, data in more.items()}
     content = {
         "tool": about.generation_tool,
         "fmi": about.version,

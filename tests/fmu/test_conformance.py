@@ -18,7 +18,7 @@ import kinfmu
 from kinfmu.cli import main
 from kinfmu.errors import FmuError
 from kinfmu.fmu import description
-from kinfmu.fmu.conformance import CERTIFICATE, RECORD, conformance, record
+from kinfmu.fmu.conformance import CERTIFICATE, RECORD, Check, conformance, record
 from kinfmu.fmu.related import FOLDER, MANIFEST
 from tests.fmu.conftest import Build
 
@@ -148,6 +148,16 @@ def test_fmus_without_reference_results_or_record(built: Build, tmp_path: Path) 
     assert "efforts drive this FMU" in done.output
     assert "holds no record of checks" in conformance(built("fourbar", "time"))[0].text
     assert all(check.ok for check in conformance(built("fourbar", "inputs")))
+
+
+def test_what_a_run_leaves_in_the_folder_is_not_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def state(folder: Path, _: object) -> Check:
+        (folder / "resources" / "left.pyc").write_bytes(b"left")
+        return Check("state", ok=True, text="left a file")
+
+    monkeypatch.setattr("kinfmu.fmu.conformance._state", state)
+    path = kinfmu.build(kinfmu.load("crank_rocker"), tmp_path / "it.fmu", flavour="python", checks=True)
+    assert conformance(path)[0].ok
 
 
 def test_an_fmu_is_built_below_a_folder_in_which_it_cannot_be_stepped(
