@@ -208,7 +208,7 @@ def test_build_reports_a_run_beyond_the_range_as_check_does(
     (printed,) = notes(*build)
     assert printed.endswith("beyond the range")
     shown = " ".join(command("check", "mine.toml").stdout.split())
-    assert f" {printed.replace('note: ', 'note ')} " in shown
+    assert f" {printed.replace('note: ', 'poor ')} " in shown
     assert notes(*build, "--drive", "inputs") == []
     assert notes(*build, "--set", "crank.speed=0.01rad/s") == []
 
