@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -258,8 +258,12 @@ def unit_notes(mechanism: Mechanism) -> Iterator[str]:
                 f"{path_text(place)} = {value:.12g} is {understood}, although the unit of length is {unit}: write "
                 f"'{value:.12g} {meant}' if intended, else '{understood}'"
             )
+    ends = {point for joint in mechanism.joints for point in getattr(joint, "between", ())}
     yield from dict.fromkeys(
-        text for place, (value, _) in bare.items() if place in lengths for text in _lengths(place, value, lengths, unit)
+        text
+        for place, (value, _) in bare.items()
+        if place in lengths
+        for text in _lengths(place, value, lengths, unit, is_link=_is_link(place, ends))
     )  # once for the two coordinates of a point
 
 
@@ -276,7 +280,14 @@ def _gravity(mechanism: Mechanism, bare: dict[NumberPath, tuple[float, Quantity]
         )
 
 
-def _lengths(place: NumberPath, value: float, lengths: dict[NumberPath, float], unit: str) -> Iterator[str]:
+def _is_link(place: NumberPath, ends: Container[str]) -> bool:
+    """Return whether a number is the place of a joint on a moving body, whose length is noted as that of a link."""
+    return place[2:3] == ("points",) and place[1] != GROUND_NAME and f"{place[1]}.{place[3]}" in ends
+
+
+def _lengths(
+    place: NumberPath, value: float, lengths: dict[NumberPath, float], unit: str, *, is_link: bool
+) -> Iterator[str]:
     """Yield a line for a length that all others are a thousand times, or a thousandth of."""
     size, least = abs(value), _FREE_APART if place[-1] == "free_length" else _APART
     others = [other for other in lengths.values() if max(other, size) > min(other, size) * math.sqrt(least)]
@@ -286,7 +297,7 @@ def _lengths(place: NumberPath, value: float, lengths: dict[NumberPath, float], 
     for factor, word in ((_SLIP, "a thousandth of"), (1.0 / _SLIP, "a thousand times")):
         is_apart = size * least < low if factor > 1.0 else size > high * least
         meant = [f"{value:.12g} {one}" for one in ("m", "mm") if math.isclose(METRES[one], METRES[unit] * factor)]
-        if place[:2] == ("bodies", GROUND_NAME):  # of links, their lengths are noted
+        if not is_link:
             meant.append(f"{value * factor:.12g} {unit}")
         if is_apart and low / _NEAR <= size * factor <= high * _NEAR and meant:
             yield (

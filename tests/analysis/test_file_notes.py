@@ -418,3 +418,12 @@ def test_a_ground_pivot_a_thousand_times_too_far_is_noted_in_any_unit() -> None:
         (note,) = unit_notes(mechanism)
         others = f"about a thousand times the other lengths (100 to 350 {unit}); write '{meant}' if intended"
         assert note == f"[bodies.ground] points.C: 400000 is 400000 {unit}, {others}"
+
+
+def test_a_point_of_interest_a_thousand_times_too_far_is_noted() -> None:
+    text = BARS.format(unit="mm", g=400, a=100, b=350, c=300).replace(
+        "Q = [350, 0] }", "Q = [350, 0], T = [200000, 0] }"
+    )
+    (note,) = unit_notes(parse(text))
+    others = "about a thousand times the other lengths (100 to 400 mm); write '200 mm' if intended"
+    assert note == f"[bodies.coupler] points.T: 200000 is 200000 mm, {others}"
