@@ -168,6 +168,7 @@ def test_a_large_mechanism_is_answered_too() -> None:
 
 
 @pytest.mark.parametrize("name", gallery.names())
+@pytest.mark.few(8)
 def test_files_of_the_gallery_are_edited_without_another_change(name: str) -> None:
     drawing = drawing_of(name)
     longer = changed(drawing, [bar((1, 2), (3, 4)), {"do": "delete", "place": ["bodies", "link_1"]}])
@@ -179,6 +180,7 @@ def test_files_of_the_gallery_are_edited_without_another_change(name: str) -> No
 
 
 @pytest.mark.parametrize("name", gallery.names())
+@pytest.mark.few(6)
 def test_a_moved_pin_moves_all_that_is_held_there_and_no_body(name: str) -> None:
     drawing = drawing_of(name)
     pins = [point for point, group in drawing.pins.items() if len(group) > 1 and not point.startswith("ground")]
