@@ -163,8 +163,8 @@ def main() -> int:
         whole = sum(not one.gaps for one in done)
         seconds = np.median([one.seconds for one in done] or [0.0])
         print(
-            f"{family}: {len(done)} of {len(of)}, {poses} poses, {walked} walked, certified {shares.mean():.5f} of the range, "
-            f"least {shares.min():.4f}, whole {whole}, median {seconds:.2f} s"
+            f"{family}: {len(done)} of {len(of)}, {poses} poses, {walked} walked, certified {shares.mean():.5f} "
+            f"of the range, least {shares.min():.4f}, whole {whole}, median {seconds:.2f} s"
         )
         for reason in sorted({gap for one in done for gap in one.gaps}):
             print(f"    {sum(reason in one.gaps for one in done)} with: {reason}")

@@ -23,6 +23,7 @@ from kinfmu.files import errors_of_writing, write_whole
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_text import text
 from kinfmu.plan.equations.graph import Node
+from kinfmu.units import unit_of
 from kinfmu.version import VERSION
 
 FORMAT = "kinfmu certificate 1"
@@ -110,6 +111,8 @@ class Certificate:
         ]
         if not len(self.cover.cells):
             lines = [f"certified   {self.driver}: nothing"]
+        if self.tolerances is not None:
+            lines.append(f"            for all mechanisms with {self._tolerances_text()}")
         for low, high, _ in self.dead_centres:
             lines.append(
                 f"            dead centre at {self.driver} = {place_text(0.5 * (low + high), unit)}, within "
@@ -121,6 +124,17 @@ class Certificate:
                 f"{reason}"
             )
         return "\n".join(f"  {line}" for line in lines)
+
+    def _tolerances_text(self) -> str:
+        if not isinstance(self.tolerances, Mapping):
+            return f"every length within {100.0 * float(self.tolerances or 0.0):.4g} %"
+        parts = []
+        for name, size in self.tolerances.items():
+            one = self.mechanism.parameters.get(name)
+            unit = "" if one is None or one.quantity is None else unit_of(one.quantity, self.mechanism.length_unit)
+            value = "" if one is None else f" = {float(one.value):.9g} {unit}".rstrip()
+            parts.append(f"{name}{value} within {size:.4g} {unit}".rstrip())
+        return listed(parts)
 
     def as_json(self) -> dict[str, Any]:
         """The certificate as values of JSON: angles in rad, lengths in the unit of the file."""

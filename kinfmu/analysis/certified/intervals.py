@@ -340,9 +340,7 @@ def enclosed(targets: Sequence[Node], values: Mapping[str, Intervals], shape: tu
     return [at[target] for target in targets]
 
 
-def _evaluated(
-    order: Sequence[Node], values: Mapping[str, Intervals], shape: tuple[int, ...]
-) -> dict[Node, Intervals]:
+def _evaluated(order: Sequence[Node], values: Mapping[str, Intervals], shape: tuple[int, ...]) -> dict[Node, Intervals]:
     """Return enclosures of nodes, each after its arguments."""
     at: dict[Node, Intervals] = {}
     ends: dict[Node, tuple[_Pair, _Pair]] = {}

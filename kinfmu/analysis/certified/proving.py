@@ -98,6 +98,8 @@ def _varied(mechanism: Mechanism, tolerances: float | Mapping[str, float]) -> tu
                 raise RequestError(
                     f"tolerance of '{name}': not a number of this mechanism, such as {listed(list(names)[:3])}"
                 )
+            if name in mechanism.parameters and mechanism.parameters[name].expression is not None:
+                raise RequestError(f"tolerance of '{name}': it follows from other parameters; give theirs")
         return made.mechanism, {names[name]: abs(float(value)) for name, value in tolerances.items()}
     given = made.mechanism.parameters.items()
     lengths = {name: one for name, one in given if one.quantity is not None and one.quantity.kind == "length"}

@@ -166,6 +166,95 @@ def test_tolerances_are_in_outputs_that_depend_on_them_directly() -> None:
     assert certificate.bounds("rod.x").most[1] >= 30.5
 
 
+SLIDER = """
+name = "slider"
+units.length = "mm"
+parameters = { crank = "20 mm", rod = 80.0, both = "crank + rod" }
+[bodies]
+ground.points.O = [0, 0]
+crank = { points = { O = [0, 0], P = ["crank", 0] } }
+rod = { points = { P = [0, 0], Q = ["rod", 0] }, start = { x = 20, y = 0, phi = -0.1 } }
+block = { points.Q = [0, 0], start.x = 100 }
+[joints]
+O = { type = "revolute", between = ["ground.O", "crank.O"] }
+P = { type = "revolute", between = ["crank.P", "rod.P"] }
+Q = { type = "revolute", between = ["rod.Q", "block.Q"] }
+guide = { type = "translational", between = ["ground.O", "block.Q"], axis = 0.0 }
+[drivers]
+crank = { type = "angle", of = "crank", law = "constant_speed", start = 0.0, speed = 1.0 }
+"""
+STUDY = 'mechanism = "slider.toml"\n[parameters]\ncrank.tolerance = 0.05\nrod = { from = 79.5, to = "80.5 mm" }\n'
+
+
+@pytest.fixture
+def check_slider(tmp_path: Path) -> Callable[..., str]:
+    files = {"slider.toml": SLIDER, "study.toml": STUDY, "grid.toml": STUDY.replace("tolerance = 0.05", "values = [1]")}
+    for name, written in files.items():
+        (tmp_path / name).write_text(written)
+
+    def check(*arguments: str) -> str:
+        paths = [str(tmp_path / argument) if argument in files else argument for argument in arguments]
+        return CliRunner().invoke(main, ["check", str(tmp_path / "slider.toml"), *paths]).output
+
+    return check
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--set", "crank=20mm\N{PLUS-MINUS SIGN}0.05mm", "--set", "rod=80\N{PLUS-MINUS SIGN}0.625%"),
+        ("--set", "crank=20+-0.05mm", "--set", "rod=80 mm +/- 0.5"),
+        ("--tolerances", "study.toml"),
+    ],
+)
+def test_tolerances_of_the_command_line_make_one_certificate(
+    options: tuple[str, ...], check_slider: Callable[..., str], tmp_path: Path
+) -> None:
+    shown = check_slider("--certify", *options, "--certificate", str(tmp_path / "proof.json"))
+    assert "for all mechanisms with crank = 20 mm within 0.05 mm, rod = 80 mm within 0.5 mm" in shown
+    certificate = proved_again(tmp_path / "proof.json")
+    assert certificate.turns == 1
+    u = np.linspace(0.0, math.tau, 50)
+    low, high = certificate.enclosed("block.x", u)
+    for crank, rod in ((19.95, 79.5), (20.05, 80.5), (20.0, 80.0)):
+        x = crank * np.cos(u) + np.sqrt(rod**2 - (crank * np.sin(u)) ** 2)
+        assert ((low <= x + 1e-12) & (x - 1e-12 <= high)).all()
+    assert (high - low).max() < 1.2
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (
+            ("--set", "crank=20+-0.05"),
+            "--set: crank=20+-0.05: a tolerance belongs to a certificate; use check --certify",
+        ),
+        (("--tolerances", "study.toml"), "--tolerances needs --certify"),
+        (("--certify", "--set", "crank=20+--1"), "--set: crank=20+--1: the tolerance must be positive"),
+        (("--certify", "--set", "crank=20+-1deg"), "crank = '1deg': unit 'deg' must be one of m, mm"),
+        (("--certify", "--set", "crank=20+-x%"), "--set: crank=20+-x%: crank = 'x' must be a number"),
+        (
+            ("--certify", "--set", "crnk=20+-1"),
+            "--set: crnk=20+-1: there is no parameter 'crnk'; did you mean 'crank'?",
+        ),
+        (
+            ("--certify", "--set", "crank.speed=1+-1"),
+            "crank.speed: a constant of a law has no tolerance; parameters have",
+        ),
+        (("--certify", "--tolerances", "grid.toml"), "only tolerances and ranges of parameters have a certificate"),
+    ],
+)
+def test_tolerances_of_the_command_line_are_checked(
+    options: tuple[str, ...], message: str, check_slider: Callable[..., str]
+) -> None:
+    assert message in check_slider(*options)
+
+
+def test_what_follows_from_parameters_has_no_tolerance_of_its_own() -> None:
+    with pytest.raises(RequestError, match="tolerance of 'both': it follows from other parameters; give theirs"):
+        kinfmu.certify(parse(SLIDER), tolerances={"both": 0.1})
+
+
 def test_a_ratio_that_is_rounded_in_the_file_does_not_repeat() -> None:
     written = text(load("geared_five_bar"))
     assert "ratio = -2.0" in written
