@@ -66,6 +66,7 @@ class Certificate:
         dead_centres: Ends of the range that are proved.
         gaps: What is not proved.
         prover: What has proved the cells.
+        redundant: Bounds of the redundant rows by name, relative to the size: how far they close at most.
         tolerances: As given to `certify`.
 
     """
@@ -79,6 +80,7 @@ class Certificate:
     dead_centres: tuple[DeadCentre, ...]
     gaps: tuple[Gap, ...]
     prover: Prover
+    redundant: Mapping[str, float]
     tolerances: float | Mapping[str, float] | None = None
 
     @property
@@ -103,14 +105,18 @@ class Certificate:
         if self.driver != "time":
             kind = self.mechanism.drivers[0].quantity.kind
             unit = "rad" if kind == "angle" else self.mechanism.length_unit
+        apart = f"no other pose is within {self.tube:.2g} rad or sizes, " if math.isfinite(self.tube) else ""
         turns = f"; the poses come back after {_turns_text(self.turns)}" if self.turns else ""
         lines = [
             f"certified   {self.driver} from {place_text(self.low, unit)} to {place_text(self.high, unit)}, "
-            f"{100.0 * self.share:.9g} % of it in {len(self.cover.cells)} cells: the loops close, no other pose is "
-            f"within {self.tube:.2g} rad or sizes, no block is singular{turns}"
+            f"{100.0 * self.share:.9g} % of it in {len(self.cover.cells)} cells: the loops close, "
+            f"{apart}no block is singular{turns}"
         ]
         if not len(self.cover.cells):
             lines = [f"certified   {self.driver}: nothing"]
+        if self.redundant:
+            bounds_text = listed(f"{name} within {limit:.1g}" for name, limit in self.redundant.items())
+            lines.append(f"            redundant rows close, relative to the size: {bounds_text}")
         if self.tolerances is not None:
             lines.append(f"            for all mechanisms with {self._tolerances_text()}")
         for low, high, _ in self.dead_centres:
@@ -148,6 +154,7 @@ class Certificate:
             "share": self.share,
             "tube": self.tube if math.isfinite(self.tube) else None,
             "cells": len(self.cover.cells),
+            "redundant_rows": dict(self.redundant),
             "dead_centres": [centre._asdict() for centre in self.dead_centres],
             "not_proved": [gap._asdict() for gap in self.gaps],
         }

@@ -48,6 +48,11 @@ class BlockFormulas:
         """How many unknowns it has."""
         return len(self.names)
 
+    @property
+    def is_tall(self) -> bool:
+        """True if it has redundant rows."""
+        return len(self.rows[0]) > len(self.names)
+
 
 class PlanRows:
     """The rows of a plan on one graph; coordinates that rows give outright are replaced by their formulas.
@@ -110,6 +115,7 @@ class Formulas(PlanRows):
         constants: Values of the constants.
         blocks: Blocks with unknowns.
         outputs: Each output with its first two derivatives.
+        redundant: Redundant rows by name, relative to the size: of blocks that have some, all rows.
 
     """
 
@@ -132,6 +138,10 @@ class Formulas(PlanRows):
         self.unknowns: tuple[str, ...] = plan.unknowns
         self.units = tuple(1.0 if name.is_angle else plan.size for name in plan.unknowns)
         self.blocks = tuple(self._block(block.unknowns, place, rows) for block, place, rows in self.solved())
+        self.redundant = dict(zip(plan.watch_names, self.inlined([node for _, node in plan.watches]), strict=True))
+        for block, formulas in zip((block for block in plan.blocks if block.unknowns), self.blocks, strict=True):
+            if formulas.is_tall:
+                self.redundant |= zip(block.row_names, formulas.rows[0], strict=True)
         self.outputs = tuple(self.along(self.inlined([motion.position for motion in plan.outputs_motion]), 2))
 
     def turned(self, number: int, direction: Sequence[float], at: Sequence[float]) -> Formulas:

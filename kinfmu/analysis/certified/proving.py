@@ -8,9 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from kinfmu.analysis.certified.bounds import closing
 from kinfmu.analysis.certified.cells import Prover
 from kinfmu.analysis.certified.certificate import Certificate, DeadCentre, Gap
-from kinfmu.analysis.certified.cover import Cover, Guess, cover
+from kinfmu.analysis.certified.cover import Cover, Guess, cover, joined
 from kinfmu.analysis.certified.dead_centre import dead_centre
 from kinfmu.analysis.certified.formulas import Formulas
 from kinfmu.analysis.certified.intervals import Intervals, around
@@ -24,6 +25,7 @@ from kinfmu.mechanism.opened import opened
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.solver.python import Pose, Solver
+from kinfmu.solver.python.solver import TOLERANCE
 
 WIDTH = 0.1  # [rad, sizes] of the driver; of the first cells
 LEAST = 1e-9  # [rad, sizes]; narrower cells are given up
@@ -75,10 +77,11 @@ def prepared(
     mechanism = replace(mechanism, coordinates="all")
     made, varied = (mechanism, {}) if tolerances is None else _varied(mechanism, tolerances)
     plan = compile_plan(made)
-    if varied and plan.watches:
+    redundant = [*plan.watch_names, *(row for block in plan.blocks for row in block.row_names[len(block.unknowns) :])]
+    if varied and redundant:
         raise RequestError(
-            f"redundant rows ({listed(plan.watch_names)}) close for the numbers of the file only: there is no "
-            "certificate of tolerances"
+            f"redundant rows ({listed(redundant)}) close for the numbers of the file only: there is no certificate of "
+            "tolerances"
         )
     box: dict[str, Intervals] = {
         parameter_symbol(one.name): around(np.array(one.value), np.array(varied[one.name]))
@@ -108,7 +111,7 @@ def _varied(mechanism: Mechanism, tolerances: float | Mapping[str, float]) -> tu
 
 def _over_range(path: DriverPath, width: float, box: Mapping[str, Intervals]) -> Certificate:
     plan = path.plan
-    prover = Prover(formulas_of(plan, varied=box), box)
+    prover = Prover(Formulas(plan, varied=box), box)
     unit = 1.0 if path.kind == "angle" else plan.size
     low = path.low.u[0] if path.low else path.poses[0].u[0]
     high = path.high.u[0] if path.high else path.poses[-1].u[0]
@@ -123,7 +126,8 @@ def of_range(path: DriverPath, prover: Prover, found: Cover) -> Certificate:
     unit = 1.0 if path.kind == "angle" else path.plan.size
     low = path.low.u[0] if path.low else path.poses[0].u[0]
     high = path.high.u[0] if path.high else path.poses[-1].u[0]
-    centres, reasons = [], []
+    found, limits, reasons = with_redundant_rows(prover, found)
+    centres = []
     for limit, is_high in ((path.low, False), (path.high, True)):
         if limit is None:
             continue
@@ -136,12 +140,14 @@ def of_range(path: DriverPath, prover: Prover, found: Cover) -> Certificate:
         low, high = (low, centre.high) if centre.is_high else (centre.low, high)
     gaps = _gaps(found, low, high, centres, reasons, _MEET * unit)
     turns = path.turns if path.turns is not None and not gaps and _closes(prover, found, path.turns) else None
-    return Certificate(path.plan.mechanism, path.name, low, high, turns, found, tuple(centres), tuple(gaps), prover)
+    return Certificate(
+        path.plan.mechanism, path.name, low, high, turns, found, tuple(centres), tuple(gaps), prover, limits
+    )
 
 
 def _over_run(plan: SolvePlan, box: Mapping[str, Intervals]) -> Certificate:
     run = plan.mechanism.run
-    prover = Prover(formulas_of(plan, over_time=True, varied=box), box)
+    prover = Prover(Formulas(plan, over_time=True, varied=box), box)
     edges = np.unique([*np.arange(run.start, run.stop, run.step), run.stop, *_jumps(plan, run.start, run.stop)])
     solver, poses, values = poses_at(plan, edges)
     found = cover(prover, edges, _guess(solver, poses, values), LEAST * (run.stop - run.start))
@@ -151,8 +157,9 @@ def _over_run(plan: SolvePlan, box: Mapping[str, Intervals]) -> Certificate:
 def of_run(plan: SolvePlan, prover: Prover, found: Cover) -> Certificate:
     """Return the certificate of a run: with what the cells leave unproved."""
     start, stop = float(plan.mechanism.run.start), float(plan.mechanism.run.stop)
-    gaps = _gaps(found, start, stop, [], [], 0.0)
-    return Certificate(plan.mechanism, "time", start, stop, None, found, (), tuple(gaps), prover)
+    found, limits, reasons = with_redundant_rows(prover, found)
+    gaps = _gaps(found, start, stop, [], reasons, 0.0)
+    return Certificate(plan.mechanism, "time", start, stop, None, found, (), tuple(gaps), prover, limits)
 
 
 Values = Callable[[float], tuple[float, ...]]  # of the drivers
@@ -180,14 +187,20 @@ def of_branch(found: Cover, poses: Mapping[float, Pose]) -> Cover:
     return found.with_poses(np.array(list(known)), np.array([pose.z for pose in known.values()]).T)
 
 
-def formulas_of(plan: SolvePlan, *, over_time: bool = False, varied: Collection[str] = ()) -> Formulas:
-    for block in plan.blocks:
-        if len(block.residuals) > len(block.unknowns):
-            raise RequestError(
-                f"{listed(block.unknowns)}: solved with redundant rows ({listed(block.row_names)}); such blocks cannot "
-                "be certified yet"
-            )
-    return Formulas(plan, over_time=over_time, varied=varied)
+def with_redundant_rows(prover: Prover, found: Cover) -> tuple[Cover, dict[str, float], list[tuple[float, str]]]:
+    """Return the cells in which all redundant rows close, bounds of these rows, and where one does not close."""
+    rows = prover.formulas.redundant
+    if not rows:
+        return found, {}, []
+    limits, is_open = closing(prover, found.cells, found.tubes, [*rows.values()], TOLERANCE)
+    reasons = [
+        (float(u), f"the redundant row {name} does not close")
+        for name, where in zip(rows, is_open, strict=True)
+        for u in found.cells.u[where]
+    ]
+    kept = ~is_open.any(axis=0)
+    found = found if kept.all() else joined([(found.cells[kept], found.tubes[kept])])
+    return found, dict(zip(rows, limits.tolist(), strict=True)), reasons
 
 
 def _jumps(plan: SolvePlan, start: float, stop: float) -> list[float]:

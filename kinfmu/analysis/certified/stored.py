@@ -12,8 +12,8 @@ import numpy as np
 from kinfmu.analysis.certified.cells import Cells, Prover
 from kinfmu.analysis.certified.certificate import FORMAT, Certificate
 from kinfmu.analysis.certified.cover import joined
+from kinfmu.analysis.certified.formulas import Formulas
 from kinfmu.analysis.certified.proving import (
-    formulas_of,
     of_branch,
     of_range,
     of_run,
@@ -53,7 +53,7 @@ def proved_again(path: str | Path) -> Certificate:
     plan, box = prepared(mechanism, over, tolerances)
     path_of_driver = follow(plan, 0) if over == "range" else None
     plan = path_of_driver.plan if path_of_driver else plan
-    prover = Prover(formulas_of(plan, over_time=over == "run", varied=box), box)
+    prover = Prover(Formulas(plan, over_time=over == "run", varied=box), box)
     count, n = len(arrays["u"]), len(prover.formulas.unknowns)
     shapes = {"low": (count,), "high": (count,), "u": (count,), "path": (3, n, count)}
     shapes["radii"] = (len(prover.formulas.blocks), count)

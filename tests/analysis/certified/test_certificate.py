@@ -14,14 +14,16 @@ import pytest
 from click.testing import CliRunner
 
 import kinfmu
-from kinfmu import Certificate
+from kinfmu import AngleDriver, Body, Certificate, ConstantSpeed, Mechanism, Revolute
 from kinfmu.analysis.certified import cells
 from kinfmu.analysis.certified.cover import Cover
+from kinfmu.analysis.certified.formulas import Formulas
 from kinfmu.analysis.certified.intervals import Intervals
 from kinfmu.analysis.certified.stored import proved_again
 from kinfmu.cli import main
 from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.mechanism.gallery import load, names
+from kinfmu.mechanism.joints import Distance
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text
 from tests import oracle
@@ -264,6 +266,46 @@ def test_a_ratio_that_is_rounded_in_the_file_does_not_repeat() -> None:
 def test_redundant_rows_have_no_certificate_of_tolerances() -> None:
     with pytest.raises(RequestError, match=r"redundant rows \(third\.across\) close for the numbers of the file only"):
         kinfmu.certify(load("elliptic_trammel"), tolerances=0.001)
+
+
+def coupled_wheels() -> Mechanism:
+    """Two wheels coupled by two rods a quarter turn apart: each keeps the block regular where the other cannot."""
+    pins = {"A": (1.0, 0.0), "B": (0.0, 1.0)}
+    ground = Body("ground", {"O0": (0, 0), "O1": (3.0, 0)})
+    wheels = [Body(f"wheel{k}", {"O": (0, 0), **pins}, (3.0 * k, 0, 0.3)) for k in range(2)]
+    joints = [Revolute(f"O{k}", (f"ground.O{k}", f"wheel{k}.O")) for k in range(2)]
+    joints += [Distance(name, (f"wheel0.{name}", f"wheel1.{name}"), 3.0) for name in pins]
+    return Mechanism("wheels", [ground, *wheels], joints, [AngleDriver("drive", "wheel0", ConstantSpeed(0.3, 1.0))])
+
+
+def test_blocks_with_redundant_rows_are_proved_and_the_rows_bounded(tmp_path: Path) -> None:
+    certificate = kinfmu.certify(coupled_wheels())
+    assert any(block.is_tall for block in certificate.prover.formulas.blocks)
+    assert certificate.turns == 1
+    assert certificate.is_complete
+    assert set(certificate.redundant) == {"A", "B"} or len(certificate.redundant) == 2
+    assert max(certificate.redundant.values()) <= 1e-9
+    u = np.linspace(0.3, 0.3 + math.tau, 50)
+    low, high = certificate.enclosed("wheel1.phi", u)
+    assert ((low <= u) & (u <= high)).all()
+    assert "redundant rows close, relative to the size: " in str(certificate)
+    certificate.write(tmp_path / "proof.json")
+    assert proved_again(tmp_path / "proof.json").is_complete
+
+
+def test_a_redundant_row_that_does_not_close_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = Formulas.__init__
+
+    def with_a_wrong_row(self: Formulas, *arguments: Any, **options: Any) -> None:
+        made(self, *arguments, **options)
+        angle = self.outputs[list(self.plan.outputs).index("rocker.phi")][0]
+        self.redundant = {"wrong": angle - self.graph.constant(2.0)}
+
+    monkeypatch.setattr(Formulas, "__init__", with_a_wrong_row)
+    certificate = kinfmu.certify(load("crank_rocker"))
+    assert {gap.reason for gap in certificate.gaps} == {"the redundant row wrong does not close"}
+    assert certificate.share < 0.2
+    assert certificate.turns is None
 
 
 def test_outputs_of_a_range_that_ends_at_a_dead_centre_are_not_bounded() -> None:
