@@ -24,6 +24,7 @@ from tests.stress.trial import trial
 FAMILIES = ("four-bars", "slider-cranks", "pins in slots", "watt six-bars", "stephenson six-bars", "geared five-bars")
 FAMILIES += ("led by laws",)  # cams with dwells
 SAMPLES = 200  # of each mechanism, in 50 digits
+LEAST_SHARE = 0.99  # of the range of a branch; mechanisms with less are listed
 WALKED = 1e-9  # of the size: the same for places of the walk in long doubles, some of them 1e-13 from singular poses
 ROUNDED = 1e-11  # of the size: lengths are given as doubles, which poses near singular ones amplify
 
@@ -175,6 +176,8 @@ def main() -> int:
         for reason in sorted({one.refused.partition(":")[2][:60] for one in of if one.refused}):
             print(f"    refused: {reason}")
     for one in found:
+        if not one.refused and one.share < LEAST_SHARE:
+            print(f"seed {one.seed}, {one.family}: certified {one.share:.4f} of the range; {', '.join(one.gaps)}")
         for fault in one.faults[:2]:
             print(f"seed {one.seed}, {one.family}: {fault}")
     faulty = sum(bool(one.faults) for one in found)

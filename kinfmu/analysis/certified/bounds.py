@@ -69,9 +69,7 @@ def _most(quantity: EnclosedQuantity, cells: Cells, tubes: Tubes, sign: float) -
         cells, tubes = parts, part_tubes
 
 
-def closing(
-    prover: Prover, cells: Cells, tubes: Tubes, nodes: Sequence[Node], enough: float
-) -> tuple[FloatArray, Any]:
+def closing(prover: Prover, cells: Cells, tubes: Tubes, nodes: Sequence[Node], enough: float) -> tuple[FloatArray, Any]:
     """Return bounds of the absolute values of rows, and where a row is more than `enough`, (rows, cells).
 
     Parts of cells are halved and proved again until all rows are at most `enough` there.

@@ -217,6 +217,18 @@ class Prover:
             proved, wide, narrow, rates, accelerations, np.reshape(contractions, shape), np.reshape(signs, shape)
         )
 
+    def most_along(self, cells: Cells) -> float:
+        """Return a bound of all residuals along predicted paths, relative to the size."""
+        found, blocks = 0.0, (block for block in self.formulas.plan.blocks if block.unknowns)
+        still = Intervals(*np.zeros((2, len(self.formulas.unknowns), len(cells))))
+        with np.errstate(all="ignore"):
+            thin, broad, _ = self.enclosures(cells)
+            for block, formulas in zip(blocks, self.formulas.blocks, strict=True):
+                rows = self._rest(cells, formulas, thin, broad, still)
+                for row, scale in zip(rows, block.row_scales, strict=True):
+                    found = max(found, float(row.magnitude.max()) / scale)
+        return found
+
     def closer(self, cells: Cells, tubes: Tubes, s: Intervals) -> Tubes:
         """Return the tubes with closer enclosures of rates and accelerations at driver values s from the centres."""
         count, n = len(cells), len(self.formulas.unknowns)

@@ -110,6 +110,7 @@ class Formulas(PlanRows):
 
     Attributes:
         x: Name of x.
+        unit_of_x: 1 rad, the mechanism's size, or 1 s.
         unknowns: Names of all unknowns, block after block.
         units: 1 rad or the mechanism's size for each of them.
         constants: Values of the constants.
@@ -125,12 +126,13 @@ class Formulas(PlanRows):
         self.constants = dict(plan.parameter_values)
         self._rates: dict[Node, Node] = {}
         if over_time:
-            self.x = TIME
+            self.x, self.unit_of_x = TIME, 1.0
             self.constants |= {constant.name: constant.value for constant in plan.law_constants}
             for driver, law in zip(plan.drivers, plan.laws, strict=True):
                 (self._given[driver.inputs[0]],) = self.inlined([law.position])
         else:
             self.x = plan.drivers[0].inputs[0]
+            self.unit_of_x = 1.0 if plan.drivers[0].quantity.kind == "angle" else plan.size
         self._rates[self.graph.symbol(self.x)] = self.graph.constant(1.0)
         self.names: dict[str, tuple[str, str]] = {}
         for name in plan.unknowns:
@@ -165,8 +167,7 @@ class Formulas(PlanRows):
         found._move(*driver)
         places = [k for block in blocks for k in range(block.place, block.place + block.size)]
         found.unknowns = (driver[0], *(self.unknowns[k] for k in places))
-        angle = self.plan.drivers[0].quantity.kind == "angle"
-        found.units = (1.0 if angle else self.plan.size, *(self.units[k] for k in places))
+        found.units = (self.unit_of_x, *(self.units[k] for k in places))
         rows = [*(node for block in blocks for node in block.rows[0]), row]
         found.blocks = (found._block(found.unknowns, 0, rows),)
         found.outputs = ()
