@@ -15,6 +15,7 @@ import numpy as np
 
 from kinfmu.analysis.certified.certificate import Certificate
 from kinfmu.analysis.certified.proving import certify
+from kinfmu.analysis.driver_path import SIZES
 from kinfmu.errors import KinfmuError
 from tests.stress.branch import INSIDE, OUTSIDE, TURN, Expected, Floats, Interval
 from tests.stress.comparisons import all_compared, command_line
@@ -75,6 +76,9 @@ def _share(branch: Interval, certificate: Certificate) -> float:
     high = branch.high if branch.high_is_limit else certificate.high
     if not branch.is_free:
         low, high = max(low, branch.low), min(high, branch.high)
+    if branch.drawn.sketch.kinds == ("length",):
+        start, reach = branch.drawn.start[0], SIZES * certificate.prover.formulas.plan.size
+        low, high = max(low, start - reach), min(high, start + reach)
     inside = np.minimum(cells.high, high) - np.maximum(cells.low, low)
     return float(np.maximum(inside, 0.0).sum()) / (high - low)
 

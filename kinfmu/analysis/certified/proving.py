@@ -131,21 +131,32 @@ def of_range(path: DriverPath, prover: Prover, found: Cover) -> Certificate:
     low = path.low.u[0] if path.low else path.poses[0].u[0]
     high = path.high.u[0] if path.high else path.poses[-1].u[0]
     found, limits, reasons = with_redundant_rows(prover, found)
-    centres = []
+    centres, ends = [], []
     for limit, is_high in ((path.low, False), (path.high, True)):
         if limit is None:
             continue
         centre = dead_centre(prover, found, limit, is_high=is_high)
-        if isinstance(centre, DeadCentre):
-            centres.append(centre)
-        else:
+        if isinstance(centre, str):
             reasons.append((limit.u[0], centre))
+        else:
+            centres.append(centre[0])
+            ends.append(centre[1])
     for centre in centres:
         low, high = (low, centre.high) if centre.is_high else (centre.low, high)
     gaps = _gaps(prover, found, low, high, centres, reasons, _MEET * unit)
     turns = path.turns if path.turns is not None and not gaps and _closes(prover, found, path.turns) else None
     return Certificate(
-        path.plan.mechanism, path.name, low, high, turns, found, tuple(centres), tuple(gaps), prover, limits
+        path.plan.mechanism,
+        path.name,
+        low,
+        high,
+        turns,
+        found,
+        tuple(centres),
+        tuple(gaps),
+        prover,
+        limits,
+        tuple(ends),
     )
 
 

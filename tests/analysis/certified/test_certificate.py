@@ -6,6 +6,7 @@ import json
 import math
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from click.testing import CliRunner
 
 import kinfmu
 from kinfmu import AngleDriver, Body, Certificate, ConstantSpeed, Mechanism, Revolute
-from kinfmu.analysis.certified import cells
+from kinfmu.analysis.certified import cells, intervals
 from kinfmu.analysis.certified.cover import Cover, joined
 from kinfmu.analysis.certified.formulas import Formulas
 from kinfmu.analysis.certified.intervals import Intervals
@@ -25,9 +26,11 @@ from kinfmu.cli import main
 from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.mechanism.gallery import load, names
 from kinfmu.mechanism.joints import Distance
+from kinfmu.mechanism.measures.transfer import TransmissionAngle
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text
 from tests import oracle
+from tests.analysis.certified import test_intervals
 from tests.gallery_members import mostly_long
 from tests.mechanisms import fourbar
 
@@ -137,15 +140,62 @@ def test_the_other_branch_after_a_change_point_is_not_joined() -> None:
     assert path_across(same.prover, mixed, 1) == "the direction after it is not shown to be that before it"
 
 
+def without_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("_down", "_up"):
+        monkeypatch.setattr(intervals, name, lambda x: x)
+
+
+def with_a_wrong_sign(monkeypatch: pytest.MonkeyPatch) -> None:
+    right = cells._times
+    monkeypatch.setattr(cells, "_times", lambda y, rows: [-row for row in right(y, rows)])
+
+
+def with_a_cell_skipped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave a cell out, and state that its neighbours are joined."""
+    whole = Cover.with_poses
+
+    def without_one(self: Cover, x: np.ndarray, z: np.ndarray) -> Cover:
+        found = whole(self, x, z)
+        kept = np.arange(len(found.cells)) != 30
+        return Cover(found.cells[kept], found.tubes[kept], np.delete(found.is_joined, 30))
+
+    monkeypatch.setattr(Cover, "with_poses", without_one)
+
+
+def rounding_is_outward() -> None:
+    test_intervals.test_operations_of_two_intervals_enclose_100_digits("+")
+
+
+def the_crank_rocker_is_enclosed_all_around() -> None:
+    certificate = kinfmu.certify(load("crank_rocker"))
+    test_enclosures_hold_the_poses_in_50_digits(certificate)
+    assert certificate.cover.cells.low[1:].tolist() == certificate.cover.cells.high[:-1].tolist()
+
+
+@pytest.mark.parametrize(
+    ("mutate", "check"),
+    [
+        (without_rounding, rounding_is_outward),
+        (with_a_wrong_sign, the_crank_rocker_is_enclosed_all_around),
+        (with_a_cell_skipped, the_crank_rocker_is_enclosed_all_around),
+    ],
+)
+def test_a_mutation_is_found(
+    mutate: Callable[[pytest.MonkeyPatch], None], check: Callable[[], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    check()
+    mutate(monkeypatch)
+    with pytest.raises(AssertionError):
+        check()
+
+
 def test_a_skipped_cell_is_named(crank_rocker: Certificate, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = Cover.with_poses
 
     def without_one(self: Cover, x: np.ndarray, z: np.ndarray) -> Cover:
         found = whole(self, x, z)
         kept = np.arange(len(found.cells)) != 30
-        return Cover(
-            found.cells[kept], found.tubes[kept], np.delete(found.is_joined, 30) & (np.arange(len(kept) - 2) != 29)
-        )
+        return joined([(found.cells[kept], found.tubes[kept])])
 
     monkeypatch.setattr(Cover, "with_poses", without_one)
     certificate = kinfmu.certify(load("crank_rocker"))
@@ -154,12 +204,29 @@ def test_a_skipped_cell_is_named(crank_rocker: Certificate, monkeypatch: pytest.
     assert crank_rocker.is_complete
 
 
-def test_with_a_wrong_sign_nothing_is_enclosed(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = cells._times
-    monkeypatch.setattr(cells, "_times", lambda y, rows: [-row for row in right(y, rows)])
-    certificate = kinfmu.certify(load("crank_rocker"))
-    with pytest.raises(AssertionError):
-        test_enclosures_hold_the_poses_in_50_digits(certificate)
+@pytest.mark.parametrize("seed", range(5))
+def test_bounds_of_20_measures_enclose_the_extremes_in_50_digits(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    ground, crank, coupler, rocker = (4.0, float(random.uniform(0.5, 1.9)), *random.uniform(2.6, 3.6, 2).tolist())
+    bars = TransmissionAngle("mu", ("coupler.Q", "coupler.P"), ("rocker.Q", "rocker.C"))
+    certificate = kinfmu.certify(replace(fourbar(ground, crank, coupler, rocker), measures=(bars,)))
+    assert certificate.turns == 1
+    g, a, b, c = map(oracle.mp.mpf, (ground, crank, coupler, rocker))
+
+    def angle(x: Any, y: Any, opposite: Any) -> Any:
+        return oracle.mp.acos((x * x + y * y - opposite * opposite) / (2 * x * y))
+
+    exact = {
+        "rocker.phi": sorted(oracle.mp.pi - angle(g, c, b + side * a) for side in (-1, 1)),
+        "mu": [angle(b, c, g + side * a) for side in (-1, 1)],
+    }
+    for name, extremes in exact.items():
+        found = certificate.bounds(name)
+        for extreme, (low, high) in zip(extremes, found, strict=True):
+            assert low <= extreme <= high, name
+            assert high - low < 1e-3
+    with pytest.raises(RequestError, match="'mu' is an angle of transmission, whose rates are not bounded"):
+        certificate.bounds("mu", order=1)
 
 
 def test_a_certificate_of_tolerances_holds_for_every_corner() -> None:
@@ -327,9 +394,16 @@ def test_a_redundant_row_that_does_not_close_is_named(monkeypatch: pytest.Monkey
     assert certificate.turns is None
 
 
-def test_outputs_of_a_range_that_ends_at_a_dead_centre_are_not_bounded() -> None:
-    with pytest.raises(RequestError, match="ends at a dead centre, up to which outputs are not bounded"):
-        kinfmu.certify(load("triple_rocker")).bounds("left.phi")
+def test_outputs_of_a_range_that_ends_at_dead_centres_are_bounded() -> None:
+    certificate = kinfmu.certify(load("triple_rocker"))
+    ground, left, coupler, right = 100, 65, 50, 65
+    diagonal = oracle.mp.mpf(coupler + right)  # where both are in line
+    swing = oracle.mp.acos((ground**2 + left**2 - diagonal**2) / (2 * oracle.mp.mpf(ground * left)))
+    for ends, exact in zip(certificate.bounds("left.phi"), (-swing, swing), strict=True):
+        assert ends[0] <= exact <= ends[1]
+        assert ends[1] - ends[0] < 1e-4
+    with pytest.raises(RequestError, match="ends at a dead centre, up to which rates grow without bound"):
+        certificate.bounds("right.phi", order=1)
 
 
 def test_over_and_outputs_are_checked(crank_rocker: Certificate) -> None:
