@@ -61,7 +61,7 @@ def compared(task: tuple[int, str]) -> Certified:
         found.refused = str(error)
         return found
     found.seconds = time.perf_counter() - begun
-    found.gaps = [gap.reason for gap in certificate.gaps]
+    found.gaps = [gap.reason.partition(", along which")[0] for gap in certificate.gaps]
     _check_range(branch, certificate, found)
     found.share = _share(branch, certificate)
     _check_walk(branch, certificate, found)
