@@ -23,7 +23,8 @@ from kinfmu.analysis.certified.intervals import Intervals
 from kinfmu.analysis.certified.proving import path_across
 from kinfmu.analysis.certified.stored import proved_again
 from kinfmu.cli import main
-from kinfmu.errors import KinfmuError, RequestError
+from kinfmu.draw import plot
+from kinfmu.errors import FigureError, KinfmuError, RequestError
 from kinfmu.mechanism.gallery import load, names
 from kinfmu.mechanism.joints import Distance
 from kinfmu.mechanism.measures.transfer import TransmissionAngle
@@ -244,6 +245,18 @@ def test_a_certificate_of_tolerances_holds_for_every_corner() -> None:
     assert all(a <= value <= b for a, value, b in zip(low, middle, high, strict=True))
     with pytest.raises(RequestError, match=r"tolerance of 'crank.P': not a number of this mechanism, such as bodies"):
         kinfmu.certify(load("crank_rocker"), tolerances={"crank.P": 0.05})
+
+
+def test_plots_have_the_bounds_as_a_band(tmp_path: Path, crank_rocker: Certificate) -> None:
+    run = kinfmu.solve(load("crank_rocker"))
+    certificate = kinfmu.certify(load("crank_rocker"), over="run", tolerances=0.005)
+    drawn = {}
+    for name, band in (("plain", None), ("band", certificate)):
+        plot(run, tmp_path / f"{name}.svg", ["rocker.phi"], certificate=band)
+        drawn[name] = (tmp_path / f"{name}.svg").read_text().count("opacity: 0.25")
+    assert drawn["band"] == drawn["plain"] + 3  # position, velocity, acceleration
+    with pytest.raises(FigureError, match="a band needs panels over the run and its certificate"):
+        plot(run, tmp_path / "none.svg", certificate=crank_rocker)
 
 
 def test_tolerances_are_in_outputs_that_depend_on_them_directly() -> None:
