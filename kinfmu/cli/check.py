@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -82,7 +83,8 @@ def check(
         if not settings:
             _print_part(mechanism, problem, detail=detail, as_json=as_json)
         raise
-    plain, tolerances = list(settings), {}
+    plain: Sequence[tuple[str, str]] = settings
+    tolerances: dict[str, float] = {}
     if is_certified or proof:
         plain, tolerances = without_tolerances(loaded, settings)
     elif study:

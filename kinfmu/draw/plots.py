@@ -377,7 +377,7 @@ def _panel(
             look |= {"marker": "o", "markersize": 3.0}
         axes.plot(axis_of(run).values[rows], shown[rows], **look)
     if band is not None:
-        shade = {"color": ink(colour), "alpha": _BAND, "linewidth": 0.0, "zorder": 1.0}
+        shade: dict[str, Any] = {"color": ink(colour), "alpha": _BAND, "linewidth": 0.0, "zorder": 1.0}
         axes.fill_between(axis_of(runs[0]).values, band[0] * factor, band[1] * factor, **shade)
         everything += [end[np.isfinite(end)] for end in band]
     dress(axes, "")

@@ -76,19 +76,19 @@ def closing(prover: Prover, cells: Cells, tubes: Tubes, nodes: Sequence[Node], e
     """
     quantities = [EnclosedQuantity(prover, node, 0) for node in nodes]
     of, bound = np.arange(len(cells)), np.zeros(len(nodes))
-    is_open = np.zeros((len(nodes), len(cells)), dtype=bool)
+    is_open: Any = np.zeros((len(nodes), len(cells)), dtype=bool)
     while len(cells):
         values = [quantity.at(cells, tubes, cells.s) for quantity in quantities]
         most = np.array([value.magnitude for value in values])
-        for row, value in zip(is_open, values, strict=True):
-            row[of[value.mignitude > enough]] = True
+        for number, value in enumerate(values):
+            is_open[number, of[value.mignitude > enough]] = True
         todo = (most > enough).any(axis=0) & ~is_open[:, of].any(axis=0)
         parts, part_tubes, given_up = _halved(prover, cells[todo], tubes[todo])
         of_parts = np.tile(of[todo][~given_up], 2)
         if len(parts) > _MOST_CLOSING:
             given_up[:] = True
             parts, part_tubes = parts[:0], part_tubes[:0]
-        done = ~is_open[:, of].any(axis=0)
+        done: Any = ~is_open[:, of].any(axis=0)
         done[np.flatnonzero(todo)[~given_up]] = False
         bound = np.maximum(bound, most[:, done].max(axis=1, initial=0.0))
         of, cells, tubes = of_parts[: len(parts)], parts, part_tubes

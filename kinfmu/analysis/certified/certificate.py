@@ -302,5 +302,5 @@ def _angles_of_cosines(low: Any, high: Any, name: str, order: int) -> tuple[Any,
     cosine = Intervals(np.maximum(low, -1.0), np.minimum(high, 1.0))
     squared = (interval(1.0) - cosine) * (cosine + 1.0)
     found = angle(root(Intervals(np.maximum(squared.low, 0.0), squared.high)), cosine)
-    ends = np.where(np.isnan(low), np.nan, np.maximum(found.low, 0.0)), np.minimum(found.high, HALF_TURN)
-    return tuple(end if np.ndim(end) else float(end) for end in ends)
+    least, most = np.where(np.isnan(low), np.nan, np.maximum(found.low, 0.0)), np.minimum(found.high, HALF_TURN)
+    return (least, most) if np.ndim(least) else (float(least), float(most))

@@ -10,11 +10,11 @@ import numpy as np
 
 from kinfmu.analysis.certified.bounds import closing
 from kinfmu.analysis.certified.cells import Cells, Prover
-from kinfmu.analysis.certified.certificate import Certificate, DeadCentre, Gap
+from kinfmu.analysis.certified.certificate import Certificate, DeadCentre, Gap, PathEnd
 from kinfmu.analysis.certified.cover import Cover, Guess, cover, joined
 from kinfmu.analysis.certified.dead_centre import dead_centre
 from kinfmu.analysis.certified.formulas import Formulas
-from kinfmu.analysis.certified.intervals import Intervals, around
+from kinfmu.analysis.certified.intervals import Intervals, around, jumping
 from kinfmu.analysis.certified.poses import is_whole, turns_of
 from kinfmu.analysis.driver_path import DriverPath, follow
 from kinfmu.arrays import FloatArray
@@ -131,19 +131,23 @@ def of_range(path: DriverPath, prover: Prover, found: Cover) -> Certificate:
     low = path.low.u[0] if path.low else path.poses[0].u[0]
     high = path.high.u[0] if path.high else path.poses[-1].u[0]
     found, limits, reasons = with_redundant_rows(prover, found)
-    centres, ends = [], []
+    centres: list[DeadCentre] = []
+    ends: list[PathEnd] = []
     for limit, is_high in ((path.low, False), (path.high, True)):
         if limit is None:
             continue
-        centre = dead_centre(prover, found, limit, is_high=is_high)
-        if isinstance(centre, str):
-            reasons.append((limit.u[0], centre))
+        proved = dead_centre(prover, found, limit, is_high=is_high)
+        if isinstance(proved, str):
+            reasons.append((limit.u[0], proved))
         else:
-            centres.append(centre[0])
-            ends.append(centre[1])
+            centres.append(proved[0])
+            ends.append(proved[1])
     for centre in centres:
         low, high = (low, centre.high) if centre.is_high else (centre.low, high)
     gaps = _gaps(prover, found, low, high, centres, reasons, _MEET * unit)
+    if path.stopped:
+        at = high if path.high is None else low
+        gaps.append(Gap(at, at, f"the motion is not followed farther: {path.stopped}"))
     turns = path.turns if path.turns is not None and not gaps and _closes(prover, found, path.turns) else None
     return Certificate(
         path.plan.mechanism,
@@ -310,6 +314,9 @@ def _gaps(
         if 0 < k < len(pieces) and begin < end and _changes_sign(found, k):
             gaps.append(Gap(begin, end, f"branches cross: a change point; {path_across(prover, found, k)}"))
             continue
+        if 0 < k < len(pieces) and _jumps_within(prover, found, k):
+            gaps.append(Gap(begin, end, "a law begins anew, or an angle passes half a turn"))
+            continue
         if begin == end:
             gaps.append(Gap(begin, end, "the cells on both sides are not joined"))
             continue
@@ -323,6 +330,15 @@ def _changes_sign(found: Cover, piece: int) -> bool:
     """Return whether the determinant of a block has other signs before and after a gap, the one before a piece."""
     before, after = found.pieces[piece - 1][1], found.pieces[piece][0]
     return bool((found.tubes.sign[:, before] != found.tubes.sign[:, after]).any())
+
+
+def _jumps_within(prover: Prover, found: Cover, piece: int) -> bool:
+    """Return whether a law may begin anew in the gap before a piece, or an angle pass half a turn: rows jump there."""
+    before, after = found.pieces[piece - 1][1], found.pieces[piece][0]
+    cell, tube = found.cells[before : before + 1], found.tubes[before : before + 1]
+    s = Intervals(found.cells.high[[before]], found.cells.low[[after]]) - cell.u
+    values = prover.deviated(prover.over(cell, s), tube)
+    return any(bool(jumping(block.rows[0], values, (1,))[0]) for block in prover.formulas.blocks)
 
 
 def path_across(prover: Prover, found: Cover, piece: int) -> str:

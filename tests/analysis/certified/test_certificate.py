@@ -16,12 +16,13 @@ from click.testing import CliRunner
 
 import kinfmu
 from kinfmu import AngleDriver, Body, Certificate, ConstantSpeed, Mechanism, Revolute
-from kinfmu.analysis.certified import cells, intervals
+from kinfmu.analysis.certified import cells, intervals, proving
 from kinfmu.analysis.certified.cover import Cover, joined
 from kinfmu.analysis.certified.formulas import Formulas
 from kinfmu.analysis.certified.intervals import Intervals
 from kinfmu.analysis.certified.proving import path_across
 from kinfmu.analysis.certified.stored import proved_again
+from kinfmu.analysis.driver_path import follow
 from kinfmu.cli import main
 from kinfmu.draw import plot
 from kinfmu.errors import FigureError, KinfmuError, RequestError
@@ -39,8 +40,8 @@ CROSSING = "branches cross: a change point"
 REASONS = {
     "fourbar": [CROSSING] * 2,
     "parallel_jaw": [CROSSING] * 2,
-    "cam_roller": ["not proved"] * 2,
-}  # its law repeats
+    "cam_roller": ["a law begins anew, or an angle passes half a turn"] * 2,
+}
 SLOW = ("fourbar_chain",)  # a hundred loops
 NOT_PROVED = "the cell from 0.498665501 to 0.598398601 is not proved"
 
@@ -354,6 +355,13 @@ def test_tolerances_of_the_command_line_are_checked(
 def test_what_follows_from_parameters_has_no_tolerance_of_its_own() -> None:
     with pytest.raises(RequestError, match="tolerance of 'both': it follows from other parameters; give theirs"):
         kinfmu.certify(parse(SLIDER), tolerances={"both": 0.1})
+
+
+def test_a_motion_that_is_not_followed_to_an_end_is_not_complete(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(proving, "follow", lambda *arguments: replace(follow(*arguments), stopped="too many steps"))
+    certificate = kinfmu.certify(load("crank_rocker"))
+    assert [gap.reason for gap in certificate.gaps] == ["the motion is not followed farther: too many steps"]
+    assert not certificate.is_complete
 
 
 def test_a_ratio_that_is_rounded_in_the_file_does_not_repeat() -> None:
