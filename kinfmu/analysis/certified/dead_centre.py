@@ -56,8 +56,10 @@ def _dead_centre(
     k = int(near[np.argmax(ways[near])])
     cell = found.cells[k : k + 1]
     unscaled = cell.path[1, own, 0] / prover.unit[own] * toward
-    direction = unscaled / np.linalg.norm(unscaled) / prover.unit[own]
     way = float(ways[k])
+    if not (unscaled.any() and way > 0.0):
+        return "a dead centre: the block does not move before it"
+    direction = unscaled / np.linalg.norm(unscaled) / prover.unit[own]
     turned = Prover(formulas.turned(limit.block, direction.tolist(), cell.path[0, own, 0].tolist()))
     solved = [formulas.blocks[number] for number in formulas.behind(limit.block)]
     places = [place for one in solved for place in range(one.place, one.place + one.size)]

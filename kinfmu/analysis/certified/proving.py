@@ -341,6 +341,7 @@ def _jumps_within(prover: Prover, found: Cover, piece: int) -> bool:
     return any(bool(jumping(block.rows[0], values, (1,))[0]) for block in prover.formulas.blocks)
 
 
+@np.errstate(all="ignore")  # of rates that are not known
 def path_across(prover: Prover, found: Cover, piece: int) -> str:
     """Return how well all rows close along a path through the gap before a piece, from its pose before to that after.
 

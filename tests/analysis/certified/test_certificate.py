@@ -39,10 +39,10 @@ from tests.mechanisms import fourbar
 CROSSING = "branches cross: a change point"
 REASONS = {
     "fourbar": [CROSSING] * 2,
+    "fourbar_chain": [CROSSING] * 2,
     "parallel_jaw": [CROSSING] * 2,
     "cam_roller": ["a law begins anew, or an angle passes half a turn"] * 2,
 }
-SLOW = ("fourbar_chain",)  # a hundred loops
 NOT_PROVED = "the cell from 0.498665501 to 0.598398601 is not proved"
 
 
@@ -80,7 +80,7 @@ def test_bounds_enclose_the_extremes_in_50_digits(crank_rocker: Certificate) -> 
 
 
 @pytest.mark.parametrize(
-    "name", mostly_long(sorted({*names()} - {*SLOW}), ("crank_rocker", "fourbar", "triple_rocker", "excavator"))
+    "name", mostly_long(sorted(names()), ("crank_rocker", "fourbar", "triple_rocker", "excavator"))
 )
 def test_the_gallery_is_certified(name: str) -> None:
     certificate = kinfmu.certify(load(name))
