@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -14,9 +15,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kinfmu.cli.arguments import OutputFile, driver_value, mechanism_argument
+from kinfmu.cli.arguments import InputFile, OutputFile, driver_value, mechanism_argument
 from kinfmu.cli.group import errors_of, main
-from kinfmu.cli.settings import checked_settings, set_option
+from kinfmu.cli.settings import checked_settings, set_option, tolerances_of_study, without_tolerances
 from kinfmu.errors import KinfmuError, MechanismError, listed
 from kinfmu.mechanism import gallery
 from kinfmu.mechanism.body import MEASURED_OVER
@@ -40,6 +41,12 @@ COLUMNS, MOST_COLUMNS = 80, 120  # of a report in a file, and on a wide terminal
 @click.option(
     "--certificate", "proof", type=OutputFile(".json"), help="Certify, and write the proof for kinfmu verify: .json."
 )
+@click.option(
+    "--tolerances",
+    "study",
+    type=InputFile(".toml"),
+    help="Study file: the certificate holds for all its tolerances; also --set crank=20mm+-0.05mm.",
+)
 @click.option("--assemblies", is_flag=True, help="List the ways to assemble the mechanism, and how to choose one.")
 @click.option(
     "--figure", "picture", type=OutputFile(*FIGURES), help="Draw the mechanism with its names: .svg, .png or .pdf."
@@ -55,6 +62,7 @@ def check(
     assemblies: bool,
     is_certified: bool,
     proof: Path | None,
+    study: Path | None,
     picture: Path | None,
     at: str | None,
     over: str | None,
@@ -75,7 +83,16 @@ def check(
         if not settings:
             _print_part(mechanism, problem, detail=detail, as_json=as_json)
         raise
-    mech = checked_settings(loaded, settings).mechanism()
+    plain: Sequence[tuple[str, str]] = settings
+    tolerances: dict[str, float] = {}
+    if is_certified or proof:
+        plain, tolerances = without_tolerances(loaded, settings)
+    elif study:
+        raise click.UsageError("--tolerances needs --certify")
+    if study:
+        own, of_study = tolerances_of_study(loaded, study)
+        plain, tolerances = [*own, *plain], of_study | tolerances
+    mech = checked_settings(loaded, plain).mechanism()
     if over is not None:
         mech = replace(mech, run=replace(mech.run, over=over))
     value = _value(mech, mechanism, at, picture)
@@ -84,7 +101,7 @@ def check(
     certificate = None
     if (is_certified or proof) and report.problem is None:
         with errors_of(mechanism):
-            certificate = certified(mech)
+            certificate = certified(mech, tolerances=tolerances or None)
         if proof:
             certificate.write(proof)
     if as_json:

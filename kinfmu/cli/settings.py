@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from kinfmu.cli.arguments import ArgumentType
-from kinfmu.cli.group import note
+from kinfmu.cli.group import errors_of, note
 from kinfmu.errors import MechanismError, RequestError, listed
 from kinfmu.units import METRES, Quantity, in_turns, looks_like_degrees
 
@@ -93,9 +95,13 @@ def checked_settings(mechanism: Mechanism, settings: Sequence[tuple[str, str]], 
     from kinfmu.mechanism.settings import read_tolerance
 
     settable, known = mechanism.settable, (*mechanism.settable.names, *of_run)
-    for setting, _ in settings:
+    for setting, text in settings:
         if setting in _ELSEWHERE and setting not in known:
             raise click.UsageError(f"--set: {setting} {_ELSEWHERE[setting]}")
+        if _WITH_TOLERANCE.fullmatch(text):
+            raise click.UsageError(
+                f"--set: {setting}={text}: a tolerance belongs to a certificate; use check --certify"
+            )
     values = {setting: _value(text) for setting, text in settings if setting not in of_run}
     for setting, value in values.items():
         constant = settable.constants.get(setting)
@@ -119,6 +125,72 @@ def checked_settings(mechanism: Mechanism, settings: Sequence[tuple[str, str]], 
         {setting: value for setting, value in values.items() if setting in settable.constants},
         run,
     )
+
+
+_WITH_TOLERANCE = re.compile(r"\s*(.+?)\s*(?:\N{PLUS-MINUS SIGN}|\+/?-)\s*(.+?)\s*")
+_NUMBER_AND_UNIT = re.compile(r"([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*(.*)")
+
+
+def without_tolerances(
+    mechanism: Mechanism, settings: Sequence[tuple[str, str]]
+) -> tuple[list[tuple[str, str]], dict[str, float]]:
+    """Return settings without their tolerances, and these by name [rad or the file's unit of length].
+
+    20mm±0.05mm, 20±0.05mm, 20mm+-0.05 and 20mm±0.25% are one tolerance.
+    """
+    settable = mechanism.settable
+    plain: list[tuple[str, str]] = []
+    tolerances: dict[str, float] = {}
+    for name, text in settings:
+        found = _WITH_TOLERANCE.fullmatch(text)
+        if not found:
+            plain.append((name, text))
+            continue
+        value, tolerance = found.groups()
+        parts = [_NUMBER_AND_UNIT.fullmatch(part) for part in (value, tolerance)]
+        units = [part[2] for part in parts if part]
+        if len(units) == 2 and units[1] != "%" and not all(units):  # one unit is that of both
+            value, tolerance = (f"{part[1]}{''.join(units)}" for part in parts if part)
+        plain.append((name, value))
+        try:
+            settable.check_name(name)
+            if name in settable.constants:
+                raise RequestError(f"{name}: a constant of a law has no tolerance; parameters have")
+            if tolerance.endswith("%"):
+                size = abs(settable.number(name, _value(value))) * settable.number(name, _value(tolerance[:-1])) / 100.0
+            else:
+                size = settable.number(name, _value(tolerance))
+        except RequestError as error:
+            raise click.UsageError(f"--set: {name}={text}: {error}") from None
+        if not size > 0.0:
+            raise click.UsageError(f"--set: {name}={text}: the tolerance must be positive")
+        tolerances[name] = size
+    return plain, tolerances
+
+
+def tolerances_of_study(mechanism: Mechanism, path: Path) -> tuple[list[tuple[str, str]], dict[str, float]]:
+    """Return the settings and the tolerances of the parameters of a study file, ranges as tolerances."""
+    from kinfmu.design.study.definition import KEYS
+    from kinfmu.design.study.sampling import Grid, UniformRange, read_variation
+    from kinfmu.mechanism.toml_document import document_of, refuse_other_kind, table_of, text_in
+
+    document = document_of(text_in(path, "a study file"), str(path))
+    plain: list[tuple[str, str]] = []
+    tolerances: dict[str, float] = {}
+    with errors_of(str(path)):
+        refuse_other_kind(document, "study", KEYS)
+        tables = table_of(document, "parameters")
+        for name, table in tables.items():
+            varied = read_variation(f"[parameters.{name}]", name, table, mechanism)
+            if name in mechanism.settable.constants or isinstance(varied, Grid):
+                raise RequestError(f"[parameters.{name}]: only tolerances and ranges of parameters have a certificate")
+            if isinstance(varied, UniformRange):
+                nominal, tolerance = 0.5 * (varied.low + varied.high), 0.5 * (varied.high - varied.low)
+            else:
+                nominal, tolerance = varied.nominal, varied.tolerance
+            plain.append((name, f"{nominal!r}{varied.unit}"))
+            tolerances[name] = tolerance
+    return plain, tolerances
 
 
 def tolerance_of(settings: Settings) -> float:

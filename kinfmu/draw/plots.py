@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, overload
 
 import numpy as np
 
@@ -57,8 +58,20 @@ _LEFT, _RIGHT, _TOP, _BOTTOM = 64.0, 22.0, 44.0, 34.0  # [pt] around all panels;
 _BETWEEN, _GAP, _BLOCK_GAP = 68.0, 14.0, 52.0  # [pt] between coordinates, their panels, and rows of coordinates
 _FORCES: palette.Colour = (185, 28, 28)  # that of driving arrows in drawings
 _LABEL = 42.0  # [pt] from an axis to its name
+_BAND = 0.25  # opacity of bounds
 _NOTE = 12.0  # [pt] of a line below all panels
 _LONGEST = 20  # letters of a name with its unit that fit next to a panel in one line
+
+
+class Bounding(Protocol):
+    """A certificate: bounds of outputs at times or values of a driver."""
+
+    @property
+    def driver(self) -> str:
+        """What it is over: a driver, or 'time'."""
+
+    def enclosed(self, of: str, x: FloatArray, order: int = 0) -> tuple[FloatArray, FloatArray]:
+        """Return lower and upper bounds of an output, its rate or acceleration."""
 
 
 @overload
@@ -74,6 +87,7 @@ def plot(
     degrees: bool | None = None,
     other: Run | None = None,
     names: tuple[str, str] = ("A", "B"),
+    certificate: Bounding | None = None,
 ) -> None: ...
 
 
@@ -101,6 +115,7 @@ def plot(
     degrees: bool | None = None,
     other: Run | None = None,
     names: tuple[str, str] = ("A", "B"),
+    certificate: Bounding | None = None,
 ) -> Axes | None:
     """Draw `run` over its axis, usually time, or over any column, into a file or into Axes of matplotlib.
 
@@ -130,6 +145,8 @@ def plot(
         degrees: True: angles in deg, and angular rates in deg/s and deg/s2; False: in rad. Default: True in a file.
         other: A second run, drawn narrow over the first one, which is wide.
         names: Of the two runs, for the title.
+        certificate: Of the run, `certify(mechanism, over="run")`: panels of a file have its bounds as a band, which is
+            wide with tolerances.
 
     Returns:
         `ax`; None for a file.
@@ -146,20 +163,24 @@ def plot(
     check_target("plot", path, ax)
     xs = (x,) if isinstance(x, str) else tuple(x)
     if ax is not None:
-        if overlaid or polar or other is not None or len(xs) > 1:
-            raise FigureError("overlaid, polar, other and several x are for files; call plot again to add curves to ax")
+        if overlaid or polar or other is not None or len(xs) > 1 or certificate:
+            raise FigureError(
+                "overlaid, polar, other, certificate and several x are for files; call plot again to add curves to ax"
+            )
         return curves(ax, run, columns, *xs, degrees=bool(degrees))
     path = Path(str(path))
     check_suffix(path)
     runs = (run,) if other is None else (run, other)
     check_comparable(runs)
     degrees = degrees is not False
+    if certificate is not None and (certificate.driver != "time" or xs or overlaid or polar):
+        raise FigureError("a band needs panels over the run and its certificate: certify(mechanism, over='run')")
     if xs or overlaid or polar:
         shown = overlay(runs, names, columns, xs, degrees=degrees, polar=polar)
         write(path, lambda: overlay_sheet(shown))
     else:
         stacks, notes = _chosen(runs, columns, path, degrees=degrees)
-        write(path, lambda: _sheet(runs, stacks, names, notes, degrees=degrees))
+        write(path, lambda: _sheet(runs, stacks, names, notes, degrees=degrees, certificate=certificate))
     return None
 
 
@@ -284,6 +305,7 @@ def _sheet(
     notes: Sequence[str] = (),
     *,
     degrees: bool = False,
+    certificate: Bounding | None = None,
 ) -> Figure:
     axis = axis_of(runs[0])
     abreast = -(-len(stacks) // -(-len(stacks) // _ABREAST))  # rows of about the same length
@@ -307,7 +329,8 @@ def _sheet(
             size = ((_WIDTH - _BETWEEN) / width, (_HEIGHT - _GAP) / height)
             axes = made.add_axes((left / width, (top - _HEIGHT + _GAP) / height, *size))
             panels.append(axes)
-            _panel(axes, runs, panel, degrees=degrees)
+            band = _band(runs[0], panel, certificate)
+            _panel(axes, runs, panel, degrees=degrees, band=band)
         for axes in panels[:-1]:
             axes.tick_params(labelbottom=False)
         panels[0].set_title(symbol(stack.title), fontsize=FONT + 1.0, loc="left", color=ink(INK), parse_math=False)
@@ -317,8 +340,24 @@ def _sheet(
     return made
 
 
-def _panel(axes: Axes, runs: Sequence[Run], panel: Panel, *, degrees: bool) -> None:
-    """Draw one curve over each whole run."""
+def _band(run: Run, panel: Panel, certificate: Bounding | None) -> tuple[FloatArray, FloatArray] | None:
+    """Return the bounds of a coordinate at the samples of a run; None of what has none."""
+    if certificate is None or not isinstance(panel.name, CoordinateName):
+        return None
+    with suppress(RequestError):  # another mechanism's, or what never moves
+        return certificate.enclosed(panel.name, run.t, panel.order)
+    return None
+
+
+def _panel(
+    axes: Axes,
+    runs: Sequence[Run],
+    panel: Panel,
+    *,
+    degrees: bool,
+    band: tuple[FloatArray, FloatArray] | None = None,
+) -> None:
+    """Draw one curve over each whole run; band: lower and upper bounds of the first one."""
     is_force = isinstance(panel.name, (ForceName, SignalName))
     is_log = is_logarithmic(panel.column)
     unit, factor = degrees_of(panel.unit) if degrees else (panel.unit, 1.0)
@@ -337,6 +376,10 @@ def _panel(axes: Axes, runs: Sequence[Run], panel: Panel, *, degrees: bool) -> N
         if len(everything[-1]) < 2:
             look |= {"marker": "o", "markersize": 3.0}
         axes.plot(axis_of(run).values[rows], shown[rows], **look)
+    if band is not None:
+        shade: dict[str, Any] = {"color": ink(colour), "alpha": _BAND, "linewidth": 0.0, "zorder": 1.0}
+        axes.fill_between(axis_of(runs[0]).values, band[0] * factor, band[1] * factor, **shade)
+        everything += [end[np.isfinite(end)] for end in band]
     dress(axes, "")
     run, axis, known = runs[0], axis_of(runs[0]), np.concatenate(everything)
     axes.set_xlim(*span(np.concatenate([axis_of(one).values for one in runs]), 0.01))

@@ -87,13 +87,13 @@ def quantity_model(model: Model, quantities: Sequence[QuantityRead]) -> Model:
         if len(kept) >= _MOST_KEPT:
             kept.pop(next(iter(kept)))
         names = (CoordinateName(f"quantity_{k}", "phi" if one.is_angle else "x") for k, one in enumerate(quantities))
-        nodes = _nodes(model.plan, quantities)
+        nodes = quantity_nodes(model.plan, quantities)
         motions = [_motion(model.plan, name, node) for name, node in zip(names, nodes, strict=True)]
         kept[key] = Model(replace(model.plan, outputs_motion=tuple(motions), coordinate_count=0), model.engine)
     return kept[key]
 
 
-def _nodes(plan: SolvePlan, quantities: Sequence[QuantityRead]) -> list[Node]:
+def quantity_nodes(plan: SolvePlan, quantities: Sequence[QuantityRead]) -> list[Node]:
     """Return the quantities as nodes of the plan's graph."""
     graph = plan.laws[0].position.graph
     nodes: dict[str, Node] = {name: node for name, node in plan.fixed_nodes.items()}  # noqa: C416  of other keys

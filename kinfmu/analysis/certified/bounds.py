@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from kinfmu.analysis.certified.cells import Cells, Prover, Tubes
 from kinfmu.analysis.certified.intervals import Intervals, enclosed
+from kinfmu.arrays import FloatArray
 from kinfmu.plan.equations.graph import Node
 
 _CLOSE = 1e-5  # of the largest value; a bound is not sought closer
 _MOST_PARTS = 5000  # of cells that may contain an extreme
+_MOST_CLOSING = 20_000  # of cells in which a redundant row is bounded
 _NARROWEST = 1e-9  # of the driver
 
 
@@ -64,6 +67,32 @@ def _most(quantity: EnclosedQuantity, cells: Cells, tubes: Tubes, sign: float) -
         if not 0 < len(parts) <= _MOST_PARTS:
             return best, max(best, rest, sure)
         cells, tubes = parts, part_tubes
+
+
+def closing(prover: Prover, cells: Cells, tubes: Tubes, nodes: Sequence[Node], enough: float) -> tuple[FloatArray, Any]:
+    """Return bounds of the absolute values of rows, and where a row is more than `enough`, (rows, cells).
+
+    Parts of cells are halved and proved again until all rows are at most `enough` there.
+    """
+    quantities = [EnclosedQuantity(prover, node, 0) for node in nodes]
+    of, bound = np.arange(len(cells)), np.zeros(len(nodes))
+    is_open: Any = np.zeros((len(nodes), len(cells)), dtype=bool)
+    while len(cells):
+        values = [quantity.at(cells, tubes, cells.s) for quantity in quantities]
+        most = np.array([value.magnitude for value in values])
+        for number, value in enumerate(values):
+            is_open[number, of[value.mignitude > enough]] = True
+        todo = (most > enough).any(axis=0) & ~is_open[:, of].any(axis=0)
+        parts, part_tubes, given_up = _halved(prover, cells[todo], tubes[todo])
+        of_parts = np.tile(of[todo][~given_up], 2)
+        if len(parts) > _MOST_CLOSING:
+            given_up[:] = True
+            parts, part_tubes = parts[:0], part_tubes[:0]
+        done: Any = ~is_open[:, of].any(axis=0)
+        done[np.flatnonzero(todo)[~given_up]] = False
+        bound = np.maximum(bound, most[:, done].max(axis=1, initial=0.0))
+        of, cells, tubes = of_parts[: len(parts)], parts, part_tubes
+    return bound, is_open
 
 
 def _halved(prover: Prover, cells: Cells, tubes: Tubes) -> tuple[Cells, Tubes, Any]:

@@ -12,11 +12,15 @@ a box W of deviations w, 0 among them,
 lies in the interior of W only if each s of the cell has exactly one w in W with r = 0, and that w lies in K(W)
 (Krawczyk, 1969; Neumaier, Interval Methods for Systems of Equations, 1990, section 5.1). r(zp) is enclosed by its
 series in s with the remainder of third order over the whole cell, or of second order where a law's curvature jumps.
+
+Of a block with redundant rows Y is near the pseudo-inverse at the centre. The same test is that of Y r = 0, as many
+equations as unknowns, which hold in every pose that closes all rows; how far these close is bounded apart.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -96,7 +100,7 @@ class Tubes:
         rates: Deviations of z' of the poses from that of the predicted path.
         accelerations: The same of z''.
         contraction: The largest row sum of |1 - Y J| on the narrow tube, for each block and cell.
-        sign: Of the determinant of J, for each block and cell.
+        sign: Of the determinant of J, for each block and cell; 0 of a block with redundant rows.
 
     """
 
@@ -173,7 +177,7 @@ class Prover:
         """Return J^-1 rows, (n, cells)."""
         shape = values[self.formulas.x].shape
         found = np.array(approximate([*rows, *block.jacobian], values, shape))
-        inverse = _inverse(found[len(rows) :], block.size)
+        inverse = _inverse(found[len(rows) :], block)
         return np.asarray(np.einsum("cij,jc->ic", inverse, found[: len(rows)]))
 
     # ---- proofs
@@ -195,7 +199,7 @@ class Prover:
             thin, broad, plain = self.enclosures(cells)
             for number, block in enumerate(self.formulas.blocks):
                 own = slice(block.place, block.place + block.size)
-                y = _inverse(np.array(approximate(block.jacobian, plain, (count,))), block.size)
+                y = _inverse(np.array(approximate(block.jacobian, plain, (count,))), block)
                 moved = _times(y, self._rest(cells, block, thin, broad, narrow))
                 given = None if radii is None else radii[number]
                 found = self._tube(cells, block, broad, narrow, y, moved, given)
@@ -203,7 +207,7 @@ class Prover:
                 for tube, part in ((wide, found[1]), (narrow, found[2])):
                     tube.low[own], tube.high[own] = part.low, part.high
                 contractions.append(found[3])
-                signs.append(np.sign(np.linalg.det(y)))
+                signs.append(np.zeros(count) if block.is_tall else np.sign(np.linalg.det(y)))
                 for order in (1, 2):
                     rest = self._rest_of_rates(cells, block, thin, broad, motion, order)
                     part = _within(_times(y, rest), found[3], self.unit[own, None])
@@ -213,6 +217,18 @@ class Prover:
             proved, wide, narrow, rates, accelerations, np.reshape(contractions, shape), np.reshape(signs, shape)
         )
 
+    def most_along(self, cells: Cells) -> float:
+        """Return a bound of all residuals along predicted paths, relative to the size."""
+        found, blocks = 0.0, (block for block in self.formulas.plan.blocks if block.unknowns)
+        still = Intervals(*np.zeros((2, len(self.formulas.unknowns), len(cells))))
+        with np.errstate(all="ignore"):
+            thin, broad, _ = self.enclosures(cells)
+            for block, formulas in zip(blocks, self.formulas.blocks, strict=True):
+                rows = self._rest(cells, formulas, thin, broad, still)
+                for row, scale in zip(rows, block.row_scales, strict=True):
+                    found = max(found, float(row.magnitude.max()) / scale)
+        return found
+
     def closer(self, cells: Cells, tubes: Tubes, s: Intervals) -> Tubes:
         """Return the tubes with closer enclosures of rates and accelerations at driver values s from the centres."""
         count, n = len(cells), len(self.formulas.unknowns)
@@ -221,7 +237,7 @@ class Prover:
         motion = [tubes.narrow, *(Intervals(np.zeros((n, count)), np.zeros((n, count))) for _ in range(2))]
         for number, block in enumerate(self.formulas.blocks):
             own = slice(block.place, block.place + block.size)
-            y = _inverse(np.array(approximate(block.jacobian, plain, (count,))), block.size)
+            y = _inverse(np.array(approximate(block.jacobian, plain, (count,))), block)
             for order in (1, 2):
                 tube = self._moving_at(symbols, motion, block, order)
                 rest = enclosed(block.rows[order], tube, (count,))
@@ -258,7 +274,7 @@ class Prover:
 
         The derivative of order n of r(z(x)) is 0, and linear in that of z: J w_n = -rest, w_n its deviation.
         """
-        shape, s, k = (len(cells),), cells.s, block.size
+        shape, s, k = (len(cells),), cells.s, len(block.rows[0])
         if order == 2:
             return enclosed(block.rows[2], self._moving_at(broad, motion, block, 2), shape)
         narrow, rates, _ = motion
@@ -424,7 +440,7 @@ class Prover:
             total = np.zeros(len(which))
             for j in range(block.size):
                 product = interval(1.0 if i == j else 0.0)
-                for k in range(block.size):
+                for k in range(len(block.rows[0])):
                     product = product - Intervals(y[which, i, k]) * entries[k * block.size + j]
                 row = row + product * w[j]
                 total = total + product.magnitude * (unit[j] / unit[i])
@@ -433,14 +449,14 @@ class Prover:
         return Intervals(np.array([row.low for row in rows]), np.array([row.high for row in rows])), off
 
 
-def _inverse(entries: FloatArray, size: int) -> FloatArray:
-    """Return approximate inverses, (cells, n, n), of Jacobians given by their entries, (n n, cells)."""
-    matrices = np.moveaxis(entries.reshape(size, size, -1), -1, 0)
-    safe = np.where(np.isfinite(matrices).all(axis=(1, 2), keepdims=True), matrices, np.nan)
-    try:
-        return np.asarray(np.linalg.inv(safe))
-    except np.linalg.LinAlgError:
-        return np.asarray(np.linalg.pinv(np.nan_to_num(safe)))
+def _inverse(entries: FloatArray, block: BlockFormulas) -> FloatArray:
+    """Return approximate inverses of Jacobians given by their entries, (cells, n, rows); if tall, pseudo-inverses."""
+    matrices = np.moveaxis(entries.reshape(len(block.rows[0]), block.size, -1), -1, 0)
+    finite = np.isfinite(matrices).all(axis=(1, 2), keepdims=True)
+    if not block.is_tall:
+        with suppress(np.linalg.LinAlgError):  # one of them is singular to the bit
+            return np.asarray(np.linalg.inv(np.where(finite, matrices, np.nan)))
+    return np.where(finite, np.linalg.pinv(np.nan_to_num(matrices)), np.nan)
 
 
 def _with_zero(w: Intervals) -> Intervals:

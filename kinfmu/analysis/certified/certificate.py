@@ -15,16 +15,21 @@ import numpy as np
 from kinfmu.analysis.certified.bounds import EnclosedQuantity, ExtremeBounds, bounds
 from kinfmu.analysis.certified.cells import Prover
 from kinfmu.analysis.certified.cover import Cover
-from kinfmu.analysis.certified.intervals import Intervals
+from kinfmu.analysis.certified.intervals import Intervals, angle, interval, root
 from kinfmu.analysis.driver_path import place_text
 from kinfmu.arrays import FloatArray
 from kinfmu.errors import KinfmuError, RequestError, listed
 from kinfmu.files import errors_of_writing, write_whole
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.measures.transfer import TransmissionAngle
+from kinfmu.mechanism.quantities import PoseQuantity
 from kinfmu.mechanism.toml_text import text
-from kinfmu.plan.equations.graph import Node
+from kinfmu.motion.quantities import quantity_nodes
+from kinfmu.plan.equations.graph import Node, symbols
+from kinfmu.units import unit_of
 from kinfmu.version import VERSION
 
+HALF_TURN = 3.1415926535897936  # above pi
 FORMAT = "kinfmu certificate 1"
 
 
@@ -51,6 +56,25 @@ class DeadCentre(NamedTuple):
     is_high: bool
 
 
+@dataclass(frozen=True)
+class PathEnd:
+    """The path to a dead centre, over its way: proved cells before the one in which it turns back, and that one."""
+
+    prover: Prover
+    cover: Cover
+    inner: int
+
+    def bounds(self, node: Node) -> ExtremeBounds:
+        """Return the bounds of a quantity on the path; in the cell where it turns back its values are enclosed."""
+        cells, tubes = self.cover.cells, self.cover.tubes
+        least, most = bounds(self.prover, cells[: self.inner], tubes[: self.inner], node, 0)
+        last = slice(self.inner, self.inner + 1)
+        value = EnclosedQuantity(self.prover, node, 0).at(cells[last], tubes[last], cells[last].s)
+        return ExtremeBounds(
+            (min(least[0], float(value.low[0])), least[1]), (most[0], max(most[1], float(value.high[0])))
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Certificate:
     """What is proved of one motion.
@@ -65,6 +89,8 @@ class Certificate:
         dead_centres: Ends of the range that are proved.
         gaps: What is not proved.
         prover: What has proved the cells.
+        redundant: Bounds of the redundant rows by name, relative to the size: how far they close at most.
+        ends: Paths to the dead centres.
         tolerances: As given to `certify`.
 
     """
@@ -78,6 +104,8 @@ class Certificate:
     dead_centres: tuple[DeadCentre, ...]
     gaps: tuple[Gap, ...]
     prover: Prover
+    redundant: Mapping[str, float]
+    ends: tuple[PathEnd, ...] = ()
     tolerances: float | Mapping[str, float] | None = None
 
     @property
@@ -102,14 +130,20 @@ class Certificate:
         if self.driver != "time":
             kind = self.mechanism.drivers[0].quantity.kind
             unit = "rad" if kind == "angle" else self.mechanism.length_unit
+        apart = f"no other pose is within {self.tube:.2g} rad or sizes, " if math.isfinite(self.tube) else ""
         turns = f"; the poses come back after {_turns_text(self.turns)}" if self.turns else ""
         lines = [
             f"certified   {self.driver} from {place_text(self.low, unit)} to {place_text(self.high, unit)}, "
-            f"{100.0 * self.share:.9g} % of it in {len(self.cover.cells)} cells: the loops close, no other pose is "
-            f"within {self.tube:.2g} rad or sizes, no block is singular{turns}"
+            f"{100.0 * self.share:.9g} % of it in {len(self.cover.cells)} cells: the loops close, "
+            f"{apart}no block is singular{turns}"
         ]
         if not len(self.cover.cells):
             lines = [f"certified   {self.driver}: nothing"]
+        if self.redundant:
+            bounds_text = listed(f"{name} within {limit:.1g}" for name, limit in self.redundant.items())
+            lines.append(f"            redundant rows close, relative to the size: {bounds_text}")
+        if self.tolerances is not None:
+            lines.append(f"            for all mechanisms with {self._tolerances_text()}")
         for low, high, _ in self.dead_centres:
             lines.append(
                 f"            dead centre at {self.driver} = {place_text(0.5 * (low + high), unit)}, within "
@@ -121,6 +155,17 @@ class Certificate:
                 f"{reason}"
             )
         return "\n".join(f"  {line}" for line in lines)
+
+    def _tolerances_text(self) -> str:
+        if not isinstance(self.tolerances, Mapping):
+            return f"every length within {100.0 * float(self.tolerances or 0.0):.4g} %"
+        parts = []
+        for name, size in self.tolerances.items():
+            one = self.mechanism.parameters.get(name)
+            unit = "" if one is None or one.quantity is None else unit_of(one.quantity, self.mechanism.length_unit)
+            value = "" if one is None else f" = {float(one.value):.9g} {unit}".rstrip()
+            parts.append(f"{name}{value} within {size:.4g} {unit}".rstrip())
+        return listed(parts)
 
     def as_json(self) -> dict[str, Any]:
         """The certificate as values of JSON: angles in rad, lengths in the unit of the file."""
@@ -134,6 +179,7 @@ class Certificate:
             "share": self.share,
             "tube": self.tube if math.isfinite(self.tube) else None,
             "cells": len(self.cover.cells),
+            "redundant_rows": dict(self.redundant),
             "dead_centres": [centre._asdict() for centre in self.dead_centres],
             "not_proved": [gap._asdict() for gap in self.gaps],
         }
@@ -151,33 +197,45 @@ class Certificate:
         with errors_of_writing(path, KinfmuError):
             write_whole(path, json.dumps(self._content()).encode())
 
-    def bounds(self, output: str, order: int = 0) -> ExtremeBounds:
+    def bounds(self, of: str | PoseQuantity, order: int = 0) -> ExtremeBounds:
         """Return the bounds of an output (order 0), its rate (1) or acceleration (2) over all that is proved.
 
         Rates are per unit of the driver, over a run per second.
 
         Args:
-            output: The output.
+            of: An output; a measure of the file that is a transmission angle, of which this angle is bounded [rad]; or
+                a quantity of the pose, such as `CosineBetween`.
             order: Of the derivative.
 
         Raises:
-            RequestError: There is no such output, or the range ends at a dead centre.
+            RequestError: There is no such output, or the range ends at a dead centre where it is not bounded.
 
         """
-        if self.dead_centres:
-            raise RequestError(
-                f"the range of {self.driver} ends at a dead centre, up to which outputs are not bounded; use "
-                "over = 'run'"
-            )
-        return bounds(self.prover, self.cover.cells, self.cover.tubes, self._node(output), order)
+        if isinstance(of, str) and of in self._transmissions:
+            found = self.bounds(self._transmissions[of], order)
+            least, most = (_angles_of_cosines(*ends, of, order) for ends in (found.most, found.least))
+            return ExtremeBounds(least, most)
+        node = self._node(of)
+        parts = [bounds(self.prover, self.cover.cells, self.cover.tubes, node, order)]
+        for end in self.ends:
+            known = {end.prover.formulas.x, *end.prover.formulas.unknowns, *end.prover.formulas.constants}
+            if order or not {symbol.name for symbol in symbols([node])} <= known:
+                raise RequestError(
+                    f"the range of {self.driver} ends at a dead centre, up to which "
+                    f"{'rates grow without bound' if order else 'only what its block moves is bounded'}; use over = "
+                    "'run'"
+                )
+            parts.append(end.bounds(node))
+        (a, b), (c, d) = (zip(*ends, strict=True) for ends in zip(*parts, strict=True))
+        return ExtremeBounds((min(a), min(b)), (max(c), max(d)))
 
-    def enclosed(self, output: str, x: FloatArray, order: int = 0) -> tuple[FloatArray, FloatArray]:
+    def enclosed(self, of: str | PoseQuantity, x: FloatArray, order: int = 0) -> tuple[FloatArray, FloatArray]:
         """Return lower and upper bounds of an output, its rate or acceleration, at values of the driver or at times.
 
         NaN where nothing is proved.
 
         Args:
-            output: The output.
+            of: As for `bounds`.
             x: Values of the driver, or times, (n,).
             order: Of the derivative.
 
@@ -185,8 +243,11 @@ class Certificate:
             RequestError: There is no such output.
 
         """
+        if isinstance(of, str) and of in self._transmissions:
+            low, high = self.enclosed(self._transmissions[of], x, order)
+            return _angles_of_cosines(low, high, of, order)
         x = np.asarray(x, dtype=float)
-        node, cells = self._node(output), self.cover.cells
+        node, cells = self._node(of), self.cover.cells
         k = np.clip(np.searchsorted(cells.low, x, "right") - 1, 0, max(len(cells) - 1, 0))
         known = np.flatnonzero((cells.low[k] <= x) & (x <= cells.high[k])) if len(cells) else np.array([], dtype=int)
         k, low, high = k[known], np.full_like(x, np.nan), np.full_like(x, np.nan)
@@ -196,11 +257,21 @@ class Certificate:
         low[known], high[known] = value.low, value.high
         return low, high
 
-    def _node(self, output: str) -> Node:
-        names: list[str] = list(self.prover.formulas.plan.outputs)
-        if output not in names:
-            raise RequestError(f"'{output}' is no output; outputs: {listed(names)}")
-        return self.prover.formulas.outputs[names.index(output)][0]
+    @cached_property
+    def _transmissions(self) -> dict[str, PoseQuantity]:
+        """Cosines of the transmission angles among the measures, by name."""
+        readings = (one for one in self.mechanism.measures if isinstance(one, TransmissionAngle))
+        return {one.name: one.quantities()[0] for one in readings}
+
+    def _node(self, of: str | PoseQuantity) -> Node:
+        formulas = self.prover.formulas
+        if isinstance(of, PoseQuantity):
+            return formulas.inlined(quantity_nodes(formulas.plan, [of]))[0]
+        names: list[str] = list(formulas.plan.outputs)
+        if of not in names:
+            known = [*names, *self._transmissions]
+            raise RequestError(f"'{of}' is no output; outputs: {listed(known)}")
+        return formulas.outputs[names.index(of)][0]
 
     def _content(self) -> dict[str, Any]:
         """The values of its file: mechanism, what it states, and centre, prediction and tube of each cell."""
@@ -222,3 +293,14 @@ class Certificate:
 
 def _turns_text(turns: int) -> str:
     return "a turn" if turns == 1 else f"{turns} turns"
+
+
+def _angles_of_cosines(low: Any, high: Any, name: str, order: int) -> tuple[Any, Any]:
+    """Return bounds of angles from 0 to pi [rad] from those of their cosines."""
+    if order:
+        raise RequestError(f"'{name}' is an angle of transmission, whose rates are not bounded")
+    cosine = Intervals(np.maximum(low, -1.0), np.minimum(high, 1.0))
+    squared = (interval(1.0) - cosine) * (cosine + 1.0)
+    found = angle(root(Intervals(np.maximum(squared.low, 0.0), squared.high)), cosine)
+    least, most = np.where(np.isnan(low), np.nan, np.maximum(found.low, 0.0)), np.minimum(found.high, HALF_TURN)
+    return (least, most) if np.ndim(least) else (float(least), float(most))

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinfmu.analysis.certified.cells import Prover
-from kinfmu.analysis.certified.certificate import DeadCentre
+from kinfmu.analysis.certified.certificate import DeadCentre, PathEnd
 from kinfmu.analysis.certified.cover import Cover, cover
 from kinfmu.analysis.certified.intervals import Intervals
 from kinfmu.arrays import FloatArray
@@ -19,23 +19,25 @@ _WINDOWS = (0.03, 0.003, 0.0003)  # [rad, sizes] from a dead centre along the pa
 _PARTS = 6  # of the way to a dead centre
 
 
-def dead_centre(prover: Prover, found: Cover, limit: Limit, *, is_high: bool) -> DeadCentre | str:
-    """Return a dead centre with the proof that the branch turns back there; or why there is no proof.
+def dead_centre(prover: Prover, found: Cover, limit: Limit, *, is_high: bool) -> tuple[DeadCentre, PathEnd] | str:
+    """Return a dead centre and the path to it, with the proof that the branch turns back there; or why there is none.
 
     Near it the driver is a function of the way x along the direction in which the unknowns move there. Cells over x
     prove the only curve through a window; its second derivative has one sign in all cells, and its first derivative
     changes its sign within the one whose values of the driver are returned. The curve begins at a pose of the proved
     cells.
     """
-    found_there: DeadCentre | str = ""
+    found_there: tuple[DeadCentre, PathEnd] | str = ""
     for within in _WINDOWS:
         found_there = _dead_centre(prover, found, limit, within, is_high=is_high)
-        if isinstance(found_there, DeadCentre):
+        if not isinstance(found_there, str):
             break
     return found_there
 
 
-def _dead_centre(prover: Prover, found: Cover, limit: Limit, within: float, *, is_high: bool) -> DeadCentre | str:
+def _dead_centre(
+    prover: Prover, found: Cover, limit: Limit, within: float, *, is_high: bool
+) -> tuple[DeadCentre, PathEnd] | str:
     """Return what `dead_centre` does, for cells over the way that begin within a distance."""
     if prover.formulas.varied:
         return "a dead centre, whose place depends on the tolerances"
@@ -54,8 +56,10 @@ def _dead_centre(prover: Prover, found: Cover, limit: Limit, within: float, *, i
     k = int(near[np.argmax(ways[near])])
     cell = found.cells[k : k + 1]
     unscaled = cell.path[1, own, 0] / prover.unit[own] * toward
-    direction = unscaled / np.linalg.norm(unscaled) / prover.unit[own]
     way = float(ways[k])
+    if not (unscaled.any() and way > 0.0):
+        return "a dead centre: the block does not move before it"
+    direction = unscaled / np.linalg.norm(unscaled) / prover.unit[own]
     turned = Prover(formulas.turned(limit.block, direction.tolist(), cell.path[0, own, 0].tolist()))
     solved = [formulas.blocks[number] for number in formulas.behind(limit.block)]
     places = [place for one in solved for place in range(one.place, one.place + one.size)]
@@ -90,7 +94,8 @@ def _dead_centre(prover: Prover, found: Cover, limit: Limit, within: float, *, i
     if not _lies_in(pose[:, :1], found, k, places):
         return "a dead centre: the path to it is not joined to the cells"
     value = window.cells.at(window.cells.s) + window.tubes.narrow
-    return DeadCentre(float(value.low[0, inner]), float(value.high[0, inner]), is_high)
+    centre = DeadCentre(float(value.low[0, inner]), float(value.high[0, inner]), is_high)
+    return centre, PathEnd(turned, window, inner)
 
 
 def turned_rate(window: Cover, x: FloatArray) -> Intervals:

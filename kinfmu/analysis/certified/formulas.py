@@ -48,6 +48,11 @@ class BlockFormulas:
         """How many unknowns it has."""
         return len(self.names)
 
+    @property
+    def is_tall(self) -> bool:
+        """True if it has redundant rows."""
+        return len(self.rows[0]) > len(self.names)
+
 
 class PlanRows:
     """The rows of a plan on one graph; coordinates that rows give outright are replaced by their formulas.
@@ -105,11 +110,13 @@ class Formulas(PlanRows):
 
     Attributes:
         x: Name of x.
+        unit_of_x: 1 rad, the mechanism's size, or 1 s.
         unknowns: Names of all unknowns, block after block.
         units: 1 rad or the mechanism's size for each of them.
         constants: Values of the constants.
         blocks: Blocks with unknowns.
         outputs: Each output with its first two derivatives.
+        redundant: Redundant rows by name, relative to the size: of blocks that have some, all rows.
 
     """
 
@@ -119,12 +126,13 @@ class Formulas(PlanRows):
         self.constants = dict(plan.parameter_values)
         self._rates: dict[Node, Node] = {}
         if over_time:
-            self.x = TIME
+            self.x, self.unit_of_x = TIME, 1.0
             self.constants |= {constant.name: constant.value for constant in plan.law_constants}
             for driver, law in zip(plan.drivers, plan.laws, strict=True):
                 (self._given[driver.inputs[0]],) = self.inlined([law.position])
         else:
             self.x = plan.drivers[0].inputs[0]
+            self.unit_of_x = 1.0 if plan.drivers[0].quantity.kind == "angle" else plan.size
         self._rates[self.graph.symbol(self.x)] = self.graph.constant(1.0)
         self.names: dict[str, tuple[str, str]] = {}
         for name in plan.unknowns:
@@ -132,6 +140,10 @@ class Formulas(PlanRows):
         self.unknowns: tuple[str, ...] = plan.unknowns
         self.units = tuple(1.0 if name.is_angle else plan.size for name in plan.unknowns)
         self.blocks = tuple(self._block(block.unknowns, place, rows) for block, place, rows in self.solved())
+        self.redundant = dict(zip(plan.watch_names, self.inlined([node for _, node in plan.watches]), strict=True))
+        for block, formulas in zip((block for block in plan.blocks if block.unknowns), self.blocks, strict=True):
+            if formulas.is_tall:
+                self.redundant |= zip(block.row_names, formulas.rows[0], strict=True)
         self.outputs = tuple(self.along(self.inlined([motion.position for motion in plan.outputs_motion]), 2))
 
     def turned(self, number: int, direction: Sequence[float], at: Sequence[float]) -> Formulas:
@@ -155,8 +167,7 @@ class Formulas(PlanRows):
         found._move(*driver)
         places = [k for block in blocks for k in range(block.place, block.place + block.size)]
         found.unknowns = (driver[0], *(self.unknowns[k] for k in places))
-        angle = self.plan.drivers[0].quantity.kind == "angle"
-        found.units = (1.0 if angle else self.plan.size, *(self.units[k] for k in places))
+        found.units = (self.unit_of_x, *(self.units[k] for k in places))
         rows = [*(node for block in blocks for node in block.rows[0]), row]
         found.blocks = (found._block(found.unknowns, 0, rows),)
         found.outputs = ()

@@ -150,7 +150,7 @@ def _up(x: Any) -> Any:
 
 def _known(low: Any, high: Any) -> Intervals:
     """Return intervals from bounds; where one is no number (infinite minus infinite), nothing is known."""
-    return Intervals(np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high))
+    return Intervals(np.fmax(low, -np.inf), np.fmin(high, np.inf))
 
 
 # ---- functions
@@ -158,21 +158,31 @@ def _known(low: Any, high: Any) -> Intervals:
 
 def sine(x: Intervals) -> Intervals:
     """Return the sine of angles [rad]."""
-    return _wave(x, 0, 0.5)
+    return _wave(x, _at_ends(x), *_WAVES["sin"])
 
 
 def cosine(x: Intervals) -> Intervals:
     """Return the cosine of angles [rad]."""
-    return _wave(x, 1, 0.0)
+    return _wave(x, _at_ends(x), *_WAVES["cos"])
 
 
-def _wave(x: Intervals, which: int, highest: float) -> Intervals:
+_WAVES = {"sin": (0, 0.5), "cos": (1, 0.0)}  # number in `_at_ends`; highest value [half turns]
+_Pair = tuple[FloatArray, FloatArray]
+
+
+def _at_ends(x: Intervals) -> tuple[_Pair, _Pair]:
+    """Return sine and cosine of the lower ends, and of the upper ones."""
+    left = _sine_and_cosine(x.low)
+    return left, left if x.high is x.low else _sine_and_cosine(x.high)
+
+
+def _wave(x: Intervals, at_ends: tuple[_Pair, _Pair], which: int, highest: float) -> Intervals:
     """Return the sine (which = 0) or cosine (1), whose largest values are at highest + 2 k half turns.
 
     Extremes are at whole numbers of half turns from there. A margin covers the rounding of t: taking one that lies just
     outside only widens the result.
     """
-    left, right = _sine_and_cosine(x.low)[which], _sine_and_cosine(x.high)[which]
+    left, right = at_ends[0][which], at_ends[1][which]
     low = np.maximum(np.minimum(left, right) - 2.0 * _SINE_ERROR, -1.0)
     high = np.minimum(np.maximum(left, right) + 2.0 * _SINE_ERROR, 1.0)
     with np.errstate(invalid="ignore"):
@@ -187,7 +197,7 @@ def _wave(x: Intervals, which: int, highest: float) -> Intervals:
     return Intervals(np.where(has_low | large, -1.0, low), np.where(has_high | large, 1.0, high))
 
 
-def _sine_and_cosine(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _sine_and_cosine(x: FloatArray) -> _Pair:
     """Return sine and cosine of angles up to 1e6 rad, each within 2^-50 of the exact value.
 
     x = k pi/2 + r with |r| <= pi/4 (1 + 1e-9). k C, C one of the first three parts of pi/2, is exact for |k| < 2^20;
@@ -311,8 +321,6 @@ _OPERATIONS: dict[str, Callable[..., Intervals]] = {
     "*": lambda a, b: a.square() if a is b else a * b,
     "/": lambda a, b: a / b,
     "neg": lambda a: -a,
-    "sin": sine,
-    "cos": cosine,
     "sqrt": root,
     "floor": whole,
     "atan2": angle,
@@ -328,17 +336,29 @@ def enclosed(targets: Sequence[Node], values: Mapping[str, Intervals], shape: tu
         shape: Of all results.
 
     """
+    at = _evaluated(reachable(targets), values, shape)
+    return [at[target] for target in targets]
+
+
+def _evaluated(order: Sequence[Node], values: Mapping[str, Intervals], shape: tuple[int, ...]) -> dict[Node, Intervals]:
+    """Return enclosures of nodes, each after its arguments."""
     at: dict[Node, Intervals] = {}
-    for node in reachable(targets):
+    ends: dict[Node, tuple[_Pair, _Pair]] = {}
+    for node in order:
         if node.constant is not None:
             at[node] = Intervals(np.full(shape, node.constant))
         elif node.op == "symbol":
             at[node] = values[node.name]
         elif node.op == "curve":
             at[node] = curve(at[node.args[0]], *node.curve)
+        elif node.op in _WAVES:  # sine and cosine of an angle are mostly needed together
+            (arg,) = node.args
+            if arg not in ends:
+                ends[arg] = _at_ends(at[arg])
+            at[node] = _wave(at[arg], ends[arg], *_WAVES[node.op])
         else:
             at[node] = _OPERATIONS[node.op](*(at[arg] for arg in node.args))
-    return [at[target] for target in targets]
+    return at
 
 
 def jumping(targets: Sequence[Node], values: Mapping[str, Intervals], shape: tuple[int, ...]) -> Any:
@@ -402,20 +422,10 @@ def contracted(
 
     """
     order = reachable(targets)
-    at: dict[Node, Intervals] = {}
+    at = _evaluated(order, values, (1,))
     moving: set[Node] = set()
     for node in order:
-        if node.constant is not None:
-            at[node] = Intervals(np.full(1, node.constant))
-        elif node.op == "symbol":
-            at[node] = values[node.name]
-            if node.name in names:
-                moving.add(node)
-        elif node.op == "curve":
-            at[node] = curve(at[node.args[0]], *node.curve)
-        else:
-            at[node] = _OPERATIONS[node.op](*(at[arg] for arg in node.args))
-        if not moving.isdisjoint(node.args):
+        if (node.op == "symbol" and node.name in names) or not moving.isdisjoint(node.args):
             moving.add(node)
     is_empty = np.zeros(1, dtype=bool)
     for target in targets:

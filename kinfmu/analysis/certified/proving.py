@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from kinfmu.analysis.certified.cells import Prover
-from kinfmu.analysis.certified.certificate import Certificate, DeadCentre, Gap
-from kinfmu.analysis.certified.cover import Cover, Guess, cover
+from kinfmu.analysis.certified.bounds import closing
+from kinfmu.analysis.certified.cells import Cells, Prover
+from kinfmu.analysis.certified.certificate import Certificate, DeadCentre, Gap, PathEnd
+from kinfmu.analysis.certified.cover import Cover, Guess, cover, joined
 from kinfmu.analysis.certified.dead_centre import dead_centre
 from kinfmu.analysis.certified.formulas import Formulas
-from kinfmu.analysis.certified.intervals import Intervals, around
+from kinfmu.analysis.certified.intervals import Intervals, around, jumping
 from kinfmu.analysis.certified.poses import is_whole, turns_of
 from kinfmu.analysis.driver_path import DriverPath, follow
 from kinfmu.arrays import FloatArray
@@ -22,13 +23,18 @@ from kinfmu.errors import RequestError, listed
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.opened import opened
 from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.plan.equations.closing import CONSISTENT
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.solver.python import Pose, Solver
+from kinfmu.solver.python.solver import TOLERANCE
 
 WIDTH = 0.1  # [rad, sizes] of the driver; of the first cells
 LEAST = 1e-9  # [rad, sizes]; narrower cells are given up
 _NEAR_CENTRE = 1e3  # times _MEET before a dead centre: there its own cells prove the block that turns back
 _MEET = 1e-9  # of the driver; what is covered up to this distance from the end of the range counts as covered
+_CLEAR = 1e-4  # of the range; width of cells that are not close to a change point
+_SMOOTH = 0.01  # rad or sizes of an unknown per rad or size of the driver, within which directions agree
+_WORTH = 1e-6  # of the range; narrower pieces, as between branches that cross, are not looked at
 _TURN = (6.283185307179586, 6.283185307179587)  # [rad], with 2 pi between them
 
 
@@ -75,10 +81,11 @@ def prepared(
     mechanism = replace(mechanism, coordinates="all")
     made, varied = (mechanism, {}) if tolerances is None else _varied(mechanism, tolerances)
     plan = compile_plan(made)
-    if varied and plan.watches:
+    redundant = [*plan.watch_names, *(row for block in plan.blocks for row in block.row_names[len(block.unknowns) :])]
+    if varied and redundant:
         raise RequestError(
-            f"redundant rows ({listed(plan.watch_names)}) close for the numbers of the file only: there is no "
-            "certificate of tolerances"
+            f"redundant rows ({listed(redundant)}) close for the numbers of the file only: there is no certificate of "
+            "tolerances"
         )
     box: dict[str, Intervals] = {
         parameter_symbol(one.name): around(np.array(one.value), np.array(varied[one.name]))
@@ -98,6 +105,8 @@ def _varied(mechanism: Mechanism, tolerances: float | Mapping[str, float]) -> tu
                 raise RequestError(
                     f"tolerance of '{name}': not a number of this mechanism, such as {listed(list(names)[:3])}"
                 )
+            if name in mechanism.parameters and mechanism.parameters[name].expression is not None:
+                raise RequestError(f"tolerance of '{name}': it follows from other parameters; give theirs")
         return made.mechanism, {names[name]: abs(float(value)) for name, value in tolerances.items()}
     given = made.mechanism.parameters.items()
     lengths = {name: one for name, one in given if one.quantity is not None and one.quantity.kind == "length"}
@@ -106,51 +115,71 @@ def _varied(mechanism: Mechanism, tolerances: float | Mapping[str, float]) -> tu
 
 def _over_range(path: DriverPath, width: float, box: Mapping[str, Intervals]) -> Certificate:
     plan = path.plan
-    prover = Prover(formulas_of(plan, varied=box), box)
-    unit = 1.0 if path.kind == "angle" else plan.size
+    prover = Prover(Formulas(plan, varied=box), box)
+    unit = prover.formulas.unit_of_x
     low = path.low.u[0] if path.low else path.poses[0].u[0]
     high = path.high.u[0] if path.high else path.poses[-1].u[0]
     edges = np.linspace(low, high, max(2, math.ceil((high - low) / (width * unit)) + 1))
     poses = {pose.u[0]: pose for pose in path.poses}
-    found = of_branch(cover(prover, edges, _guess(path.solver, poses, lambda u: (u,)), LEAST * unit), poses)
-    return of_range(path, prover, found)
+    guess = guess_of(path.solver, poses, lambda u: (u,))
+    return of_range(path, prover, of_branch(cover(prover, edges, guess, LEAST * unit), poses, guess))
 
 
 def of_range(path: DriverPath, prover: Prover, found: Cover) -> Certificate:
     """Return the certificate of a range: with the dead centres at its ends, and what the cells leave unproved."""
-    unit = 1.0 if path.kind == "angle" else path.plan.size
+    unit = prover.formulas.unit_of_x
     low = path.low.u[0] if path.low else path.poses[0].u[0]
     high = path.high.u[0] if path.high else path.poses[-1].u[0]
-    centres, reasons = [], []
+    found, limits, reasons = with_redundant_rows(prover, found)
+    centres: list[DeadCentre] = []
+    ends: list[PathEnd] = []
     for limit, is_high in ((path.low, False), (path.high, True)):
         if limit is None:
             continue
-        centre = dead_centre(prover, found, limit, is_high=is_high)
-        if isinstance(centre, DeadCentre):
-            centres.append(centre)
+        proved = dead_centre(prover, found, limit, is_high=is_high)
+        if isinstance(proved, str):
+            reasons.append((limit.u[0], proved))
         else:
-            reasons.append((limit.u[0], centre))
+            centres.append(proved[0])
+            ends.append(proved[1])
     for centre in centres:
         low, high = (low, centre.high) if centre.is_high else (centre.low, high)
-    gaps = _gaps(found, low, high, centres, reasons, _MEET * unit)
+    gaps = _gaps(prover, found, low, high, centres, reasons, _MEET * unit)
+    if path.stopped:
+        at = high if path.high is None else low
+        gaps.append(Gap(at, at, f"the motion is not followed farther: {path.stopped}"))
     turns = path.turns if path.turns is not None and not gaps and _closes(prover, found, path.turns) else None
-    return Certificate(path.plan.mechanism, path.name, low, high, turns, found, tuple(centres), tuple(gaps), prover)
+    return Certificate(
+        path.plan.mechanism,
+        path.name,
+        low,
+        high,
+        turns,
+        found,
+        tuple(centres),
+        tuple(gaps),
+        prover,
+        limits,
+        tuple(ends),
+    )
 
 
 def _over_run(plan: SolvePlan, box: Mapping[str, Intervals]) -> Certificate:
     run = plan.mechanism.run
-    prover = Prover(formulas_of(plan, over_time=True, varied=box), box)
+    prover = Prover(Formulas(plan, over_time=True, varied=box), box)
     edges = np.unique([*np.arange(run.start, run.stop, run.step), run.stop, *_jumps(plan, run.start, run.stop)])
     solver, poses, values = poses_at(plan, edges)
-    found = cover(prover, edges, _guess(solver, poses, values), LEAST * (run.stop - run.start))
-    return of_run(plan, prover, of_branch(found, poses))
+    guess = guess_of(solver, poses, values)
+    found = cover(prover, edges, guess, LEAST * (run.stop - run.start))
+    return of_run(plan, prover, of_branch(found, poses, guess))
 
 
 def of_run(plan: SolvePlan, prover: Prover, found: Cover) -> Certificate:
     """Return the certificate of a run: with what the cells leave unproved."""
     start, stop = float(plan.mechanism.run.start), float(plan.mechanism.run.stop)
-    gaps = _gaps(found, start, stop, [], [], 0.0)
-    return Certificate(plan.mechanism, "time", start, stop, None, found, (), tuple(gaps), prover)
+    found, limits, reasons = with_redundant_rows(prover, found)
+    gaps = _gaps(prover, found, start, stop, [], reasons, 0.0)
+    return Certificate(plan.mechanism, "time", start, stop, None, found, (), tuple(gaps), prover, limits)
 
 
 Values = Callable[[float], tuple[float, ...]]  # of the drivers
@@ -172,20 +201,35 @@ def poses_at(plan: SolvePlan, times: FloatArray) -> tuple[Solver, dict[float, Po
     return solver, poses, values
 
 
-def of_branch(found: Cover, poses: Mapping[float, Pose]) -> Cover:
-    """Return the pieces of the branch that the solver follows."""
+def of_branch(found: Cover, poses: Mapping[float, Pose], guess: Guess) -> Cover:
+    """Return the pieces of the branch that the solver follows; guess: its poses, where a piece is between two poses."""
     known = {x: pose for x, pose in poses.items() if not pose.status}
-    return found.with_poses(np.array(list(known)), np.array([pose.z for pose in known.values()]).T)
+    x, z = np.array(list(known)), np.array([pose.z for pose in known.values()]).T
+    ends = [(found.cells.low[first], found.cells.high[last]) for first, last in found.pieces]
+    worth = _WORTH * (found.cells.high.max(initial=0.0) - found.cells.low.min(initial=0.0))
+    more = np.array(
+        [0.5 * (a + b) for a, b in ends if b - a > worth and not ((x >= a) & (x <= b)).any()],
+        dtype=float,
+    )
+    at = guess(more)
+    is_known = np.isfinite(at).all(axis=0)
+    return found.with_poses(np.append(x, more[is_known]), np.concatenate((z, at[:, is_known]), axis=1))
 
 
-def formulas_of(plan: SolvePlan, *, over_time: bool = False, varied: Collection[str] = ()) -> Formulas:
-    for block in plan.blocks:
-        if len(block.residuals) > len(block.unknowns):
-            raise RequestError(
-                f"{listed(block.unknowns)}: solved with redundant rows ({listed(block.row_names)}); such blocks cannot "
-                "be certified yet"
-            )
-    return Formulas(plan, over_time=over_time, varied=varied)
+def with_redundant_rows(prover: Prover, found: Cover) -> tuple[Cover, dict[str, float], list[tuple[float, str]]]:
+    """Return the cells in which all redundant rows close, bounds of these rows, and where one does not close."""
+    rows = prover.formulas.redundant
+    if not rows:
+        return found, {}, []
+    limits, is_open = closing(prover, found.cells, found.tubes, [*rows.values()], TOLERANCE)
+    reasons = [
+        (float(u), f"the redundant row {name} does not close")
+        for name, where in zip(rows, is_open, strict=True)
+        for u in found.cells.u[where]
+    ]
+    kept = ~is_open.any(axis=0)
+    found = found if kept.all() else joined([(found.cells[kept], found.tubes[kept])])
+    return found, dict(zip(rows, limits.tolist(), strict=True)), reasons
 
 
 def _jumps(plan: SolvePlan, start: float, stop: float) -> list[float]:
@@ -205,7 +249,7 @@ def _jumps(plan: SolvePlan, start: float, stop: float) -> list[float]:
     return found
 
 
-def _guess(solver: Solver, poses: Mapping[float, Pose], values: Values) -> Guess:
+def guess_of(solver: Solver, poses: Mapping[float, Pose], values: Values) -> Guess:
     """Return what finds poses by the solver, each followed from the nearest known one."""
     known = np.array(sorted(poses))
 
@@ -250,6 +294,7 @@ def _closes(prover: Prover, found: Cover, turns: int) -> bool:
 
 
 def _gaps(
+    prover: Prover,
     found: Cover,
     low: float,
     high: float,
@@ -267,7 +312,10 @@ def _gaps(
         if k in (0, len(pieces)) and end - begin <= (_NEAR_CENTRE * near if is_end else near):
             continue
         if 0 < k < len(pieces) and begin < end and _changes_sign(found, k):
-            gaps.append(Gap(begin, end, "branches cross: a change point"))
+            gaps.append(Gap(begin, end, f"branches cross: a change point; {path_across(prover, found, k)}"))
+            continue
+        if 0 < k < len(pieces) and _jumps_within(prover, found, k):
+            gaps.append(Gap(begin, end, "a law begins anew, or an angle passes half a turn"))
             continue
         if begin == end:
             gaps.append(Gap(begin, end, "the cells on both sides are not joined"))
@@ -282,3 +330,69 @@ def _changes_sign(found: Cover, piece: int) -> bool:
     """Return whether the determinant of a block has other signs before and after a gap, the one before a piece."""
     before, after = found.pieces[piece - 1][1], found.pieces[piece][0]
     return bool((found.tubes.sign[:, before] != found.tubes.sign[:, after]).any())
+
+
+def _jumps_within(prover: Prover, found: Cover, piece: int) -> bool:
+    """Return whether a law may begin anew in the gap before a piece, or an angle pass half a turn: rows jump there."""
+    before, after = found.pieces[piece - 1][1], found.pieces[piece][0]
+    cell, tube = found.cells[before : before + 1], found.tubes[before : before + 1]
+    s = Intervals(found.cells.high[[before]], found.cells.low[[after]]) - cell.u
+    values = prover.deviated(prover.over(cell, s), tube)
+    return any(bool(jumping(block.rows[0], values, (1,))[0]) for block in prover.formulas.blocks)
+
+
+@np.errstate(all="ignore")  # of rates that are not known
+def path_across(prover: Prover, found: Cover, piece: int) -> str:
+    """Return how well all rows close along a path through the gap before a piece, from its pose before to that after.
+
+    That they close exactly is a property of exact numbers: a change of a length by as little as rounding parts the
+    branches. So it is not proved, and the branch through the gap is not either.
+    """
+    before, after = found.pieces[piece - 1][1], found.pieces[piece][0]
+    ends = [(before, found.cells.high[before]), (after, found.cells.low[after])]
+    poses = []
+    for k, u in ends:
+        cell = found.cells[k : k + 1]
+        poses.append((cell.at(Intervals(np.array([u])) - cell.u) + found.tubes[k : k + 1].narrow).middle)
+    (_, low), (_, high) = ends
+    wide = np.flatnonzero(found.cells.high - found.cells.low > _CLEAR * (found.cells.high[-1] - found.cells.low[0]))
+    nearest = [wide[np.argmin(abs(found.cells.u[wide] - u))] for _, u in ends if len(wide)]
+    bend = found.cells.path[2][:, nearest].mean(axis=1, keepdims=True) if nearest else 0.0 * poses[0]
+    rate = (poses[1] - poses[0]) / (high - low)
+    middle = 0.5 * (poses[0] + poses[1]) - bend * (0.125 * (high - low) ** 2)
+    window = Cells(np.array([low]), np.array([high]), np.array([0.5 * (low + high)]), np.array([middle, rate, bend]))
+    for k, u in ends:
+        cell = found.cells[k : k + 1]
+        off = window.at(Intervals(np.array([u])) - window.u) - cell.at(Intervals(np.array([u])) - cell.u)
+        if not off.is_inside(found.tubes[k : k + 1].wide).all():
+            return "no path joins the poses before and after"
+    most = prover.most_along(window)
+    if most > CONSISTENT:
+        return f"on the path from the pose before to that after rows are open by {most:.1g} of the size"
+    turn = _turn_across(prover, found, piece)
+    if not turn < _SMOOTH:
+        return "the direction after it is not shown to be that before it"
+    return (
+        f"a path joins the poses before and after, along which all rows close within {most:.1g} of the size; its "
+        f"direction changes by less than {turn:.1g}"
+    )
+
+
+def _turn_across(prover: Prover, found: Cover, piece: int) -> float:
+    """Return by how much the rates before a piece differ at most from those of it, near the gap between them.
+
+    Close to the gap rates are known less well, farther away they change: the cells where both are least are taken.
+    """
+    unit = prover.unit[:, None]
+    sides = []
+    for number, is_before in ((piece - 1, True), (piece, False)):
+        first, last = found.pieces[number]
+        k = np.arange(first, last + 1)
+        cells, tubes = found.cells[k], found.tubes[k]
+        u = cells.high if is_before else cells.low
+        s = Intervals(u) - cells.u
+        tubes = prover.closer(cells, tubes, s)
+        rates = Intervals(cells.path[1]) + Intervals(cells.path[2]) * s + tubes.rates
+        doubt = (rates.radius / unit).max(axis=0) + abs(u - u[-1 if is_before else 0]) / prover.formulas.unit_of_x
+        sides.append(rates[:, np.argmin(doubt)])
+    return float(((sides[1] - sides[0]).magnitude * prover.formulas.unit_of_x / unit[:, 0]).max())

@@ -12,8 +12,9 @@ import numpy as np
 from kinfmu.analysis.certified.cells import Cells, Prover
 from kinfmu.analysis.certified.certificate import FORMAT, Certificate
 from kinfmu.analysis.certified.cover import joined
+from kinfmu.analysis.certified.formulas import Formulas
 from kinfmu.analysis.certified.proving import (
-    formulas_of,
+    guess_of,
     of_branch,
     of_range,
     of_run,
@@ -53,7 +54,7 @@ def proved_again(path: str | Path) -> Certificate:
     plan, box = prepared(mechanism, over, tolerances)
     path_of_driver = follow(plan, 0) if over == "range" else None
     plan = path_of_driver.plan if path_of_driver else plan
-    prover = Prover(formulas_of(plan, over_time=over == "run", varied=box), box)
+    prover = Prover(Formulas(plan, over_time=over == "run", varied=box), box)
     count, n = len(arrays["u"]), len(prover.formulas.unknowns)
     shapes = {"low": (count,), "high": (count,), "u": (count,), "path": (3, n, count)}
     shapes["radii"] = (len(prover.formulas.blocks), count)
@@ -71,9 +72,12 @@ def proved_again(path: str | Path) -> Certificate:
         raise KinfmuError(f"{path}: the cell from {cells.low[k]:.9g} to {cells.high[k]:.9g} is not proved")
     found = joined([(cells, tubes)])
     if path_of_driver:
-        certificate = of_range(path_of_driver, prover, of_branch(found, {p.u[0]: p for p in path_of_driver.poses}))
+        poses = {pose.u[0]: pose for pose in path_of_driver.poses}
+        guess = guess_of(path_of_driver.solver, poses, lambda u: (u,))
+        certificate = of_range(path_of_driver, prover, of_branch(found, poses, guess))
     else:
-        certificate = of_run(plan, prover, of_branch(found, poses_at(plan, cells.u)[1]))
+        solver, poses, values = poses_at(plan, cells.u)
+        certificate = of_run(plan, prover, of_branch(found, poses, guess_of(solver, poses, values)))
     certificate = replace(certificate, mechanism=mechanism, tolerances=tolerances)
     near = _SAME * max(abs(certificate.high - certificate.low), 1e-300)
     for gap in certificate.gaps:
