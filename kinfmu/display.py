@@ -182,6 +182,8 @@ class Styled(NamedTuple):
 COLOURS = {"ok": "#1a7f37", "note": "#0969da", "advice": "#0969da", "poor": "#cf222e", "problem": "#cf222e"}
 _CODES = {"ok": "32", "note": "36", "advice": "36", "poor": "31", "problem": "1;31", "title": "1", "faint": "90"}
 _GAP = 2  # letters between columns
+_SHORT = 16  # letters that stay of a long name in a narrow table
+_LONG = re.compile(r"\w{20,}")  # names that may break on a page
 _INSIDE = re.compile(r" (?== )|(?<= =) |(?<=\d) (?=[A-Za-z])")  # blanks at which no line ends
 
 
@@ -211,7 +213,7 @@ class Summary(NamedTuple):
             yield from ([Styled("", " " * indent + line)] for line in (*others, *(f"  {line}" for line in below)))
         for table in self.tables:
             yield []
-            lines = [*_table_lines(table, width - indent)]
+            lines = [*_table_lines(table, width - indent, width - 2)]
             left = min(indent, max(width - max(sum(len(part.text) for part in line) for line in lines), 2))
             yield from ([Styled("", " " * left), *line] for line in lines)
 
@@ -232,6 +234,14 @@ def terminal(part: Styled) -> str:
     return f"\x1b[{_CODES[part.style]}m{part.text}\x1b[0m" if part.style and part.text.strip() else part.text
 
 
+def shortened(word: str, most: int) -> str:
+    """Return a word of at most so many letters, with an ellipsis in its middle if it is longer."""
+    if len(word) <= most:
+        return word
+    head = most // 2
+    return f"{word[:head]}\N{HORIZONTAL ELLIPSIS}{word[len(word) - (most - head - 1) :]}"
+
+
 def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
     """Return text as lines of whole words; indent: begin of all lines but the first. 'u = 60 deg' is one word."""
     glued = _INSIDE.sub("\0", text)
@@ -239,8 +249,11 @@ def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
     return [line.replace("\0", " ") for line in lines] or [""]
 
 
-def _table_lines(table: Table, width: int) -> Iterator[list[Styled]]:
-    """Yield the lines of a table; where it is too wide, its widest columns break between words."""
+def _table_lines(table: Table, width: int, most: int) -> Iterator[list[Styled]]:
+    """Yield the lines of a table; wider than `width`, its widest columns break between words.
+
+    Wider than `most` even then, its long names are shortened.
+    """
     if table.caption:
         yield from ([Styled("title", line)] for line in _wrapped(table.caption, width))
     every = (table.columns, *table.rows)
@@ -250,12 +263,19 @@ def _table_lines(table: Table, width: int) -> Iterator[list[Styled]]:
         is_text = k < table.left
         words = [f"{word}{'  '}" for cell in cells for word in _INSIDE.sub("_", cell).split()] if is_text else cells
         least.append(max(map(len, (*head.split(), *words)), default=0))
-    for _ in range(sum(widths) + _GAP * (len(widths) - 1) - width):
-        k = max(range(len(widths)), key=lambda k: (widths[k] > least[k], widths[k]))
-        widths[k] -= widths[k] > least[k]
+    full, short = [*widths], [min(letters, _SHORT) if k < table.left else letters for k, letters in enumerate(least)]
+    for lowest, target in ((least, width), (short, most)):  # names of many letters are shortened last
+        for _ in range(sum(widths) + _GAP * (len(widths) - 1) - target):
+            k = max(range(len(widths)), key=lambda k: (widths[k] > lowest[k], widths[k]))
+            widths[k] -= widths[k] > lowest[k]
+    is_short = [now < min(had, letters) for now, had, letters in zip(widths, full, least, strict=True)]
     for number, row in enumerate(every):
         indents = ["  " * (number > 0 and k < table.left) for k in range(len(row))]
-        parts = [*map(_wrapped, row, widths, indents)]
+        cells = [
+            " ".join(shortened(word, letters - 2) for word in cell.split(" ")) if is_cut else cell
+            for cell, letters, is_cut in zip(row, widths, is_short, strict=True)
+        ]
+        parts = [*map(_wrapped, cells, widths, indents)]
         for line in range(max(map(len, parts))):
             shown = []
             for k, (cell, width, lines) in enumerate(zip(row, widths, parts, strict=True)):
@@ -279,7 +299,8 @@ def _html_table(table: Table) -> str:
 
 def _tag(kind: str, text: str, style: str, name: str = "") -> str:
     """Return a cell of a table; name: of its class."""
-    return f'<{kind}{f" class={name}" if name else ""} style="{style}">{escaped(text)}</{kind}>'
+    shown = _LONG.sub(lambda word: word[0].replace("_", "_<wbr>"), escaped(text))
+    return f'<{kind}{f" class={name}" if name else ""} style="{style}">{shown}</{kind}>'
 
 
 def _rows_html(rows: Iterable[str]) -> str:

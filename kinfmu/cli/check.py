@@ -10,6 +10,7 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from shlex import quote
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import click
@@ -116,7 +117,10 @@ def check(
         if report.problem is not None:
             raise report.problem if as_json else _shown(report.problem)
     if sys.stdout.isatty() and not (detail or as_json):
-        click.echo(f"\nkinfmu play {quote(mechanism)} moves it; --detail shows how it is solved")
+        hint = f"kinfmu play {quote(mechanism)} moves it; --detail shows how it is solved"
+        click.echo(
+            f"\n{fill(hint, shutil.get_terminal_size().columns, break_long_words=False, break_on_hyphens=False)}"
+        )
 
 
 def _print_part(path: str, problem: MechanismError, *, detail: bool, as_json: bool) -> None:

@@ -85,7 +85,7 @@ def _motion(found: Report) -> Run | None:
 
 def _page(found: Report, run: Run | None) -> str:
     """Return the sheet as a page that holds all that it shows."""
-    from kinfmu.draw.document import drawing_svg, plots_svg
+    from kinfmu.draw.document import drawing_svg, plots_note, plots_svg
     from kinfmu.notebook import picture, title
 
     name = title(found.mechanism)
@@ -94,7 +94,9 @@ def _page(found: Report, run: Run | None) -> str:
         parts.clear()  # the verdicts state it
     parts.append(found.summary().html())
     with suppress(KinfmuError):  # the drawing states that matplotlib is missing
-        parts += ["".join(picture(partial(str, svg), f"Plot of {name}") for svg in plots_svg(run))] if run else []
+        if run is not None:
+            note = f"<p>{escaped(plots_note(run))}</p>"
+            parts.append("".join(picture(partial(str, svg), f"Plot of {name}") for svg in plots_svg(run)) + note)
     head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{escaped(name)}</title>'
     body = "\n".join(f"<div>{part}</div>" for part in parts)
     return (

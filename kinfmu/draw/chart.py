@@ -216,6 +216,26 @@ def repeats_effort(run: Run, name: ForceName) -> bool:
     return bool(np.all(~run.good | (np.abs(own - other) <= ROUND_OFF * largest) | ~np.isfinite(own)))
 
 
+def repeated(run: Run) -> dict[CoordinateName, CoordinateName]:
+    """Return places of bodies and points that move as another one does, to round-off, by name, and that one.
+
+    Points of interest are the ones that stay. Angles never repeat one another: each belongs to its own body.
+    """
+    columns = {name: run[name][run.good] for name in shown_outputs(run) if not name.is_angle}
+    near = ROUND_OFF * max((float(np.abs(values).max(initial=0.0)) for values in columns.values()), default=0.0)
+    moving = {name: values for name, values in columns.items() if len(values) and np.ptp(values) > near}
+    found: dict[CoordinateName, CoordinateName] = {}
+    for name, values in moving.items():
+        for other in moving:
+            if other == name:
+                break
+            is_like = other.axis == name.axis and other not in found and abs(moving[other][0] - values[0]) <= near
+            if is_like and np.abs(moving[other] - values).max() <= near:
+                found[name] = other
+                break
+    return found
+
+
 def equal_below(curves: Sequence[FloatArray]) -> list[int]:
     """Return for each curve (n,) how many later ones look the same; drawn wider by these, it stays visible."""
     known = np.concatenate([finite(values) for values in curves])
@@ -313,7 +333,8 @@ def overview(run: Run) -> Figure:
     """Return a figure of the first outputs of a run with samples, with a panel for each unit; needs matplotlib."""
     from matplotlib.figure import Figure
 
-    by_unit = [[name for name in shown_outputs(run) if name.is_angle == is_angle] for is_angle in (False, True)]
+    names = [name for name in shown_outputs(run) if name not in repeated(run)]
+    by_unit = [[name for name in names if name.is_angle == is_angle] for is_angle in (False, True)]
     panels = [names for names in by_unit if names]
     figure = Figure(figsize=(WIDTH * max(len(panels), 1), HEIGHT), layout="constrained", facecolor="white")
     for index, names in enumerate(panels, start=1):
