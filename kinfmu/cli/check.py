@@ -151,9 +151,13 @@ def _print_part(path: str, problem: MechanismError, *, detail: bool, as_json: bo
 def _print(report: Report, *, detail: bool) -> None:
     """Print a report in the width of the terminal; in colours on one, unless NO_COLOR is set."""
     is_terminal = sys.stdout.isatty()
-    width = min(shutil.get_terminal_size().columns, MOST_COLUMNS) if is_terminal else COLUMNS
-    text = report.summary(detail=detail).text(width, colour=is_terminal and not os.environ.get("NO_COLOR"))
+    text = report.summary(detail=detail).text(_width(), colour=is_terminal and not os.environ.get("NO_COLOR"))
     click.echo(text, color=is_terminal)
+
+
+def _width() -> int:
+    """Return the letters of a line on the terminal, or in a file."""
+    return min(shutil.get_terminal_size().columns, MOST_COLUMNS) if sys.stdout.isatty() else COLUMNS
 
 
 def _shown(problem: KinfmuError) -> Exception:

@@ -196,7 +196,7 @@ def round_ticks(axis: Axis, most: int, unit: str) -> None:
     """Give an axis with a linear scale at most this many steps of 1, 2 or 5 times a power of ten, or as of degrees."""
     from matplotlib.ticker import MaxNLocator
 
-    axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 5, 10]))
+    axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 5, 10], min_n_ticks=3))
     if unit == "deg":
         degree_ticks(axis, most)
 
@@ -216,12 +216,12 @@ def repeats_effort(run: Run, name: ForceName) -> bool:
     return bool(np.all(~run.good | (np.abs(own - other) <= ROUND_OFF * largest) | ~np.isfinite(own)))
 
 
-def repeated(run: Run) -> dict[CoordinateName, CoordinateName]:
-    """Return places of bodies and points that move as another one does, to round-off, by name, and that one.
+def repeated(run: Run, names: Sequence[CoordinateName]) -> dict[CoordinateName, CoordinateName]:
+    """Return which of the places named move as one before them does, to round-off, and that one.
 
-    Points of interest are the ones that stay. Angles never repeat one another: each belongs to its own body.
+    Angles never repeat one another: each belongs to its own body.
     """
-    columns = {name: run[name][run.good] for name in shown_outputs(run) if not name.is_angle}
+    columns = {name: run[name][run.good] for name in names if not name.is_angle and name not in run.absent}
     near = ROUND_OFF * max((float(np.abs(values).max(initial=0.0)) for values in columns.values()), default=0.0)
     moving = {name: values for name, values in columns.items() if len(values) and np.ptp(values) > near}
     found: dict[CoordinateName, CoordinateName] = {}
@@ -333,7 +333,8 @@ def overview(run: Run) -> Figure:
     """Return a figure of the first outputs of a run with samples, with a panel for each unit; needs matplotlib."""
     from matplotlib.figure import Figure
 
-    names = [name for name in shown_outputs(run) if name not in repeated(run)]
+    outputs = shown_outputs(run)
+    names = [name for name in outputs if name not in repeated(run, outputs)]
     by_unit = [[name for name in names if name.is_angle == is_angle] for is_angle in (False, True)]
     panels = [names for names in by_unit if names]
     figure = Figure(figsize=(WIDTH * max(len(panels), 1), HEIGHT), layout="constrained", facecolor="white")

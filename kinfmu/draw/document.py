@@ -34,6 +34,7 @@ _LETTER = 0.6021 * _LETTERS  # [pt], width of a letter of DejaVu Sans Mono
 _COLUMNS = int((_WIDTH - 2.0 * _EDGE) / _LETTER)
 _DRAWING = 225.0  # [pt], height of the figure with its scale
 _PANEL = 132.0  # [pt], height of a plot with its scale and names
+_LEAST_PANEL = 105.0  # [pt]
 _ABREAST = 2
 _STILL = 1e-9  # of the driver's range; by which a coordinate that follows the driver differs from it
 _LONGEST = 26  # letters of a name above a plot
@@ -81,9 +82,11 @@ def _pages(summary: Summary, mechanism: Mechanism, run: Run | None) -> list[Figu
     for paragraph in paragraphs:
         pages.text(paragraph)
     if run is not None:
-        for number, panels in enumerate(_groups(run)):
-            _panel(pages.axes(_PANEL, number % _ABREAST, _ABREAST), run, panels)
-        pages.text([[Styled("faint", line)] for line in wrap(plots_note(run), _COLUMNS)])
+        groups, note = _groups(run), wrap(plots_note(run), _COLUMNS)
+        height = pages.height(-(-len(groups) // _ABREAST), (len(note) + 1) * _LINE)
+        for number, panels in enumerate(groups):
+            _panel(pages.axes(height, number % _ABREAST, _ABREAST), run, panels)
+        pages.text([[Styled("faint", line)] for line in note])
     return pages.made
 
 
@@ -129,6 +132,11 @@ class _Pages:
         corner = (_EDGE + column * width + left) / _WIDTH, (self._y + bottom) / _HEIGHT
         size = (width - left - right) / _WIDTH, (height - bottom - top) / _HEIGHT
         return self.made[-1].add_axes((*corner, *size))
+
+    def height(self, rows: int, below: float) -> float:
+        """Return the height of a row of plots: lower ones, if they then fit on the last page with a text below them."""
+        free = (self._y - _EDGE - below) / max(rows, 1)
+        return free if _LEAST_PANEL <= free < _PANEL else _PANEL
 
     def remove(self, axes: Axes, height: float) -> None:
         """Take back the last row, of a height, which has only these axes."""

@@ -86,7 +86,7 @@ def pose_note(shown: Instant) -> str:
     if len(shown.poses[GROUND_NAME]) == 1 or np.allclose(values, starts, rtol=1e-9, atol=1e-9):
         return ""
     texts = [f"{d.name} = {value_text(shown, d, start)}" for d, start in zip(mechanism.drivers, starts, strict=True)]
-    why = "drawn where links overlap least; " if shown.is_clearest else ""
+    why = "clearest pose; " if shown.is_clearest else ""
     return f"{why}the run starts at {listed(texts)}"
 
 

@@ -194,7 +194,7 @@ def _chosen(runs: Sequence[Run], columns: Sequence[str], path: Path, *, degrees:
 
 def not_drawn(run: Run, names: Sequence[str]) -> str:
     """Return 'not drawn: crank.φ, slider.x (= piston.x)' for names and what repeats another curve; '' without any."""
-    equal = [f"{symbol(name)} (= {symbol(other)})" for name, other in repeated(run).items()]
+    equal = [f"{symbol(name)} (= {symbol(other)})" for name, other in _usual_and_repeated(run)[1].items()]
     left = [*map(symbol, names), *equal]
     return f"not drawn: {', '.join(left)}" if left else ""
 
@@ -461,12 +461,18 @@ def usual_coordinates(run: Run) -> list[CoordinateName]:
     Places of the frames of bodies that turn are left out if there are points of interest: where the frame of a body has
     its origin is a choice of the file, and the points are those that matter. So are places that another one repeats.
     """
+    usual, left_out = _usual_and_repeated(run)
+    return [name for name in usual if name not in left_out]
+
+
+def _usual_and_repeated(run: Run) -> tuple[list[CoordinateName], dict[CoordinateName, CoordinateName]]:
+    """Return usual coordinates, and which of them repeat another one, a point of interest if there is one."""
     points = [name for name in run.outputs[run.coordinate_count :] if name not in run.absent]
     names = run.names or run.outputs
     turning = {name.owner for name in names if name.is_angle and points}
-    usual = [*(name for name in names if name.is_angle or name.owner not in turning), *(points if run.names else ())]
-    left_out = repeated(run)
-    return [name for name in usual if name not in left_out]
+    bodies = [name for name in names if name.is_angle or name.owner not in turning]
+    points = points if run.names else []
+    return [*bodies, *points], repeated(run, [*points, *bodies])
 
 
 def _title_of(name: ForceName | SignalName) -> str:

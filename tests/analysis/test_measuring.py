@@ -29,10 +29,10 @@ def test_a_driver_that_turns_round_is_measured_over_one_turn_at_its_speed() -> N
     assert speed.value == pytest.approx(45.0 * 20.0 * math.pi, rel=1e-12)
     assert speed.unit == "mm/s"
     text = unwrapped(report)
-    assert " Over one turn of crank at 62.8319 rad/s\n measure value at crank\n" in text
+    assert " Over one turn of crank at 600 rpm\n measure value at crank\n" in text
     assert " stroke 90 mm 180 deg and 0 deg\n" in text
     found = report.as_json()["measures"]
-    assert found["over"] == "one turn of crank at 62.8319 rad/s"
+    assert found["over"] == "one turn of crank at 600 rpm"
     assert found["values"][0]["name"] == "stroke"
     assert found["values"][0]["at"] == pytest.approx([math.pi, 0.0], abs=1e-12)
     assert found["refused"] == {}
