@@ -202,13 +202,13 @@ class Summary(NamedTuple):
 
     def lines(self, width: int) -> Iterator[list[Styled]]:
         """Yield the lines of the report; longer than `width` are only words that are longer."""
-        *head, last = _wrapped(self.title or self.name, width - len(self.name) - _GAP)
+        *head, last = wrapped(self.title or self.name, width - len(self.name) - _GAP)
         yield from ([Styled("title", line)] for line in head)
         yield [Styled("title", last), Styled("faint", f"{'':{_GAP}}{self.name}" if self.title else "")]
         yield []
         indent = 4 + max((len(verdict.level) for verdict in self.verdicts), default=0)
         for level, text, below in self.verdicts:
-            first, *others = _wrapped(text, width - indent)
+            first, *others = wrapped(text, width - indent)
             yield [Styled(level, f"  {level}".ljust(indent)), Styled("", first)]
             yield from ([Styled("", " " * indent + line)] for line in (*others, *(f"  {line}" for line in below)))
         for table in self.tables:
@@ -221,7 +221,7 @@ class Summary(NamedTuple):
         """Return verdicts and tables as HTML."""
         rows = []
         for level, text, below in self.verdicts:
-            shown = _tag("td", "\n".join((text, *below)), _CELL)
+            shown = _tag("td", "\n".join((text, *below)), f"{_CELL}; overflow-wrap: anywhere")
             rows.append(_tag("th", level, f"{_CELL}; color: {COLOURS[level]}", level) + shown)
         tables = [
             f"<p>{escaped(table.caption)}</p>" * bool(table.caption) + _html_table(table) for table in self.tables
@@ -242,7 +242,7 @@ def shortened(word: str, most: int) -> str:
     return f"{word[:head]}\N{HORIZONTAL ELLIPSIS}{word[len(word) - (most - head - 1) :]}"
 
 
-def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
+def wrapped(text: str, width: int, indent: str = "") -> list[str]:
     """Return text as lines of whole words; indent: begin of all lines but the first. 'u = 60 deg' is one word."""
     glued = _INSIDE.sub("\0", text)
     lines = wrap(glued, max(width, 1), subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
@@ -255,7 +255,7 @@ def _table_lines(table: Table, width: int, most: int) -> Iterator[list[Styled]]:
     Wider than `most` even then, its long names are shortened.
     """
     if table.caption:
-        yield from ([Styled("title", line)] for line in _wrapped(table.caption, width))
+        yield from ([Styled("title", line)] for line in wrapped(table.caption, width))
     every = (table.columns, *table.rows)
     widths = [max(map(len, column)) for column in zip(*every, strict=True)]
     least = []
@@ -275,7 +275,7 @@ def _table_lines(table: Table, width: int, most: int) -> Iterator[list[Styled]]:
             " ".join(shortened(word, letters - 2) for word in cell.split(" ")) if is_cut else cell
             for cell, letters, is_cut in zip(row, widths, is_short, strict=True)
         ]
-        parts = [*map(_wrapped, cells, widths, indents)]
+        parts = [*map(wrapped, cells, widths, indents)]
         for line in range(max(map(len, parts))):
             shown = []
             for k, (cell, width, lines) in enumerate(zip(row, widths, parts, strict=True)):
@@ -294,13 +294,12 @@ def _html_table(table: Table) -> str:
         poor = [f"; color: {COLOURS['poor']}" if isinstance(cell, Poor) else "" for cell in row]
         cells = zip(row, styles, poor, strict=True)
         rows.append("".join(_tag("td", cell, style + more, "poor" if more else "") for cell, style, more in cells))
-    return _rows_html(rows)
+    return _LONG.sub(lambda name: name[0].replace("_", "_<wbr>"), _rows_html(rows))
 
 
 def _tag(kind: str, text: str, style: str, name: str = "") -> str:
     """Return a cell of a table; name: of its class."""
-    shown = _LONG.sub(lambda word: word[0].replace("_", "_<wbr>"), escaped(text))
-    return f'<{kind}{f" class={name}" if name else ""} style="{style}">{shown}</{kind}>'
+    return f'<{kind}{f" class={name}" if name else ""} style="{style}">{escaped(text)}</{kind}>'
 
 
 def _rows_html(rows: Iterable[str]) -> str:

@@ -10,7 +10,6 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from shlex import quote
-from textwrap import fill
 from typing import TYPE_CHECKING
 
 import click
@@ -18,6 +17,7 @@ import click
 from kinfmu.cli.arguments import OutputFile, driver_value, mechanism_argument
 from kinfmu.cli.group import errors_of, main
 from kinfmu.cli.settings import checked_settings, set_option
+from kinfmu.display import wrapped
 from kinfmu.errors import KinfmuError, MechanismError, listed
 from kinfmu.mechanism import gallery
 from kinfmu.mechanism.body import MEASURED_OVER
@@ -101,9 +101,9 @@ def check(
     else:
         _print(report, detail=detail)
         if certificate is not None:
-            click.echo(f"\n{certificate}")
+            click.echo(f"\n{_fitted(str(certificate))}")
         if assemblies and (found := _assemblies(report)) is not None:
-            click.echo(f"\n{found}")
+            click.echo(f"\n{_fitted(str(found))}")
         if matrices and (report.problem is None or report.has_cut_cam):
             for matrix in report.matrices():
                 click.echo(f"\n{matrix}")
@@ -118,9 +118,7 @@ def check(
             raise report.problem if as_json else _shown(report.problem)
     if sys.stdout.isatty() and not (detail or as_json):
         hint = f"kinfmu play {quote(mechanism)} moves it; --detail shows how it is solved"
-        click.echo(
-            f"\n{fill(hint, shutil.get_terminal_size().columns, break_long_words=False, break_on_hyphens=False)}"
-        )
+        click.echo(f"\n{_fitted(hint, indent=0)}")
 
 
 def _print_part(path: str, problem: MechanismError, *, detail: bool, as_json: bool) -> None:
@@ -158,6 +156,13 @@ def _print(report: Report, *, detail: bool) -> None:
 def _width() -> int:
     """Return the letters of a line on the terminal, or in a file."""
     return min(shutil.get_terminal_size().columns, MOST_COLUMNS) if sys.stdout.isatty() else COLUMNS
+
+
+def _fitted(text: str, indent: int = 14) -> str:
+    """Return text as lines that fit on the terminal, with what continues a line indented; as it is in a file."""
+    if not sys.stdout.isatty():
+        return text
+    return "\n".join(part for line in text.split("\n") for part in wrapped(line, _width(), " " * indent))
 
 
 def _shown(problem: KinfmuError) -> Exception:
