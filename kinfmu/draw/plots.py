@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, overload
 import numpy as np
 
 from kinfmu.arrays import FloatArray, finite
+from kinfmu.display import shortened
 from kinfmu.draw.chart import (
     LOST,
     SMALL,
@@ -59,6 +60,7 @@ _BETWEEN, _GAP, _BLOCK_GAP = 68.0, 14.0, 52.0  # [pt] between coordinates, their
 _FORCES: palette.Colour = (185, 28, 28)  # that of driving arrows in drawings
 _LABEL = 42.0  # [pt] from an axis to its name
 _NOTE = 12.0  # [pt] of a line below all panels
+_LONGEST_TITLE = 32  # letters of a name above its panels
 _LONGEST = 20  # letters of a name with its unit that fit next to a panel in one line
 
 
@@ -323,7 +325,8 @@ def _sheet(
             _panel(axes, runs, panel, degrees=degrees)
         for axes in panels[:-1]:
             axes.tick_params(labelbottom=False)
-        panels[0].set_title(symbol(stack.title), fontsize=FONT + 1.0, loc="left", color=ink(INK), parse_math=False)
+        name = shortened(symbol(stack.title), _LONGEST_TITLE)
+        panels[0].set_title(name, fontsize=FONT + 1.0, loc="left", color=ink(INK), parse_math=False)
         panels[-1].set_xlabel(axis.label, fontsize=SMALL, color=ink(GREY), labelpad=1.0)
         for axes in panels:
             axes.yaxis.set_label_coords(-_LABEL / (_WIDTH - _BETWEEN), 0.5)

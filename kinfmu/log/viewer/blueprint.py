@@ -30,6 +30,7 @@ AFTER = 0.13  # of the run's time, left free after them for half of the label of
 LEGEND_EDGE, LETTER = 34.0, 7.0  # [points]; width of a legend around its names, and of a letter
 LEGEND_EDGE_Y, LEGEND_LINE = 14.0, 23.0  # [points]; height of a legend around its names, and of one
 MOST_LEGEND = 0.5  # of the height of a plot, that is made free for a legend
+LONGER = 1.1  # times the range of curves and legend, of an axis that leaves enough of it to the curves
 ABREAST = 3  # most plots of efforts and signals in a row
 FEW = 4  # plots of two runs, up to which they are wide
 WIDTH, HEIGHT = 870.0, 820.0  # [points], of all plots and states on a usual screen
@@ -289,8 +290,9 @@ def plot(
     corner = free_corner(found, runs, shown, width - NUMBERS, height - CAPTION)
     wide, part = legend_size(found, width - NUMBERS, height - CAPTION)
     if corner is None and shown and wide <= 1.0 and part <= MOST_LEGEND:
-        shown = with_two_labels(low, low + (high - low) / (1.0 - part), height - CAPTION)
-        corner = "RightTop"
+        longer = with_two_labels(low, low + (high - low) / (1.0 - part), height - CAPTION)
+        if (longer[1] - longer[0]) * (1.0 - part) <= LONGER * (high - low):  # it has its labels without being longer
+            shown, corner = longer, "RightTop"
     return rrb.TimeSeriesView(
         name=title,
         origin="/",
