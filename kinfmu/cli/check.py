@@ -17,7 +17,6 @@ import click
 from kinfmu.cli.arguments import OutputFile, driver_value, mechanism_argument
 from kinfmu.cli.group import errors_of, main
 from kinfmu.cli.settings import checked_settings, set_option
-from kinfmu.display import wrapped
 from kinfmu.errors import KinfmuError, MechanismError, listed
 from kinfmu.mechanism import gallery
 from kinfmu.mechanism.body import MEASURED_OVER
@@ -160,6 +159,8 @@ def _width() -> int:
 
 def _fitted(text: str, indent: int = 14) -> str:
     """Return text as lines that fit on the terminal, with what continues a line indented; as it is in a file."""
+    from kinfmu.display import wrapped
+
     if not sys.stdout.isatty():
         return text
     return "\n".join(part for line in text.split("\n") for part in wrapped(line, _width(), " " * indent))
