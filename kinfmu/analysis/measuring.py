@@ -17,13 +17,13 @@ from kinfmu.mechanism.drivers import SAMPLES_PER_TURN
 from kinfmu.mechanism.laws import ConstantSpeed, ConstantValue, External, Law, Polynomial
 from kinfmu.mechanism.laws.law import NEARLY
 from kinfmu.mechanism.loads.load import Following
-from kinfmu.mechanism.number import display_unit, given_unit
+from kinfmu.mechanism.number import given_unit
 from kinfmu.motion import MeasuredValue, measure
 from kinfmu.plan import SolvePlan
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
 from kinfmu.run.solve import solve
-from kinfmu.units import Quantity
+from kinfmu.units import Quantity, angular_speed, factors
 
 _MOST_TURNS = 24  # of the law of a load
 
@@ -98,8 +98,9 @@ def constant_speed(law: Law) -> float | None:
 
 def _speed_text(law: Law, speed: float) -> str:
     """Return the speed of an angle in the unit of the mechanism file, such as '600 rpm'."""
-    unit = display_unit(Quantity("angle", 1), "m", given_unit(getattr(law, "speed", speed)))
-    return f"{speed / unit.factor:.6g}{unit.suffix}"
+    unit = given_unit(getattr(law, "speed", speed))
+    factor = factors(Quantity("angle", 1), "m").get(unit)
+    return angular_speed(speed) if factor is None else f"{speed / factor:.6g} {unit}"
 
 
 def turns_of_cycle(mechanism: Mechanism, turns: int) -> int:

@@ -10,10 +10,10 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray, finite
 from kinfmu.errors import listed
-from kinfmu.units import ANGLES, InputName, unit_of
+from kinfmu.units import ANGLES, InputName, angular_speed
 
 TIME, SAMPLE = "time", "sample"  # axes of runs; the others are names of inputs, such as 'crank_angle'
-DEGREE, RPM = ANGLES["deg"], ANGLES["rev"] / 60.0
+DEGREE = ANGLES["deg"]
 _LARGE = 1e9  # [rad]; larger angles stay in radians
 ROUND_OFF = 1e-9  # relative to a usual value of the motion; smaller curves are noise around 0
 OUTLIERS = 1.0  # [percent] of the values on either side that may be outside the plot if they would flatten the others
@@ -142,18 +142,15 @@ def _span(values: FloatArray) -> float:
 
 
 def _at_speeds(run: HasAxis) -> str:
-    """Return 'Rates are at the speed crank = 3 rad/s.' if each driver has one speed, else that speeds were given.
-
-    A speed of an angle is in rad/s or in rpm, as its number is shorter: 600 rpm, not 62.8319 rad/s.
-    """
+    """Return 'Rates are at the speed crank = 3 rad/s.' if each driver has one speed, else that speeds were given."""
     shown = []
     for name in run.input_names[::3]:
         column = run.input_names.index(name) + 1
         speeds = run.inputs[:, column]
         if len(speeds) and math.isfinite(speeds[0]) and np.all(speeds == speeds[0]):
-            texts = [f"{speeds[0]:.6g} {unit_of(name.derivative(1).quantity, run.length_unit)}"]
-            texts += [f"{speeds[0] / RPM:.6g} rpm"] if name.quantity.kind == "angle" else []
-            shown.append(f"{name.driver} = {min(texts, key=len)}")
+            is_angle = name.quantity.kind == "angle"
+            text = angular_speed(speeds[0]) if is_angle else f"{speeds[0]:.6g} {run.length_unit}/s"
+            shown.append(f"{name.driver} = {text}")
     if len(shown) < len(run.input_names) // 3:
         return f"Rates are at the speeds given for {listed(name.driver for name in run.input_names[::3])}."
     return f"Rates are at the speed{'s' if len(shown) > 1 else ''} {listed(shown)}."

@@ -132,6 +132,16 @@ def _stroke(low: float, high: float) -> float:
     return max(x) - min(x)
 
 
+@pytest.mark.parametrize(
+    ("speed", "shown"),
+    [('"600 rpm"', "600 rpm"), ('"90 deg/s"', "90 deg/s"), ("62.83185307179586", "600 rpm"), ("3", "3 rad/s")],
+)
+def test_a_speed_is_in_the_unit_of_the_file(speed: str, shown: str) -> None:
+    report = kinfmu.check(parse(SLIDER_CRANK.replace("LAW", f'law = "constant_speed", speed = {speed}')))
+    assert report.measured is not None
+    assert report.measured.over == f"one turn of crank at {shown}"
+
+
 CYCLE, RUN, PER_RAD = "one turn of crank at 3 rad/s", "the run of the file, t = 0 to 2 s", "1 rad/s, so that rates are"
 LAWS = [
     ('law = "constant_speed", start = 1, speed = 3', CYCLE, (0.0, math.tau)),
