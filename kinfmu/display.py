@@ -182,6 +182,8 @@ class Styled(NamedTuple):
 COLOURS = {"ok": "#1a7f37", "note": "#0969da", "advice": "#0969da", "poor": "#cf222e", "problem": "#cf222e"}
 _CODES = {"ok": "32", "note": "36", "advice": "36", "poor": "31", "problem": "1;31", "title": "1", "faint": "90"}
 _GAP = 2  # letters between columns
+_SHORT = 16  # letters that stay of a long name in a narrow table
+_LONG = re.compile(r"\w{20,}")  # names that may break on a page
 _INSIDE = re.compile(r" (?== )|(?<= =) |(?<=\d) (?=[A-Za-z])")  # blanks at which no line ends
 
 
@@ -200,18 +202,18 @@ class Summary(NamedTuple):
 
     def lines(self, width: int) -> Iterator[list[Styled]]:
         """Yield the lines of the report; longer than `width` are only words that are longer."""
-        *head, last = _wrapped(self.title or self.name, width - len(self.name) - _GAP)
+        *head, last = wrapped(self.title or self.name, width - len(self.name) - _GAP)
         yield from ([Styled("title", line)] for line in head)
         yield [Styled("title", last), Styled("faint", f"{'':{_GAP}}{self.name}" if self.title else "")]
         yield []
         indent = 4 + max((len(verdict.level) for verdict in self.verdicts), default=0)
         for level, text, below in self.verdicts:
-            first, *others = _wrapped(text, width - indent)
+            first, *others = wrapped(text, width - indent)
             yield [Styled(level, f"  {level}".ljust(indent)), Styled("", first)]
             yield from ([Styled("", " " * indent + line)] for line in (*others, *(f"  {line}" for line in below)))
         for table in self.tables:
             yield []
-            lines = [*_table_lines(table, width - indent)]
+            lines = [*_table_lines(table, width - indent, width - 2)]
             left = min(indent, max(width - max(sum(len(part.text) for part in line) for line in lines), 2))
             yield from ([Styled("", " " * left), *line] for line in lines)
 
@@ -219,7 +221,7 @@ class Summary(NamedTuple):
         """Return verdicts and tables as HTML."""
         rows = []
         for level, text, below in self.verdicts:
-            shown = _tag("td", "\n".join((text, *below)), _CELL)
+            shown = _tag("td", "\n".join((text, *below)), f"{_CELL}; overflow-wrap: anywhere")
             rows.append(_tag("th", level, f"{_CELL}; color: {COLOURS[level]}", level) + shown)
         tables = [
             f"<p>{escaped(table.caption)}</p>" * bool(table.caption) + _html_table(table) for table in self.tables
@@ -232,17 +234,28 @@ def terminal(part: Styled) -> str:
     return f"\x1b[{_CODES[part.style]}m{part.text}\x1b[0m" if part.style and part.text.strip() else part.text
 
 
-def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
+def shortened(word: str, most: int) -> str:
+    """Return a word of at most so many letters, with an ellipsis in its middle if it is longer."""
+    if len(word) <= most:
+        return word
+    head = most // 2
+    return f"{word[:head]}\N{HORIZONTAL ELLIPSIS}{word[len(word) - (most - head - 1) :]}"
+
+
+def wrapped(text: str, width: int, indent: str = "") -> list[str]:
     """Return text as lines of whole words; indent: begin of all lines but the first. 'u = 60 deg' is one word."""
     glued = _INSIDE.sub("\0", text)
     lines = wrap(glued, max(width, 1), subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
     return [line.replace("\0", " ") for line in lines] or [""]
 
 
-def _table_lines(table: Table, width: int) -> Iterator[list[Styled]]:
-    """Yield the lines of a table; where it is too wide, its widest columns break between words."""
+def _table_lines(table: Table, width: int, most: int) -> Iterator[list[Styled]]:
+    """Yield the lines of a table; wider than `width`, its widest columns break between words.
+
+    Wider than `most` even then, its long names are shortened.
+    """
     if table.caption:
-        yield from ([Styled("title", line)] for line in _wrapped(table.caption, width))
+        yield from ([Styled("title", line)] for line in wrapped(table.caption, width))
     every = (table.columns, *table.rows)
     widths = [max(map(len, column)) for column in zip(*every, strict=True)]
     least = []
@@ -250,12 +263,19 @@ def _table_lines(table: Table, width: int) -> Iterator[list[Styled]]:
         is_text = k < table.left
         words = [f"{word}{'  '}" for cell in cells for word in _INSIDE.sub("_", cell).split()] if is_text else cells
         least.append(max(map(len, (*head.split(), *words)), default=0))
-    for _ in range(sum(widths) + _GAP * (len(widths) - 1) - width):
-        k = max(range(len(widths)), key=lambda k: (widths[k] > least[k], widths[k]))
-        widths[k] -= widths[k] > least[k]
+    full, short = [*widths], [min(letters, _SHORT) if k < table.left else letters for k, letters in enumerate(least)]
+    for lowest, target in ((least, width), (short, most)):  # names of many letters are shortened last
+        for _ in range(sum(widths) + _GAP * (len(widths) - 1) - target):
+            k = max(range(len(widths)), key=lambda k: (widths[k] > lowest[k], widths[k]))
+            widths[k] -= widths[k] > lowest[k]
+    is_short = [now < min(had, letters) for now, had, letters in zip(widths, full, least, strict=True)]
     for number, row in enumerate(every):
         indents = ["  " * (number > 0 and k < table.left) for k in range(len(row))]
-        parts = [*map(_wrapped, row, widths, indents)]
+        cells = [
+            " ".join(shortened(word, letters - 2) for word in cell.split(" ")) if is_cut else cell
+            for cell, letters, is_cut in zip(row, widths, is_short, strict=True)
+        ]
+        parts = [*map(wrapped, cells, widths, indents)]
         for line in range(max(map(len, parts))):
             shown = []
             for k, (cell, width, lines) in enumerate(zip(row, widths, parts, strict=True)):
@@ -274,7 +294,7 @@ def _html_table(table: Table) -> str:
         poor = [f"; color: {COLOURS['poor']}" if isinstance(cell, Poor) else "" for cell in row]
         cells = zip(row, styles, poor, strict=True)
         rows.append("".join(_tag("td", cell, style + more, "poor" if more else "") for cell, style, more in cells))
-    return _rows_html(rows)
+    return _LONG.sub(lambda name: name[0].replace("_", "_<wbr>"), _rows_html(rows))
 
 
 def _tag(kind: str, text: str, style: str, name: str = "") -> str:

@@ -114,6 +114,12 @@ def in_turns(angle: float) -> str:
     return f"{abs(angle) / ANGLES['rev']:.3g} turns"
 
 
+def angular_speed(speed: float) -> str:
+    """Return a speed of an angle as text: in rad/s, or in rpm if that is rounder, '600 rpm' for 62.8318530718 rad/s."""
+    rad, rpm = f"{speed:.6g}", f"{speed * 60.0 / ANGLES['rev']:.6g}"
+    return f"{rpm} rpm" if len(rpm) + 2 <= len(rad) else f"{rad} rad/s"
+
+
 _OTHER_SPELLING = re.compile("|".join(rf"(?<![^\W\d]){one}(?!\w)" for one in OTHER_SPELLINGS))
 
 

@@ -14,6 +14,7 @@ from kinfmu.analysis.transmission import NamedLoop
 from kinfmu.errors import listed
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.drivers import SAMPLES_PER_TURN
 from kinfmu.mechanism.joints import Fixed, Revolute
 from kinfmu.mechanism.quantities.placement import body_of
 from kinfmu.plan.equations.system import size_of
@@ -25,11 +26,12 @@ _LEAST_LINKS = 4  # fewer have no usual length
 _STILL = 1e-9  # [rad, sizes]; a body that moves less does not move
 _SAME = 1e-9  # of the size; points closer than this coincide
 _IN_LINE = 1e-9  # sine of the angle between links that are in line at a pose
+_FEWEST_STEPS = 36.0  # of a cycle, for smooth curves
 _EDGE = 1e-6  # of the run's range; positions closer to its ends are not crossed
 
 
 def part_notes(mechanism: Mechanism) -> Iterator[str]:
-    """Yield lines for unused points, coinciding joints, links much too short, and a step longer than the run."""
+    """Yield lines for unused points, coinciding joints, links much too short, and too long a step of the run."""
     if unused := unused_points(mechanism):
         yield unused
     yield from _joints_in_one_place(mechanism)
@@ -39,6 +41,12 @@ def part_notes(mechanism: Mechanism) -> Iterator[str]:
         yield (
             f"[run] step = {run.step:.6g} s is longer than the run, {run.start:.6g} to {run.stop:.6g} s: "
             "it has one sample"
+        )
+    fastest = min((driver for driver in mechanism.drivers if driver.cycle), key=lambda one: one.cycle, default=None)
+    if fastest is not None and run.step < run.stop - run.start and fastest.cycle < _FEWEST_STEPS * run.step:
+        yield (
+            f"[run] step = {run.step:.6g} s takes {fastest.cycle / run.step:.3g} samples of a cycle of {fastest.name}: "
+            f"step = {fastest.cycle / SAMPLES_PER_TURN:.4g} takes {SAMPLES_PER_TURN}"
         )
 
 

@@ -13,16 +13,18 @@ from kinfmu.analysis.driver_path import follow
 from kinfmu.analysis.singular import DriverRange, driver_range
 from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.drivers import SAMPLES_PER_TURN
 from kinfmu.mechanism.laws import ConstantSpeed, ConstantValue, External, Law, Polynomial
 from kinfmu.mechanism.laws.law import NEARLY
 from kinfmu.mechanism.loads.load import Following
+from kinfmu.mechanism.number import given_unit
 from kinfmu.motion import MeasuredValue, measure
 from kinfmu.plan import SolvePlan
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
 from kinfmu.run.solve import solve
+from kinfmu.units import Quantity, angular_speed, factors
 
-SAMPLES_PER_TURN = 360
 _MOST_TURNS = 24  # of the law of a load
 
 
@@ -94,6 +96,13 @@ def constant_speed(law: Law) -> float | None:
     return 0.0 if isinstance(law, External | ConstantValue) else None
 
 
+def _speed_text(law: Law, speed: float) -> str:
+    """Return the speed of an angle in the unit of the mechanism file, such as '600 rpm'."""
+    unit = given_unit(getattr(law, "speed", speed))
+    factor = factors(Quantity("angle", 1), "m").get(unit)
+    return angular_speed(speed) if factor is None else f"{speed / factor:.6g} {unit}"
+
+
 def turns_of_cycle(mechanism: Mechanism, turns: int) -> int:
     """Return the turns after which the loads repeat too, such as two for the gas force of a four-stroke engine.
 
@@ -132,5 +141,5 @@ def _cycle(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> tuple[dict[st
     start = float(driver.law.at(mechanism.run.start))
     angles = start + np.linspace(0.0, turns * math.tau, turns * SAMPLES_PER_TURN + 1)
     count = "one turn" if turns == 1 else f"{turns} turns"
-    at = f"{speed:.6g} rad/s" if speed else "1 rad/s, so that rates are per rad"
+    at = _speed_text(drivers[0].law, speed) if speed else "1 rad/s, so that rates are per rad"
     return {angle: angles, speed_name: speed or 1.0}, f"{count} of {driver.name} at {at}"

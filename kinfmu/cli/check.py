@@ -117,9 +117,9 @@ def check(
     else:
         _print(report, detail=detail)
         if certificate is not None:
-            click.echo(f"\n{certificate}")
+            click.echo(f"\n{_fitted(str(certificate))}")
         if assemblies and (found := _assemblies(report)) is not None:
-            click.echo(f"\n{found}")
+            click.echo(f"\n{_fitted(str(found))}")
         if matrices and (report.problem is None or report.has_cut_cam):
             for matrix in report.matrices():
                 click.echo(f"\n{matrix}")
@@ -133,7 +133,8 @@ def check(
         if report.problem is not None:
             raise report.problem if as_json else _shown(report.problem)
     if sys.stdout.isatty() and not (detail or as_json):
-        click.echo(f"\nkinfmu play {quote(mechanism)} moves it; --detail shows how it is solved")
+        hint = f"kinfmu play {quote(mechanism)} moves it; --detail shows how it is solved"
+        click.echo(f"\n{_fitted(hint, indent=0)}")
 
 
 def _print_part(path: str, problem: MechanismError, *, detail: bool, as_json: bool) -> None:
@@ -164,9 +165,22 @@ def _print_part(path: str, problem: MechanismError, *, detail: bool, as_json: bo
 def _print(report: Report, *, detail: bool) -> None:
     """Print a report in the width of the terminal; in colours on one, unless NO_COLOR is set."""
     is_terminal = sys.stdout.isatty()
-    width = min(shutil.get_terminal_size().columns, MOST_COLUMNS) if is_terminal else COLUMNS
-    text = report.summary(detail=detail).text(width, colour=is_terminal and not os.environ.get("NO_COLOR"))
+    text = report.summary(detail=detail).text(_width(), colour=is_terminal and not os.environ.get("NO_COLOR"))
     click.echo(text, color=is_terminal)
+
+
+def _width() -> int:
+    """Return the letters of a line on the terminal, or in a file."""
+    return min(shutil.get_terminal_size().columns, MOST_COLUMNS) if sys.stdout.isatty() else COLUMNS
+
+
+def _fitted(text: str, indent: int = 14) -> str:
+    """Return text as lines that fit on the terminal, with what continues a line indented; as it is in a file."""
+    from kinfmu.display import wrapped
+
+    if not sys.stdout.isatty():
+        return text
+    return "\n".join(part for line in text.split("\n") for part in wrapped(line, _width(), " " * indent))
 
 
 def _shown(problem: KinfmuError) -> Exception:

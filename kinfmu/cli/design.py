@@ -28,7 +28,7 @@ from kinfmu.files import suffix_of
 @click.option("--workers", type=click.IntRange(1), help="Number of processes. Default: one for each core.")
 @on_interrupt("interrupted; nothing is written")
 def fit(file: Path, output: Path | None, picture: Path | None, starts: int, seed: int, workers: int | None) -> None:
-    """Find parameters with which a mechanism does what its targets ask.
+    """Find the parameters with which a mechanism does its task.
 
     FILE names a mechanism, bounds of its parameters, and targets: a path through points, a function, poses of a body,
     or values of measures. Errors of the targets, constraints, and all local optima found are printed.
@@ -113,10 +113,11 @@ def study(
     recordings: Path | None,
     **of_table: Any,
 ) -> None:
-    """Measure many designs: parameters on a grid, in ranges, or with tolerances.
+    """Measure many designs of a mechanism.
 
-    FILE names a mechanism and how its parameters vary (docs/studies.md). Prints a summary and writes a table with a row
-    for each design. A study that was ended goes on where it was when the same command is given again.
+    FILE names a mechanism and how its parameters vary: on a grid, in ranges, or with tolerances (docs/studies.md).
+    Prints a summary and writes a table with a row for each design. A study that was ended goes on where it was when the
+    same command is given again.
     """
     from kinfmu.design.study import read_study, run_study
     from kinfmu.design.study.parts import folder_of

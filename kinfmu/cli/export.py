@@ -135,10 +135,10 @@ _LABELS = {  # of parameters, in messages, before their values where these are s
 @table_options
 @set_option
 def export(run: str, output: Path, cam: str | None, settings: tuple[tuple[str, str], ...], **options: Any) -> None:
-    """Write a run as a table, as plots, as an animation or as a page; or a mechanism as a page.
+    """Write a run as a table, plot, animation or page.
 
-    A page (.html) is the mechanism, to be dragged in a browser, with the parameters and the time of the run; it is one
-    file, works offline, and computes with the compiled code of the FMU.
+    Or a mechanism as a page: a page (.html) is the mechanism, to be dragged in a browser, with the parameters and the
+    time of the run; it is one file, works offline, and computes with the compiled code of the FMU.
 
     RUN is a record (.mcap) of simulate or solve. Tables but .csv always contain the units. Plots (.svg, .png, .pdf)
     show coordinates, velocities and accelerations against time, or against the driver of a solve --angle. With --x,

@@ -116,7 +116,7 @@ def main() -> None:
     \b
     A first tour:
       kinfmu play jansen_leg               drag a mechanism in the browser
-      kinfmu new crank_rocker mine.toml    write a commented mechanism file, to edit
+      kinfmu new crank_rocker mine.toml    write a commented mechanism file
       kinfmu check mine.toml               report its properties
       kinfmu simulate mine.toml            build and step its FMU, write logs
       kinfmu review logs/mine.mcap         open the run in the viewer

@@ -17,10 +17,11 @@ from kinfmu.cli.group import main, note, patience
 @click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port on this machine. Default: a free one.")
 @click.option("--no-browser", is_flag=True, help="Print the address only.")
 def play(mechanism: str | None, new: Path | None, port: int, no_browser: bool) -> None:
-    """Drag a mechanism in the browser, with the solver of its native FMU.
+    """Drag a mechanism in the browser.
 
-    The page follows the file while you edit it; errors in the file are shown in the page. The page saves FMUs, tables,
-    drawings and mechanism files with the lengths as set. Only this machine can open the address. Ctrl-C ends it.
+    The page computes with the solver of the native FMU and follows the file while you edit it; errors in the file are
+    shown in the page. It saves FMUs, tables, drawings and mechanism files with the lengths as set. Only this machine
+    can open the address. Ctrl-C ends it.
 
     The button Draw in the page of a file draws it further: bars, joints, motors, cylinders, gears, cams, loads. Every
     step can be undone, also after the program has ended; the file is written when you save it.

@@ -31,6 +31,7 @@ h1 { font-size: 1.5em; }
 @media (max-width: 30em) { body { font-size: 13px; } th, td { padding-right: 0.7em; } }
 div { overflow-x: auto; }
 div:last-child p { display: inline-block; margin: 0; }
+small { display: block; }
 @media screen and (prefers-color-scheme: dark) {
   body { color: #d1d7e0; background: #151b23; }
   .ok { color: #3fb950 !important; }
@@ -46,10 +47,10 @@ div:last-child p { display: inline-block; margin: 0; }
 @click.option("-o", "--output", type=OutputFile(".html", ".pdf"), required=True, help="The sheet: .html or .pdf.")
 @set_option
 def report(mechanism: str, output: Path, settings: tuple[tuple[str, str], ...]) -> None:
-    """Write figure, verdicts, tables and plots of a mechanism on one sheet, to print or to file.
+    """Write figure, verdicts, tables and plots on one sheet.
 
-    They are those of check; the plots show the motion that its measures and forces are taken of. An .html file holds
-    all that it shows, and is light or dark like its reader. Needs matplotlib.
+    To print or to file. They are those of check; the plots show the motion that its measures and forces are taken of.
+    An .html file holds all that it shows, and is light or dark like its reader. Needs matplotlib.
     """
     from kinfmu.analysis import check
     from kinfmu.draw.document import document
@@ -85,7 +86,7 @@ def _motion(found: Report) -> Run | None:
 
 def _page(found: Report, run: Run | None) -> str:
     """Return the sheet as a page that holds all that it shows."""
-    from kinfmu.draw.document import drawing_svg, plots_svg
+    from kinfmu.draw.document import drawing_svg, plots_note, plots_svg
     from kinfmu.notebook import picture, title
 
     name = title(found.mechanism)
@@ -94,7 +95,9 @@ def _page(found: Report, run: Run | None) -> str:
         parts.clear()  # the verdicts state it
     parts.append(found.summary().html())
     with suppress(KinfmuError):  # the drawing states that matplotlib is missing
-        parts += ["".join(picture(partial(str, svg), f"Plot of {name}") for svg in plots_svg(run))] if run else []
+        if run is not None:
+            note = f"<small>{escaped(plots_note(run))}</small>"
+            parts.append("".join(picture(partial(str, svg), f"Plot of {name}") for svg in plots_svg(run)) + note)
     head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{escaped(name)}</title>'
     body = "\n".join(f"<div>{part}</div>" for part in parts)
     return (

@@ -86,11 +86,11 @@ def simulate(
     live: bool,
     rate: float | None,
 ) -> None:
-    """Step an FMU or an SSP and write logs; build an FMU first from a MECH.
+    """Step an FMU or an SSP and write logs.
 
-    Steps an FMU with fmpy, of kinfmu or of another tool, or the connected FMUs of an SSP, and writes an MCAP record
-    and, with the extra viewer, a Rerun recording. The record grows during the run; kinfmu recover restores that of a
-    killed run.
+    Steps an FMU with fmpy, of kinfmu, built from a MECH first, or of another tool, or the connected FMUs of an SSP, and
+    writes an MCAP record and, with the extra viewer, a Rerun recording. The record grows during the run; kinfmu recover
+    restores that of a killed run.
     """
     from kinfmu.fmu import simulate as simulated
     from kinfmu.log.viewer.package import INSTALL, has_viewer, require_viewer, without_pandas

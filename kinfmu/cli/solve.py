@@ -65,8 +65,8 @@ HALF_TURN = math.pi  # [rad]; a longer step between samples is probably a wrappe
     "angle",
     metavar="A:B:N",
     help="N driver values from A to B in place of times, such as 0deg:360deg:361 or 0mm:50mm:101. Bare numbers are in "
-    "rad or in the file's unit of length. Rates are derivatives with respect to the driver, without --speed. The table "
-    "begins with the driver's values and has no time.",
+    "rad or in the file's unit of length. Rates are derivatives by the driver, per rad or unit of length, without "
+    "--speed. The table begins with the driver's values and has no time.",
 )
 @click.option(
     "--speed",

@@ -196,7 +196,7 @@ def round_ticks(axis: Axis, most: int, unit: str) -> None:
     """Give an axis with a linear scale at most this many steps of 1, 2 or 5 times a power of ten, or as of degrees."""
     from matplotlib.ticker import MaxNLocator
 
-    axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 5, 10]))
+    axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 5, 10], min_n_ticks=3))
     if unit == "deg":
         degree_ticks(axis, most)
 
@@ -214,6 +214,26 @@ def repeats_effort(run: Run, name: ForceName) -> bool:
     own, other = run[name], run[effort]
     largest = float(np.max(np.abs(other), initial=0.0, where=np.isfinite(other)))
     return bool(np.all(~run.good | (np.abs(own - other) <= ROUND_OFF * largest) | ~np.isfinite(own)))
+
+
+def repeated(run: Run, names: Sequence[CoordinateName]) -> dict[CoordinateName, CoordinateName]:
+    """Return which of the places named move as one before them does, to round-off, and that one.
+
+    Angles never repeat one another: each belongs to its own body.
+    """
+    columns = {name: run[name][run.good] for name in names if not name.is_angle and name not in run.absent}
+    near = ROUND_OFF * max((float(np.abs(values).max(initial=0.0)) for values in columns.values()), default=0.0)
+    moving = {name: values for name, values in columns.items() if len(values) and np.ptp(values) > near}
+    found: dict[CoordinateName, CoordinateName] = {}
+    for name, values in moving.items():
+        for other in moving:
+            if other == name:
+                break
+            is_like = other.axis == name.axis and other not in found and abs(moving[other][0] - values[0]) <= near
+            if is_like and np.abs(moving[other] - values).max() <= near:
+                found[name] = other
+                break
+    return found
 
 
 def equal_below(curves: Sequence[FloatArray]) -> list[int]:
@@ -313,7 +333,9 @@ def overview(run: Run) -> Figure:
     """Return a figure of the first outputs of a run with samples, with a panel for each unit; needs matplotlib."""
     from matplotlib.figure import Figure
 
-    by_unit = [[name for name in shown_outputs(run) if name.is_angle == is_angle] for is_angle in (False, True)]
+    outputs = shown_outputs(run)
+    names = [name for name in outputs if name not in repeated(run, outputs)]
+    by_unit = [[name for name in names if name.is_angle == is_angle] for is_angle in (False, True)]
     panels = [names for names in by_unit if names]
     figure = Figure(figsize=(WIDTH * max(len(panels), 1), HEIGHT), layout="constrained", facecolor="white")
     for index, names in enumerate(panels, start=1):

@@ -6,21 +6,22 @@ from collections.abc import Sequence
 from functools import partial
 from itertools import groupby
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinfmu.display import COLOURS, Styled, Summary
-from kinfmu.draw.chart import HEIGHT, MOST_CURVES, WIDTH, curves, dress, numbers, raised, round_ticks
+from kinfmu.display import COLOURS, Styled, Summary, shortened
+from kinfmu.draw.chart import HEIGHT, MOST_CURVES, WIDTH, curves, dress, numbers, raised, round_ticks, symbol
 from kinfmu.draw.drawing import figure, sheet_of
 from kinfmu.draw.instant import instant
-from kinfmu.draw.plots import usual_coordinates
+from kinfmu.draw.plots import Panel, Stack, moving, not_drawn, ranked, stacks_of
 from kinfmu.draw.sheet import GREY, INCH, INK, ink
 from kinfmu.draw.writing import svg_text, write_pdf
 from kinfmu.errors import KinfmuError
 from kinfmu.mechanism import Mechanism
 from kinfmu.run import Run
-from kinfmu.units import degrees_of
+from kinfmu.units import ForceName, degrees_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,8 +34,10 @@ _LETTER = 0.6021 * _LETTERS  # [pt], width of a letter of DejaVu Sans Mono
 _COLUMNS = int((_WIDTH - 2.0 * _EDGE) / _LETTER)
 _DRAWING = 225.0  # [pt], height of the figure with its scale
 _PANEL = 132.0  # [pt], height of a plot with its scale and names
+_LEAST_PANEL = 105.0  # [pt]
 _ABREAST = 2
-_STILL = 1e-9  # of the size; a column that changes less is left out
+_STILL = 1e-9  # of the driver's range; by which a coordinate that follows the driver differs from it
+_LONGEST = 26  # letters of a name above a plot
 
 
 def document(path: Path, summary: Summary, mechanism: Mechanism, run: Run | None) -> None:
@@ -58,7 +61,12 @@ def drawing_svg(mechanism: Mechanism) -> str:
 
 def plots_svg(run: Run) -> list[str]:
     """Return the plots of a run as SVG."""
-    return [svg_text("the plots", partial(_plot, run, names)) for names in _groups(run)]
+    return [svg_text("the plots", partial(_plot, run, panels)) for panels in _groups(run)]
+
+
+def plots_note(run: Run) -> str:
+    """Return a line that names the coordinates without a curve in the plots; '' without any."""
+    return not_drawn(run, [stack.title for kind in _coordinates(run) for stack in kind[MOST_CURVES:]])
 
 
 def _pages(summary: Summary, mechanism: Mechanism, run: Run | None) -> list[Figure]:
@@ -74,8 +82,11 @@ def _pages(summary: Summary, mechanism: Mechanism, run: Run | None) -> list[Figu
     for paragraph in paragraphs:
         pages.text(paragraph)
     if run is not None:
-        for number, names in enumerate(_groups(run)):
-            _panel(pages.axes(_PANEL, number % _ABREAST, _ABREAST), run, names)
+        groups, note = _groups(run), wrap(plots_note(run), _COLUMNS)
+        height = pages.height(-(-len(groups) // _ABREAST), (len(note) + 1) * _LINE)
+        for number, panels in enumerate(groups):
+            _panel(pages.axes(height, number % _ABREAST, _ABREAST), run, panels)
+        pages.text([[Styled("faint", line)] for line in note])
     return pages.made
 
 
@@ -122,6 +133,11 @@ class _Pages:
         size = (width - left - right) / _WIDTH, (height - bottom - top) / _HEIGHT
         return self.made[-1].add_axes((*corner, *size))
 
+    def height(self, rows: int, below: float) -> float:
+        """Return the height of a row of plots: lower ones, if they then fit on the last page with a text below them."""
+        free = (self._y - _EDGE - below) / max(rows, 1)
+        return free if _LEAST_PANEL <= free < _PANEL else _PANEL
+
     def remove(self, axes: Axes, height: float) -> None:
         """Take back the last row, of a height, which has only these axes."""
         axes.remove()
@@ -133,49 +149,63 @@ def _paragraphs(summary: Summary) -> list[list[list[Styled]]]:
     return [list(lines) for is_text, lines in groupby(summary.lines(_COLUMNS), bool) if is_text]
 
 
-def _groups(run: Run) -> list[list[str]]:
-    """Return the columns to plot, those of a unit together: outputs and efforts of drivers.
-
-    Columns that stand still, or change as the only driver does, are left out.
-    """
-    units = run.column_units()
+def _groups(run: Run) -> list[list[Panel]]:
+    """Return what to plot, columns of a unit together: positions, velocities, accelerations, efforts of drivers."""
+    shown = [panel for kind in _coordinates(run) for stack in kind[:MOST_CURVES] for panel in stack.panels]
     drivers = {name.driver for name in run.input_names}
-    efforts = [name for name in run.force_names if name.owner in drivers and name.noun in ("torque", "force")]
-    driven = run.inputs[run.good, 0] if len(run.input_names) == 3 else 0.0
-    groups: dict[str, list[str]] = {}
-    for name in map(str, (*usual_coordinates(run), *efforts)):
-        groups.setdefault(units[name], []).append(name)
-    found = []
-    for unit, names in groups.items():
-        values = {name: np.asarray(run[name], dtype=float)[run.good] for name in names}
-        least = _STILL * max(float(unit == "rad"), *(float(np.abs(one).max(initial=0.0)) for one in values.values()))
-        moving = [
-            name
-            for name, one in values.items()
-            if all(np.ptp(relative) > least for relative in (one, one - driven, one + driven))
-        ]
-        found.append(moving[:MOST_CURVES])
-    return [names for names in found if names]
+    efforts = [
+        panel
+        for stack in _moving_stacks(run)
+        for panel in stack.panels
+        if isinstance(panel.name, ForceName) and panel.name.owner in drivers and panel.name.noun in ("torque", "force")
+    ]
+    groups: dict[str, list[Panel]] = {}
+    for panel in (*sorted(shown, key=lambda panel: panel.order), *efforts):
+        groups.setdefault(panel.unit, []).append(panel)
+    return list(groups.values())
 
 
-def _plot(run: Run, names: Sequence[str]) -> Figure:
+def _coordinates(run: Run) -> list[list[Stack]]:
+    """Return the coordinates of each unit that move otherwise than the only driver does, those that matter first."""
+    kinds: dict[str, list[Stack]] = {}
+    for stack in ranked(run, _moving_stacks(run)):
+        if not _follows_driver(run, stack):
+            kinds.setdefault(stack.panels[0].unit, []).append(stack)
+    return list(kinds.values())
+
+
+def _moving_stacks(run: Run) -> list[Stack]:
+    return moving([run], stacks_of(run, ()), keeps_one=False)[0]
+
+
+def _follows_driver(run: Run, stack: Stack) -> bool:
+    """Return True for a coordinate that changes as the only driver does, forward or backward."""
+    if len(run.input_names) != 3:
+        return False
+    values, driven = run[stack.title][run.good], run.inputs[run.good, 0]
+    return any(np.ptp(values + sign * driven) <= _STILL * np.ptp(driven) for sign in (1.0, -1.0))
+
+
+def _plot(run: Run, panels: Sequence[Panel]) -> Figure:
     from matplotlib.figure import Figure
 
     made = Figure(figsize=(WIDTH, HEIGHT), layout="constrained", facecolor="white")
-    _panel(made.add_subplot(), run, names)
+    _panel(made.add_subplot(), run, panels)
     return made
 
 
-def _panel(axes: Axes, run: Run, names: Sequence[str]) -> None:
+def _panel(axes: Axes, run: Run, panels: Sequence[Panel]) -> None:
     """Draw columns of one unit over the driver, or over time where several drivers move."""
-    x = str(run.input_names[0]) if len(run.input_names) == 3 else ""
-    curves(axes, run, names, x, degrees=True)
+    x = run.input_names[0] if len(run.input_names) == 3 else None
+    curves(axes, run, [panel.column for panel in panels], str(x or ""), degrees=True)
     dress(axes, "")
-    shown, _ = degrees_of(run.column_units()[names[0]])
-    round_ticks(axes.xaxis, 6, "deg" if axes.get_xlabel().endswith("[deg]") else "")
-    round_ticks(axes.yaxis, 4, shown)
+    shown, _ = degrees_of(panels[0].unit)
+    across = axes.get_xlabel() if x is None else axes.get_xlabel().replace(symbol(x), x.driver)
+    round_ticks(axes.xaxis, 6, "deg" if across.endswith("[deg]") else "")
+    round_ticks(axes.yaxis, 6, shown)
     unit = numbers(axes, raised(shown))
     axes.set_ylabel(f"[{unit}]", fontsize=_LETTERS, color=ink(GREY))
-    axes.set_xlabel(axes.get_xlabel(), fontsize=_LETTERS, color=ink(GREY))
+    axes.set_xlabel(across, fontsize=_LETTERS, color=ink(GREY))
+    names = [symbol(shortened(panel.column, _LONGEST)) for panel in panels]
     look: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.0, "frameon": False}
-    axes.legend(fontsize=7.0, ncols=2, handlelength=1.2, **look)
+    axes.legend(labels=names, fontsize=7.0, ncols=2, handlelength=1.2, **look)

@@ -67,24 +67,27 @@ def _with_run(mechanism: Mechanism, plan: SolvePlan, at: float | None) -> Instan
     poses, _ = poses_of(run, mechanism)
     poses[GROUND_NAME] = np.zeros((len(run), 3))
     ways = directions(run, mechanism)
+    is_clearest = False
     if at is not None:
         drawn = _poses_at(mechanism, plan, at)
     elif run.good[0] and _is_clear(mechanism, first := {name: pose[:1] for name, pose in poses.items()}):
         drawn = first
     else:
-        drawn = _clearest_poses(mechanism, plan, run, poses)
-    return Instant(mechanism, {name: np.vstack([drawn[name], pose]) for name, pose in poses.items()}, ways)
+        drawn, is_clearest = _clearest_poses(mechanism, plan, run, poses), True
+    shown = {name: np.vstack([drawn[name], pose]) for name, pose in poses.items()}
+    return Instant(mechanism, shown, ways, is_clearest=is_clearest)
 
 
 def pose_note(shown: Instant) -> str:
-    """Return a sentence on the start of the run, if the drawn pose is another one; '' without a run."""
+    """Return a sentence on the start of the run and the reason, if the drawn pose is another one; '' without a run."""
     mechanism = shown.mechanism
     starts = [float(driver.law.at(mechanism.run.start)) for driver in mechanism.drivers]
     values = [shown.value(driver.name) for driver in mechanism.drivers]
     if len(shown.poses[GROUND_NAME]) == 1 or np.allclose(values, starts, rtol=1e-9, atol=1e-9):
         return ""
     texts = [f"{d.name} = {value_text(shown, d, start)}" for d, start in zip(mechanism.drivers, starts, strict=True)]
-    return f"the run starts at {listed(texts)}"
+    why = "clearest pose; " if shown.is_clearest else ""
+    return f"{why}the run starts at {listed(texts)}"
 
 
 def _poses_at(mechanism: Mechanism, plan: SolvePlan, at: float) -> dict[str, FloatArray]:

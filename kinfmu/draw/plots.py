@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, overload
 import numpy as np
 
 from kinfmu.arrays import FloatArray, finite
+from kinfmu.display import shortened
 from kinfmu.draw.chart import (
     LOST,
     SMALL,
@@ -21,6 +22,7 @@ from kinfmu.draw.chart import (
     numbers,
     powers_of_ten,
     raised,
+    repeated,
     repeats_effort,
     round_ticks,
     rows_of,
@@ -60,6 +62,7 @@ _FORCES: palette.Colour = (185, 28, 28)  # that of driving arrows in drawings
 _LABEL = 42.0  # [pt] from an axis to its name
 _BAND = 0.25  # opacity of bounds
 _NOTE = 12.0  # [pt] of a line below all panels
+_LONGEST_TITLE = 32  # letters of a name above its panels
 _LONGEST = 20  # letters of a name with its unit that fit next to a panel in one line
 
 
@@ -200,7 +203,7 @@ def _chosen(runs: Sequence[Run], columns: Sequence[str], path: Path, *, degrees:
     notes = [_constants(run, constant, degrees=degrees)]
     if not columns:
         stacks, others = main_panels(run, stacks or found)
-        notes.append(f"not drawn: {', '.join(map(symbol, others))}" if others else "")
+        notes.append(not_drawn(run, others))
     if len(stacks) > MOST_COORDINATES:
         what = (
             "coordinates" if all(isinstance(s.panels[0].name, CoordinateName) for s in stacks) else "columns of panels"
@@ -210,6 +213,13 @@ def _chosen(runs: Sequence[Run], columns: Sequence[str], path: Path, *, degrees:
             f"of them by name, such as {stacks[0].panels[0].column}"
         )
     return stacks, [*filter(None, notes)]
+
+
+def not_drawn(run: Run, names: Sequence[str]) -> str:
+    """Return 'not drawn: crank.φ, slider.x (= piston.x)' for names and what repeats another curve; '' without any."""
+    equal = [f"{symbol(name)} (= {symbol(other)})" for name, other in _usual_and_repeated(run)[1].items()]
+    left = [*map(symbol, names), *equal]
+    return f"not drawn: {', '.join(left)}" if left else ""
 
 
 def moving(runs: Sequence[Run], stacks: Sequence[Stack], *, keeps_one: bool) -> tuple[list[Stack], list[Panel]]:
@@ -260,7 +270,7 @@ def main_panels(run: Run, stacks: Sequence[Stack]) -> tuple[list[Stack], list[st
     ratio. The first effort has its place behind the first coordinate.
     """
     kept = [stack._replace(panels=panels) for stack in stacks if (panels := _kept_panels(run, stack))]
-    coordinates = sorted((one for one in kept if _is_coordinate(one)), key=lambda stack: _rank(run, stack))
+    coordinates = ranked(run, kept)
     forces = [one for one in kept if not _is_coordinate(one)]
     first = [forces[0]._replace(panels=forces[0].panels[:2])] if forces else []
     shown: list[Stack] = []
@@ -273,6 +283,11 @@ def main_panels(run: Run, stacks: Sequence[Stack]) -> tuple[list[Stack], list[st
     columns = [panel.column for stack in kept for panel in stack.panels]
     left = dict.fromkeys(name for name, column in zip(names, columns, strict=True) if column not in drawn)
     return shown, [name for name in left if name not in drawn]
+
+
+def ranked(run: Run, stacks: Sequence[Stack]) -> list[Stack]:
+    """Return the stacks of coordinates, those that show most of a motion first."""
+    return sorted((one for one in stacks if _is_coordinate(one)), key=lambda stack: _rank(run, stack))
 
 
 def _is_coordinate(stack: Stack) -> bool:
@@ -333,7 +348,8 @@ def _sheet(
             _panel(axes, runs, panel, degrees=degrees, band=band)
         for axes in panels[:-1]:
             axes.tick_params(labelbottom=False)
-        panels[0].set_title(symbol(stack.title), fontsize=FONT + 1.0, loc="left", color=ink(INK), parse_math=False)
+        name = shortened(symbol(stack.title), _LONGEST_TITLE)
+        panels[0].set_title(name, fontsize=FONT + 1.0, loc="left", color=ink(INK), parse_math=False)
         panels[-1].set_xlabel(axis.label, fontsize=SMALL, color=ink(GREY), labelpad=1.0)
         for axes in panels:
             axes.yaxis.set_label_coords(-_LABEL / (_WIDTH - _BETWEEN), 0.5)
@@ -489,12 +505,20 @@ def usual_coordinates(run: Run) -> list[CoordinateName]:
     """Return the coordinates to plot where none are named: of bodies and points of interest.
 
     Places of the frames of bodies that turn are left out if there are points of interest: where the frame of a body has
-    its origin is a choice of the file, and the points are those that matter.
+    its origin is a choice of the file, and the points are those that matter. So are places that another one repeats.
     """
+    usual, left_out = _usual_and_repeated(run)
+    return [name for name in usual if name not in left_out]
+
+
+def _usual_and_repeated(run: Run) -> tuple[list[CoordinateName], dict[CoordinateName, CoordinateName]]:
+    """Return usual coordinates, and which of them repeat another one, a point of interest if there is one."""
     points = [name for name in run.outputs[run.coordinate_count :] if name not in run.absent]
     names = run.names or run.outputs
     turning = {name.owner for name in names if name.is_angle and points}
-    return [*(name for name in names if name.is_angle or name.owner not in turning), *(points if run.names else ())]
+    bodies = [name for name in names if name.is_angle or name.owner not in turning]
+    points = points if run.names else []
+    return [*bodies, *points], repeated(run, [*points, *bodies])
 
 
 def _title_of(name: ForceName | SignalName) -> str:

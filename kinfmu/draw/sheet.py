@@ -59,7 +59,7 @@ class Sheet:
         self.sizes = Sizes(self.point, fine)
         self.low: FloatArray = (low + high) / 2.0 - paper / 2.0 / scale
         self.high: FloatArray = (low + high) / 2.0 + paper / 2.0 / scale
-        self._has_names, self._is_given = unit is not None, given is not None
+        self._has_names = unit is not None
         self._layer = 1.0
         self._dots: list[FloatArray] = []  # (k, 3): x, y [pt], weight
         self.axes = _new_axes(paper, bool(unit), title) if given is None else given
@@ -198,9 +198,8 @@ class Sheet:
         """Write a sentence below the right end of the title's line."""
         if not text:
             return
-        if self._is_given:
-            width = float((self.high - self.low)[0]) / self.point
-            text = "\n".join(title_lines(text, width * TITLE_FONT / _NOTE_FONT))
+        width = float((self.high - self.low)[0]) / self.point
+        text = "\n".join(title_lines(text, width * TITLE_FONT / _NOTE_FONT))
         self.axes.text(
             1.0, 1.0, text, fontsize=_NOTE_FONT, ha="right", va="top", transform=self.axes.transAxes, color=ink(GREY)
         )

@@ -351,8 +351,8 @@ class RunSettings:
     """
 
     start: Annotated[float, Quantity("time"), "First sample [s]; default: 0"] = 0.0
-    stop: Annotated[float, Quantity("time"), "Last sample [s]; default: 1"] = 1.0
-    step: Annotated[float, Quantity("time"), "Communication step [s]; default: 0.01"] = 0.01
+    stop: Annotated[float, Quantity("time"), "Last sample [s]; default: one cycle of a single driver, else 1"] = 1.0
+    step: Annotated[float, Quantity("time"), "Communication step [s]; default: a 360th of it, else 0.01"] = 0.01
     over: str = field(default="", metadata={"internal": True})
 
     def __post_init__(self) -> None:

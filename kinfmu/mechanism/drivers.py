@@ -10,10 +10,13 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
 from kinfmu.mechanism.laws import ConstantSpeed, Law
+from kinfmu.mechanism.laws.law import TURN
 from kinfmu.mechanism.quantities import AngleBetween, CoordinateOf, DistanceBetween, PoseQuantity, PositionAlong
 from kinfmu.mechanism.quantities.arithmetic import Value
 from kinfmu.mechanism.quantities.placement import Axis, BodyName, BodyPair, Placement, PointName, PointPair
 from kinfmu.units import InputName, Quantity, Radians
+
+SAMPLES_PER_TURN = 360  # of a run that shows one cycle
 
 
 class Driver(ABC):
@@ -51,6 +54,13 @@ class Driver(ABC):
     def law_kinds(self) -> tuple[str, str]:
         """Kinds of the law's output and of its input."""
         return self.quantity.kind, "time"
+
+    @property
+    def cycle(self) -> float:
+        """Time [s] of one turn at constant speed, or of one period of the law; 0 if the driver does not repeat."""
+        if isinstance(self.law, ConstantSpeed) and self.quantity.kind == "angle" and self.law.speed:
+            return TURN / abs(self.law.speed)
+        return self.law.period
 
     def check(self) -> None:
         """Raise a MechanismError for invalid values; numbers are finite and references valid by then."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,7 +13,7 @@ from kinfmu.errors import MechanismError, listed
 from kinfmu.mechanism.body import MASS_KEYS, RUN_TIMES, Body, Gravity, RunSettings, Start
 from kinfmu.mechanism.checks import NO_DRIVER
 from kinfmu.mechanism.declared import REQUIRED, Takes, keys_of
-from kinfmu.mechanism.drivers import DRIVERS
+from kinfmu.mechanism.drivers import DRIVERS, SAMPLES_PER_TURN
 from kinfmu.mechanism.joints import JOINTS
 from kinfmu.mechanism.laws import LAWS, RISES, External, Law, Segment, Spline
 from kinfmu.mechanism.loads import LOADS
@@ -93,7 +95,7 @@ def mechanism_of(document: dict[str, Any], folder: Path | None) -> Mechanism:
     laws_of_joints = [law for law in LAWS if law is not External]  # nothing from outside moves a cam
     run = table_of(document, "run")
     check_keys("[run]", run, (*RUN_TIMES, "over"))
-    return Mechanism(
+    mechanism = Mechanism(
         name=text_of("name", document["name"]),
         title=text_of("title", document.get("title", "")),
         length_unit=text_of("[units] length", units.get("length", "m")),
@@ -111,6 +113,17 @@ def mechanism_of(document: dict[str, Any], folder: Path | None) -> Mechanism:
         gravity=_gravity(document),
         loads=_members(document, "loads", LOADS, LAWS, folder),
     )
+    return mechanism if {"stop", "step"} & run.keys() else _with_cycle(mechanism)
+
+
+def _with_cycle(mechanism: Mechanism) -> Mechanism:
+    """Return a mechanism whose run is one cycle of its driver, if it has a single one that moves in cycles."""
+    cycle = mechanism.drivers[0].cycle if len(mechanism.drivers) == 1 else 0.0
+    if not 0.0 < cycle < math.inf:
+        return mechanism
+    step = float(f"{cycle / SAMPLES_PER_TURN:.12g}")
+    stop = mechanism.run.start + float(f"{cycle:.12g}")
+    return replace(mechanism, run=replace(mechanism.run, stop=stop, step=step))
 
 
 def read_measures(document: Mapping[str, Any], folder: Path | None) -> tuple[Reading, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from kinfmu.arrays import FloatArray, finite
 from kinfmu.errors import listed
-from kinfmu.units import ANGLES, InputName, unit_of
+from kinfmu.units import ANGLES, InputName, angular_speed
 
 TIME, SAMPLE = "time", "sample"  # axes of runs; the others are names of inputs, such as 'crank_angle'
 DEGREE = ANGLES["deg"]
@@ -148,7 +148,9 @@ def _at_speeds(run: HasAxis) -> str:
         column = run.input_names.index(name) + 1
         speeds = run.inputs[:, column]
         if len(speeds) and math.isfinite(speeds[0]) and np.all(speeds == speeds[0]):
-            shown.append(f"{name.driver} = {speeds[0]:.6g} {unit_of(name.derivative(1).quantity, run.length_unit)}")
+            is_angle = name.quantity.kind == "angle"
+            text = angular_speed(speeds[0]) if is_angle else f"{speeds[0]:.6g} {run.length_unit}/s"
+            shown.append(f"{name.driver} = {text}")
     if len(shown) < len(run.input_names) // 3:
         return f"Rates are at the speeds given for {listed(name.driver for name in run.input_names[::3])}."
     return f"Rates are at the speed{'s' if len(shown) > 1 else ''} {listed(shown)}."

@@ -387,7 +387,7 @@ class Run(Tabular, Displayed):
 
     def _places(self) -> Iterator[ColumnPlace]:
         per = rates_per(self)
-        quantities = [given.quantity for given in self.input_names]
+        quantities = [given.quantity._replace(per=per) for given in self.input_names]
         quantities += [name.quantity(order, per) for order in range(3) for name in self.outputs]
         quantities += [force.quantity for force in (*self.force_names, *self.reaction_names)]
         units = ["s" if self.axis == TIME else "1", *(unit_of(quantity, self.length_unit) for quantity in quantities)]

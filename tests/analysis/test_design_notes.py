@@ -175,6 +175,12 @@ def test_a_step_longer_than_the_run_is_reported() -> None:
     assert found == ("[run] step = 2 s is longer than the run, 0 to 1 s: it has one sample",)
 
 
+def test_a_step_too_long_for_smooth_curves_is_reported() -> None:
+    (found,) = notes(('speed = "60 rpm"', 'speed = "600 rpm"'))
+    assert found == "[run] step = 0.01 s takes 10 samples of a cycle of crank: step = 0.0002778 takes 360"
+    assert not notes(('stop = "1 s"', 'over = "run"'), ('speed = "60 rpm"', 'speed = "600 rpm"'))
+
+
 def toggles_of(mechanism: Mechanism) -> list[tuple[str, float]]:
     """The toggle positions of a mechanism, which are information: not among its notes."""
     report = kinfmu.check(mechanism)

@@ -29,10 +29,10 @@ def test_a_driver_that_turns_round_is_measured_over_one_turn_at_its_speed() -> N
     assert speed.value == pytest.approx(45.0 * 20.0 * math.pi, rel=1e-12)
     assert speed.unit == "mm/s"
     text = unwrapped(report)
-    assert " Over one turn of crank at 62.8319 rad/s\n measure value at crank\n" in text
+    assert " Over one turn of crank at 600 rpm\n measure value at crank\n" in text
     assert " stroke 90 mm 180 deg and 0 deg\n" in text
     found = report.as_json()["measures"]
-    assert found["over"] == "one turn of crank at 62.8319 rad/s"
+    assert found["over"] == "one turn of crank at 600 rpm"
     assert found["values"][0]["name"] == "stroke"
     assert found["values"][0]["at"] == pytest.approx([math.pi, 0.0], abs=1e-12)
     assert found["refused"] == {}
@@ -130,6 +130,16 @@ def _stroke(low: float, high: float) -> float:
     inside = [k * math.pi for k in range(-2, 4) if low <= k * math.pi <= high]
     x = [0.2 * math.cos(u) + math.sqrt(0.36 - 0.04 * math.sin(u) ** 2) for u in (low, high, *inside)]
     return max(x) - min(x)
+
+
+@pytest.mark.parametrize(
+    ("speed", "shown"),
+    [('"600 rpm"', "600 rpm"), ('"90 deg/s"', "90 deg/s"), ("62.83185307179586", "600 rpm"), ("3", "3 rad/s")],
+)
+def test_a_speed_is_in_the_unit_of_the_file(speed: str, shown: str) -> None:
+    report = kinfmu.check(parse(SLIDER_CRANK.replace("LAW", f'law = "constant_speed", speed = {speed}')))
+    assert report.measured is not None
+    assert report.measured.over == f"one turn of crank at {shown}"
 
 
 CYCLE, RUN, PER_RAD = "one turn of crank at 3 rad/s", "the run of the file, t = 0 to 2 s", "1 rad/s, so that rates are"

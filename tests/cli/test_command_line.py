@@ -62,11 +62,11 @@ def test_a_report_is_coloured_on_a_terminal_as_wide_as_it(columns: str, tmp_path
     assert b"\x1b[32m  ok" in printed
     assert b"\x1b[31m8.648 deg" in printed
     assert [line.rstrip() for line in COLOUR.sub(b"", printed).splitlines()] == plain.splitlines()
-    *report, _, hint = plain.decode().splitlines()
-    width = max(map(len, report))
+    lines = plain.decode().splitlines()
+    width = max(map(len, lines))
     assert width <= int(columns)
     assert (width > 80) == (columns == "200")
-    assert hint.startswith("kinfmu play jansen_leg moves it")
+    assert any(line.startswith("kinfmu play jansen_leg moves it") for line in lines[-2:])
 
 
 @pytest.mark.parametrize(

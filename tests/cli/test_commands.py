@@ -42,6 +42,12 @@ def program(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+def test_the_help_fits_on_a_terminal_and_cuts_no_sentence(command: Command) -> None:
+    text = command("--help").stdout
+    assert "..." not in text.partition("Commands:")[2]
+    assert max(map(len, text.splitlines())) <= 80
+
+
 def test_list_names_the_gallery_with_titles(command: Command) -> None:
     result = command("list")
     assert result.exit_code == 0

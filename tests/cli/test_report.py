@@ -34,7 +34,11 @@ def test_a_page_holds_figure_verdicts_tables_and_plots(name: str, command: Comma
     drawing, *plots = images(page)
     assert all(f">{body.name}<" in drawing for body in mechanism.moving_bodies)
     assert any("[deg]" in plot for plot in plots)
+    assert any("/s" in plot for plot in plots)
+    assert any("/s²" in plot for plot in plots)
+    assert not any(re.search(r"crank_angle|\.phi|\.omega", plot) for plot in plots)
     assert any(re.search(r"\bN\]", plot) for plot in plots) == mechanism.has_masses
+    assert ("not drawn: bucket.φ" in page) is (name == "excavator_loaded")  # four curves a plot
     assert not any("crank.phi" in plot for plot in plots)  # a straight line over the crank's angle
 
 

@@ -31,7 +31,7 @@ def test_it_prints_a_summary_and_writes_table_and_figure(tmp_path: Path, monkeyp
     result = CliRunner().invoke(main, command)
     assert (result.exit_code, result.stderr) == (0, "")
     lines = result.stdout.splitlines()
-    assert lines[0] == "hoeken: 3 designs (on a grid) over base; one turn of crank at 3.14159 rad/s"
+    assert lines[0] == "hoeken: 3 designs (on a grid) over base; one turn of crank at 30 rpm"
     assert lines[2].split() == ["measure", "unit", "nominal", "mean", "deviation", "min", "max", "failures"]
     assert lines[3].split()[-1] == "2"
     assert lines[-5].startswith("2 of 3 designs lack a measure, the first is design 1: ")

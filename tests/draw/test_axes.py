@@ -78,7 +78,7 @@ def test_a_mechanism_fills_its_axes_and_leaves_the_others_alone(dpi: int) -> Non
 def test_a_long_note_stays_within_given_axes() -> None:
     whole = Figure(figsize=(4.0, 3.0))
     given = figure(kinfmu.load("excavator"), ax=whole.subplots())
-    note = next(text for text in given.texts if text.get_text().startswith("the run starts at"))
+    note = next(text for text in given.texts if text.get_text().startswith("clearest pose; the run starts at"))
     assert "\n" in note.get_text()
     assert note.get_window_extent().x0 >= given.get_window_extent().x0
 

@@ -24,6 +24,7 @@ from kinfmu.draw.chart import (
     gaps,
     label_size,
     numbers,
+    repeated,
     round_ticks,
     rows_of,
 )
@@ -134,9 +135,20 @@ def test_without_points_of_interest_all_coordinates_are_plotted_and_sliders_alwa
     )
     assert usual_coordinates(bare) == list(run.names)
     mechanism = kinfmu.load("slider_crank")
-    mechanism = dataclasses.replace(mechanism, points={"middle": "rod.S"})
+    mechanism = dataclasses.replace(mechanism, points={"middle": "crank.P"})
     chosen = usual_coordinates(kinfmu.solve(mechanism, crank_angle=[0.0, 1.0]))
     assert chosen == ["crank.phi", "rod.phi", "piston.x", "middle.x", "middle.y"]
+
+
+def test_equal_places_are_drawn_once_and_angles_always(tmp_path: Path) -> None:
+    mechanism = kinfmu.load("slider_crank")
+    run = kinfmu.solve(replace(mechanism, points={"pin": "rod.S", "same": "rod.S"}), np.linspace(0.0, 0.1, 61))
+    plot(run, tmp_path / "run.svg")
+    texts = written(tmp_path / "run.svg")
+    assert [text for text in texts if text in run.outputs or text == "rod.φ"] == ["pin.x", "rod.φ"]
+    assert "not drawn: crank.φ, same.x (= pin.x), piston.x (= pin.x)" in texts
+    still = kinfmu.solve(mechanism, crank_angle=[0.0])
+    assert repeated(still, still.outputs) == {}
 
 
 def test_names_of_axes_stay_off_numbers_and_numbers_differ() -> None:

@@ -312,3 +312,38 @@ def test_a_text_that_no_longer_gives_its_number_is_not_written() -> None:
     assert '[0.03, "a"]' in metric
     assert parse(metric) == mechanism.in_metres()
     assert '[30.0, "a"]' in text(replace(mechanism, length_unit="cm"), as_written=True)
+
+
+ARM = """
+name = "arm"
+bodies = { ground = { points = { O = [0, 0] } }, arm = { points = { O = [0, 0] } } }
+joints.O = { type = "revolute", between = ["ground.O", "arm.O"] }
+drivers.arm = { type = "angle", of = "arm", LAW }
+run = { RUN }
+"""
+
+
+@pytest.mark.parametrize(
+    ("law", "run", "times"),
+    [
+        ('law = "constant_speed", speed = "600 rpm"', "", (0.0, 0.1, 0.1 / 360.0)),
+        ('law = "constant_speed", speed = "-0.5 rpm"', 'start = "0.5 s"', (0.5, 120.5, 1.0 / 3.0)),
+        ('law = "harmonic", amplitude = 0.1, frequency = "5 Hz"', 'over = "run"', (0.0, 0.2, 0.2 / 360.0)),
+        ('law = "constant_speed", speed = "600 rpm"', "stop = 2", (0.0, 2.0, 0.01)),
+        ('law = "constant_speed", speed = "600 rpm"', "step = 0.1", (0.0, 1.0, 0.1)),
+        ('law = "constant_speed", speed = 0', "", (0.0, 1.0, 0.01)),
+        ('law = "external"', "", (0.0, 1.0, 0.01)),
+        ('law = "cycloidal", rise = 1, duration = 2', "", (0.0, 1.0, 0.01)),
+    ],
+)
+def test_a_run_that_the_file_does_not_give_is_a_cycle_of_its_driver(
+    law: str, run: str, times: tuple[float, float, float]
+) -> None:
+    found = parse(ARM.replace("LAW", law).replace("RUN", run)).run
+    assert (found.start, found.stop, found.step) == pytest.approx(times, rel=1e-11)
+
+
+def test_the_run_of_several_drivers_is_a_second() -> None:
+    two = text(gallery.load("five_bar"))
+    start = two.index("[run]")
+    assert parse(two[:start] + two[two.index("[bodies") :]).run == RunSettings()

@@ -321,6 +321,7 @@ def test_rates_of_a_sweep_have_the_unit_of_the_slope_over_its_driver(sweep: Run)
     units = {place.name: place.unit for place in sweep.places()}
     assert units["time"] == "1"
     assert (units["rocker.omega"], units["coupler.vx"], units["coupler.ax"]) == ("rad/rad", "mm/rad", "mm/rad2")
+    assert [units[f"crank_{noun}"] for noun in ("angle", "speed", "acceleration")] == ["rad", "rad/rad", "rad/rad2"]
     slope = np.gradient(sweep["coupler.x"], np.radians(axis_of(sweep).values))
     np.testing.assert_allclose(slope[1:-1], sweep["coupler.vx"][1:-1], atol=1e-3 * np.ptp(slope))
 
@@ -329,7 +330,10 @@ def test_rates_at_given_speeds_stay_rates_of_time() -> None:
     m = kinfmu.load("crank_rocker")
     at_three = kinfmu.solve(m, crank_angle=TURN, crank_speed=3.0)
     assert axis_of(at_three).rates == "Rates are at the speed crank = 3 rad/s."
-    assert {place.unit for place in at_three.places() if place.name == "coupler.vx"} == {"mm/s"}
+    units = at_three.column_units()
+    assert [units[name] for name in ("coupler.vx", "crank_speed", "crank.omega")] == ["mm/s", "rad/s", "rad/s"]
+    rated = kinfmu.solve(m, crank_angle=TURN, crank_speed=20.0 * np.pi)
+    assert axis_of(rated).rates == "Rates are at the speed crank = 600 rpm."
     faster = kinfmu.solve(m, crank_angle=TURN, crank_speed=TURN + 1.0)
     assert axis_of(faster).rates == "Rates are at the speeds given for crank."
     pushed = kinfmu.solve(m, crank_angle=TURN, crank_acceleration=2.0)

@@ -35,12 +35,14 @@ class Instant:
     poses: (1 + n, 3) by body, ground included: x, y [length], phi [rad] of the drawn pose, then of n samples of the
     run, NaN at samples without numbers. Bodies whose pose is not in the run are missing, and so are their joints.
     directions: +1.0 or -1.0 by driver, the direction of its first motion. open_gap: where the mechanism does not close.
+    is_clearest: the pose is drawn because links hide one another least in it.
     """
 
     mechanism: Mechanism
     poses: Mapping[str, FloatArray]
     directions: Mapping[str, float]
     open_gap: OpenGap | None = None
+    is_clearest: bool = False
 
     @property
     def joints(self) -> Sequence[Joint]:

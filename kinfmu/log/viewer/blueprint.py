@@ -29,6 +29,8 @@ EDGE = 0.01  # of the run's time, left free before and after the curves
 AFTER = 0.13  # of the run's time, left free after them for half of the label of a tick such as +100 ms at the end
 LEGEND_EDGE, LETTER = 34.0, 7.0  # [points]; width of a legend around its names, and of a letter
 LEGEND_EDGE_Y, LEGEND_LINE = 14.0, 23.0  # [points]; height of a legend around its names, and of one
+MOST_LEGEND = 0.5  # of the height of a plot, that is made free for a legend
+LONGER = 1.1  # times the range of curves and legend, of an axis that leaves enough of it to the curves
 ABREAST = 3  # most plots of efforts and signals in a row
 FEW = 4  # plots of two runs, up to which they are wide
 WIDTH, HEIGHT = 870.0, 820.0  # [points], of all plots and states on a usual screen
@@ -274,16 +276,23 @@ def plot(
     width: float = WIDTH / 2,
     height: float = HEIGHT / 4,
 ) -> rrb.TimeSeriesView:
-    """Return a plot of curves, with a legend if there is a corner in which it hides none of them.
+    """Return a plot of curves, with a legend in a corner where it hides none of them, or above them.
 
-    groups: (root entity, group); width, height: of the plot [points].
+    Without a legend is a single curve, and a plot of which it would take too large a part. groups: (root entity,
+    group); width, height: of the plot [points].
     """
     import rerun.blueprint as rrb
 
     ranges = [group.extent for _, group in groups if group.extent]
     low, high = min((low for low, _ in ranges), default=0.0), max((high for _, high in ranges), default=0.0)
     shown = with_two_labels(low, high, height - CAPTION) if ranges else None
-    corner = free_corner([group for _, group in groups], runs, shown, width - NUMBERS, height - CAPTION)
+    found = [group for _, group in groups]
+    corner = free_corner(found, runs, shown, width - NUMBERS, height - CAPTION)
+    wide, part = legend_size(found, width - NUMBERS, height - CAPTION)
+    if corner is None and shown and wide <= 1.0 and part <= MOST_LEGEND:
+        longer = with_two_labels(low, low + (high - low) / (1.0 - part), height - CAPTION)
+        if (longer[1] - longer[0]) * (1.0 - part) <= LONGER * (high - low):  # it has its labels without being longer
+            shown, corner = longer, "RightTop"
     return rrb.TimeSeriesView(
         name=title,
         origin="/",
@@ -297,6 +306,15 @@ def plot(
 CORNERS: tuple[Corner, ...] = ("RightTop", "LeftTop", "RightBottom", "LeftBottom")
 
 
+def legend_size(groups: Sequence[Group], width: float, height: float) -> tuple[float, float]:
+    """Return width and height of a legend as parts of those of a plot; more than all of it for a single curve."""
+    names = [name for group in groups for name in group.names]
+    if len(names) < 2:
+        return math.inf, math.inf
+    wide = (LEGEND_EDGE + LETTER * max(map(len, names))) / width
+    return wide, (LEGEND_EDGE_Y + LEGEND_LINE * len(names)) / height
+
+
 def free_corner(
     groups: Sequence[Group], runs: Sequence[Run], shown: tuple[float, float] | None, width: float, height: float
 ) -> Corner | None:
@@ -304,10 +322,8 @@ def free_corner(
 
     shown: range of the values, None for that of the curves; width, height: of the plot without its numbers [points].
     """
-    names = [name for group in groups for name in group.names]
-    wide = (LEGEND_EDGE + LETTER * max(map(len, names), default=0)) / width
-    high = (LEGEND_EDGE_Y + LEGEND_LINE * len(names)) / height
-    if len(names) < 2 or wide > 1.0 or high > 1.0:
+    wide, high = legend_size(groups, width, height)
+    if wide > 1.0 or high > 1.0:
         return None
     times = [run.t for run in runs if len(run)] or [np.zeros(1)]
     start, stop = min(float(t.min()) for t in times), max(float(t.max()) for t in times)

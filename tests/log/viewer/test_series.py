@@ -69,6 +69,17 @@ def test_every_one_of_many_curves_has_a_name_and_a_colour_of_its_own_and_no_lege
         assert not is_shown.as_py()
 
 
+def test_two_curves_without_a_free_corner_have_a_legend_above_them(run: Run) -> None:
+    waves = np.column_stack([np.sin(run.t), -np.sin(run.t)])
+    group = Group("x", "x", ("first_crank.x", "second_crank.x"), palette.BODIES[:2], waves)
+    view = plot("x", [("", group)], timeline_of([run]), [run])
+    (is_shown,) = view.properties["PlotLegend"].visible.as_arrow_array()
+    ((low, high),) = view.properties["ScalarAxis"].range.as_arrow_array().to_pylist()
+    assert is_shown.as_py()
+    assert low < -1.0
+    assert high > 1.5
+
+
 def test_a_single_curve_is_named_by_its_plot(run: Run) -> None:
     (is_shown,) = (
         plot("margin", [("", margin(run))], timeline_of([run]), [run]).properties["PlotLegend"].visible.as_arrow_array()
