@@ -16,7 +16,7 @@ for (const code of document.querySelectorAll(".highlight-none pre"))
     code.innerHTML = code.innerHTML.replace(/[^\n]*\n/g, (line) => `<span class="line">${line}</span>`);
 
 // Places at which names in tables may break.
-for (const name of document.querySelectorAll("td code .pre")) name.innerHTML = name.innerHTML.replace(/\w[._/](?=\w)/g, "$&<wbr>");
+for (const name of document.querySelectorAll("td code .pre")) name.innerHTML = name.innerHTML.replace(/\w{3}[._/](?=\w{2})/g, "$&<wbr>");
 
 // Names for readers aloud that the theme leaves out, and keys for what scrolls.
 for (const button of document.querySelectorAll(".search-button-field")) button.ariaLabel = button.textContent.trim().replace(/\s+/g, " ");
