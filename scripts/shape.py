@@ -153,11 +153,13 @@ def picture(graph: Graph, heights: Mapping[str, int]) -> str:
         for j, row in enumerate(rows)
         for k, name in enumerate(row)
     }
+    height = STOREY * len(rows)
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {STOREY * len(rows)}" font-family="sans-serif" '
-        f'font-size="13" text-anchor="middle" fill="none" stroke="#667">',
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" '
+        f'font-family="sans-serif" font-size="13" text-anchor="middle" fill="none" stroke="#778">',
+        "<style>@media(prefers-color-scheme:dark){rect{fill:#1d2733}text{fill:#dde4ee}}</style>",
         '<marker id="head" markerWidth="8" markerHeight="6" refX="8" refY="3" orient="auto" stroke="none">'
-        '<path d="M0 0 8 3 0 6z" fill="#667"/></marker>',
+        '<path d="M0 0 8 3 0 6z" fill="#778"/></marker>',
     ]
     for name, other in sorted(needed(graph)):
         (x, y), (to_x, to_y) = middle[name], middle[other]

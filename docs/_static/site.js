@@ -11,6 +11,13 @@ for (const code of document.querySelectorAll("article pre")) {
     code.after(button);
 }
 
+// Lines of commands, which continue indented on a phone.
+for (const code of document.querySelectorAll(".highlight-none pre"))
+    code.innerHTML = code.innerHTML.replace(/[^\n]*\n/g, (line) => `<span class="line">${line}</span>`);
+
+// Places at which names in tables may break.
+for (const name of document.querySelectorAll("td code .pre")) name.innerHTML = name.innerHTML.replace(/\w{3}[._/](?=\w{2})/g, "$&<wbr>");
+
 // Names for readers aloud that the theme leaves out, and keys for what scrolls.
 for (const button of document.querySelectorAll(".search-button-field")) button.ariaLabel = button.textContent.trim().replace(/\s+/g, " ");
 for (const summary of document.querySelectorAll("summary"))

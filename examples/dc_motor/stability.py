@@ -16,6 +16,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from kinfmu.draw.writing import write
+
 sys.path.insert(0, str(Path(__file__).parent))
 from build import build
 from coupling import LARGEST_INERTIA, coupled, monolithic
@@ -70,19 +72,23 @@ def _convergence(axes: Axes, found: dict[str, NDArray[np.float64]]) -> None:
     axes.legend(frameon=False)
 
 
-def draw(path: Path) -> dict[str, NDArray[np.float64]]:
-    """Write the figure and return rows of ratio, step and error by coupling."""
-    with tempfile.TemporaryDirectory() as folder:
-        fmus = build(Path(folder))
-        found = {coupling: np.array(list(errors(fmus, coupling))) for coupling in TITLES}
-    look = {"font.size": 9, "axes.titlesize": 9, "svg.hashsalt": "kinfmu", "axes.spines.top": False}
-    with mpl.rc_context(look | {"axes.spines.right": False, "legend.fontsize": 8}):
+def _figure(found: dict[str, NDArray[np.float64]]) -> Figure:
+    look = {"font.size": 9, "axes.titlesize": 9, "axes.spines.top": False, "axes.spines.right": False}
+    with mpl.rc_context(look | {"legend.fontsize": 8}):
         figure = Figure(figsize=(11.0, 3.4), layout="constrained")
         panels = figure.subplots(1, 3)
         for axes, (coupling, title) in zip(panels, TITLES.items(), strict=False):
             _map(axes, found[coupling], title)
         _convergence(panels[2], found)
-        figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else {}, dpi=150)
+    return figure
+
+
+def draw(path: Path) -> dict[str, NDArray[np.float64]]:
+    """Write the figure and return rows of ratio, step and error by coupling."""
+    with tempfile.TemporaryDirectory() as folder:
+        fmus = build(Path(folder))
+        found = {coupling: np.array(list(errors(fmus, coupling))) for coupling in TITLES}
+    write(path, lambda: _figure(found))
     return found
 
 

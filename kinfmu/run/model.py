@@ -276,7 +276,9 @@ class Model:
     ) -> Sensitivities:
         """Return exact derivatives of positions and rates with respect to parameters.
 
-            J z_p = -Phi_p,   J zd_p = -(d/dp)(J zd + Phi_u ud)      block after block, then outputs by the chain rule
+            J z_p = -Phi_p,   J zd_p = -(d/dp)(J zd + Phi_u ud)
+
+        block after block, then outputs by the chain rule.
 
         Parameters change alone: times or driver values stay, and all that is written as an expression of a parameter
         changes with it. No difference quotients are involved.

@@ -170,6 +170,15 @@ def test_the_types_of_measures_are_what_the_classes_declare(request: pytest.Fixt
 
 
 @pytest.mark.long
+def test_own_linkage(request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    followed = follow("own-linkage.md", tmp_path)
+    page = with_outputs(page_text("own-linkage.md"), followed.outputs["kinfmu check press.toml"])
+    accept("own-linkage.md", page, request)
+    assert len((tmp_path / "turn.csv").read_text(encoding="utf-8").splitlines()) == 38
+    assert {"press.svg", "press.html", "mine.toml"} <= {path.name for path in tmp_path.iterdir()}
+
+
+@pytest.mark.long
 def test_playing_has_a_live_mechanism_with_the_length_of_the_page(tmp_path: Path) -> None:
     pytest.importorskip("anywidget", reason="anywidget is not installed")
     live = follow("playing.md", tmp_path).names["live"]
