@@ -35,9 +35,7 @@ _SAME_DIRECTION = 0.8  # cosine between directions of motion a step apart; branc
 _RANK = 1e-9  # singular values below this fraction of the largest count as zero
 
 
-def close(
-    part: System | Part, q: FloatArray, u: FloatArray, iterations: int = _ITERATIONS
-) -> tuple[FloatArray, float]:
+def close(part: System | Part, q: FloatArray, u: FloatArray, iterations: int = _ITERATIONS) -> tuple[FloatArray, float]:
     """Return the pose nearest to q where all rows hold, and its residual relative to the size.
 
     Levenberg-Marquardt far away, the shortest Gauss-Newton step near a solution, so that redundant rows and singular
