@@ -72,7 +72,9 @@ for (let now = 0; now < 4000; now += 10) {
     spots.begin(now, {}, view);
     const names = new Names({ line() {}, text: (x, y, text) => texts.push(text) }, view, theme, spots);
     const x = now ? Math.min(250 + 0.1 * now, 500) : 250;
-    for (const [text, place, rank] of [["crank", [400, 300], 1], ["rod", [x, 300], 2]]) names.add({ text, places: [place], colour: "#000", off: 20, rank });
+    for (const [text, place, rank] of [["crank", [400, 300], 1], ["rod", [x, 300], 2]]) {
+        names.add({ text, places: [place], colour: "#000", off: 20, rank });
+    }
     names.draw();
     if (texts.includes("rod") !== shown.at(-1)?.[1]) shown.push([now, texts.includes("rod")]);
 }
@@ -101,3 +103,13 @@ def test_a_name_is_hidden_while_it_passes_a_more_important_one_and_300_ms_longer
     assert [is_there, is_passing, is_back] == [True, False, True]
     widths = 0.5 * (7 * len("crank") + 7 * len("rod")) + 4
     assert end - begin == pytest.approx(2 * widths / 0.1 + 300, abs=30)
+
+
+@needs_node
+def test_a_place_without_a_name_has_no_leader(tmp_path: Path) -> None:
+    script = """
+    const names = new Names({}, view, {}, spots);
+    for (const text of ["", "crank"]) names.add({ text, places: [[400, 300]], colour: "#000", off: 20, rank: 1 });
+    console.log(JSON.stringify(names.wanted.map(({ text }) => text)));
+    """
+    assert printed(script, tmp_path) == ["crank"]

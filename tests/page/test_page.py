@@ -240,7 +240,7 @@ def test_names_keep_their_places_in_a_turn_and_have_the_contrast_of_wcag_aa(
 def test_a_name_without_a_place_is_shown_at_a_tap_and_under_the_mouse(chromium: Browser) -> None:
     with chromium.open(text_of("parallel_jaw"), has_touch=True) as page:
         page.resize(PHONE)
-        page.get("k.fit()")
+        page.get("(k.fit(), k.zoom(0.8))")
         page.tab.evaluate(
             """() => {
                 window.texts = [];

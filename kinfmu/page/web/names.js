@@ -71,6 +71,7 @@ export class Names {
     // the direction of the line that it is on. Name and rank tell which name it is in the next frame, or a key in place of
     // the name.
     add({ text, places, colour, off, rank, key = text, inside = null, fill = "", gap = null }) {
+        if (!text) return;
         const own = `${rank} ${key}`;
         const count = (this.counts.get(own) ?? 0) + 1; // of names with the same text
         this.counts.set(own, count);
