@@ -25,8 +25,9 @@ _LONGEST = 0.2  # [rad, sizes]; step from the start poses to the start of the la
 _SHORTEST = 1e-5  # the same; shorter steps mean a limit
 _CLOSEST = 1e-2  # of the square of the margin, the order of the distance to a limit; shorter steps lead nowhere
 _HELD = 1e-6  # part of the speed of a driver that rows do not allow
-_WORK = 1e7  # cube of the coordinates times steps: less than a second; between these numbers of steps
-_LEAST_TRIALS, _MOST_TRIALS = 8, 100
+_WORK = 1e7  # cube of the coordinates times steps: less than a second
+_LEAST_TRIALS, _MOST_TRIALS = 8, 100  # of steps on a path
+_LEAST_DIRECTIONS, _LEAST_ITERATIONS = 2, 25  # of searches for branches
 _STEEPEST = 10.0  # change of a coordinate over the longest step: a prediction of more is rejected
 _LESS = 0.5  # of the margin at the start of a path: beyond, the path leads toward a limit
 _DOUBLED = 8.0  # times the correction, where a step to second order is twice as long
@@ -186,7 +187,7 @@ def followed(
     done, step = 0.0, min(1.0, _LONGEST / length)
     here = first = there = margin(system, q) if trust else 0.0
     shortest = max(_ROUNDED, _CLOSEST * here * here) if trust else _SHORTEST
-    trials = max(_LEAST_TRIALS, min(_MOST_TRIALS, int(_WORK / len(q) ** 3))) if trust else -1
+    trials = max(_LEAST_TRIALS, min(_MOST_TRIALS, affordable(len(q)))) if trust else -1
     while done < 1.0 and trials and (step == 1.0 or step * length >= shortest):  # a way of round-off is one step
         trials -= 1
         step = min(step, 1.0 - done)
@@ -216,6 +217,11 @@ def followed(
         if _DOUBLED * corrected <= allowed:
             step *= 2.0
     return q, u
+
+
+def affordable(coordinates: int) -> int:
+    """Return the number of steps of all rows at once that take about as long as one answer may."""
+    return int(_WORK / coordinates**3)
 
 
 def reaches(system: System) -> FloatArray:
@@ -253,14 +259,19 @@ def dependent_rows(gradients: FloatArray) -> dict[int, list[int]]:
 
 
 def branches(system: System, singular: FloatArray, u: FloatArray) -> list[FloatArray]:
-    """Return closed poses at driver values u near a singular pose, nearest first: one per branch that leaves it."""
-    free = null_space(system.scaled_jacobian(singular), 1e-4)
+    """Return closed poses at driver values u near a singular pose, nearest first: one per branch that leaves it.
+
+    Of a large system only those in the directions that are held least.
+    """
+    few = affordable(len(singular))
+    free = null_space(system.scaled_jacobian(singular), 1e-4)[:, -max(_LEAST_DIRECTIONS, few) :]
+    iterations = max(_LEAST_ITERATIONS, min(_ITERATIONS, 4 * few))
     starts = [singular] + [
         singular + side * system.column_scales * direction for direction in free.T for side in (-0.2, 0.2)
     ]
     found: list[tuple[float, FloatArray]] = []
     for start in starts:
-        pose, gap = close(system, start, u)
+        pose, gap = close(system, start, u, iterations)
         away = float(np.abs((pose - singular) / system.column_scales).max())
         new = all(np.abs((pose - other) / system.column_scales).max() > _APART for _, other in found)
         if gap <= closed_up_to(system) and away < 1.0 and new:
