@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import signal
 import sys
 import threading
@@ -56,6 +57,7 @@ class _Program(click.Command):
     """A program that reports a KinfmuError as one line on stderr with exit status 1."""
 
     def invoke(self, ctx: click.Context) -> Any:
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of numpy, imported later: its threads slow small matrices
         if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
             sys.stdout.reconfigure(errors="surrogateescape")  # the name of a file need not be UTF-8
         try:

@@ -351,3 +351,14 @@ def test_play_prints_the_address_of_the_page_and_ends_with_ctrl_c(tmp_path: Path
         finally:
             play.kill()  # else leaving the block waits for a program that does not end
         assert play.returncode == 0
+
+
+@pytest.mark.parametrize(("given", "expected"), [(None, "1"), ("3", "3")])
+def test_commands_use_one_thread_for_small_matrices_unless_more_are_set(
+    given: str | None, expected: str, command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    if given:
+        monkeypatch.setenv("OPENBLAS_NUM_THREADS", given)
+    command("list")
+    assert os.environ["OPENBLAS_NUM_THREADS"] == expected

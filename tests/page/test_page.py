@@ -240,7 +240,7 @@ def test_names_keep_their_places_in_a_turn_and_have_the_contrast_of_wcag_aa(
 def test_a_name_without_a_place_is_shown_at_a_tap_and_under_the_mouse(chromium: Browser) -> None:
     with chromium.open(text_of("parallel_jaw"), has_touch=True) as page:
         page.resize(PHONE)
-        page.get("k.fit()")
+        page.get("(k.fit(), k.zoom(0.8))")
         page.tab.evaluate(
             """() => {
                 window.texts = [];
@@ -711,7 +711,10 @@ def test_a_page_moves_once_when_it_opens_unless_less_motion_is_wanted(chromium: 
         page.tab.click("#play")
         assert not page.get("k.isPlaying")
         page.get("k.motion.showOnce()")
-        page.tab.mouse.click(300, 300)
+        page.tab.mouse.click(30, 600)
+        page.tab.keyboard.press("+")
+        assert page.get("k.isPlaying")
+        page.drag("crank.P", [(400, 300)])
         assert not page.get("k.isPlaying")
         page.get("k.motion.showOnce()")
         page.tab.keyboard.press("Space")
@@ -726,6 +729,8 @@ def test_on_a_small_page_the_drawing_has_most_of_the_height(chromium: Browser, s
     with chromium.open(text_of(name)) as page:
         page.resize(size)
         assert page.get("k.view.height") >= 0.7 * size["height"]
+        x0, y0, x1, y1 = (page.get("k.view.scale") * edge for edge in page.get("k.linkage.box()"))
+        assert max((x1 - x0) / page.get("k.view.width"), (y1 - y0) / page.get("k.view.height")) >= 0.7
         controls = ["#play", "#sheet", "#drivers input[type=range]" if name == "jansen_leg" else "#time"]
         controls.append("#drivers input[type=number]" if name == "jansen_leg" else "#clock")
         boxes = [page.tab.locator(one).bounding_box() for one in controls]

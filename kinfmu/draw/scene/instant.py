@@ -78,7 +78,8 @@ class Instant:
 
     def placed(self, frame: str, points: FloatArray) -> FloatArray:
         """Return world coordinates (k, 2) as drawn of points (k, 2) in a frame."""
-        return np.array([world(self.frames[frame][:1], (x, y))[0] for x, y in points]).reshape(-1, 2)
+        x, y = np.reshape(points, (-1, 2)).T
+        return world(self.frames[frame][:1], (x, y))
 
     def seen(self, frame: str, points: FloatArray) -> FloatArray:
         """Return coordinates (k, 2) in a frame of points (k, 2) of the world, the inverse of `placed`."""

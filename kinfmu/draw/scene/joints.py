@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -251,27 +252,19 @@ def cam_shapes(shown: Instant) -> list[CamShape]:
 def _shape(shown: Instant, joint: CamJoint) -> CamShape | None:
     cam, follower, touching = members_of(joint)
     if isinstance(joint, CamRoller | CamFlatFace):
-        around, now = _given(joint, _ANGLES), _given(joint, np.array([_argument(shown, joint)]))
+        (around, is_real), now = _given_turn(joint), _given(joint, np.array([_argument(shown, joint)]))
         origin = complex(*shown.body_points[joint.between[0]])
     else:
         try:
             placed = placed_cam(shown.mechanism, joint, {name: tuple(row[0]) for name, row in shown.poses.items()})
             around, now = _led(placed, _ANGLES), _led(placed, np.array([placed.turn]))
+            is_real = _is_real(joint, around)
         except MechanismError:
             return None  # such as a law that does not repeat, or a follower without a guide
         origin = placed.axle
     if touching is None:
         return None
     normal, radius = getattr(joint, "normal", None), getattr(joint, "roller_radius", None)
-    is_real = normal is not None or radius is not None
-    if normal is not None:
-        is_real = bool((around.radius > 0.0).all() and ((around.curve * around.normal.conj()).real > 0.0).all())
-    elif radius is not None:
-        bends_less = (around.radius > radius) | (around.radius <= 0.0)
-        is_real = bool(bends_less.all() and np.abs(around.curve).min() > radius)
-        if is_real:  # unless the roller, at some place, cuts into the profile that it makes at another
-            depths = cut_depths(around.curve, around.curve - radius * around.normal, radius)
-            is_real = not depths.max() > _TOUCH * radius
     size = float(radius or 0.0) if is_real else 0.0
     profile, contact = around.curve - size * around.normal, now.curve - size * now.normal
     reach = face = None
@@ -301,6 +294,29 @@ def _shape(shown: Instant, joint: CamJoint) -> CamShape | None:
 def _led(placed: PlacedCam, s: FloatArray) -> _Curve:
     found = traced(placed, s)
     return _Curve(found.curve, found.normal, found.curve_radius, found.offset)
+
+
+def _is_real(joint: CamJoint, around: _Curve) -> bool:
+    """Return whether the follower touches a cam that can be made."""
+    normal, radius = getattr(joint, "normal", None), getattr(joint, "roller_radius", None)
+    if normal is not None:
+        return bool((around.radius > 0.0).all() and ((around.curve * around.normal.conj()).real > 0.0).all())
+    if radius is None:
+        return False
+    bends_less = (around.radius > radius) | (around.radius <= 0.0)
+    if not (bends_less.all() and np.abs(around.curve).min() > radius):
+        return False
+    depths = cut_depths(
+        around.curve, around.curve - radius * around.normal, radius
+    )  # at a place by the roller at another
+    return not depths.max() > _TOUCH * radius
+
+
+@lru_cache(maxsize=64)
+def _given_turn(joint: CamRoller | CamFlatFace) -> tuple[_Curve, bool]:
+    """Return a given curve over a turn, and whether it can be made; states of a drawing share them."""
+    around = _given(joint, _ANGLES)
+    return around, _is_real(joint, around)
 
 
 def _given(joint: CamRoller | CamFlatFace, s: FloatArray) -> _Curve:

@@ -47,8 +47,8 @@ def poses_of(run: Run, mechanism: Mechanism) -> tuple[dict[str, FloatArray], dic
     return poses, left_out
 
 
-def world(pose: FloatArray, s: tuple[float, float]) -> FloatArray:
-    """Return world coordinates r + A s, (n, 2), of the body-fixed point s in poses (n, 3)."""
+def world(pose: FloatArray, s: tuple[float, float] | tuple[FloatArray, FloatArray]) -> FloatArray:
+    """Return world coordinates r + A s, (n, 2), of the body-fixed point s in poses (n, 3), or of points in one pose."""
     x, y, phi = pose.T
     c, sin = np.cos(phi), np.sin(phi)
     return np.column_stack([x + c * s[0] - sin * s[1], y + sin * s[0] + c * s[1]])

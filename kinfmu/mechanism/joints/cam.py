@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated, ClassVar
 
 from kinfmu.errors import MechanismError, listed
@@ -138,6 +139,12 @@ def closing(law: Law) -> tuple[Condition, ...]:
     return tuple(Condition(f"law: {key}", value, "0") for key, value in law.zeros().items())
 
 
+@lru_cache(maxsize=64)
+def _largest(law: Law) -> float:
+    """Return the largest value of a law in a turn; mechanisms that differ in other numbers share it."""
+    return max(float(law.at(k * TURN / _SAMPLES_OF_CURVE)) for k in range(_SAMPLES_OF_CURVE))
+
+
 class CamCurve(Joint):
     """A follower on a curve that is fixed in the cam: a law gives its distance from a pole over a turn.
 
@@ -158,7 +165,7 @@ class CamCurve(Joint):
         return tuple(map(body_of, self.between))
 
     def reach(self) -> float:
-        return max(float(self.law.at(k * TURN / _SAMPLES_OF_CURVE)) for k in range(_SAMPLES_OF_CURVE))
+        return _largest(self.law)
 
     def conditions(self) -> tuple[Condition, ...]:
         return closing(self.law)

@@ -34,6 +34,7 @@ from kinfmu.plan.equations.system import System
 
 AS_DRAWN = 1e-9  # of the size; start poses that close this well are the drawn poses, to the bit
 _STEPS = 10  # on the way of a driver
+_CORRECTIONS = 20  # iterations after a step; a pose that needs more is at the end of the way
 PLACEHOLDER = "_"  # stands for the bodies of a file that has only the ground, which is no mechanism yet
 
 Pose = tuple[float, float, float]
@@ -193,7 +194,7 @@ class Drawing:
         begin = last = float(u[number])
         for step in range(1, _STEPS + 1):
             u[number] = begin + step / _STEPS * (value - begin)
-            q, gap = close(self.system, q, u)
+            q, gap = close(self.system, q, u, _CORRECTIONS)
             if gap > closed_up_to(self.system):
                 break
             last = float(u[number])

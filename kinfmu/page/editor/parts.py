@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.drivers import AngleDriver, RelativeAngleDriver
 from kinfmu.mechanism.joints import Revolute
 from kinfmu.mechanism.quantities.placement import body_of, point_of
+from kinfmu.mechanism.toml_file import mechanism_of
 from kinfmu.mechanism.valid import check_name, quoted
 from kinfmu.page.editor.drawing import Drawing, Spot, written_angle, written_number
 from kinfmu.page.editor.moving import carry
@@ -219,7 +221,8 @@ def cylinder(pen: Pen, values: OperationArguments) -> None:
     name = pen.numbered_name("cylinder")
     pen.put(("drivers", name), {"type": "distance", "between": ends, **law})
     if not values.has("stroke"):
-        stroke = _possible_stroke(pen.drawing.with_edits(pen.edits), name, length, rise)
+        tried = replace(pen.drawing, document=pen.document, mechanism=mechanism_of(pen.document, pen.drawing.folder))
+        stroke = _possible_stroke(tried, name, length, rise)
         pen.put(("drivers", name, "rise"), _rounded(stroke))
     _add_run(pen)
 

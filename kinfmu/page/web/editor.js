@@ -14,6 +14,7 @@ import { Sketch } from "./editor_sketch.js";
 
 const PATIENT = 400; // [ms] before the badge states that an answer takes longer
 const IDLE = 800; // [ms] without a step, before changes of a drawing that is not complete are tried
+const SMALL = 0.5; // part of the view; a mechanism that takes less is fitted when it begins to move
 const ELSEWHERE = 0.3; // of the size; a drawing whose edges move by more is another one
 const PICTURES = ["image/png", "image/jpeg"];
 
@@ -275,7 +276,8 @@ export class Editor {
         if (!wasPlayable && isIdle && this.session.answer.badge.isComplete && this.isDrawn && !window.matchMedia("(prefers-reduced-motion: reduce)").matches) {
             this.machine = null;
             const [x0, y0, x1, y1] = linkage.box();
-            if (![[x0, y0], [x1, y1]].every((p) => this.#isInView(p))) page.fit();
+            const part = page.view.scale * Math.max((x1 - x0) / page.view.width, (y1 - y0) / page.view.height);
+            if (part < SMALL || ![[x0, y0], [x1, y1]].every((p) => this.#isInView(p))) page.fit();
             page.motion.play(true);
         }
         this.#changed();

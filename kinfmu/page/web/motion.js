@@ -1,7 +1,6 @@
 // Motion over time, and the loop of frames in which it is drawn.
 
 const ONCE = 6; // [s] of the motion that a page shows when it opens
-const TOUCHES = ["pointerdown", "keydown", "wheel"];
 
 export class Motion {
     constructor(page) {
@@ -36,17 +35,12 @@ export class Motion {
         this.page.refresh();
     }
 
-    // Move once through the motion, slowly, and back to its start; whatever the hand does ends it.
+    // Move once through the motion, slowly, and back to its start; what stops a play ends it.
     showOnce() {
         if (this.page.linkage.data.over) return;
         this.play(true);
         const { from } = this.linkage.data.run;
         this.oncePace = (this.#end(from) - from) / ONCE;
-        const end = ({ key, target }) => {
-            for (const kind of TOUCHES) window.removeEventListener(kind, end, true);
-            if (this.oncePace && key !== " " && !target.closest?.("#play")) this.play(false); // these stop it themselves
-        };
-        for (const kind of TOUCHES) window.addEventListener(kind, end, true);
     }
 
     #endOnce() {

@@ -18,8 +18,9 @@ export const PATIENCE = 300; // [ms] for which a name may collide before it leav
 
 // What frames know of the spots of names.
 //
-// known: of the frames before, by name { spot, since }: spot: { id of a place, side, factor, worth } or { isInside, worth },
-// undefined if the name was left out; since: time [ms] of the first of the last frames in which it collided, or was left out.
+// known: of the frames before, by name { spot, since, hidden }: spot: { id of a place, side, factor, worth } or { isInside, worth },
+// undefined if the name was left out; since: time [ms] of the first of the last frames in which it collided, or was left out;
+// hidden: time of the last frame in which a more important name covered it.
 // best: by name its spots, the best first; worth: for which part of the motion one is free, less for spots that are far.
 export class Spots {
     constructor() {
@@ -60,6 +61,7 @@ export class Names {
     constructor(pen, view, theme, spots) {
         Object.assign(this, { pen, view, theme, spots });
         this.boxes = new Boxes(); // of names and pins
+        this.texts = new Boxes(); // of names alone
         this.lines = new Boxes(); // of the linkage, loads and arrows
         [this.wanted, this.hidden, this.counts] = [[], [], new Map()];
     }
@@ -69,6 +71,7 @@ export class Names {
     // the direction of the line that it is on. Name and rank tell which name it is in the next frame, or a key in place of
     // the name.
     add({ text, places, colour, off, rank, key = text, inside = null, fill = "", gap = null }) {
+        if (!text) return;
         const own = `${rank} ${key}`;
         const count = (this.counts.get(own) ?? 0) + 1; // of names with the same text
         this.counts.set(own, count);
@@ -142,21 +145,25 @@ export class Names {
         const { known, best, now, isMoving } = this.spots;
         const before = known.get(name.key);
         const there = before?.spot && this.#at(name, before.spot);
+        if (there && !this.texts.isFree(there.box)) before.hidden = now; // by a more important name
+        const isHidden = now - before?.hidden < (isMoving ? PATIENCE : 1);
+        const shown = isHidden ? null : there;
+        if (isHidden) this.spots.isWaiting = true;
         if (there && this.#isClear(there)) {
             before.since = null;
-            return there;
+            return shown;
         }
         const since = before ? before.since ?? now : -Infinity;
         if (before && now - since < PATIENCE) {
             before.since = since;
             this.spots.isWaiting = true;
-            return there;
+            return shown;
         }
         let spots = best.get(name.key) ?? [];
         if (isMoving && before) spots = spots.filter(({ worth }) => worth > (before.spot?.worth ?? 0) + FAR);
         else spots = [...spots, ...spotsOf(name)];
         const spot = spots.find((one) => this.placeAt(name, one, true));
-        if (!spot && isMoving) return there;
+        if (!spot && isMoving) return shown;
         known.set(name.key, { spot, since: spot ? null : now });
         return spot ? this.placeAt(name, spot) : null;
     }
@@ -169,7 +176,7 @@ export class Names {
 
     // Keep other names off a place.
     take(place) {
-        if (place) this.boxes.add(place.box);
+        if (place) for (const boxes of [this.boxes, this.texts]) boxes.add(place.box);
     }
 
     // Return { spot, box, leader } of a name at a spot: a place by its id, a direction and a factor, or "inside".

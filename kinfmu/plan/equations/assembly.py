@@ -12,6 +12,7 @@ from kinfmu.errors import AssemblyError, listed
 from kinfmu.plan.equations.blocks import Ordered, ordered_blocks
 from kinfmu.plan.equations.closing import (
     CLOSED,
+    affordable,
     branches,
     close,
     closed_up_to,
@@ -44,6 +45,7 @@ DENSE_RESTARTS = 8
 _LOOKS = 4  # random poses at which the structure of the rows is determined
 _TRUST = 10.0  # a correction of a prediction must be this much smaller than the margin: other branches are farther away
 _PARTS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of OFFSET, at which branches near a singular start pose are sought
+_LEAST_PARTS = 2
 _NEARBY_STARTS = 6  # poses tried near a start that almost closes
 _SPREAD = 0.3  # [rad, sizes]; their distance from the start pose
 _NEARLY = 0.01  # residual of a pose that almost closes
@@ -157,8 +159,11 @@ def closes_nearby(system: System, singular: Assembled) -> bool:
 
 
 def _nearby(system: System, singular: Assembled, side: float) -> Assembled | None:
-    """Return a closed pose on one side of a singular one, at the first distance of _PARTS that has one."""
-    for part in _PARTS:
+    """Return a closed pose on one side of a singular one, at the first distance of _PARTS that has one.
+
+    Of a large system only the largest distances are tried.
+    """
+    for part in _PARTS[: max(_LEAST_PARTS, affordable(len(singular.q)))]:
         u = singular.u + side * part * OFFSET * reaches(system)
         near = next(iter(branches(system, singular.q, u)), None)
         if near is not None:

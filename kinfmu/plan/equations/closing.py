@@ -15,6 +15,7 @@ CONSISTENT = 1e-11  # gap up to which a dependent row counts as consistent, of t
 _DEPENDENT = 1e-6  # part of a row outside the span of others that counts as zero; so does a weight in a combination
 _APART = 1e-6  # [rad, sizes]; poses further apart are different branches
 _ITERATIONS = 200
+_CORRECTIONS = 10  # iterations after a prediction that is nearer than the margin; more are on the way to another branch
 _SLOW, _SLOW_STEPS = 0.9, 4  # a small residual that falls more slowly in so many steps does not close
 OFFSET_ROUNDING = 8.0 * 2.0**-52  # of what is far from the origin, in the residual that it leaves
 _TOLERANCE = 1e-9  # residual relative to the size up to which samples are good, by default
@@ -22,6 +23,11 @@ _ROUNDED = 1e-14  # residual relative to the size that rounding leaves
 _FAR_FROM_SINGULAR = 1e-3  # least singular value over the largest; gradients keep the digits to tell what depends
 _LONGEST = 0.2  # [rad, sizes]; step from the start poses to the start of the laws
 _SHORTEST = 1e-5  # the same; shorter steps mean a limit
+_CLOSEST = 1e-2  # of the square of the margin, the order of the distance to a limit; shorter steps lead nowhere
+_HELD = 1e-6  # part of the speed of a driver that rows do not allow
+_WORK = 1e7  # cube of the coordinates times steps: less than a second
+_LEAST_TRIALS, _MOST_TRIALS = 8, 100  # of steps on a path
+_LEAST_DIRECTIONS, _LEAST_ITERATIONS = 2, 25  # of searches for branches
 _STEEPEST = 10.0  # change of a coordinate over the longest step: a prediction of more is rejected
 _LESS = 0.5  # of the margin at the start of a path: beyond, the path leads toward a limit
 _DOUBLED = 8.0  # times the correction, where a step to second order is twice as long
@@ -30,7 +36,7 @@ _SAME_DIRECTION = 0.8  # cosine between directions of motion a step apart; branc
 _RANK = 1e-9  # singular values below this fraction of the largest count as zero
 
 
-def close(part: System | Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray, float]:
+def close(part: System | Part, q: FloatArray, u: FloatArray, iterations: int = _ITERATIONS) -> tuple[FloatArray, float]:
     """Return the pose nearest to q where all rows hold, and its residual relative to the size.
 
     Levenberg-Marquardt far away, the shortest Gauss-Newton step near a solution, so that redundant rows and singular
@@ -38,12 +44,12 @@ def close(part: System | Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray
 
     The residual is that beyond what the rounding of an offset leaves; above CLOSED the pose does not close.
 
-    q: Rough pose, (columns of the part,). u: Driver values, (d,).
+    q: Rough pose, (columns of the part,). u: Driver values, (d,). iterations: at most.
     """
     part = Part(part) if isinstance(part, System) else part
     best, residual, jacobian = _straight(part, q, u)
     damping, too_far, slow = 1e-3, False, 0
-    for _ in range(_ITERATIONS):
+    for _ in range(iterations):
         norm = float(np.linalg.norm(residual))
         if norm == 0.0 or slow == _SLOW_STEPS:
             break
@@ -170,26 +176,34 @@ def followed(
     """Return a pose followed along a straight line of driver values to `target`, or to its limit, and the values there.
 
     Steps are predicted to second order. trust: the margin over the largest correction of a prediction, so that no
-    other branch is that near, and the end is where the margin has halved; None: any branch will do where branches
-    cross.
+    other branch is that near, and the end is where the margin has halved, where rows hold the driver, or after a number
+    of steps that falls with the size of the system; None: any branch will do where branches cross.
     """
     whole, scales = Part(system), system.column_scales
     way, at_rest = target - u, np.zeros(len(target))
     length = float(np.abs(way / reaches(system)).max())
-    shortest = _SHORTEST if trust is None else _ROUNDED
+    if length == 0.0:
+        return q, u
     done, step = 0.0, min(1.0, _LONGEST / length)
     here = first = there = margin(system, q) if trust else 0.0
-    while done < 1.0 and (step == 1.0 or step * length >= shortest):  # a way of round-off is one step
+    shortest = max(_ROUNDED, _CLOSEST * here * here) if trust else _SHORTEST
+    trials = max(_LEAST_TRIALS, min(_MOST_TRIALS, affordable(len(q)))) if trust else -1
+    while done < 1.0 and trials and (step == 1.0 or step * length >= shortest):  # a way of round-off is one step
+        trials -= 1
         step = min(step, 1.0 - done)
         ahead = target if step == 1.0 - done else u + step * way
         jacobian = whole.jacobian(q)
-        qd = scales * np.linalg.lstsq(jacobian, system.nu(q, u, step * way) / whole.row_scales, rcond=_RANK)[0]
+        speeds = system.nu(q, u, step * way) / whole.row_scales
+        qd = np.linalg.lstsq(jacobian, speeds, rcond=_RANK)[0]
+        if trust and np.linalg.norm(jacobian @ qd - speeds) > _HELD * np.linalg.norm(speeds):
+            break
+        qd = scales * qd
         gamma = system.gamma(q, qd, u, step * way, at_rest)
         qdd = scales * np.linalg.lstsq(jacobian, gamma / whole.row_scales, rcond=_RANK)[0]
         predicted = q + qd + 0.5 * qdd
         corrected, allowed = np.inf, _CORRECTION
         if np.abs((predicted - q) / scales).max() <= _LONGEST * _STEEPEST:
-            trial, gap = close(whole, predicted, ahead)
+            trial, gap = close(whole, predicted, ahead, _CORRECTIONS if trust else _ITERATIONS)
             if gap <= closed_up_to(system):
                 corrected = float(np.abs((trial - predicted) / scales).max())
                 there = margin(system, trial) if trust else there
@@ -203,6 +217,11 @@ def followed(
         if _DOUBLED * corrected <= allowed:
             step *= 2.0
     return q, u
+
+
+def affordable(coordinates: int) -> int:
+    """Return the number of steps of all rows at once that take about as long as one answer may."""
+    return int(_WORK / coordinates**3)
 
 
 def reaches(system: System) -> FloatArray:
@@ -240,14 +259,19 @@ def dependent_rows(gradients: FloatArray) -> dict[int, list[int]]:
 
 
 def branches(system: System, singular: FloatArray, u: FloatArray) -> list[FloatArray]:
-    """Return closed poses at driver values u near a singular pose, nearest first: one per branch that leaves it."""
-    free = null_space(system.scaled_jacobian(singular), 1e-4)
+    """Return closed poses at driver values u near a singular pose, nearest first: one per branch that leaves it.
+
+    Of a large system only those in the directions that are held least.
+    """
+    few = affordable(len(singular))
+    free = null_space(system.scaled_jacobian(singular), 1e-4)[:, -max(_LEAST_DIRECTIONS, few) :]
+    iterations = max(_LEAST_ITERATIONS, min(_ITERATIONS, 4 * few))
     starts = [singular] + [
         singular + side * system.column_scales * direction for direction in free.T for side in (-0.2, 0.2)
     ]
     found: list[tuple[float, FloatArray]] = []
     for start in starts:
-        pose, gap = close(system, start, u)
+        pose, gap = close(system, start, u, iterations)
         away = float(np.abs((pose - singular) / system.column_scales).max())
         new = all(np.abs((pose - other) / system.column_scales).max() > _APART for _, other in found)
         if gap <= closed_up_to(system) and away < 1.0 and new:

@@ -184,6 +184,21 @@ def test_findings_apply_their_edits_and_the_mechanism_plays_in_the_same_page(chr
         assert hand.page.errors == []
 
 
+def test_a_small_drawing_fills_the_view_when_it_begins_to_move(chromium: Browser, tmp_path: Path) -> None:
+    with drawing_hand(chromium, tmp_path) as hand:
+        for _ in range(6):
+            hand.button("#out")
+        hand.typed((0, 0), (0, 40), (120, 80), (100, 0))
+        hand.press("g")
+        hand.typed((0, 0), (100, 0))
+        hand.press("m")
+        hand.typed((0, 20))
+        assert hand.plays()
+        x0, y0, x1, y1 = hand.get("k.linkage.box().map((edge) => edge * k.view.scale)")
+        assert max((x1 - x0) / hand.get("k.view.width"), (y1 - y0) / hand.get("k.view.height")) > 0.5
+        assert hand.page.errors == []
+
+
 def test_values_set_while_it_moves_are_part_of_the_drawing(hand: DrawingHand) -> None:
     hand.button("#draw")
     hand.get("(k.design.set({'bodies.crank.points.C.y': 45, 'bodies.coupler.points.C.y': 45}), k.design.commit())")

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute
+from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, RelativeAngleDriver, Revolute
 from kinfmu.errors import AmbiguousStartError
 from kinfmu.mechanism import gallery
 from kinfmu.plan import compile_plan
+from kinfmu.plan.equations import closing
 from kinfmu.plan.equations.assembly import find_assembly, in_order, start_values
 from kinfmu.plan.equations.system import System
 from tests.mechanisms import PINS
@@ -214,3 +215,60 @@ def test_a_start_that_misses_a_change_point_is_assembled_or_reported_as_ambiguou
         assert abs(u - angle - side * miss) <= 0.1001
     if miss == 1e-3:
         compile_plan(mechanism)
+
+
+def chain_of_four_bars(count: int) -> Mechanism:
+    """Four-bars in a row, each driven by a corner of the rocker before, and that of the last rocker is held too."""
+    ground, bodies, joints = {"O": (0.0, 0.0)}, [Body("crank", {"O": (0, 0), "end": (0, 40)}, (0, 0, 0))], []
+    joints.append(Revolute("O", ("ground.O", "crank.O")))
+    tip, end = "crank.end", (0.0, 40.0)
+    for k in range(1, count + 1):
+        top, foot, corner = (100.0 * k + 20.0, 80.0 - 3.0 * (k % 3)), (100.0 * k, 0.0), (100.0 * k + 8.0, 36.0)
+        ground[f"C{k}"] = foot
+        bodies.append(Body(f"coupler{k}", {"P": end, "Q": top}, (0, 0, 0)))
+        bodies.append(Body(f"rocker{k}", {"Q": top, "C": foot, "end": corner}, (0, 0, 0)))
+        joints += [
+            Revolute(f"P{k}", (tip, f"coupler{k}.P")),
+            Revolute(f"Q{k}", (f"coupler{k}.Q", f"rocker{k}.Q")),
+            Revolute(f"C{k}", (f"ground.C{k}", f"rocker{k}.C")),
+        ]
+        tip, end = f"rocker{k}.end", corner
+    ground["end"] = end
+    joints.append(Revolute("held", ("ground.end", tip)))
+    return Mechanism(
+        "chain", [Body("ground", ground), *bodies], joints, [AngleDriver("drive", "crank", ConstantSpeed(0.0, 1.0))]
+    )
+
+
+def straight_chain(count: int) -> Mechanism:
+    """Bars in a straight line between two pins of the ground, with drivers of all angles that are free but there."""
+    bodies = [Body(f"bar{k}", {"A": (10 * k, 0), "B": (10 * k + 10, 0)}, (0, 0, 0)) for k in range(count)]
+    joints = [Revolute(f"P{k}", (f"bar{k - 1}.B", f"bar{k}.A")) for k in range(1, count)]
+    joints += [Revolute("O", ("ground.O", "bar0.A")), Revolute("E", ("ground.E", f"bar{count - 1}.B"))]
+    drivers = [
+        RelativeAngleDriver(f"drive{k}", (f"bar{k - 1}", f"bar{k}"), ConstantSpeed(0.0, 0.1))
+        for k in range(1, count - 1)
+    ]
+    return Mechanism("straight", [Body("ground", {"O": (0, 0), "E": (10 * count, 0)}), *bodies], joints, drivers)
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "most"), [(chain_of_four_bars(6), 2), (chain_of_four_bars(19), 16), (straight_chain(39), 30)]
+)
+def test_long_chains_that_are_singular_or_cannot_move_are_judged_in_few_steps(
+    mechanism: Mechanism, most: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With 19 four-bars the crank hardly feels that the last rocker is held: a step is as short as the margin."""
+    closes = []
+    monkeypatch.setattr(closing, "close", lambda *given, close=closing.close: closes.append(1) or close(*given))
+    assert find_assembly(System(mechanism)).pose is not None
+    assert len(closes) <= most
+
+
+def test_a_path_to_where_it_begins_has_no_steps() -> None:
+    system = System(kinfmu.load("fourbar"))
+    pose = find_assembly(system).pose
+    assert pose is not None
+    q, u = closing.followed(system, pose.q, pose.u, pose.u, trust=10.0)
+    np.testing.assert_array_equal(q, pose.q)
+    np.testing.assert_array_equal(u, pose.u)
