@@ -4,7 +4,7 @@
     documentation/index.html
     binaries/<platform>/<identifier>.so|dll       pythonfmu's, unchanged
     resources/slavemodule.txt                     names the module that holds the slave class
-    resources/<package>_slave.py                  imports the slave class
+    resources/<package>_slave.py                  passes the slave class to the library
     resources/<package>/mechanism_slave.py        the slave class, with its model and layout
     resources/<package>/solver/python/            the solver, and the emitted model; forces, if they are outputs;
                                                   reduced inertia, if efforts drive
@@ -104,10 +104,10 @@ class Slave(MechanismSlave):
 
 _MODULE = '''"""The module of the FMU '{name}' that pythonfmu's library runs for each instance."""
 
+from {package} import mechanism_slave
 from {package}.fmu.slave.library import hold
-from {package}.mechanism_slave import Slave
 
-hold(globals())
+hold(globals(), mechanism_slave.Slave)
 '''
 
 _BY_EFFORTS = """\
