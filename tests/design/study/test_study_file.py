@@ -129,7 +129,7 @@ def test_the_mechanism_is_found_from_the_folder_of_the_file_or_in_the_gallery(
     study = read_study(path)
     assert study.sampling.variations == (UniformRange("crank", "mm", 15.0, 25.0),)
     assert len(study) == 3
-    assert (study.motion.over, len(study.motion)) == ("one turn of crank at 3.14159 rad/s", 361)
+    assert (study.motion.over, len(study.motion)) == ("one turn of crank at 30 rpm", 361)
     measures = "[measures.stride]\ntype = 'range'\nof = 'foot.x'"
     path = write(folder, f'mechanism = "jansen_leg"\n[parameters]\na = {{ tolerance = 0.01 }}\n{measures}')
     (tolerance,) = read_study(path).sampling.tolerances
