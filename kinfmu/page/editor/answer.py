@@ -19,7 +19,7 @@ from kinfmu.mechanism.quantities.placement import body_of
 from kinfmu.page.describe import drawn
 from kinfmu.page.editor.drawing import AS_DRAWN, PLACEHOLDER, Drawing
 from kinfmu.page.html import page_data
-from kinfmu.plan import plan_from
+from kinfmu.plan import require_solvable
 from kinfmu.plan.equations.assembly import SINGULAR
 from kinfmu.plan.equations.redundancy import Redundancy
 
@@ -95,7 +95,7 @@ def _problem_with(drawing: Drawing, redundancy: Redundancy | KinfmuError) -> Kin
     if not isinstance(redundancy, Redundancy):
         return redundancy
     try:
-        plan_from(drawing.mechanism, drawing.system, drawing.origin, redundancy)
+        require_solvable(drawing.system, redundancy)
     except KinfmuError as problem:
         return problem
     return None
