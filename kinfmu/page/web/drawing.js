@@ -305,6 +305,7 @@ class Painter {
         for (const { type, name, points: both } of joints) {
             if (!both || ["translational", "cam_flat_face"].includes(type)) continue;
             both.forEach((point, k) => {
+                if (!k && SECOND_ONLY.includes(type)) return;
                 const pin = at(point);
                 pin.key = type === "fixed" && pin.key !== "pin" ? "weld" : "pin";
                 if (type === "distance") pin.ends.push(points[point].name);
@@ -337,6 +338,7 @@ class Painter {
     }
 }
 
+const SECOND_ONLY = ["point_on_line", "cam_roller"]; // joints whose first point only says where a line or a cam is
 const BARS = ["rod", "face"]; // lines of a body besides its link
 
 // Return the row of the table of strokes for a shape that is a line; "" for what is not painted.
