@@ -327,7 +327,7 @@ class Painter {
             this.names.boxes.add([p[0] - radius, p[1] - radius, p[0] + radius, p[1] + radius]);
             const text = [...new Set(names.length ? names : ends)].join(", ");
             const rank = colour ? 0 : names.length ? 1 : 4; // an end of a bar or cylinder, whose own name is at its middle
-            this.name(text, [p], this.theme.ink, radius + 8, rank, { gap: (one) => distance(one, p) - radius });
+            this.name(text, [p], this.theme.ink, radius + 8, rank, { gap: (one) => distance(one, p) - radius, yields: true });
         }
         if (held) this.pen.circle(...this.dot(held), 0.33 * this.width + 6, { width: 2.5, colour: this.theme.accent });
     }
