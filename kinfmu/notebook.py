@@ -28,7 +28,7 @@ from kinfmu.draw.writing import svg_text
 from kinfmu.errors import KinfmuError, some
 from kinfmu.mechanism import Mechanism
 from kinfmu.motion import DesignMeasures, MeasuredValues
-from kinfmu.plan import localized, plan_from
+from kinfmu.plan import localized, require_solvable
 from kinfmu.plan.equations.redundancy import find_redundancy
 from kinfmu.plan.equations.system import System
 from kinfmu.run import Run
@@ -93,14 +93,13 @@ def _parts(mechanism: Mechanism) -> Iterator[tuple[str, str]]:
 
 def _mobility(mechanism: Mechanism) -> Iterator[tuple[str, str]]:
     """Yield the mobility, redundant joints, and the problem that prevents solving."""
-    local, origin = localized(mechanism)
-    system = System(local)
+    system = System(localized(mechanism)[0])
     redundancy = find_redundancy(system)
     yield "mobility", str(redundancy.mobility)
     if redundancy.redundant:
         yield "redundant", ", ".join(dict.fromkeys(row.row.owner for row in redundancy.redundant))
     try:
-        plan_from(mechanism, system, origin, redundancy)
+        require_solvable(system, redundancy)
     except KinfmuError as problem:
         yield "problem", str(problem)
 

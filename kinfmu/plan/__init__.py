@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from kinfmu.plan.block import Block, determinant_formula
-from kinfmu.plan.compile import compile_plan, plan_from
+from kinfmu.plan.compile import compile_plan, plan_from, require_solvable
 from kinfmu.plan.origin import localized
 from kinfmu.plan.plan import DriverInfo, SolvePlan
 
@@ -15,4 +15,5 @@ __all__ = [
     "determinant_formula",
     "localized",
     "plan_from",
+    "require_solvable",
 ]

@@ -17,6 +17,7 @@ from kinfmu.plan.conditions import (
     refuse_negative_distances,
     refuse_undefined_loads,
 )
+from kinfmu.plan.equations.assembly import Assembled
 from kinfmu.plan.equations.graph import Node, symbols
 from kinfmu.plan.equations.redundancy import Redundancy, find_redundancy
 from kinfmu.plan.equations.system import System
@@ -62,6 +63,28 @@ def compile_plan(
     return plan_from(mechanism, system, origin, redundancy or find_redundancy(system), outputs, parameters, solved)
 
 
+def require_solvable(system: System, redundancy: Redundancy) -> Assembled:
+    """Return the anchor of a mechanism, or raise why it has no plan, without making the plan.
+
+    Args:
+        system: The equations of the mechanism.
+        redundancy: Of the system, with its assembly.
+
+    Returns:
+        The anchor.
+
+    Raises:
+        KinfmuError: As in `compile_plan`.
+
+    """
+    refuse_inconsistent(system, redundancy)
+    refuse_mobility(system, redundancy)
+    refuse_negative_distances(system, redundancy.assembly.start)
+    anchor = find_anchor(system, redundancy.assembly, redundancy.kept)
+    refuse_undefined_loads(system, redundancy.assembly.start, anchor)
+    return anchor
+
+
 def plan_from(
     mechanism: Mechanism,
     system: System,
@@ -89,12 +112,7 @@ def plan_from(
         KinfmuError: As in `compile_plan`.
 
     """
-    local = system.mechanism
-    refuse_inconsistent(system, redundancy)
-    refuse_mobility(system, redundancy)
-    refuse_negative_distances(system, redundancy.assembly.start)
-    anchor = find_anchor(system, redundancy.assembly, redundancy.kept)
-    refuse_undefined_loads(system, redundancy.assembly.start, anchor)
+    local, anchor = system.mechanism, require_solvable(system, redundancy)
     settable = _parameters(mechanism, parameters)
     tracer = Tracer(local, [parameter.name for parameter in settable])
     row = RowTracer(system, tracer)

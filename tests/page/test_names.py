@@ -73,7 +73,7 @@ for (let now = 0; now < 4000; now += 10) {
     const names = new Names({ line() {}, text: (x, y, text) => texts.push(text) }, view, theme, spots);
     const x = now ? Math.min(250 + 0.1 * now, 500) : 250;
     for (const [text, place, rank] of [["crank", [400, 300], 1], ["rod", [x, 300], 2]]) {
-        names.add({ text, places: [place], colour: "#000", off: 20, rank });
+        names.add({ text, places: [place], colour: "#000", off: 20, rank, yields: true });
     }
     names.draw();
     if (texts.includes("rod") !== shown.at(-1)?.[1]) shown.push([now, texts.includes("rod")]);

@@ -19,7 +19,7 @@ from kinfmu.mechanism.quantities.placement import body_of
 from kinfmu.page.describe import drawn
 from kinfmu.page.editor.drawing import AS_DRAWN, PLACEHOLDER, Drawing
 from kinfmu.page.html import page_data
-from kinfmu.plan import plan_from
+from kinfmu.plan import require_solvable
 from kinfmu.plan.equations.assembly import SINGULAR
 from kinfmu.plan.equations.redundancy import Redundancy
 
@@ -95,7 +95,7 @@ def _problem_with(drawing: Drawing, redundancy: Redundancy | KinfmuError) -> Kin
     if not isinstance(redundancy, Redundancy):
         return redundancy
     try:
-        plan_from(drawing.mechanism, drawing.system, drawing.origin, redundancy)
+        require_solvable(drawing.system, redundancy)
     except KinfmuError as problem:
         return problem
     return None
@@ -134,7 +134,10 @@ def _findings(drawing: Drawing, problem: KinfmuError | None, advised: Iterable[F
     edits = [edit for one in unpinned for edit in one["edits"]]  # what is left open by mistake comes first
     pins = [{*edit["operations"][0]["points"]} for edit in edits]
     edits += [edit for edit in (*advised, *_help(drawing)) if not any(_is_pin(edit, points) for points in pins)]
-    return [{"kind": "problem", "text": str(problem), "edits": edits[:_MOST_EDITS]}, *unpinned]
+    redundancy = drawing.redundancy
+    is_open = isinstance(redundancy, Redundancy) and redundancy.mobility > len(drawing.mechanism.drivers)
+    text = str(problem).removeprefix("[drivers] ")  # a page has no tables
+    return [{"kind": "open" if is_open else "problem", "text": text, "edits": edits[:_MOST_EDITS]}, *unpinned]
 
 
 def _is_pin(edit: Finding, points: set[str]) -> bool:

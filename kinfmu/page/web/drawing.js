@@ -305,6 +305,7 @@ class Painter {
         for (const { type, name, points: both } of joints) {
             if (!both || ["translational", "cam_flat_face"].includes(type)) continue;
             both.forEach((point, k) => {
+                if (!k && SECOND_ONLY.includes(type)) return;
                 const pin = at(point);
                 pin.key = type === "fixed" && pin.key !== "pin" ? "weld" : "pin";
                 if (type === "distance") pin.ends.push(points[point].name);
@@ -326,7 +327,7 @@ class Painter {
             this.names.boxes.add([p[0] - radius, p[1] - radius, p[0] + radius, p[1] + radius]);
             const text = [...new Set(names.length ? names : ends)].join(", ");
             const rank = colour ? 0 : names.length ? 1 : 4; // an end of a bar or cylinder, whose own name is at its middle
-            this.name(text, [p], this.theme.ink, radius + 8, rank, { gap: (one) => distance(one, p) - radius });
+            this.name(text, [p], this.theme.ink, radius + 8, rank, { gap: (one) => distance(one, p) - radius, yields: true });
         }
         if (held) this.pen.circle(...this.dot(held), 0.33 * this.width + 6, { width: 2.5, colour: this.theme.accent });
     }
@@ -337,6 +338,7 @@ class Painter {
     }
 }
 
+const SECOND_ONLY = ["point_on_line", "cam_roller"]; // joints whose first point only says where a line or a cam is
 const BARS = ["rod", "face"]; // lines of a body besides its link
 
 // Return the row of the table of strokes for a shape that is a line; "" for what is not painted.

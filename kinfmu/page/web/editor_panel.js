@@ -6,7 +6,7 @@ import { number } from "./numbers.js";
 import { GROUND } from "./editor_places.js";
 
 const UNITS = ["mm", "cm", "m", "in"];
-const KINDS = { problem: "Problem", note: "Note", ok: "" };
+const KINDS = { problem: "Problem", open: "Not complete", note: "Note", ok: "" };
 
 export class DrawPanel {
     constructor(editor, root) {

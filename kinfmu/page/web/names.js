@@ -20,7 +20,7 @@ export const PATIENCE = 300; // [ms] for which a name may collide before it leav
 //
 // known: of the frames before, by name { spot, since, hidden }: spot: { id of a place, side, factor, worth } or { isInside, worth },
 // undefined if the name was left out; since: time [ms] of the first of the last frames in which it collided, or was left out;
-// hidden: time of the last frame in which a more important name covered it.
+// hidden: time of the last frame in which it yielded.
 // best: by name its spots, the best first; worth: for which part of the motion one is free, less for spots that are far.
 export class Spots {
     constructor() {
@@ -61,22 +61,22 @@ export class Names {
     constructor(pen, view, theme, spots) {
         Object.assign(this, { pen, view, theme, spots });
         this.boxes = new Boxes(); // of names and pins
-        this.texts = new Boxes(); // of names alone
+        this.yielding = new Boxes(); // of names that yield
         this.lines = new Boxes(); // of the linkage, loads and arrows
         [this.wanted, this.hidden, this.counts] = [[], [], new Map()];
     }
 
-    // Want a name next to one of its places, the best first, at a distance `off`, or on the place `inside` of an area
-    // with the colour `fill`; gap: how far a pixel is from what it names. Names of a lower rank are more important. A place is a pixel, or { at, id, along } with
-    // the direction of the line that it is on. Name and rank tell which name it is in the next frame, or a key in place of
-    // the name.
-    add({ text, places, colour, off, rank, key = text, inside = null, fill = "", gap = null }) {
+    // Want a name next to one of its places, the best first, at a distance `off`, or on the place `inside` of an area with
+    // the colour `fill`; gap: how far a pixel is from what it names; yields: hidden while a more important one that yields
+    // covers it. Names of a lower rank are more important. A place is a pixel, or { at, id, along } with the direction of
+    // the line that it is on. Name and rank tell which name it is in the next frame, or a key in place of the name.
+    add({ text, places, colour, off, rank, key = text, inside = null, fill = "", gap = null, yields = false }) {
         if (!text) return;
         const own = `${rank} ${key}`;
         const count = (this.counts.get(own) ?? 0) + 1; // of names with the same text
         this.counts.set(own, count);
         const all = places.map((place, id) => (Array.isArray(place) ? { at: place, id } : place));
-        this.wanted.push({ text, places: all, colour, off, rank, inside, fill, gap, key: `${own} ${count}`, width: widthOf(text) + 4 });
+        this.wanted.push({ text, places: all, colour, off, rank, inside, fill, gap, yields, key: `${own} ${count}`, width: widthOf(text) + 4 });
     }
 
     // Keep names off a line of a width.
@@ -114,6 +114,7 @@ export class Names {
                 return;
             }
             this.take(place);
+            if (name.yields) this.yielding.add(place.box);
             found.push({ ...place, name });
         });
         for (const { leader } of found) if (leader) this.pen.line(leader, { width: 0.8, colour: this.theme.quiet });
@@ -145,7 +146,7 @@ export class Names {
         const { known, best, now, isMoving } = this.spots;
         const before = known.get(name.key);
         const there = before?.spot && this.#at(name, before.spot);
-        if (there && !this.texts.isFree(there.box)) before.hidden = now; // by a more important name
+        if (there && name.yields && !this.yielding.isFree(there.box)) before.hidden = now;
         const isHidden = now - before?.hidden < (isMoving ? PATIENCE : 1);
         const shown = isHidden ? null : there;
         if (isHidden) this.spots.isWaiting = true;
@@ -176,7 +177,7 @@ export class Names {
 
     // Keep other names off a place.
     take(place) {
-        if (place) for (const boxes of [this.boxes, this.texts]) boxes.add(place.box);
+        if (place) this.boxes.add(place.box);
     }
 
     // Return { spot, box, leader } of a name at a spot: a place by its id, a direction and a factor, or "inside".

@@ -16,7 +16,7 @@ export class View {
     }
 
     fit([x0, y0, x1, y1]) {
-        const [across, upright] = [this.width, this.height].map((size) => Math.min(64, 0.09 * size));
+        const [across, upright] = [this.width, this.height].map((size) => Math.min(64, 0.12 * size));
         const [w, h] = [Math.max(x1 - x0, 1e-12), Math.max(y1 - y0, 1e-12)];
         const [aw, ah] = [Math.max(this.width - 2 * across, 20), Math.max(this.height - 2 * upright - BUTTONS, 20)];
         this.scale = Math.min(aw / w, ah / h);

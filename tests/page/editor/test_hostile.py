@@ -298,7 +298,7 @@ def test_the_problem_of_a_drawing_comes_with_changes_that_help(server: PlayServe
     assert status == HTTPStatus.OK
     assert answer["view"] is None
     problem, *_ = answer["findings"]
-    assert problem["kind"] == "problem"
+    assert problem["kind"] == "open"
     assert "mobility is 3 but there is 1 driver" in problem["text"]
     first, *_ = problem["edits"]
     helped = draw(server, *first["operations"])

@@ -105,7 +105,7 @@ def test_the_badge_sets_mobility_against_drivers(operations: tuple[Operation, ..
 def test_what_is_missing_can_be_added_by_the_operations_of_a_finding() -> None:
     drawing = drawn(*FOURBAR[:-1])
     (finding,) = answer(drawing)["findings"]
-    assert finding["kind"] == "problem"
+    assert (finding["kind"], finding["text"].split(":")[0]) == ("open", "mobility is 1 but there is no driver")
     assert [edit["text"] for edit in finding["edits"]] == ["add a motor to crank", "add a motor to rocker"]
     for edit in finding["edits"]:
         assert answer(changed(drawing, edit["operations"]))["badge"]["isComplete"]

@@ -343,8 +343,8 @@ def test_a_half_drawn_mechanism_gets_changes_that_were_tried_and_one_click_makes
     half = drawn(*FOURBAR[:4], bar((123, 78), "ground.B", "rocker"))
     with drawing_hand(chromium, tmp_path, half.text) as hand:
         hand.page.tab.wait_for_function("window.kinfmu.editor.sketch")
-        ghosts = hand.page.tab.locator("#draw-panel .problem .ghost")
-        tried = hand.page.tab.locator(".problem .ghost", has_text="join coupler.D and rocker.E and drive crank")
+        ghosts = hand.page.tab.locator("#draw-panel .open .ghost")
+        tried = hand.page.tab.locator(".open .ghost", has_text="join coupler.D and rocker.E and drive crank")
         tried.wait_for()
         assert ghosts.first.inner_text() == "pin coupler.D and rocker.E"
         assert "it moves over the whole run" in tried.inner_text()
