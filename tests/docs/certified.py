@@ -31,13 +31,13 @@ def _draw_tubes(axes: Axes, certificate: Certificate) -> None:
     cells, tubes = certificate.cover.cells, certificate.cover.tubes
     number = list(certificate.prover.formulas.unknowns).index(NAME)
     for k in range(len(cells)):
-        u = np.linspace(cells.low[k], cells.high[k], 25)
+        u = np.linspace(cells.low[k], cells.high[k], 9)
         path = np.concatenate([cells[k : k + 1].at(Intervals(x) - cells.u[k]).middle[number] for x in u[:, None]])
         for tube, shade in ((tubes.wide, 0.15), (tubes.narrow, 0.45)):
             low, high = tube.low[number, k], tube.high[number, k]
             axes.fill_between(u, path + low, path + high, color=BLUE, alpha=shade, linewidth=0.0)
         axes.axvline(cells.high[k], color=ink(GREY), linewidth=0.4)
-    u = np.linspace(certificate.low, certificate.high, 300)
+    u = np.linspace(certificate.low, certificate.high, 90)
     low, high = certificate.enclosed(NAME, u)
     axes.plot(u, 0.5 * (low + high), color=BLUE, linewidth=0.8)
     axes.set(xlabel="crank [rad]", ylabel="rocker [rad]", xlim=(certificate.low, certificate.high))
