@@ -14,13 +14,14 @@ import kinfmu
 from kinfmu import Certificate
 from kinfmu.analysis.certified.intervals import Intervals
 from kinfmu.draw.chart import SMALL, dress
+from kinfmu.draw.overlay import curve_colour
 from kinfmu.draw.sheet import GREY, ink
 from kinfmu.draw.writing import write
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-BLUE, ORANGE = "#1d4ed8", "#b45309"
+BLUE, ORANGE = (ink(curve_colour(k)) for k in (0, 1))
 WIDTH = 0.6  # [rad] of a cell, for tubes that are seen
 SHOWN = 2  # the cell of the second panel
 NAME = "rocker.phi"
@@ -31,13 +32,13 @@ def _draw_tubes(axes: Axes, certificate: Certificate) -> None:
     cells, tubes = certificate.cover.cells, certificate.cover.tubes
     number = list(certificate.prover.formulas.unknowns).index(NAME)
     for k in range(len(cells)):
-        u = np.linspace(cells.low[k], cells.high[k], 25)
+        u = np.linspace(cells.low[k], cells.high[k], 9)
         path = np.concatenate([cells[k : k + 1].at(Intervals(x) - cells.u[k]).middle[number] for x in u[:, None]])
-        for tube, shade in ((tubes.wide, 0.15), (tubes.narrow, 0.45)):
+        for tube, shade in ((tubes.wide, 0.25), (tubes.narrow, 0.5)):
             low, high = tube.low[number, k], tube.high[number, k]
             axes.fill_between(u, path + low, path + high, color=BLUE, alpha=shade, linewidth=0.0)
         axes.axvline(cells.high[k], color=ink(GREY), linewidth=0.4)
-    u = np.linspace(certificate.low, certificate.high, 300)
+    u = np.linspace(certificate.low, certificate.high, 90)
     low, high = certificate.enclosed(NAME, u)
     axes.plot(u, 0.5 * (low + high), color=BLUE, linewidth=0.8)
     axes.set(xlabel="crank [rad]", ylabel="rocker [rad]", xlim=(certificate.low, certificate.high))
@@ -48,7 +49,7 @@ def _draw_test(axes: Axes, certificate: Certificate) -> None:
     tubes = certificate.cover.tubes
     for tube, colour, text in ((tubes.wide, BLUE, "W"), (tubes.narrow, ORANGE, "K(W)")):
         (left, bottom), (right, top) = tube.low[:, SHOWN], tube.high[:, SHOWN]
-        box = Rectangle((left, bottom), right - left, top - bottom, alpha=0.2, facecolor=colour, edgecolor=colour)
+        box = Rectangle((left, bottom), right - left, top - bottom, alpha=0.3, facecolor=colour, edgecolor=colour)
         axes.add_patch(box)
         axes.annotate(text, (right, top), ha="right", va="top", color=colour, fontsize=SMALL + 1.0)
     reach = 1.15 * float(tubes.wide.high[:, SHOWN].max())

@@ -34,6 +34,7 @@ _NEAR_CENTRE = 1e3  # times _MEET before a dead centre: there its own cells prov
 _MEET = 1e-9  # of the driver; what is covered up to this distance from the end of the range counts as covered
 _CLEAR = 1e-4  # of the range; width of cells that are not close to a change point
 _SMOOTH = 0.01  # rad or sizes of an unknown per rad or size of the driver, within which directions agree
+_GRADE = 0.5  # of distances from a singular place: ends of cells next to each other
 _WORTH = 1e-6  # of the range; narrower pieces, as between branches that cross, are not looked at
 _TURN = (6.283185307179586, 6.283185307179587)  # [rad], with 2 pi between them
 
@@ -119,10 +120,23 @@ def _over_range(path: DriverPath, width: float, box: Mapping[str, Intervals]) ->
     unit = prover.formulas.unit_of_x
     low = path.low.u[0] if path.low else path.poses[0].u[0]
     high = path.high.u[0] if path.high else path.poses[-1].u[0]
-    edges = np.linspace(low, high, max(2, math.ceil((high - low) / (width * unit)) + 1))
+    singular = [limit.u[0] for limit in (path.low, path.high) if limit]
+    singular += [bridge.centre for bridge in path.bridges]
+    edges = _graded(low, high, width * unit, singular, LEAST * unit)
     poses = {pose.u[0]: pose for pose in path.poses}
     guess = guess_of(path.solver, poses, lambda u: (u,))
     return of_range(path, prover, of_branch(cover(prover, edges, guess, LEAST * unit), poses, guess))
+
+
+def _graded(low: float, high: float, width: float, singular: Sequence[float], least: float) -> FloatArray:
+    """Return ends of cells of a width; towards singular places cells are narrower, as those that are proved there."""
+    edges = np.linspace(low, high, max(2, math.ceil((high - low) / width) + 1))
+    offsets = width * _GRADE ** np.arange(math.ceil(math.log(least / width) / math.log(_GRADE)))
+    for place in singular:
+        near = np.concatenate((place - offsets, place + offsets))
+        edges = edges[(abs(edges - place) > width) | (edges == low) | (edges == high)]
+        edges = np.concatenate((edges, near[(low < near) & (near < high)]))
+    return np.unique(edges)
 
 
 def of_range(path: DriverPath, prover: Prover, found: Cover) -> Certificate:

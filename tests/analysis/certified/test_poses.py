@@ -87,6 +87,13 @@ def test_platforms_and_six_bars_have_the_assemblies_of_an_elimination(seed: int,
     assert found.count >= 2
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("family", FAMILIES)
+def test_500_mechanisms_of_a_family_have_the_assemblies_of_an_elimination(family: str) -> None:
+    wrong = [one for one in (compared((seed, family)) for seed in range(500)) if one.refused or one.faults]
+    assert wrong == []
+
+
 def two_tables(seed: int) -> Mechanism:
     """Two tables pinned to each other, each on two bars: a block of six angles."""
     random = np.random.default_rng(seed)
