@@ -164,6 +164,19 @@ static kf_rows looked_at(const double *f, const double *v, const double *a, int6
     return rows;
 }
 
+/* The smallest and the largest values of quantities, (designs, count) with a step from design to design, and their places:
+ * (designs, 4), as both_extremes finds them.
+ */
+void kf_both_extremes(int64_t designs, int64_t count, const double *x, const double *h, const double *f, ptrdiff_t f_step,
+                      const double *v, ptrdiff_t v_step, const double *a, ptrdiff_t a_step, double *found)
+{
+    int64_t k;
+    for (k = 0; k < designs; ++k, f += f_step, v += v_step, a += a_step, found += 4) {
+        const kf_rows rows = looked_at(f, v, a, count);
+        both_extremes(&rows, count, x, h, found);
+    }
+}
+
 /* Values, rates and accelerations of a column, or of its first or second derivative, whose own are estimated. */
 static kf_rows rows_of(const kf_extremes *of, int64_t column, int64_t order, bool is_closed)
 {

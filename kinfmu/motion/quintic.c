@@ -136,49 +136,6 @@ static bool is_finite(const double *numbers, int64_t count)
     return low <= high;
 }
 
-/* The largest sample, with its sign: its number. */
-static int64_t largest(const kf_quantity *of, int64_t count)
-{
-    double low, high;
-    int64_t k;
-    range(of->f, count, &low, &high);
-    for (k = 0; of->f[k] != (of->sign < 0.0 ? low : high); ++k) {
-    }
-    return k;
-}
-
-/* Mark the intervals whose control points exceed a value; the number of marks. */
-static int64_t mark(const kf_quantity *of, int64_t count, const double *h, double value, int64_t most, int64_t *marked)
-{
-    enum { AT_ONCE = 32 };
-    int64_t k, i, found = 0;
-    for (k = 0; k + 1 < count; k += AT_ONCE) {
-        const int64_t end = k + AT_ONCE < count - 1 ? k + AT_ONCE : count - 1;
-        double tops[AT_ONCE];
-        int64_t any = 0;
-        for (i = k; i < end; ++i) {
-            const double c0 = h[i] * (of->sign * of->v[i]) * 0.2, c5 = h[i] * (of->sign * of->v[i + 1]) * 0.2;
-            const double c1 = of->sign * of->f[i] + c0, c4 = of->sign * of->f[i + 1] - c5;
-            const double c2 = c1 + c0 + h[i] * h[i] * (of->sign * of->a[i]) * 0.05;
-            const double c3 = c4 - c5 + h[i] * h[i] * (of->sign * of->a[i + 1]) * 0.05;
-            const double left = c1 > c2 ? c1 : c2, right = c3 > c4 ? c3 : c4;
-            tops[i - k] = left > right ? left : right;
-        }
-        for (i = k; i < end; ++i) {
-            any |= tops[i - k] > value;
-        }
-        for (i = k; i < end && any != 0; ++i) {
-            if (tops[i - k] > value) {
-                if (found < most) {
-                    marked[found] = i;
-                }
-                ++found;
-            }
-        }
-    }
-    return found;
-}
-
 /* Keep the largest value in one half of interval i, if it exceeds that before; the slope changes its sign once there. */
 static void visit(const kf_quantity *of, int64_t i, int half, const double *x, const double *h, double before, double *value,
                   double *at)
@@ -196,50 +153,6 @@ static void visit(const kf_quantity *of, int64_t i, int half, const double *x, c
     if (here > before && here >= *value) {
         *value = here;
         *at = x[i] + s * h[i];
-    }
-}
-
-/* The largest value of one design and its place. */
-static void maximum(const kf_quantity *of, int64_t count, const double *x, const double *h, double *value, double *at)
-{
-    enum { MOST = 64 };
-    int64_t marked[MOST], k;
-    const int64_t top = largest(of, count);
-    const double grid = of->sign * of->f[top];
-    const int64_t found = mark(of, count, h, grid, MOST, marked);
-    const int64_t visits = found <= MOST ? found : count - 1; /* too many to list: all intervals are visited */
-    int half;
-    *value = grid;
-    *at = x[top];
-    for (half = 0; half < 2; ++half) {
-        const double before = *value;
-        for (k = 0; k < visits; ++k) {
-            visit(of, found <= MOST ? marked[k] : k, half, x, h, before, value, at);
-        }
-    }
-}
-
-/* The largest values of quantities, (designs, count) with a step from design to design, and their places.
- *
- * signs: (sides) 1 for the largest value of a quantity, -1 for that of its negative. value, at: (sides, designs).
- */
-void kf_maxima(int64_t designs, int64_t count, const double *x, const double *h, int64_t sides, const double *signs,
-               const double *f, ptrdiff_t f_step, const double *v, ptrdiff_t v_step, const double *a, ptrdiff_t a_step,
-               double *value, double *at)
-{
-    int64_t k, side;
-    for (k = 0; k < designs; ++k) {
-        kf_quantity of = {f + k * f_step, v + k * v_step, a + k * a_step, 1.0};
-        const bool is_known = is_finite(of.f, count) && is_finite(of.v, count) && is_finite(of.a, count);
-        for (side = 0; side < sides; ++side) {
-            double *const best = &value[side * designs + k], *const place = &at[side * designs + k];
-            of.sign = signs[side];
-            if (is_known) {
-                maximum(&of, count, x, h, best, place);
-            } else {
-                *best = *place = NAN;
-            }
-        }
     }
 }
 

@@ -37,10 +37,10 @@ def use_compiled() -> None:
     library = compiler.load(files, compiler.VECTORIZED)
     place, count, step = ctypes.c_void_p, ctypes.c_int64, ctypes.c_ssize_t
     table = (place, step)
-    library.kf_maxima.argtypes = (count, count, place, place, count, place, *table * 3, place, place)
+    library.kf_both_extremes.argtypes = (count, count, place, place, *table * 3, place)
     library.kf_higher.argtypes = (count, count, ctypes.c_bool, place, place, *table * 3, place, place)
     library.kf_ranges.argtypes = (count, count, *table, place, place)
-    library.kf_maxima.restype = library.kf_higher.restype = library.kf_ranges.restype = None
+    library.kf_both_extremes.restype = library.kf_higher.restype = library.kf_ranges.restype = None
     _compiled.append(library)
 
 
@@ -230,13 +230,12 @@ def _keep_largest(value: FloatArray, x: FloatArray, design: IntArray, found: Flo
 
 def _compiled_maxima(x: FloatArray, rows: Rows, signs: Sequence[float]) -> list[tuple[FloatArray, FloatArray]]:
     tables = [_by_samples(row) for row in rows]
-    h, sides, (m, n) = np.diff(x), np.array(signs), tables[0].shape
-    x = np.ascontiguousarray(x)
-    value, at = np.empty((len(sides), m)), np.empty((len(sides), m))
+    x, h, (m, n) = np.ascontiguousarray(x), np.diff(x), tables[0].shape
+    found = np.empty((m, 4))
     places = [part for table in tables for part in (address_of(table), table.strides[0] // 8)]
-    given = (address_of(x), address_of(h), len(sides), address_of(sides))
-    _compiled[0].kf_maxima(m, n, *given, *places, address_of(value), address_of(at))
-    return list(zip(value, at, strict=True))
+    _compiled[0].kf_both_extremes(m, n, address_of(x), address_of(h), *places, address_of(found))
+    low, low_at, high, high_at = found.T.copy()
+    return [(high, high_at) if sign > 0.0 else (-low, low_at) for sign in signs]
 
 
 def _compiled_higher(rows: Rows, weights: tuple[FloatArray, FloatArray], *, is_closed: bool) -> Rows:

@@ -161,6 +161,7 @@ def test_two_drivers_on_one_freedom_one_drives_the_other_freedom() -> None:
 
 
 @pytest.mark.parametrize("factor", [1000.0, 25.4])
+@pytest.mark.few(1)
 def test_a_length_in_another_unit_is_scaled_back(factor: float) -> None:
     linkage = kinfmu.load("parallel_jaw")
     joints = tuple(

@@ -277,6 +277,7 @@ def test_a_rise_of_a_cam_in_degrees_without_a_unit_is_reported_once() -> None:
 
 
 @pytest.mark.parametrize(("offset", "is_noted"), [("5", True), ("5 deg", False), ("-40 deg", True)])
+@pytest.mark.few(2)
 def test_an_offset_that_turns_an_oscillating_follower_far_from_its_start_pose_is_reported(
     offset: str, is_noted: bool
 ) -> None:

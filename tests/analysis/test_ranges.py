@@ -112,6 +112,7 @@ def test_each_driver_of_a_five_bar_goes_until_its_arms_are_straight() -> None:
     assert text.count("dead centre at both ends, forearm and strut fall in line") == 2
 
 
+@pytest.mark.long
 def test_links_of_a_loop_without_a_name_fall_in_line_too() -> None:
     """A link from a point of the coupler to a lever that carries a rod and a block: a dead centre of this dyad."""
     text = """

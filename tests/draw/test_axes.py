@@ -211,6 +211,7 @@ def test_the_title_of_a_figure_is_in_the_picture(title: str, unit: str | None) -
 
 
 @pytest.mark.parametrize("title", ["Four-bar", LONG, "W" * 200])
+@pytest.mark.few(1)
 def test_the_title_of_plots_is_in_the_picture_and_above_the_names(title: str) -> None:
     figure = _sheet([titled(title)], stacks_of(fourbar(np.arange(10.0)), ["coupler.x"]))
     figure.canvas.draw()

@@ -176,6 +176,7 @@ OF_EXTREMES: tuple[Reading, ...] = (
     ids=["turn", "backwards", "two turns", "open", "nearly a turn"],
 )
 @pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.few(4)
 def test_measures_of_extremes_are_read_without_tables(
     angles: np.ndarray, workers: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

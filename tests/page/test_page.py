@@ -506,6 +506,7 @@ def test_change_points_are_found_again_with_new_lengths(chromium: Browser) -> No
         assert page.errors == []
 
 
+@pytest.mark.long
 def test_text_has_the_contrast_of_wcag_aa_and_controls_have_names_and_marks(chromium: Browser) -> None:
     with chromium.open(text_of("crank_rocker")) as page:
         page.get("document.querySelectorAll('details').forEach(one => { one.open = true; })")
@@ -720,6 +721,7 @@ def test_a_page_moves_once_when_it_opens_unless_less_motion_is_wanted(chromium: 
 
 @pytest.mark.parametrize("size", [PHONE, {"width": 390, "height": 844}, {"width": 700, "height": 480}])
 @pytest.mark.parametrize("name", ["jansen_leg", "excavator"])
+@pytest.mark.few(1)
 def test_on_a_small_page_the_drawing_has_most_of_the_height(chromium: Browser, size: dict[str, int], name: str) -> None:
     with chromium.open(text_of(name)) as page:
         page.resize(size)
@@ -786,6 +788,7 @@ def test_the_ring_of_a_driver_is_on_its_pin(chromium: Browser) -> None:
     ("name", "label", "value", "button"),
     [("jansen_leg", "m mm", "45", "closes up to 22 mm"), ("slider_crank", "rod length mm", "20", "closes from 40 mm")],
 )
+@pytest.mark.few(1)
 def test_what_does_not_close_is_drawn_with_its_gap_and_a_way_back(
     chromium: Browser, name: str, label: str, value: str, button: str
 ) -> None:

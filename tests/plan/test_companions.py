@@ -233,6 +233,7 @@ def test_a_row_joins_no_block_whose_rows_have_no_part_in_it(stages: tuple[Stage,
 
 @pytest.mark.parametrize("stages", STACKS)
 @pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.few(2)
 def test_a_carried_table_passes_the_change_points_of_the_table_below(stages: tuple[Stage, ...], engine: str) -> None:
     angles = np.concatenate([ANGLES, AT_ENDS])
     run = kinfmu.solve(tables(*stages), engine=engine, drive0_angle=angles, drive1_angle=1.7 * angles)
@@ -250,6 +251,7 @@ def test_a_row_that_is_singular_where_the_others_are_carries_nothing_however_lon
 
 
 @pytest.mark.parametrize("seed", [10111, 10113, 10213, 10615, 10689, 11072])
+@pytest.mark.few(2)
 def test_a_table_on_a_table_is_carried_through_the_whole_turn_of_its_crank(seed: int) -> None:
     """Its legs are singular in turn, far from the start poses."""
     assert trial(seed, "translating tables").judged().faults == []

@@ -453,6 +453,7 @@ def test_the_largest_numbers_have_the_default_range() -> None:
 
 @pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize("between", [("crank", "coupler"), ("coupler", "rocker"), ("rocker", "crank")])
+@pytest.mark.few(2)
 def test_a_motor_between_two_bodies_of_a_loop_moves_it_as_the_crank_does(between: tuple[str, str], engine: str) -> None:
     """The block of the loop has the driver's value in its Jacobian."""
     by_crank = fourbar(4.0, 1.0, 3.5, 3.0)

@@ -81,7 +81,9 @@ def test_the_gallery_is_certified(name: str) -> None:
     assert certificate.share > 0.999999
 
 
-@pytest.mark.parametrize("name", ["crank_rocker", "jansen_leg", "cam_roller", "excavator"])
+@pytest.mark.parametrize(
+    "name", ["crank_rocker", "jansen_leg", pytest.param("cam_roller", marks=pytest.mark.long), "excavator"]
+)
 def test_samples_of_solve_lie_in_the_certified_motion(name: str) -> None:
     mechanism = load(name)
     certificate = kinfmu.certify(mechanism, over="run")
@@ -104,6 +106,7 @@ def test_a_dead_centre_is_enclosed_and_nothing_lies_beyond() -> None:
 
 
 @pytest.mark.parametrize("gap", [1e-3, 1e-6, 1e-9])
+@pytest.mark.few(1)
 def test_two_branches_that_nearly_cross_are_distinguished_or_named(gap: float) -> None:
     # a parallelogram that is not one: its two branches avoid each other by about the root of the gap
     certificate = kinfmu.certify(fourbar(4.0, 2.0, 4.0 + gap, 2.0))

@@ -70,6 +70,7 @@ def test_a_contraction_keeps_every_solution_and_shrinks(number: int) -> None:
 
 
 @pytest.mark.parametrize("name", gallery.names())
+@pytest.mark.few(8)
 def test_assemblies_of_the_gallery_are_complete(name: str) -> None:
     closed, seconds = poses_and_time(kinfmu.load(name))
     print(f"{name}: {len(closed.outputs)} assemblies, {1e3 * seconds:.0f} ms")
@@ -78,6 +79,7 @@ def test_assemblies_of_the_gallery_are_complete(name: str) -> None:
 
 
 @pytest.mark.parametrize(("seed", "family"), [(seed, family) for seed in range(10) for family in FAMILIES])
+@pytest.mark.few(8)
 def test_platforms_and_six_bars_have_the_assemblies_of_an_elimination(seed: int, family: str) -> None:
     found = compared((seed, family))
     assert not found.refused

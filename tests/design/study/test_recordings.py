@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 from pathlib import Path
 
@@ -59,10 +60,15 @@ def test_all_designs_are_drawn_to_one_scale_in_one_layout(dataset: Path) -> None
         command = [executable(), "rrd", "print", "-vvv", str(path)]
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
-    layouts = [
-        [line for line in printed(path).splitlines() if "VisualBounds2D:range" in line or "ScalarAxis:range" in line]
-        for path in sorted(dataset.iterdir())
-    ]
+    def ranges(text: str) -> list[str]:
+        """What the rows of chunks with a range hold, without their ids and times."""
+        chunks = [chunk for chunk in text.split("\nChunk(") if re.search("(VisualBounds2D|ScalarAxis):range", chunk)]
+        rows = (line for chunk in chunks for line in chunk.splitlines() if "│ row_" in line)
+        return sorted(row.split("┆")[-1].strip(" │") for row in rows)
+
+    layouts = [ranges(printed(path)) for path in sorted(dataset.iterdir())]
+    assert re.fullmatch(r"\[\[-?[\d.]+, -?[\d.]+\]\]", layouts[0][0])
+    assert layouts[0][-1].startswith("[{x_range: [")
     assert len(layouts[0]) > 3
     assert layouts[0] == layouts[1] == layouts[2]
     assert all("kinfmu_study_hoeken" in printed(path) for path in dataset.iterdir())

@@ -58,6 +58,7 @@ def test_an_svg_keeps_its_colours_without_the_style_sheet() -> None:
 
 @needs_browser
 @pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.few(1)
 def test_an_image_follows_the_page_that_shows_it(theme: str, chromium: Browser, tmp_path: Path) -> None:
     """The paper shows through, and the ink has contrast to it: the darkest or lightest pixel of the picture."""
     image = pytest.importorskip("PIL.Image")

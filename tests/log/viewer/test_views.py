@@ -341,6 +341,7 @@ def test_the_card_states_the_tool_that_made_the_fmu_but_not_its_token() -> None:
     assert "parameters set" not in card(of_fmu)
 
 
+@pytest.mark.long
 def test_the_scale_of_forces_keeps_off_the_names_of_supports() -> None:
     for name in ("fourbar_loaded", "excavator_loaded", "jansen_leg_loaded", "toggle_press"):
         mechanism = kinfmu.load(name)

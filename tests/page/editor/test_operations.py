@@ -168,6 +168,7 @@ def test_a_large_mechanism_is_answered_too() -> None:
 
 
 @pytest.mark.parametrize("name", gallery.names())
+@pytest.mark.few(8)
 def test_files_of_the_gallery_are_edited_without_another_change(name: str) -> None:
     drawing = drawing_of(name)
     longer = changed(drawing, [bar((1, 2), (3, 4)), {"do": "delete", "place": ["bodies", "link_1"]}])
@@ -179,6 +180,7 @@ def test_files_of_the_gallery_are_edited_without_another_change(name: str) -> No
 
 
 @pytest.mark.parametrize("name", gallery.names())
+@pytest.mark.few(6)
 def test_a_moved_pin_moves_all_that_is_held_there_and_no_body(name: str) -> None:
     drawing = drawing_of(name)
     pins = [point for point, group in drawing.pins.items() if len(group) > 1 and not point.startswith("ground")]
@@ -352,19 +354,21 @@ def test_pins_that_are_apart_are_brought_together() -> None:
     assert drawing.at("a.B") == drawing.at("b.C") == (30, 0)
 
 
-def test_a_deleted_body_takes_all_that_depends_on_it() -> None:
-    for name in gallery.names():
-        drawing = drawing_of(name)
-        for body in drawing.mechanism.moving_bodies:
-            after = changed(drawing, [{"do": "delete", "place": ["bodies", body.name]}])
-            members = (getattr(after.mechanism, table) for table in ("joints", "drivers", "loads"))
-            named = {name for table in members for member in table for name in references(member)}
-            named |= {*after.mechanism.points.values()}
-            assert body.name not in {name.partition(".")[0] for name in named}
-            answer(after)
+@pytest.mark.parametrize("name", gallery.names())
+@pytest.mark.few(6)
+def test_a_deleted_body_takes_all_that_depends_on_it(name: str) -> None:
+    drawing = drawing_of(name)
+    for body in drawing.mechanism.moving_bodies:
+        after = changed(drawing, [{"do": "delete", "place": ["bodies", body.name]}])
+        members = (getattr(after.mechanism, table) for table in ("joints", "drivers", "loads"))
+        named = {reference for table in members for member in table for reference in references(member)}
+        named |= {*after.mechanism.points.values()}
+        assert body.name not in {reference.partition(".")[0] for reference in named}
+        answer(after)
 
 
 @pytest.mark.parametrize("name", gallery.names())
+@pytest.mark.few(6)
 def test_a_renamed_member_is_renamed_wherever_it_is_named(name: str) -> None:
     drawing = drawing_of(name)
     mechanism = drawing.mechanism
