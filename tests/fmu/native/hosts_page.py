@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import platform
 import re
 import subprocess
@@ -11,12 +12,14 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
+from shutil import copy
 from typing import NamedTuple
 
 import numpy as np
 
 import kinfmu
 from kinfmu.arrays import FloatArray
+from kinfmu.fmu.unpacked import unpacked
 
 ROOT = Path(__file__).parents[3]
 PAGE = ROOT / "docs" / "hosts.md"
@@ -115,6 +118,33 @@ def rows_of_ecos(path: Path) -> FloatArray:
     return np.array([[float(line[k]) for k in columns] for line in lines])
 
 
+def rows_of_container(path: Path) -> FloatArray:
+    """Let fmpy step the FMU into which FMUContainer puts an FMU."""
+    folder = Path(tempfile.mkdtemp(dir=path.parent))
+    outputs = [[path.name, name, name] for name in SHOWN]
+    explicit = {f"auto_{kind}": False for kind in ("input", "link", "output")}
+    held = explicit | {"name": "held.fmu", "step_size": STEP, "fmu": [path.name], "output": outputs}
+    (folder / "held.json").write_text(json.dumps(held))
+    copy(path, folder)
+    program = "from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer; fmucontainer()"
+    subprocess.run(
+        [sys.executable, "-c", program, "-container", "held.json"], cwd=folder, check=True, capture_output=True
+    )
+    return rows_of_fmpy(folder / "held.fmu", step_size=STEP)
+
+
+def rows_of_casadi(path: Path) -> FloatArray:
+    """Let CasADi evaluate an FMU for model exchange; it reads Float64 outputs only."""
+    import casadi
+
+    with unpacked(path) as folder:
+        builder = casadi.DaeBuilder("it", str(folder))
+        builder.set_y([name for name in SHOWN if name in builder.y()])
+        outputs = builder.create("outputs", ["t", "u", "p"], ["y"])
+        u, p = builder.get(builder.u()), builder.get(builder.p())
+        return np.array([outputs(STEP * k, u, p).full().ravel() for k in range(COUNT + 1)])
+
+
 CLIENTS: tuple[tuple[str, str, str, Stepped], ...] = (  # client, mode, flavours that it takes, what steps
     ("kinfmu simulate", "laws", "all", rows_of_kinfmu),
     ("kinfmu simulate", "inputs", "all", rows_of_kinfmu_by_inputs),
@@ -126,6 +156,8 @@ CLIENTS: tuple[tuple[str, str, str, Stepped], ...] = (  # client, mode, flavours
     ("Ecos, from Python", "laws", "all", lambda path: rows_of_process("ecospy", path, AT_REST)),
     ("Ecos, from Python", "inputs", "all", lambda path: rows_of_process("ecospy", path, ANGLES)),
     ("the `ecos` command", "laws", "native", rows_of_ecos),
+    ("FMUContainer", "laws", "all", rows_of_container),
+    ("CasADi", "model exchange, laws", "native", rows_of_casadi),
 )
 
 

@@ -1,7 +1,7 @@
-"""FMUs in hosts of other authors, each in a process of its own, compared with the Python engine.
+"""FMUs in hosts of other authors, most in a process of its own, compared with the Python engine.
 
 A test is skipped if its host is not installed (scripts/hosts installs them): libcosimpy (OSP, FMI 2.0), ecospy with its
-`ecos` command (both versions). KINFMU_HOSTS may name another Python that has them.
+`ecos` command, FMUContainer (both versions). KINFMU_HOSTS may name another Python that has the first two.
 """
 
 from __future__ import annotations
@@ -168,6 +168,29 @@ def test_the_ecos_command_steps_it(built_native: Build, fmi: int, tmp_path: Path
     np.testing.assert_allclose(
         rows[:, 1:], _wanted("fourbar_loaded", rows[:, 0]), rtol=0, atol=2e-5
     )  # the command writes 6 digits
+
+
+@pytest.mark.parametrize(
+    ("client", "flavour"),
+    [
+        ("fmu_manipulation_toolbox", "native 2"),
+        ("fmu_manipulation_toolbox", "native 3"),
+        ("fmu_manipulation_toolbox", "python"),
+        ("casadi", "native 2"),
+        ("casadi", "native 3"),
+    ],
+)
+@pytest.mark.few(2)
+def test_clients_inside_this_process_step_it(client: str, flavour: str, tmp_path: Path) -> None:
+    from tests.fmu.native.hosts_page import MECHANISM, SHOWN, rows_of_casadi, rows_of_container
+
+    pytest.importorskip(client)
+    kind, _, fmi = flavour.partition(" ")
+    path = kinfmu.build(kinfmu.load(MECHANISM), tmp_path, flavour=kind, fmi=int(fmi or 2), page=False)
+    angles, places = (rows_of_casadi if client == "casadi" else rows_of_container)(path).T
+    assert len(np.unique(angles)) == len(angles)
+    wanted = kinfmu.solve(kinfmu.load(MECHANISM), crank_angle=angles)[SHOWN[1]]
+    np.testing.assert_allclose(places, wanted, rtol=0, atol=1e-13)
 
 
 # Driven by inputs, in steps that the host chooses, up to a limit and past it
