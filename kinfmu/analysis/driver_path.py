@@ -212,8 +212,7 @@ def follow(plan: SolvePlan, number: int) -> DriverPath:
     solver = Solver(load_model(single))
     anchor, turns, low = solver.anchor, None, None
     if driver.quantity.kind == "angle":
-        up, turns = _turned(solver, single, math.tau)
-        down, _ = (_Leg([], []), None) if turns is not None else _turned(solver, single, -math.tau)
+        up, down, turns = _turned_both_ways(solver, single)
     else:
         reach = SIZES * plan.size
         least = 0.0 if isinstance(driver.measured(), DistanceBetween) else -math.inf
@@ -235,14 +234,26 @@ def follow(plan: SolvePlan, number: int) -> DriverPath:
     )
 
 
-def _turned(solver: Solver, plan: SolvePlan, path: float) -> tuple[_Leg, int | None]:
+def _turned_both_ways(solver: Solver, plan: SolvePlan) -> tuple[_Leg, _Leg, int | None]:
+    """Return the paths over turns up and down, and the number after which the mechanism repeats.
+
+    Down it is followed if it does not repeat, or if laws of couplings or cams do not: what they do may lie before.
+    """
+    is_periodic = not any(joint.law.why_not_periodic() for joint in plan.mechanism.joints if hasattr(joint, "law"))
+    up, turns = _turned(solver, plan, math.tau, is_periodic=is_periodic)
+    if turns is not None and is_periodic:
+        return up, _Leg([], []), turns
+    down, back = _turned(solver, plan, -math.tau, is_periodic=is_periodic)
+    return (up, _Leg([], []), turns) if turns is not None and turns == back else (up, down, None)
+
+
+def _turned(solver: Solver, plan: SolvePlan, path: float, *, is_periodic: bool) -> tuple[_Leg, int | None]:
     """Return the path over full turns of 2 pi or -2 pi, and the number after which the mechanism repeats.
 
     If laws of couplings or cams do not repeat with every turn, the same pose may come back with another rate or before
     another rise: then the poses of all turns are compared, of twice as many as a mechanism may repeat after.
     """
     most = 1 if len(plan.mechanism.coordinate_names) > _LARGE else MOST_TURNS
-    is_periodic = not any(joint.law.why_not_periodic() for joint in plan.mechanism.joints if hasattr(joint, "law"))
     legs: list[_Leg] = []
     outputs = [solver.outputs(solver.anchor)]
     periods: list[int] = []  # numbers of turns after which all poses so far have repeated

@@ -272,9 +272,10 @@ def sequence(*rises: str, repeat: str = "true") -> str:
         (sequence("20 deg", "20 deg", "30 deg"), 3),
         (sequence("20 deg", "30 deg", "20 deg", "25 deg"), 4),
         (sequence("20 deg", repeat="false"), None),
+        (sequence("20 deg", repeat="false") + '\nbegin = "-200 deg"', None),  # over before the crank starts
     ],
 )
-@pytest.mark.few(5)
+@pytest.mark.few(6)
 def test_a_mechanism_repeats_where_the_motion_does_not_only_the_pose(law: str, turns: int | None) -> None:
     report = kinfmu.check(parse(COUPLED.format(law=law)))
     assert report.range is not None
