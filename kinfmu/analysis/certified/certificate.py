@@ -302,5 +302,6 @@ def _angles_of_cosines(low: Any, high: Any, name: str, order: int) -> tuple[Any,
     cosine = Intervals(np.maximum(low, -1.0), np.minimum(high, 1.0))
     squared = (interval(1.0) - cosine) * (cosine + 1.0)
     found = angle(root(Intervals(np.maximum(squared.low, 0.0), squared.high)), cosine)
-    least, most = np.where(np.isnan(low), np.nan, np.maximum(found.low, 0.0)), np.minimum(found.high, HALF_TURN)
+    ends = (np.maximum(found.low, 0.0), np.minimum(found.high, HALF_TURN))
+    least, most = (np.where(np.isnan(low), np.nan, end) for end in ends)
     return (least, most) if np.ndim(least) else (float(least), float(most))

@@ -160,7 +160,7 @@ def of_range(path: DriverPath, prover: Prover, found: Cover) -> Certificate:
         low, high = (low, centre.high) if centre.is_high else (centre.low, high)
     gaps = _gaps(prover, found, low, high, centres, reasons, _MEET * unit)
     if path.stopped:
-        at = high if path.high is None else low
+        at = high if path.is_stopped_high else low
         gaps.append(Gap(at, at, f"the motion is not followed farther: {path.stopped}"))
     turns = path.turns if path.turns is not None and not gaps and _closes(prover, found, path.turns) else None
     return Certificate(
@@ -231,17 +231,18 @@ def of_branch(found: Cover, poses: Mapping[float, Pose], guess: Guess) -> Cover:
 
 
 def with_redundant_rows(prover: Prover, found: Cover) -> tuple[Cover, dict[str, float], list[tuple[float, str]]]:
-    """Return the cells in which all redundant rows close, bounds of these rows, and where one does not close."""
+    """Return the cells in which all redundant rows are shown to close, their bounds there, and where one is not."""
     rows = prover.formulas.redundant
     if not rows:
         return found, {}, []
-    limits, is_open = closing(prover, found.cells, found.tubes, [*rows.values()], TOLERANCE)
+    limits, is_open, is_unsure = closing(prover, found.cells, found.tubes, [*rows.values()], TOLERANCE)
     reasons = [
-        (float(u), f"the redundant row {name} does not close")
-        for name, where in zip(rows, is_open, strict=True)
+        (float(u), f"the redundant row {name} {what}")
+        for what, table in (("does not close", is_open), (f"is not shown to close within {TOLERANCE:g}", is_unsure))
+        for name, where in zip(rows, table, strict=True)
         for u in found.cells.u[where]
     ]
-    kept = ~is_open.any(axis=0)
+    kept = ~(is_open | is_unsure).any(axis=0)
     found = found if kept.all() else joined([(found.cells[kept], found.tubes[kept])])
     return found, dict(zip(rows, limits.tolist(), strict=True)), reasons
 

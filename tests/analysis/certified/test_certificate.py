@@ -16,7 +16,7 @@ from click.testing import CliRunner
 
 import kinfmu
 from kinfmu import AngleDriver, Body, Certificate, ConstantSpeed, Mechanism, Revolute
-from kinfmu.analysis.certified import cells, intervals, proving
+from kinfmu.analysis.certified import bounds, cells, intervals, proving
 from kinfmu.analysis.certified.cover import Cover, joined
 from kinfmu.analysis.certified.formulas import Formulas
 from kinfmu.analysis.certified.intervals import Intervals
@@ -230,6 +230,7 @@ def test_bounds_of_20_measures_enclose_the_extremes_in_50_digits(seed: int) -> N
         for extreme, (low, high) in zip(extremes, found, strict=True):
             assert low <= extreme <= high, name
             assert high - low < 1e-3
+    assert np.isnan(certificate.enclosed("mu", np.array([certificate.low - 1.0]))).all()
     with pytest.raises(RequestError, match="'mu' is an angle of transmission, whose rates are not bounded"):
         certificate.bounds("mu", order=1)
 
@@ -360,10 +361,15 @@ def test_what_follows_from_parameters_has_no_tolerance_of_its_own() -> None:
         kinfmu.certify(parse(SLIDER), tolerances={"both": 0.1})
 
 
-def test_a_motion_that_is_not_followed_to_an_end_is_not_complete(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(proving, "follow", lambda *arguments: replace(follow(*arguments), stopped="too many steps"))
+@pytest.mark.parametrize("is_high", [True, False])
+def test_a_motion_that_is_not_followed_to_an_end_is_not_complete(
+    monkeypatch: pytest.MonkeyPatch, *, is_high: bool
+) -> None:
+    stopped = {"stopped": "too many steps", "is_stopped_high": is_high}
+    monkeypatch.setattr(proving, "follow", lambda *arguments: replace(follow(*arguments), **stopped))
     certificate = kinfmu.certify(load("crank_rocker"))
-    assert [gap.reason for gap in certificate.gaps] == ["the motion is not followed farther: too many steps"]
+    at = certificate.high if is_high else certificate.low
+    assert certificate.gaps == ((at, at, "the motion is not followed farther: too many steps"),)
     assert not certificate.is_complete
 
 
@@ -393,14 +399,37 @@ def test_blocks_with_redundant_rows_are_proved_and_the_rows_bounded(tmp_path: Pa
     assert any(block.is_tall for block in certificate.prover.formulas.blocks)
     assert certificate.turns == 1
     assert certificate.is_complete
-    assert set(certificate.redundant) == {"A", "B"} or len(certificate.redundant) == 2
+    assert len(certificate.redundant) == 2
     assert max(certificate.redundant.values()) <= 1e-9
     u = np.linspace(0.3, 0.3 + math.tau, 50)
     low, high = certificate.enclosed("wheel1.phi", u)
     assert ((low <= u) & (u <= high)).all()
     assert "redundant rows close, relative to the size: " in str(certificate)
-    certificate.write(tmp_path / "proof.json")
-    assert proved_again(tmp_path / "proof.json").is_complete
+    path = tmp_path / "proof.json"
+    certificate.write(path)
+    assert proved_again(path).is_complete
+    content = json.loads(path.read_text())
+    content["states"]["redundant_rows"] = {"A.length": 0.0}
+    path.write_text(json.dumps(content))
+    with pytest.raises(KinfmuError, match="the redundant row A.length is not proved to close within 0"):
+        proved_again(path)
+
+
+def test_a_redundant_row_whose_bound_is_given_up_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bounds, "_MOST_CLOSING", 0)
+    certificate = kinfmu.certify(coupled_wheels())
+    assert not certificate.is_complete
+    reasons = {gap.reason for gap in certificate.gaps}
+    assert reasons <= {f"the redundant row {row}.length is not shown to close within 1e-09" for row in "AB"}
+    assert max(certificate.redundant.values()) <= 1e-9
+
+
+def test_all_rows_are_open_on_a_path_if_a_redundant_one_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    certificate = kinfmu.certify(fourbar(4.0, 2.0, 4.0, 2.0))
+    formulas = certificate.prover.formulas
+    monkeypatch.setattr(formulas, "redundant", {"wrong": formulas.graph.constant(1e-3)})
+    crossing = path_across(certificate.prover, certificate.cover, 1)
+    assert crossing == "on the path from the pose before to that after rows are open by 0.001 of the size"
 
 
 def test_a_redundant_row_that_does_not_close_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
