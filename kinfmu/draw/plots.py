@@ -176,7 +176,9 @@ def plot(
     runs = (run,) if other is None else (run, other)
     check_comparable(runs)
     degrees = degrees is not False
-    if certificate is not None and (certificate.driver != "time" or xs or overlaid or polar):
+    if certificate is not None and (
+        not axis_of(run).is_time or certificate.driver != "time" or xs or overlaid or polar
+    ):
         raise FigureError("a band needs panels over the run and its certificate: certify(mechanism, over='run')")
     if xs or overlaid or polar:
         shown = overlay(runs, names, columns, xs, degrees=degrees, polar=polar)

@@ -26,7 +26,7 @@ from kinfmu.mechanism.quantities import PoseQuantity
 from kinfmu.mechanism.toml_text import text
 from kinfmu.motion.quantities import quantity_nodes
 from kinfmu.plan.equations.graph import Node, symbols
-from kinfmu.units import unit_of
+from kinfmu.units import degrees_of, unit_of
 from kinfmu.version import VERSION
 
 HALF_TURN = 3.1415926535897936  # above pi
@@ -162,9 +162,10 @@ class Certificate:
         parts = []
         for name, size in self.tolerances.items():
             one = self.mechanism.parameters.get(name)
-            unit = "" if one is None or one.quantity is None else unit_of(one.quantity, self.mechanism.length_unit)
-            value = "" if one is None else f" = {float(one.value):.9g} {unit}".rstrip()
-            parts.append(f"{name}{value} within {size:.4g} {unit}".rstrip())
+            known = "" if one is None or one.quantity is None else unit_of(one.quantity, self.mechanism.length_unit)
+            unit, factor = degrees_of(known)
+            value = "" if one is None else f" = {float(one.value) * factor:.9g} {unit}".rstrip()
+            parts.append(f"{name}{value} within {size * factor:.4g} {unit}".rstrip())
         return listed(parts)
 
     def as_json(self) -> dict[str, Any]:

@@ -260,8 +260,10 @@ def test_plots_have_the_bounds_as_a_band(tmp_path: Path, crank_rocker: Certifica
         plot(run, tmp_path / f"{name}.svg", ["rocker.phi"], certificate=band)
         drawn[name] = (tmp_path / f"{name}.svg").read_text().count("opacity: 0.25")
     assert drawn["band"] == drawn["plain"] + 3  # position, velocity, acceleration
-    with pytest.raises(FigureError, match="a band needs panels over the run and its certificate"):
-        plot(run, tmp_path / "none.svg", certificate=crank_rocker)
+    over_angles = kinfmu.solve(load("crank_rocker"), crank_angle=np.linspace(0.0, 1.0, 5))
+    for shown, band in ((run, crank_rocker), (over_angles, certificate)):
+        with pytest.raises(FigureError, match="a band needs panels over the run and its certificate"):
+            plot(shown, tmp_path / "none.svg", certificate=band)
 
 
 def test_tolerances_are_in_outputs_that_depend_on_them_directly() -> None:
@@ -354,6 +356,12 @@ def test_tolerances_of_the_command_line_are_checked(
     options: tuple[str, ...], message: str, check_slider: Callable[..., str]
 ) -> None:
     assert message in check_slider(*options)
+
+
+def test_tolerances_of_angles_are_in_degrees() -> None:
+    tilted = SLIDER.replace('rod = 80.0,', 'rod = 80.0, tilt = "30 deg",').replace("axis = 0.0", 'axis = "tilt - 30 deg"')
+    certificate = kinfmu.certify(parse(tilted), tolerances={"tilt": math.radians(0.1)})
+    assert "for all mechanisms with tilt = 30 deg within 0.1 deg" in str(certificate)
 
 
 def test_what_follows_from_parameters_has_no_tolerance_of_its_own() -> None:
