@@ -329,15 +329,14 @@ def _gaps(
         if 0 < k < len(pieces) and begin < end and _changes_sign(found, k):
             gaps.append(Gap(begin, end, f"branches cross: a change point; {path_across(prover, found, k)}"))
             continue
-        if 0 < k < len(pieces) and _jumps_within(prover, found, k):
-            gaps.append(Gap(begin, end, "a law begins anew, or an angle passes half a turn"))
-            continue
-        if begin == end:
-            gaps.append(Gap(begin, end, "the cells on both sides are not joined"))
-            continue
         at = min(reasons, key=lambda reason: abs(reason[0] - 0.5 * (begin + end)), default=None)
-        is_near = at is not None and begin - near <= at[0] <= end + near
-        gaps.append(Gap(begin, end, at[1] if at is not None and is_near else "not proved"))
+        if at is not None and begin - near <= at[0] <= end + near:
+            reason = at[1]
+        elif 0 < k < len(pieces) and _jumps_within(prover, found, k):
+            reason = "a law begins anew, or an angle passes half a turn"
+        else:
+            reason = "the cells on both sides are not joined" if begin == end else "not proved"
+        gaps.append(Gap(begin, end, reason))
     return gaps
 
 
@@ -347,6 +346,7 @@ def _changes_sign(found: Cover, piece: int) -> bool:
     return bool((found.tubes.sign[:, before] != found.tubes.sign[:, after]).any())
 
 
+@np.errstate(all="ignore")  # of rows far from the cell
 def _jumps_within(prover: Prover, found: Cover, piece: int) -> bool:
     """Return whether a law may begin anew in the gap before a piece, or an angle pass half a turn: rows jump there."""
     before, after = found.pieces[piece - 1][1], found.pieces[piece][0]

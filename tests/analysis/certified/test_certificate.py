@@ -449,6 +449,7 @@ def test_a_redundant_row_that_does_not_close_is_named(monkeypatch: pytest.Monkey
         self.redundant = {"wrong": angle - self.graph.constant(2.0)}
 
     monkeypatch.setattr(Formulas, "__init__", with_a_wrong_row)
+    monkeypatch.setattr(proving, "_jumps_within", lambda *arguments: True)  # what is known of a row comes first
     certificate = kinfmu.certify(load("crank_rocker"))
     assert {gap.reason for gap in certificate.gaps} == {"the redundant row wrong does not close"}
     assert certificate.share < 0.2
