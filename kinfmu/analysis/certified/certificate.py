@@ -297,12 +297,12 @@ def _turns_text(turns: int) -> str:
 
 
 def _angles_of_cosines(low: Any, high: Any, name: str, order: int) -> tuple[Any, Any]:
-    """Return bounds of angles from 0 to pi [rad] from those of their cosines."""
+    """Return bounds of angles from 0 to pi [rad] from their cosines c: tan^2(angle / 2) = (1 - c) / (1 + c)."""
     if order:
         raise RequestError(f"'{name}' is an angle of transmission, whose rates are not bounded")
-    cosine = Intervals(np.maximum(low, -1.0), np.minimum(high, 1.0))
-    squared = (interval(1.0) - cosine) * (cosine + 1.0)
-    found = angle(root(Intervals(np.maximum(squared.low, 0.0), squared.high)), cosine)
+    cosine = Intervals(np.fmax(low, -1.0), np.fmin(high, 1.0))
+    squares = interval(1.0) - cosine, cosine + 1.0
+    found = 2.0 * angle(*(root(Intervals(np.maximum(one.low, 0.0), one.high)) for one in squares))
     ends = (np.maximum(found.low, 0.0), np.minimum(found.high, HALF_TURN))
     least, most = (np.where(np.isnan(low), np.nan, end) for end in ends)
     return (least, most) if np.ndim(least) else (float(least), float(most))
