@@ -185,15 +185,20 @@ class Settable:
         return display_unit(setting.quantity, self._length_unit, unit)
 
     def _expression(self, name: str) -> Expression | None:
-        """Return the expression of a parameter or of a number of a joint, driver or load, if it has one."""
+        """Return the expression of a parameter or of a number of a body, joint, driver or load, if it has one."""
         if name in self.parameters:
             return self.parameters[name].expression
-        paths = {
-            ".".join((str(path[1]), *(str(key) for key in path[2:] if key != "law"))): path
-            for path in self._expressions
-            if path[0] in ("drivers", "joints", "loads")
-        }
+        tables = ("bodies", "drivers", "joints", "loads")
+        paths = {_dotted(path): path for path in self._expressions if path[0] in tables}
         return self._expressions[paths[name]] if name in paths else None
+
+
+def _dotted(path: NumberPath) -> str:
+    """Return the name of a number: 'crank.P.x' of a point, 'crank.speed' of a law."""
+    table, owner, *keys = path
+    if table == "bodies":
+        keys = ["xy"[key] if isinstance(key, int) else key for key in keys if key != "points"]
+    return ".".join((str(owner), *(str(key) for key in keys if key != "law")))
 
 
 def _unit_in_file(setting: Parameter | LawConstant) -> str:

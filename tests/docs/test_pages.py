@@ -144,7 +144,7 @@ def test_forces(request: pytest.FixtureRequest, tmp_path: Path) -> None:
     page = with_outputs(page_text("forces.md"), over_motion(report))
     accept("forces.md", followed.commented(page), request)
     faster = followed.outputs["kinfmu check pump.toml --set piston_mass=1.2kg --set crank.speed=600rpm"]
-    assert "at 62.8319 rad/s" in faster
+    assert "at 600 rpm" in faster
     assert ",crank.torque," in (tmp_path / "pump.csv").read_text(encoding="utf-8").partition("\n")[0]
     assert (tmp_path / "pump.svg").is_file()
 
@@ -162,7 +162,7 @@ def test_measures(request: pytest.FixtureRequest, tmp_path: Path) -> None:
     page = with_outputs(page_text("measures.md"), over_motion(report))
     accept("measures.md", followed.commented(page), request)
     assert '"measures": {' in as_json
-    assert "at 6.28319 rad/s" in faster
+    assert "at 60 rpm" in faster
 
 
 def test_the_types_of_measures_are_what_the_classes_declare(request: pytest.FixtureRequest) -> None:

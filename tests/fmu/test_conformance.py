@@ -144,6 +144,10 @@ def test_fmus_without_reference_results_or_record(built: Build, tmp_path: Path) 
     ]
     assert set(related(torque).values()) == {"model", "parameter", "document", "report"}
     done = CliRunner().invoke(main, ["verify", str(torque)])
+    assert done.exit_code == 0
+    assert done.output.splitlines()[-1].startswith("results     no reference results: they depend on the efforts")
+    (tmp_path / "host.csv").write_text("time,coupler.x\n0,1\n", encoding="utf-8")
+    done = CliRunner().invoke(main, ["verify", str(torque), "--results", str(tmp_path / "host.csv")])
     assert done.exit_code == 1
     assert "efforts drive this FMU" in done.output
     assert "holds no record of checks" in conformance(built("fourbar", "time"))[0].text

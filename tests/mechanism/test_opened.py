@@ -199,6 +199,15 @@ def test_what_is_no_number_is_refused(names: str, message: str) -> None:
     assert "\n" not in str(refusal.value)
 
 
+def test_a_coordinate_by_an_expression_names_it() -> None:
+    leg = kinfmu.load("jansen_leg")
+    message = r"^crank\.X\.x follows from 'm'; set the parameters in it$"
+    with pytest.raises(RequestError, match=message):
+        with_open_numbers(leg, "crank.X.x")
+    with pytest.raises(RequestError, match=message):
+        kinfmu.solve(leg, 0.0, parameters={"crank.X.x": 16.0})
+
+
 def test_names_that_clash_are_refused() -> None:
     written = text(kinfmu.load("fourbar_loaded"))
     with pytest.raises(MechanismError, match=r"^\[parameters\] gravity.y: a body has a coordinate of this name"):

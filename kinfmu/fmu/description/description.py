@@ -104,7 +104,7 @@ def read(data: bytes, where: str) -> Description:
     simulation = root.find("CoSimulation")
     if parts is None or simulation is None:
         tool = quoted(root.get("generationTool", "an unknown tool"))[1:-1]
-        raise FmuError(f"{where}: made by {tool}; kinfmu simulates the co-simulation FMUs that kinfmu built")
+        raise FmuError(f"{where}: made by {tool}; this needs a co-simulation FMU that kinfmu built")
     try:
         interface = _interface(root, parts, [_variable(**fields) for fields in version.variables(root)])
         about = Description(

@@ -8,6 +8,7 @@ import random
 import shutil
 import subprocess
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +68,21 @@ def test_an_fmu_uses_no_locks(stepping: Path) -> None:
     names = [line.split()[-1] for line in done.stdout.splitlines()]
     assert any(name.startswith("write") for name in names)
     assert not [name for name in names if "pthread" in name or "mutex" in name or "lock" in name.replace("clock", "")]
+
+
+def test_threads_step_instances_at_a_time(start: Start) -> None:
+    def walked(host: Host, k: int) -> list[list[float]]:
+        rows = []
+        for n in range(2000):
+            host.set({"crank_angle": (0.01 + 0.005 * k) * n})
+            assert host.step(0.01 * n, 0.01) == OK
+            rows.append(host.outputs())
+        return rows
+
+    alone = [walked(start(), k) for k in range(3)]
+    hosts = [start() for _ in range(3)]
+    with ThreadPoolExecutor(3) as pool:
+        assert list(pool.map(walked, hosts, range(3))) == alone
 
 
 # The work of a step
