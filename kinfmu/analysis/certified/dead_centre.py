@@ -7,12 +7,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from kinfmu.analysis.certified.bounds import closing
 from kinfmu.analysis.certified.cells import Prover
 from kinfmu.analysis.certified.certificate import DeadCentre, PathEnd
 from kinfmu.analysis.certified.cover import Cover, cover
 from kinfmu.analysis.certified.intervals import Intervals
 from kinfmu.arrays import FloatArray
+from kinfmu.plan.equations.graph import symbols
 from kinfmu.solver.python.limit import Limit
+from kinfmu.solver.python.solver import TOLERANCE
 
 _ENCLOSED = 2e-10  # [rad, sizes] of the driver, about; how closely a dead centre is enclosed
 _WINDOWS = (0.03, 0.003, 0.0003)  # [rad, sizes] from a dead centre along the path, where cells over that way begin
@@ -93,6 +96,13 @@ def _dead_centre(
     pose = window.cells.at(Intervals(window.cells.low) - window.cells.u) + window.tubes.narrow
     if not _lies_in(pose[:, :1], found, k, places):
         return "a dead centre: the path to it is not joined to the cells"
+    known = {turned.formulas.x, *turned.formulas.unknowns, *turned.formulas.constants}
+    rows = [node for node in formulas.redundant.values() if {symbol.name for symbol in symbols([node])} <= known]
+    if rows:
+        to_it = slice(inner + 1)
+        _, is_open, is_unsure = closing(turned, window.cells[to_it], window.tubes[to_it], rows, TOLERANCE)
+        if (is_open | is_unsure).any():
+            return "a dead centre: redundant rows are not shown to close on the path to it"
     value = window.cells.at(window.cells.s) + window.tubes.narrow
     centre = DeadCentre(float(value.low[0, inner]), float(value.high[0, inner]), is_high)
     return centre, PathEnd(turned, window, inner)

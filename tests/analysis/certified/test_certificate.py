@@ -473,6 +473,19 @@ def test_outputs_of_a_range_that_ends_at_dead_centres_are_bounded() -> None:
         certificate.bounds("right.phi", order=1)
 
 
+def test_redundant_rows_close_up_to_dead_centres_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    mechanism = load("triple_rocker")
+    mechanism = replace(mechanism, joints=(*mechanism.joints, Distance("bar", ("left.C", "right.D"), 50.0)))
+    certificate = kinfmu.certify(mechanism)
+    assert certificate.is_complete
+    assert [*certificate.redundant] == ["bar.length"]
+    assert len(certificate.dead_centres) == 2
+    monkeypatch.setattr("kinfmu.analysis.certified.dead_centre.TOLERANCE", 1e-30)
+    certificate = kinfmu.certify(mechanism)
+    reason = "a dead centre: redundant rows are not shown to close on the path to it"
+    assert [gap.reason for gap in certificate.gaps] == [reason, reason]
+
+
 def test_over_and_outputs_are_checked(crank_rocker: Certificate) -> None:
     with pytest.raises(RequestError, match=r"over = 'turn' is not known; known are 'range' and 'run'"):
         kinfmu.certify(load("crank_rocker"), over="turn")
