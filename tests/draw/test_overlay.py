@@ -174,7 +174,7 @@ def test_a_column_over_another_in_given_axes(run: Run) -> None:
     plot(run, ax=axes, columns=["rocker.phi"], x="crank.phi", degrees=True)
     np.testing.assert_allclose(axes.lines[0].get_xydata(), np.column_stack([run.t, run.t]), atol=1e-12)
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("crank.phi [deg]", "rocker.phi [deg]")
-    with pytest.raises(FigureError, match=r"^overlaid, polar, other and several x are for files; call plot again"):
+    with pytest.raises(FigureError, match=r"^overlaid, polar, other, certificate and several x are for files; call plot again"):
         plot(run, ax=axes, columns=["rocker.phi"], polar=True)  # type: ignore[call-overload]
 
 
