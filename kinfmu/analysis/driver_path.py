@@ -44,7 +44,7 @@ class DriverPath:
     name, kind: of the driver, 'angle' or 'length'; plan, solver: those in which it moves alone; poses: in the order of
     the driver value, the anchor among them; bridges: those crossed; low, high: the limits, None where none was met;
     turns: number of turns after which the mechanism repeats, None for a length or if it does not; stopped: the reason
-    that ended the path other than a limit.
+    that ended the path other than a limit; is_stopped_high: at its upper end.
     """
 
     name: str
@@ -57,6 +57,7 @@ class DriverPath:
     high: Limit | None
     turns: int | None
     stopped: str | None
+    is_stopped_high: bool
 
     def coordinates(self, pose: Pose) -> dict[str, float]:
         """Return all coordinates of a pose by name, including fixed ones, in the world."""
@@ -231,6 +232,7 @@ def follow(plan: SolvePlan, number: int) -> DriverPath:
         high=up.limit,
         turns=turns,
         stopped=up.stopped or down.stopped,
+        is_stopped_high=up.stopped is not None,
     )
 
 

@@ -176,7 +176,9 @@ def plot(
     runs = (run,) if other is None else (run, other)
     check_comparable(runs)
     degrees = degrees is not False
-    if certificate is not None and (certificate.driver != "time" or xs or overlaid or polar):
+    if certificate is not None and (
+        not axis_of(run).is_time or certificate.driver != "time" or xs or overlaid or polar
+    ):
         raise FigureError("a band needs panels over the run and its certificate: certify(mechanism, over='run')")
     if xs or overlaid or polar:
         shown = overlay(runs, names, columns, xs, degrees=degrees, polar=polar)
@@ -190,7 +192,7 @@ def plot(
 def _chosen(runs: Sequence[Run], columns: Sequence[str], path: Path, *, degrees: bool) -> tuple[list[Stack], list[str]]:
     """Return the stacks of panels to plot, and lines on what has no panel."""
     run = runs[0]
-    found = stacks_of(run, columns)
+    found = stacks_of(run, columns, *runs[1:])
     wanted = [panel.column for stack in found for panel in stack.panels]
     if not len(run) or not found:
         raise FigureError(f"{path}: the run has no {'samples' if found else 'coordinates'} to plot")
@@ -203,7 +205,7 @@ def _chosen(runs: Sequence[Run], columns: Sequence[str], path: Path, *, degrees:
     notes = [_constants(run, constant, degrees=degrees)]
     if not columns:
         stacks, others = main_panels(run, stacks or found)
-        notes.append(not_drawn(run, others))
+        notes.append(not_drawn(run, others, *runs[1:]))
     if len(stacks) > MOST_COORDINATES:
         what = (
             "coordinates" if all(isinstance(s.panels[0].name, CoordinateName) for s in stacks) else "columns of panels"
@@ -215,9 +217,9 @@ def _chosen(runs: Sequence[Run], columns: Sequence[str], path: Path, *, degrees:
     return stacks, [*filter(None, notes)]
 
 
-def not_drawn(run: Run, names: Sequence[str]) -> str:
+def not_drawn(run: Run, names: Sequence[str], *others: Run) -> str:
     """Return 'not drawn: crank.φ, slider.x (= piston.x)' for names and what repeats another curve; '' without any."""
-    equal = [f"{symbol(name)} (= {symbol(other)})" for name, other in _usual_and_repeated(run)[1].items()]
+    equal = [f"{symbol(name)} (= {symbol(other)})" for name, other in _usual_and_repeated(run, *others)[1].items()]
     left = [*map(symbol, names), *equal]
     return f"not drawn: {', '.join(left)}" if left else ""
 
@@ -467,22 +469,25 @@ class Stack(NamedTuple):
     panels: tuple[Panel, ...]
 
 
-def stacks_of(run: Run, columns: Sequence[str]) -> list[Stack]:
-    """Return what to plot: a stack for each coordinate, and for the forces of each driver or joint."""
+def stacks_of(run: Run, columns: Sequence[str], *compared: Run) -> list[Stack]:
+    """Return what to plot: a stack for each coordinate, and for the forces of each driver or joint.
+
+    compared: runs drawn with it, in which places must repeat too to be left out.
+    """
     others = _inputs_and_diagnostics(run, columns)
     if others:
         columns = [name for name in columns if not _only_chooses(run, name, others)]
-    found = _of_coordinates_and_forces(run, columns) if columns or not others else []
+    found = _of_coordinates_and_forces(run, columns, compared) if columns or not others else []
     return found + _of_others(run, others)
 
 
-def _of_coordinates_and_forces(run: Run, columns: Sequence[str]) -> list[Stack]:
+def _of_coordinates_and_forces(run: Run, columns: Sequence[str], compared: Sequence[Run]) -> list[Stack]:
     """Return the stacks of coordinates, forces and signals."""
     chosen = forces(run, columns)
     names = list(columns)
     if chosen and not any(name.startswith("-") for name in names):
         names = [name for name in names if not forces(run, [name]) or _chooses_coordinates(run, name)]
-    coordinate_names: Sequence[CoordinateName] = usual_coordinates(run)
+    coordinate_names: Sequence[CoordinateName] = usual_coordinates(run, *compared)
     if columns:
         coordinate_names = coordinates(run, names) if names else ()
     per = axis_of(run).per
@@ -501,24 +506,31 @@ def _of_coordinates_and_forces(run: Run, columns: Sequence[str]) -> list[Stack]:
     return found
 
 
-def usual_coordinates(run: Run) -> list[CoordinateName]:
+def usual_coordinates(run: Run, *others: Run) -> list[CoordinateName]:
     """Return the coordinates to plot where none are named: of bodies and points of interest.
 
     Places of the frames of bodies that turn are left out if there are points of interest: where the frame of a body has
     its origin is a choice of the file, and the points are those that matter. So are places that another one repeats.
     """
-    usual, left_out = _usual_and_repeated(run)
+    usual, left_out = _usual_and_repeated(run, *others)
     return [name for name in usual if name not in left_out]
 
 
-def _usual_and_repeated(run: Run) -> tuple[list[CoordinateName], dict[CoordinateName, CoordinateName]]:
-    """Return usual coordinates, and which of them repeat another one, a point of interest if there is one."""
+def _usual_and_repeated(run: Run, *others: Run) -> tuple[list[CoordinateName], dict[CoordinateName, CoordinateName]]:
+    """Return usual coordinates, and which repeat another one in all runs, a point of interest if there is one."""
     points = [name for name in run.outputs[run.coordinate_count :] if name not in run.absent]
     names = run.names or run.outputs
     turning = {name.owner for name in names if name.is_angle and points}
     bodies = [name for name in names if name.is_angle or name.owner not in turning]
     points = points if run.names else []
-    return [*bodies, *points], repeated(run, [*points, *bodies])
+    equal = repeated(run, [*points, *bodies])
+    for other in others:
+        equal = {
+            name: first
+            for name, first in equal.items()
+            if {name, first} <= {*other.outputs} and name in repeated(other, [first, name])
+        }
+    return [*bodies, *points], equal
 
 
 def _title_of(name: ForceName | SignalName) -> str:

@@ -95,6 +95,8 @@ def mechanism_of(document: dict[str, Any], folder: Path | None) -> Mechanism:
     laws_of_joints = [law for law in LAWS if law is not External]  # nothing from outside moves a cam
     run = table_of(document, "run")
     check_keys("[run]", run, (*RUN_TIMES, "over"))
+    if is_cycle := not {"stop", "step"} & run.keys():
+        run = {"stop": run.get("start", 0.0), **run}  # until its driver is known
     mechanism = Mechanism(
         name=text_of("name", document["name"]),
         title=text_of("title", document.get("title", "")),
@@ -113,16 +115,16 @@ def mechanism_of(document: dict[str, Any], folder: Path | None) -> Mechanism:
         gravity=_gravity(document),
         loads=_members(document, "loads", LOADS, LAWS, folder),
     )
-    return mechanism if {"stop", "step"} & run.keys() else _with_cycle(mechanism)
+    return _with_cycle(mechanism) if is_cycle else mechanism
 
 
 def _with_cycle(mechanism: Mechanism) -> Mechanism:
-    """Return a mechanism whose run is one cycle of its driver, if it has a single one that moves in cycles."""
+    """Return a mechanism whose run is one cycle of a single driver that moves in cycles, else that of `RunSettings`."""
     cycle = mechanism.drivers[0].cycle if len(mechanism.drivers) == 1 else 0.0
-    if not 0.0 < cycle < math.inf:
-        return mechanism
-    step = float(f"{cycle / SAMPLES_PER_TURN:.12g}")
-    stop = mechanism.run.start + float(f"{cycle:.12g}")
+    stop, step = RunSettings.stop, RunSettings.step
+    if 0.0 < cycle < math.inf:
+        step = float(f"{cycle / SAMPLES_PER_TURN:.12g}")
+        stop = mechanism.run.start + float(f"{cycle:.12g}")
     return replace(mechanism, run=replace(mechanism.run, stop=stop, step=step))
 
 

@@ -33,8 +33,8 @@ def find_anchor(system: System, assembly: AssembledStart, kept: Sequence[int]) -
         names = listed(driver.name for driver in system.mechanism.drivers)
         if not closes_nearby(system, found):
             raise AssemblyError(
-                f"the start pose is singular ({_at(system, found.u)}), and the mechanism does not close on either side "
-                f"of it: start {names} elsewhere, or check the lengths"
+                f"the start pose is singular ({_at(system, found.u)}), and no closed pose is found on either side of "
+                f"it: start {names} elsewhere, or check the lengths"
             )
         raise MobilityError(f"[drivers] {names} do not determine the motion: it stays singular near the start pose too")
     if np.array_equal(found.u, start.u):

@@ -116,5 +116,5 @@ def test_the_limits_are_those_of_the_code() -> None:
     assert f"at most {LARGEST_FILE / 1e6:g} MB, {MOST_BODIES} bodies and {MOST_PARAMETERS} parameters" in words
     default = RunSettings()
     assert f"| time | {default.start:g} |" in PAGE
-    assert f"| time | {default.stop:g} s |" in PAGE
-    assert f"| time | {default.step:g} s |" in PAGE
+    assert f"| time | one cycle, else {default.stop:g} s |" in PAGE
+    assert f"| time | a 360th of a cycle, else {default.step:g} s |" in PAGE

@@ -147,6 +147,10 @@ def test_equal_places_are_drawn_once_and_angles_always(tmp_path: Path) -> None:
     texts = written(tmp_path / "run.svg")
     assert [text for text in texts if text in run.outputs or text == "rod.φ"] == ["pin.x", "rod.φ"]
     assert "not drawn: crank.φ, same.x (= pin.x), piston.x (= pin.x)" in texts
+    other = kinfmu.solve(replace(mechanism, points={"pin": "rod.S", "same": "crank.P"}), np.linspace(0.0, 0.1, 61))
+    assert "same.x" not in usual_coordinates(run)
+    assert "same.x" in usual_coordinates(run, other)  # of two runs places must be equal in both
+    assert "piston.x" not in usual_coordinates(run, other)
     still = kinfmu.solve(mechanism, crank_angle=[0.0])
     assert repeated(still, still.outputs) == {}
 

@@ -328,6 +328,7 @@ run = { RUN }
     [
         ('law = "constant_speed", speed = "600 rpm"', "", (0.0, 0.1, 0.1 / 360.0)),
         ('law = "constant_speed", speed = "-0.5 rpm"', 'start = "0.5 s"', (0.5, 120.5, 1.0 / 3.0)),
+        ('law = "constant_speed", speed = "600 rpm"', 'start = "7 s"', (7.0, 7.1, 0.1 / 360.0)),
         ('law = "harmonic", amplitude = 0.1, frequency = "5 Hz"', 'over = "run"', (0.0, 0.2, 0.2 / 360.0)),
         ('law = "constant_speed", speed = "600 rpm"', "stop = 2", (0.0, 2.0, 0.01)),
         ('law = "constant_speed", speed = "600 rpm"', "step = 0.1", (0.0, 1.0, 0.1)),

@@ -135,7 +135,7 @@ def test_two_drivers_on_one_freedom_are_refused() -> None:
     [
         (
             1.0,
-            r"the start pose is singular \(crank = 0 rad .*does not close on either side of it: start crank elsewhere",
+            r"the start pose is singular \(crank = 0 rad .*no closed pose is found on either side of it: start crank",
         ),
         (1.0 - 1e-8, r"does not close near its start pose .* does not close: gap 1e-08 m"),
     ],

@@ -69,30 +69,34 @@ def _most(quantity: EnclosedQuantity, cells: Cells, tubes: Tubes, sign: float) -
         cells, tubes = parts, part_tubes
 
 
-def closing(prover: Prover, cells: Cells, tubes: Tubes, nodes: Sequence[Node], enough: float) -> tuple[FloatArray, Any]:
-    """Return bounds of the absolute values of rows, and where a row is more than `enough`, (rows, cells).
+def closing(
+    prover: Prover, cells: Cells, tubes: Tubes, nodes: Sequence[Node], enough: float
+) -> tuple[FloatArray, Any, Any]:
+    """Return bounds of the absolute values of rows where they are at most `enough`, and where they are not shown to be.
 
-    Parts of cells are halved and proved again until all rows are at most `enough` there.
+    Parts of cells are halved and proved again until all rows are at most `enough` there. The second array, (rows,
+    cells), states where a row is more in some part, the third one where the halves of a part are given up.
     """
     quantities = [EnclosedQuantity(prover, node, 0) for node in nodes]
     of, bound = np.arange(len(cells)), np.zeros(len(nodes))
-    is_open: Any = np.zeros((len(nodes), len(cells)), dtype=bool)
+    is_open, is_unsure = np.zeros((2, len(nodes), len(cells)), dtype=bool)
     while len(cells):
         values = [quantity.at(cells, tubes, cells.s) for quantity in quantities]
         most = np.array([value.magnitude for value in values])
         for number, value in enumerate(values):
             is_open[number, of[value.mignitude > enough]] = True
-        todo = (most > enough).any(axis=0) & ~is_open[:, of].any(axis=0)
-        parts, part_tubes, given_up = _halved(prover, cells[todo], tubes[todo])
-        of_parts = np.tile(of[todo][~given_up], 2)
-        if len(parts) > _MOST_CLOSING:
+        is_shown = (most <= enough).all(axis=0)
+        bound = np.maximum(bound, most[:, is_shown].max(axis=1, initial=0.0))
+        todo = ~is_shown & ~(is_open | is_unsure)[:, of].any(axis=0)
+        most, of = most[:, todo], of[todo]
+        cells, tubes, given_up = _halved(prover, cells[todo], tubes[todo])
+        if len(cells) > _MOST_CLOSING:
             given_up[:] = True
-            parts, part_tubes = parts[:0], part_tubes[:0]
-        done: Any = ~is_open[:, of].any(axis=0)
-        done[np.flatnonzero(todo)[~given_up]] = False
-        bound = np.maximum(bound, most[:, done].max(axis=1, initial=0.0))
-        of, cells, tubes = of_parts[: len(parts)], parts, part_tubes
-    return bound, is_open
+            cells, tubes = cells[:0], tubes[:0]
+        for number, value in enumerate(most):
+            is_unsure[number, of[given_up & ~(value <= enough)]] = True
+        of = np.tile(of[~given_up], 2)
+    return bound, is_open, is_unsure & ~is_open
 
 
 def _halved(prover: Prover, cells: Cells, tubes: Tubes) -> tuple[Cells, Tubes, Any]:

@@ -227,6 +227,11 @@ class Prover:
                 rows = self._rest(cells, formulas, thin, broad, still)
                 for row, scale in zip(rows, block.row_scales, strict=True):
                     found = max(found, float(row.magnitude.max()) / scale)
+            shape, s = (len(cells),), cells.s
+            for position, rate, acceleration in self.formulas.along([*self.formulas.redundant.values()], 2):
+                start = enclosed([position, rate], thin, shape)
+                bend = enclosed([acceleration], broad, shape)[0]
+                found = max(found, float((start[0] + start[1] * s + bend * (s.square() * 0.5)).magnitude.max()))
         return found
 
     def closer(self, cells: Cells, tubes: Tubes, s: Intervals) -> Tubes:
@@ -456,7 +461,7 @@ def _inverse(entries: FloatArray, block: BlockFormulas) -> FloatArray:
     if not block.is_tall:
         with suppress(np.linalg.LinAlgError):  # one of them is singular to the bit
             return np.asarray(np.linalg.inv(np.where(finite, matrices, np.nan)))
-    return np.where(finite, np.linalg.pinv(np.nan_to_num(matrices)), np.nan)
+    return np.where(finite, np.linalg.pinv(np.where(finite, matrices, 0.0)), np.nan)
 
 
 def _with_zero(w: Intervals) -> Intervals:

@@ -26,7 +26,7 @@ from kinfmu.mechanism.quantities import PoseQuantity
 from kinfmu.mechanism.toml_text import text
 from kinfmu.motion.quantities import quantity_nodes
 from kinfmu.plan.equations.graph import Node, symbols
-from kinfmu.units import unit_of
+from kinfmu.units import degrees_of, unit_of
 from kinfmu.version import VERSION
 
 HALF_TURN = 3.1415926535897936  # above pi
@@ -162,9 +162,10 @@ class Certificate:
         parts = []
         for name, size in self.tolerances.items():
             one = self.mechanism.parameters.get(name)
-            unit = "" if one is None or one.quantity is None else unit_of(one.quantity, self.mechanism.length_unit)
-            value = "" if one is None else f" = {float(one.value):.9g} {unit}".rstrip()
-            parts.append(f"{name}{value} within {size:.4g} {unit}".rstrip())
+            known = "" if one is None or one.quantity is None else unit_of(one.quantity, self.mechanism.length_unit)
+            unit, factor = degrees_of(known)
+            value = "" if one is None else f" = {float(one.value) * factor:.9g} {unit}".rstrip()
+            parts.append(f"{name}{value} within {size * factor:.4g} {unit}".rstrip())
         return listed(parts)
 
     def as_json(self) -> dict[str, Any]:
@@ -296,11 +297,12 @@ def _turns_text(turns: int) -> str:
 
 
 def _angles_of_cosines(low: Any, high: Any, name: str, order: int) -> tuple[Any, Any]:
-    """Return bounds of angles from 0 to pi [rad] from those of their cosines."""
+    """Return bounds of angles from 0 to pi [rad] from their cosines c: tan^2(angle / 2) = (1 - c) / (1 + c)."""
     if order:
         raise RequestError(f"'{name}' is an angle of transmission, whose rates are not bounded")
-    cosine = Intervals(np.maximum(low, -1.0), np.minimum(high, 1.0))
-    squared = (interval(1.0) - cosine) * (cosine + 1.0)
-    found = angle(root(Intervals(np.maximum(squared.low, 0.0), squared.high)), cosine)
-    least, most = np.where(np.isnan(low), np.nan, np.maximum(found.low, 0.0)), np.minimum(found.high, HALF_TURN)
+    cosine = Intervals(np.fmax(low, -1.0), np.fmin(high, 1.0))
+    squares = interval(1.0) - cosine, cosine + 1.0
+    found = 2.0 * angle(*(root(Intervals(np.maximum(one.low, 0.0), one.high)) for one in squares))
+    ends = (np.maximum(found.low, 0.0), np.minimum(found.high, HALF_TURN))
+    least, most = (np.where(np.isnan(low), np.nan, end) for end in ends)
     return (least, most) if np.ndim(least) else (float(least), float(most))

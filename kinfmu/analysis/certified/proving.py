@@ -160,7 +160,7 @@ def of_range(path: DriverPath, prover: Prover, found: Cover) -> Certificate:
         low, high = (low, centre.high) if centre.is_high else (centre.low, high)
     gaps = _gaps(prover, found, low, high, centres, reasons, _MEET * unit)
     if path.stopped:
-        at = high if path.high is None else low
+        at = high if path.is_stopped_high else low
         gaps.append(Gap(at, at, f"the motion is not followed farther: {path.stopped}"))
     turns = path.turns if path.turns is not None and not gaps and _closes(prover, found, path.turns) else None
     return Certificate(
@@ -231,17 +231,18 @@ def of_branch(found: Cover, poses: Mapping[float, Pose], guess: Guess) -> Cover:
 
 
 def with_redundant_rows(prover: Prover, found: Cover) -> tuple[Cover, dict[str, float], list[tuple[float, str]]]:
-    """Return the cells in which all redundant rows close, bounds of these rows, and where one does not close."""
+    """Return the cells in which all redundant rows are shown to close, their bounds there, and where one is not."""
     rows = prover.formulas.redundant
     if not rows:
         return found, {}, []
-    limits, is_open = closing(prover, found.cells, found.tubes, [*rows.values()], TOLERANCE)
+    limits, is_open, is_unsure = closing(prover, found.cells, found.tubes, [*rows.values()], TOLERANCE)
     reasons = [
-        (float(u), f"the redundant row {name} does not close")
-        for name, where in zip(rows, is_open, strict=True)
+        (float(u), f"the redundant row {name} {what}")
+        for what, table in (("does not close", is_open), (f"is not shown to close within {TOLERANCE:g}", is_unsure))
+        for name, where in zip(rows, table, strict=True)
         for u in found.cells.u[where]
     ]
-    kept = ~is_open.any(axis=0)
+    kept = ~(is_open | is_unsure).any(axis=0)
     found = found if kept.all() else joined([(found.cells[kept], found.tubes[kept])])
     return found, dict(zip(rows, limits.tolist(), strict=True)), reasons
 
@@ -328,15 +329,14 @@ def _gaps(
         if 0 < k < len(pieces) and begin < end and _changes_sign(found, k):
             gaps.append(Gap(begin, end, f"branches cross: a change point; {path_across(prover, found, k)}"))
             continue
-        if 0 < k < len(pieces) and _jumps_within(prover, found, k):
-            gaps.append(Gap(begin, end, "a law begins anew, or an angle passes half a turn"))
-            continue
-        if begin == end:
-            gaps.append(Gap(begin, end, "the cells on both sides are not joined"))
-            continue
         at = min(reasons, key=lambda reason: abs(reason[0] - 0.5 * (begin + end)), default=None)
-        is_near = at is not None and begin - near <= at[0] <= end + near
-        gaps.append(Gap(begin, end, at[1] if at is not None and is_near else "not proved"))
+        if at is not None and begin - near <= at[0] <= end + near:
+            reason = at[1]
+        elif 0 < k < len(pieces) and _jumps_within(prover, found, k):
+            reason = "a law begins anew, or an angle passes half a turn"
+        else:
+            reason = "the cells on both sides are not joined" if begin == end else "not proved"
+        gaps.append(Gap(begin, end, reason))
     return gaps
 
 
@@ -346,6 +346,7 @@ def _changes_sign(found: Cover, piece: int) -> bool:
     return bool((found.tubes.sign[:, before] != found.tubes.sign[:, after]).any())
 
 
+@np.errstate(all="ignore")  # of rows far from the cell
 def _jumps_within(prover: Prover, found: Cover, piece: int) -> bool:
     """Return whether a law may begin anew in the gap before a piece, or an angle pass half a turn: rows jump there."""
     before, after = found.pieces[piece - 1][1], found.pieces[piece][0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ from kinfmu.mechanism.toml_file import parse
 
 _LARGEST = 500_000_000  # [bytes]
 _SAME = 1e-9  # of the range; what is proved again may differ by rounding of other versions
+_CLOSE = 1e-12  # of the size; the same for bounds of redundant rows
 
 
 def proved_again(path: str | Path) -> Certificate:
@@ -46,6 +48,7 @@ def proved_again(path: str | Path) -> Certificate:
         states = content["states"]
         low, high, tube = (float(states[key] or 0.0) for key in ("low", "high", "tube"))
         gaps = [(float(gap["low"]), float(gap["high"])) for gap in states["not_proved"]]
+        rows = {name: float(bound) for name, bound in dict(states.get("redundant_rows", {})).items()}
         centres = [(float(one["low"]), float(one["high"]), one["is_high"]) for one in states["dead_centres"]]
         if not np.isfinite([low, high, tube, *(x for gap in gaps for x in gap)]).all():
             raise ValueError("a number is not finite")
@@ -89,6 +92,9 @@ def proved_again(path: str | Path) -> Certificate:
     for a, b, is_high in centres:
         if not any(a - near <= one.low and one.high <= b + near and one.is_high == is_high for one in own):
             raise KinfmuError(f"{path}: a dead centre that it states is not proved")
+    for name, bound in rows.items():
+        if not certificate.redundant.get(name, math.inf) <= bound + _CLOSE:
+            raise KinfmuError(f"{path}: the redundant row {name} is not proved to close within {bound:.3g}")
     proved = certificate.as_json()
     for key in ("complete", "driver", "mechanism"):
         if states[key] != proved[key]:

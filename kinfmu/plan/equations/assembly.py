@@ -154,7 +154,7 @@ def _assembled(system: System, start: StartValues) -> Assembled | None:
 
 
 def closes_nearby(system: System, singular: Assembled) -> bool:
-    """Return True if a mechanism closes near a singular pose."""
+    """Return True if a closed pose is found near a singular one; of a large system few are sought."""
     return any(_nearby(system, singular, side) is not None for side in (1.0, -1.0))
 
 
