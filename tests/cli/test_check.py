@@ -220,7 +220,7 @@ _PEAK = '[measures.peak]\ntype = "maximum"\nof = "crank.torque"\n'
                 [
                     "           swing ",
                     "           peak     3 N m ",
-                    "turn of crank at 0.0174533 rad/s, without [loads.bad]",
+                    "turn of crank at 1 deg/s, without [loads.bad]",
                     "           crank.torque ",
                 ],
             )

@@ -286,7 +286,7 @@ def test_what_a_check_takes_a_solve_and_a_simulation_take_too(command: Command, 
         solved = command("solve", slider, "-o", "run.csv", "--times", "0:20ms:10ms", "--set", setting)
         assert solved.exit_code == 0, solved.stderr
         table = read_csv(tmp_path / "run.csv")
-        assert command("simulate", slider, "--stop", "20ms", "--set", setting).exit_code == 0
+        assert command("simulate", slider, "--stop", "20ms", "--step", "10ms", "--set", setting).exit_code == 0
         stepped = log.read(tmp_path / "logs" / "slider.mcap")
         for name in ("crank.phi", "rod.phi", "rod.x"):
             assert stepped[name] == pytest.approx(table[name], abs=1e-12)

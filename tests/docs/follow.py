@@ -65,7 +65,7 @@ FILES = {  # the file of each block of TOML, where the text above does not annou
 }
 BEFORE = {  # commands for the files that a page takes as given
     "commands.md": ["kinfmu solve crank_rocker -o host.csv"],
-    "fmu.md": ["kinfmu solve fourbar -o host.csv"],
+    "fmu.md": ["kinfmu solve fourbar -o host.csv", "kinfmu new toggle_press press.toml"],
     "host-omsimulator.md": ["kinfmu solve fourbar -o fourbar_res.csv"],
     "host-openmodelica.md": ["kinfmu solve fourbar -o fourbar_res.csv"],
     "host-pyfmi.md": ["kinfmu solve fourbar -o pyfmi.csv"],
