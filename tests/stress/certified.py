@@ -24,7 +24,7 @@ from tests.stress.trial import trial
 
 FAMILIES = ("four-bars", "slider-cranks", "pins in slots", "watt six-bars", "stephenson six-bars", "geared five-bars")
 FAMILIES += ("led by laws",)  # cams with dwells
-SAMPLES = 80  # of each mechanism, in 50 digits
+SAMPLES = 200  # of each mechanism, in 50 digits
 LEAST_SHARE = 0.99  # of the range of a branch; mechanisms with less are listed
 WALKED = 1e-9  # of the size: the same for places of the walk in long doubles, some of them 1e-13 from singular poses
 ROUNDED = 1e-11  # of the size: lengths are given as doubles, which poses near singular ones amplify

@@ -36,7 +36,7 @@ from tests.mechanisms import with_open_lengths
 
 SAMPLES = 24  # of a design, over the run of the file
 SPREADS = (0.02, 0.2)  # of the logarithm of a length
-CLOSE = (1e-12, 1e-11, 1e-9)  # of the largest of a unit: values, rates, accelerations
+CLOSE = (1e-12, 1e-10, 1e-8)  # of the largest of a column: values, rates, accelerations
 ENGINES = ("python", "native")
 PART = 50  # designs of a task
 FILES_IN_C = 2  # of a mechanism: each is compiled
@@ -59,7 +59,7 @@ class Compared(NamedTuple):
     """Designs compared with their files.
 
     faults: What differs. samples: Samples by status, of the files. worst: Largest differences of values, rates and
-    accelerations, of the largest of a unit. unsolvable: Designs whose file cannot be solved.
+    accelerations, of the largest of a column. unsolvable: Designs whose file cannot be solved.
     """
 
     faults: list[str]
@@ -139,7 +139,6 @@ def differences(
     tables: Values, rates and accelerations of the outputs.
     """
     worst = np.zeros(3)
-    is_angle = np.array([output.is_angle for output in outputs])
     if (status != run.status).any():
         sample = int(np.flatnonzero(status != run.status)[0])
         return worst, [f"status {status[sample]} at sample {sample}, of its file {run.status[sample]}"]
@@ -148,8 +147,7 @@ def differences(
         if table is None or not run.good.any():
             continue
         wanted = np.column_stack([_column(run, output, order) for output in outputs])
-        largest = np.nanmax(np.abs(wanted), axis=0)
-        size = np.array([max(largest[is_angle == own].max(), 1.0) for own in is_angle])
+        size = np.maximum(np.nanmax(np.abs(wanted), axis=0), 1.0)
         is_equal = (table == wanted) | (np.isnan(table) & np.isnan(wanted))
         apart = np.where(is_equal, 0.0, np.abs(table - wanted) / size)
         apart[np.isnan(apart)] = np.inf  # a number in one of them alone

@@ -48,8 +48,7 @@ class Settings(NamedTuple):
     """Settings compared with their files.
 
     faults: What differs. counts: Settings that were stepped and refused, and samples by status, of the FMUs. worst:
-    Largest differences of values, rates and accelerations, of the largest of a unit, and of forces, of the largest of
-    a column.
+    Largest differences of values, rates, accelerations and forces, of the largest of a column.
     """
 
     faults: list[str]
